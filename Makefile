@@ -1,0 +1,47 @@
+# Everything runs in a virtual environment of its own; the two commands of the README are `demo` and `test`.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
+
+.PHONY: setup demo test lint bench wheel clean
+
+$(VENV)/.dependencies: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade "pip>=25.1"
+	$(BIN)/python -m pip install --quiet --group dev
+	touch $@
+
+$(VENV)/.built: $(VENV)/.dependencies $(RUST_SOURCES)
+	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet
+	touch $@
+
+setup: $(VENV)/.built
+
+demo: setup
+	$(BIN)/evonav demo --out out/demo
+
+test: setup
+	cargo test --workspace
+	$(BIN)/python -m pytest
+
+lint: setup
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest evonav._core
+	$(BIN)/lint-imports
+
+bench: setup
+	$(BIN)/python -m pip install --quiet --group bench
+	cargo bench --workspace
+	$(BIN)/python -m benches
+
+wheel: $(VENV)/.dependencies
+	$(BIN)/maturin build --release --out dist
+
+clean:
+	rm -rf $(VENV) target dist out

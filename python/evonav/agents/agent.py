@@ -1,0 +1,104 @@
+"""The agent contract."""
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from evonav.sensors.observation import Observation
+from evonav.tasks.public import StageInput, TaskInfo
+from evonav.world.simulator import Action
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """One discrete action."""
+
+    action: Action
+
+
+@dataclass(frozen=True, slots=True)
+class NavigateTo:
+    """Go towards a point along planner waypoints, at most `max_travel_m` this round."""
+
+    position_m: tuple[float, float]
+    """`(x, z)`; snapped to the nearest free point."""
+    face_m: tuple[float, float] | None = None
+    """`(x, z)` to face on arrival; default: the direction of travel."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """End the stage here."""
+
+    reason: str = "arrived"
+    """`arrived`, or why the agent gave up; recorded, not scored."""
+
+
+AgentAction = Move | NavigateTo | Stop
+
+
+@dataclass(frozen=True, slots=True)
+class ViewSchedule:
+    """Views a round: `count` cameras, `spacing_deg` apart, centred on the heading; the heading view comes last."""
+
+    count: int
+    spacing_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sensing:
+    """What an agent asks of its sensors (3D-Mem's schedule by default)."""
+
+    first_round: ViewSchedule = ViewSchedule(7, 40.0)
+    later_rounds: ViewSchedule = ViewSchedule(3, 60.0)
+    needs_rgb: bool = False
+    max_travel_m: float = 1.0
+    """Path length a `NavigateTo` covers in one round."""
+    occupancy_range_m: float = 3.0
+
+
+class Agent(Protocol):
+    """What evonav evaluates."""
+
+    sensing: Sensing
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """A new house; forget everything."""
+        ...
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """A new goal in the same house, which may have changed."""
+        ...
+
+    def act(self, observation: Observation) -> AgentAction:
+        """One decision round."""
+        ...
+
+    def diagnostics(self) -> "RoundDiagnostics":
+        """What the agent believed and chose in the last round; for records and pictures, never for scoring."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class EntryBelief:
+    """An object entry as remembered."""
+
+    entry_id: int
+    label: str
+    centre_m: tuple[float, float, float]
+    size_m: tuple[float, float, float]
+    num_detections: int
+
+
+@dataclass(frozen=True, slots=True)
+class RoundDiagnostics:
+    """A round in the agent's own words."""
+
+    choice: str = ""
+    """For example `object 12`, `frontier 3`, `none`."""
+    chosen_entry: EntryBelief | None = None
+    num_entries: int = 0
+    num_frontiers: int = 0
+    counters: dict[str, int] = field(default_factory=dict)
+    """Cumulative, such as `conflicts`, `cells_cleared`, `rejected_entries`."""
+    details: dict[str, Any] = field(default_factory=dict)
+    """JSON-ready extras."""

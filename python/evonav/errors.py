@@ -1,0 +1,21 @@
+"""One error tree, created in Rust: everything evonav raises is an `EvonavError`."""
+
+from evonav._core import (
+    DecisionError,
+    EvonavError,
+    HouseError,
+    InvalidArgumentError,
+    SimulationError,
+    StoreError,
+    TaskError,
+)
+
+__all__ = [
+    "DecisionError",
+    "EvonavError",
+    "HouseError",
+    "InvalidArgumentError",
+    "SimulationError",
+    "StoreError",
+    "TaskError",
+]

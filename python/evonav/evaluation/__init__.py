@@ -1,0 +1,1 @@
+"""The multi-stage protocol, metrics, records."""

@@ -1,0 +1,1 @@
+"""Task generation (paper, Algorithm 1)."""

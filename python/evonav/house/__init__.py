@@ -1,0 +1,1 @@
+"""Houses: files, bundled ones, typed views."""

@@ -1,0 +1,1 @@
+"""Tables, maps and pages made from records."""

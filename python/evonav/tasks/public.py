@@ -1,0 +1,35 @@
+"""The public part of a task: all that an agent is given."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.sensors.observation import MapFrame
+
+
+@dataclass(frozen=True, slots=True)
+class TaskInfo:
+    """What an agent knows before the first stage."""
+
+    task_id: str
+    num_stages: int
+    max_rounds: int
+    """Decision rounds a stage (paper: 50)."""
+    map_frame: MapFrame
+    seed: int
+    """For the agent's own random choices."""
+
+
+@dataclass(frozen=True, slots=True)
+class StageInput:
+    """The public goal input `g_k` (paper, Sec. A.3), less the reference start pose, which would leak the last target."""
+
+    stage: int
+    """1-based."""
+    category: str
+    basic_instruction: str
+    appearance_instruction: str
+    unified_instruction: str
+    reference_image: NDArray[np.uint8]
+    """`(300, 300, 3)` RGB."""

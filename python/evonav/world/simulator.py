@@ -1,0 +1,148 @@
+"""The simulator protocol: what AI2-THOR and the embedded simulator both are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.world.pose import Pose
+
+
+class Action(Enum):
+    """Discrete actions, as the paper spells them (Sec. 3.1)."""
+
+    MOVE_FORWARD = "MOVE_FORWARD"
+    TURN_LEFT = "TURN_LEFT"
+    TURN_RIGHT = "TURN_RIGHT"
+    STOP = "STOP"
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """Pinhole camera; pixel centres at half-integers."""
+
+    width_px: int
+    height_px: int
+    vertical_fov_rad: float
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length, the same along both axes."""
+        return self.height_px / 2.0 / float(np.tan(self.vertical_fov_rad / 2.0))
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatorConfig:
+    """AI2-THOR's defaults, with the paper's 15 degree turns (Sec. C.3)."""
+
+    width_px: int = 300
+    height_px: int = 300
+    vertical_fov_deg: float = 90.0
+    camera_height_m: float = 1.575
+    move_m: float = 0.25
+    turn_deg: float = 15.0
+    agent_radius_m: float = 0.2
+    agent_height_m: float = 1.8
+    grid_m: float = 0.25
+    """Spacing of `reachable_positions`."""
+    occupancy_cell_m: float = 0.1
+    """Cell of the oracle occupancy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What the simulator renders at one camera pose. For evaluators: holds instance ids."""
+
+    pose: Pose
+    intrinsics: Intrinsics
+    depth_m: NDArray[np.float32]
+    """`(H, W)`, planar z in metres, `inf` where nothing is."""
+    rgb: NDArray[np.uint8] | None = None
+    """`(H, W, 3)`, when asked for."""
+    instances: NDArray[np.int32] | None = None
+    """`(H, W)`, 0 where nothing is, else 1 + index in `SceneObject` table order, when asked for."""
+    is_action_success: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class OccupancyGrid:
+    """Cells on the ground plane, `[row = z, col = x]`."""
+
+    cells: NDArray[np.uint8]
+    """`(R, C)`: 0 free, 1 blocked for the agent's body."""
+    cell_m: float
+    corner_m: tuple[float, float]
+    """`(x, z)` of the smallest corner of cell (0, 0)."""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneObject:
+    """A body of the world, by instance id (its index + 1). Oracle data."""
+
+    id: str
+    category: str
+    kind: str
+    """`object`, `wall`, `floor`, `ceiling`, `door` or `window`."""
+    centre_m: tuple[float, float, float]
+    size_m: tuple[float, float, float]
+
+
+class Simulator(Protocol):
+    """One house at a time; `check_simulator` tests an implementation."""
+
+    config: SimulatorConfig
+
+    def reset(self, house_json: str, pose: Pose | None = None) -> Pose:
+        """Loads a house; the agent stands at `pose`, or at the house's own start. Returns the effective pose."""
+        ...
+
+    @property
+    def pose(self) -> Pose:
+        """The agent's pose."""
+        ...
+
+    @property
+    def objects(self) -> Sequence[SceneObject]:
+        """Bodies in instance order (instance id = index + 1)."""
+        ...
+
+    def step(self, action: Action) -> bool:
+        """Does one discrete action; `False`, and the pose unchanged, when it collides."""
+        ...
+
+    def teleport(self, pose: Pose) -> bool:
+        """Sets the pose; `False`, and the pose unchanged, when it is not free."""
+        ...
+
+    def render(self, pose: Pose | None = None, *, rgb: bool = True, instances: bool = True) -> Frame:
+        """What the camera sees from `pose` (default: the agent's)."""
+        ...
+
+    def reachable_positions(self) -> NDArray[np.float64]:
+        """`(N, 3)` positions of the grid that the agent can reach from where it stands."""
+        ...
+
+    def nearest_reachable_position(self, position_m: tuple[float, float, float]) -> tuple[float, float, float]:
+        """The reachable position nearest on the ground plane."""
+        ...
+
+    def is_free(self, position_m: tuple[float, float, float]) -> bool:
+        """Whether the agent's body fits at the position and it is connected to the reachable floor."""
+        ...
+
+    def shortest_path(
+        self, start_m: tuple[float, float, float], target_m: tuple[float, float, float]
+    ) -> NDArray[np.float64]:
+        """`(M, 3)` corners of the geodesic; `(0, 3)` when there is none. Both ends snap to the nearest free point."""
+        ...
+
+    def occupancy(self) -> OccupancyGrid:
+        """The oracle occupancy at `config.occupancy_cell_m`."""
+        ...
+
+    def close(self) -> None:
+        """Releases everything; safe to call twice."""
+        ...

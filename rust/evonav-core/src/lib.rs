@@ -1,0 +1,18 @@
+//! Houses, simulator, mapping and evolution of evonav, in pure Rust.
+//!
+//! One way through: [`house`] -> [`assets`] -> [`world`] -> [`sensors`] -> [`memory`], with
+//! [`evolution`] beside it. Metres and radians; AI2-THOR's frame (left-handed, y up, yaw
+//! clockwise from +z seen from above).
+
+pub mod assets;
+pub mod error;
+pub mod evolution;
+pub mod geometry;
+pub mod grid;
+pub mod house;
+pub mod memory;
+pub mod rng;
+pub mod sensors;
+pub mod world;
+
+pub use error::Error;

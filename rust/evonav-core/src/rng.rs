@@ -1,0 +1,77 @@
+//! Named random streams: what is drawn depends on a seed and on labels, never on the order in
+//! which streams are used or on the number of workers.
+
+/// A counter-based stream: the `n`-th draw is a function of (seed, labels, n).
+#[derive(Debug, Clone)]
+pub struct Stream {
+    key: u64,
+    counter: u64,
+}
+
+/// Finaliser of SplitMix64 (Steele, Lea & Flood, OOPSLA 2014).
+fn mix(mut z: u64) -> u64 {
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+impl Stream {
+    /// The stream of `seed` and `labels`; labels are told apart by content and by position.
+    pub fn new(seed: u64, labels: &[&str]) -> Self {
+        let mut key = mix(seed.wrapping_add(GOLDEN));
+        for label in labels {
+            for byte in label.bytes().map(u64::from).chain([256]) {
+                key = mix(key.wrapping_mul(0x0000_0100_0000_01b3) ^ byte);
+            }
+        }
+        Self { key, counter: 0 }
+    }
+
+    /// The next 64 bits.
+    pub fn next_u64(&mut self) -> u64 {
+        self.counter = self.counter.wrapping_add(1);
+        mix(self.key.wrapping_add(self.counter.wrapping_mul(GOLDEN)))
+    }
+
+    /// Uniform in [0, 1).
+    pub fn uniform(&mut self) -> f64 {
+        (self.next_u64() >> 11) as f64 * 2.0_f64.powi(-53)
+    }
+
+    /// Uniform in `0..bound`; 0 for an empty range.
+    pub fn below(&mut self, bound: usize) -> usize {
+        // Multiply-shift; the bias is below bound / 2^64.
+        ((u128::from(self.next_u64()) * bound as u128) >> 64) as usize
+    }
+
+    /// An index drawn in proportion to `weights` (negative and non-finite count as 0); `None` if all are 0.
+    pub fn choose_weighted(&mut self, weights: &[f64]) -> Option<usize> {
+        let usable = |w: f64| if w.is_finite() && w > 0.0 { w } else { 0.0 };
+        let total: f64 = weights.iter().map(|&w| usable(w)).sum();
+        if total <= 0.0 {
+            return None;
+        }
+        let mut left = self.uniform() * total;
+        let mut last = None;
+        for (index, &weight) in weights.iter().enumerate() {
+            let weight = usable(weight);
+            if weight > 0.0 {
+                last = Some(index);
+                if left < weight {
+                    break;
+                }
+                left -= weight;
+            }
+        }
+        last
+    }
+
+    /// Fisher-Yates.
+    pub fn shuffle<T>(&mut self, items: &mut [T]) {
+        for last in (1..items.len()).rev() {
+            items.swap(last, self.below(last + 1));
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! The Python exceptions and the one place that maps core errors to them.
+
+use evonav_core::Error;
+use pyo3::{create_exception, exceptions::PyException, prelude::*};
+
+create_exception!(evonav._core, EvonavError, PyException, "Root of everything evonav raises.");
+create_exception!(evonav._core, HouseError, EvonavError, "A house file is malformed.");
+create_exception!(evonav._core, TaskError, EvonavError, "A task is malformed or cannot be made.");
+create_exception!(evonav._core, SimulationError, EvonavError, "The simulator cannot do this.");
+create_exception!(evonav._core, DecisionError, EvonavError, "No usable decision was made.");
+create_exception!(evonav._core, StoreError, EvonavError, "A results store cannot be used.");
+create_exception!(
+    evonav._core,
+    InvalidArgumentError,
+    EvonavError,
+    "An argument is outside its domain."
+);
+
+/// The Python exception for a core error.
+pub fn to_py(error: Error) -> PyErr {
+    let message = error.to_string();
+    match error {
+        Error::House { .. } => HouseError::new_err(message),
+        Error::Simulation { .. } => SimulationError::new_err(message),
+        Error::InvalidArgument { .. } => InvalidArgumentError::new_err(message),
+    }
+}
+
+/// Adds the exceptions to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("EvonavError", py.get_type::<EvonavError>())?;
+    module.add("HouseError", py.get_type::<HouseError>())?;
+    module.add("TaskError", py.get_type::<TaskError>())?;
+    module.add("SimulationError", py.get_type::<SimulationError>())?;
+    module.add("DecisionError", py.get_type::<DecisionError>())?;
+    module.add("StoreError", py.get_type::<StoreError>())?;
+    module.add("InvalidArgumentError", py.get_type::<InvalidArgumentError>())
+}

@@ -1,0 +1,12 @@
+//! Python bindings of `evonav-core`: they convert, release the GIL and map errors, nothing else.
+
+mod arrays;
+mod error;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    error::register(module)
+}
