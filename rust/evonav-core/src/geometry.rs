@@ -44,9 +44,9 @@ impl Aabb {
     /// This box grown to contain `point_m`.
     #[must_use]
     pub fn extended(mut self, point_m: Vec3) -> Self {
-        for axis in 0..3 {
-            self.min_m[axis] = self.min_m[axis].min(point_m[axis]);
-            self.max_m[axis] = self.max_m[axis].max(point_m[axis]);
+        for (axis, &value) in point_m.iter().enumerate() {
+            self.min_m[axis] = self.min_m[axis].min(value);
+            self.max_m[axis] = self.max_m[axis].max(value);
         }
         self
     }
