@@ -23,7 +23,10 @@ class TaskInfo:
 
 @dataclass(frozen=True, slots=True)
 class StageInput:
-    """The public goal input `g_k` (paper, Sec. A.3), less the reference start pose, which would leak the last target."""
+    """The goal input `g_k` (paper, Sec. A.3) less its start pose, which would tell where the last target was.
+
+    Instructions follow the grammar of `evonav.tasks.language`.
+    """
 
     stage: int
     """1-based."""

@@ -1,0 +1,119 @@
+"""What all task files share: strict records, poses, and errors that name file, field and value."""
+
+import gzip
+import hashlib
+import math
+import zlib
+from io import BytesIO
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from evonav.errors import TaskError
+from evonav.world.pose import Pose
+
+MAX_FILE_BYTES = 64 * 2**20
+"""Uncompressed size beyond which a task file is refused: a 10-room house takes 0.3 MB."""
+
+Point2 = tuple[float, float]
+"""`(x, z)` in metres."""
+Point3 = tuple[float, float, float]
+"""`(x, y, z)` in metres, or Unity Euler angles in degrees."""
+Id = Annotated[str, Field(min_length=1, max_length=256)]
+Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+
+
+class Record(BaseModel):
+    """A part of a task file: frozen, no coercion, no unknown key, no infinity or NaN."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+
+class PoseRecord(Record):
+    """A pose as AI2-THOR writes it, angles in degrees."""
+
+    position_m: Point3
+    yaw_deg: float
+    horizon_deg: float
+
+    def pose(self) -> Pose:
+        """The pose, in radians."""
+        x_m, y_m, z_m = self.position_m
+        return Pose(x_m, y_m, z_m, math.radians(self.yaw_deg), math.radians(self.horizon_deg))
+
+
+RecordT = TypeVar("RecordT", bound=Record)
+
+
+def parse_record(model: type[RecordT], data: bytes, path: Path) -> RecordT:
+    """Reads a record from JSON.
+
+    Args:
+        model: Its type.
+        data: UTF-8 JSON.
+        path: Named in errors.
+
+    Raises:
+        TaskError: The first thing wrong, with file, field and value.
+    """
+    try:
+        return model.model_validate_json(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        place = ".".join(str(part) for part in first["loc"]) or "(whole file)"
+        raise field_error(path, place, first.get("input"), first["msg"]) from None
+
+
+def field_error(path: Path, place: str, value: Any, message: str) -> TaskError:  # noqa: ANN401
+    """A `TaskError` in the words of all task files."""
+    shown = repr(value)
+    shown = shown if len(shown) <= 80 else shown[:77] + "..."
+    return TaskError(f"{path}: field `{place}`: {message} (found {shown})")
+
+
+def read_file(path: Path, max_bytes: int = MAX_FILE_BYTES) -> bytes:
+    """Contents of a task's file.
+
+    Raises:
+        TaskError: It cannot be read, or is larger than `max_bytes`.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(max_bytes + 1)
+    except OSError as error:
+        raise TaskError(f"{path}: cannot be read: {error.strerror or error}") from error
+    if len(data) > max_bytes:
+        raise TaskError(f"{path}: larger than {max_bytes} bytes")
+    return data
+
+
+def read_gzip(path: Path) -> bytes:
+    """Contents of a gzipped task file, uncompressed.
+
+    Raises:
+        TaskError: It cannot be read, is no gzip file, is cut short, or is too large.
+    """
+    try:
+        with gzip.open(BytesIO(read_file(path))) as file:
+            data = file.read(MAX_FILE_BYTES + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise TaskError(f"{path}: not a whole gzip file: {error}") from error
+    if len(data) > MAX_FILE_BYTES:
+        raise TaskError(f"{path}: uncompressed, larger than {MAX_FILE_BYTES} bytes")
+    return data
+
+
+def write_gzip(data: bytes) -> bytes:
+    """Gzips without time stamp or name, so that the same contents give the same bytes (for one zlib build)."""
+    return gzip.compress(data, compresslevel=9, mtime=0)
+
+
+def record_bytes(record: Record) -> bytes:
+    """A record as UTF-8 JSON, two spaces deep, newline at the end."""
+    return (record.model_dump_json(indent=2) + "\n").encode()
+
+
+def sha256_of(data: bytes) -> str:
+    """SHA-256, hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
