@@ -1,1 +1,1 @@
-"""The multi-stage protocol, metrics, records."""
+"""The paper's multi-stage protocol: rollouts, metrics, records, runs."""

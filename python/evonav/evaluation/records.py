@@ -1,0 +1,252 @@
+"""What a run leaves behind: one `StageRecord` a stage, one `StageMap` a stage house.
+
+A record holds all that tables, maps and reports need; nothing downstream reads houses, tasks or agents.
+Everything in it is a function of the run's inputs: wall-clock figures live in a table of their own (`store.py`).
+Points are `(x, y, z)` or `(x, z)` in metres, AI2-THOR's world frame; angles are radians.
+"""
+
+from enum import Enum
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+SCHEMA_VERSION = 1
+"""Raised whenever a field changes its meaning or vanishes; readers refuse a version they do not know."""
+
+Point2 = tuple[float, float]
+"""`(x, z)`."""
+Point3 = tuple[float, float, float]
+"""`(x, y, z)`."""
+
+
+class _Record(BaseModel):
+    """Frozen and closed: an unknown field is an error, not a surprise."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="null")
+
+
+class EndState(str, Enum):
+    """How a stage ended: exactly one of these. Rates are over `success` and `failure` alone."""
+
+    SUCCESS = "success"
+    FAILURE = "failure"
+    ERRORED = "errored"
+    NOT_RUN = "not_run"
+
+
+class ErrorKind(str, Enum):
+    """Whose fault an errored stage is."""
+
+    AGENT = "agent"
+    """The agent raised, or answered with what is no action."""
+    DECISION = "decision"
+    """The decision model gave no valid answer."""
+    SIMULATION = "simulation"
+    """The simulator raised."""
+    REFERENCE = "reference"
+    """There is no path from the effective start to the target, so SPL is undefined."""
+    CRASH = "crash"
+    """The worker process died."""
+    TIMEOUT = "timeout"
+    """The stage took longer than the run allows."""
+    HARNESS = "harness"
+    """Anything else: a bug of ours."""
+
+
+class StageError(_Record):
+    """Why a stage is errored, or why it was not run."""
+
+    kind: ErrorKind
+    message: str
+
+
+class PoseRecord(_Record):
+    """A pose of the agent."""
+
+    x_m: float
+    y_m: float
+    z_m: float
+    yaw_rad: float
+    horizon_rad: float
+
+
+class GoalRecord(_Record):
+    """What the agent was told (less the image)."""
+
+    category: str
+    instruction: str
+    """The stage input of the reported experiments: the unified instruction."""
+    basic_instruction: str
+
+
+class TargetRecord(_Record):
+    """The instance to be found. Oracle."""
+
+    object_id: str
+    category: str
+    position_m: Point3
+    room_id: str
+    is_relocated: bool
+    """Ever moved since stage 1: the paper's relocated-target split (it leaves stage 1 out of both strata)."""
+    is_relocated_now: bool
+    """Moved in the transition just before this stage."""
+    first_position_m: Point3 | None = None
+    """Where it stood in stage 1, if `is_relocated`."""
+
+
+class Relocation(_Record):
+    """One object moved in a transition. Oracle."""
+
+    object_id: str
+    category: str
+    from_m: Point3
+    to_m: Point3
+
+
+class TransitionRecord(_Record):
+    """What happened between the previous stage and this one. Oracle."""
+
+    mode: Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"] | None = None
+    """`None` when the transition is static."""
+    room_id: str | None = None
+    is_agent_in_room: bool = False
+    """Whether the carried pose lies in the evolved room, where change can happen under the agent's eyes."""
+    relocations: tuple[Relocation, ...] = ()
+
+
+class EntryRecord(_Record):
+    """An object entry as the agent believed it, judged by the evaluator."""
+
+    entry_id: int
+    label: str
+    centre_m: Point3
+    size_m: Point3
+    num_detections: int
+    is_stale: bool
+    """No object of this label is near the entry in the stage's house."""
+
+
+class ActionRecord(_Record):
+    """What the agent answered."""
+
+    kind: Literal["move", "navigate_to", "stop"]
+    action: str | None = None
+    """Of a `move`: `MOVE_FORWARD`, `TURN_LEFT`, `TURN_RIGHT` or `STOP`."""
+    position_m: Point2 | None = None
+    """Of a `navigate_to`."""
+    reason: str | None = None
+    """Of a `stop`."""
+
+
+class RoundRecord(_Record):
+    """One decision round: where the agent stood, what it chose, how it went."""
+
+    round: int
+    """0-based."""
+    pose: PoseRecord
+    """When it observed."""
+    action: ActionRecord
+    path_m: tuple[Point2, ...]
+    """Waypoints travelled, the pose's own position first; a single point when the agent stood still."""
+    is_action_success: bool
+    is_target_visible: bool
+    """Whether the target was in one of this round's views."""
+    choice: str
+    """In the agent's words: `object 12`, `frontier 3`, `none`."""
+    chosen_entry: EntryRecord | None
+    num_entries: int
+    num_frontiers: int
+    counters: dict[str, int]
+    """Cumulative over the task, such as `conflicts` or `rejected_entries`."""
+    details: dict[str, Any]
+
+
+class StageRecord(_Record):
+    """One stage of one agent's episode. Measures are `None` unless the state is success or failure."""
+
+    schema_version: Literal[1] = 1
+    agent: str
+    """The name it was asked for by: `fu`, `stage-reset`, `my_package:MyAgent`."""
+    task_id: str
+    house: str
+    stage: Annotated[int, Field(ge=1)]
+    num_stages: int
+    state: EndState
+    error: StageError | None = None
+    goal: GoalRecord
+    target: TargetRecord
+    transition: TransitionRecord
+
+    requested_start: PoseRecord | None = None
+    """The pose carried over (stage 1: the manifest's)."""
+    effective_start: PoseRecord | None = None
+    """After snapping to the nearest reachable position; equal to the requested one when that was free."""
+    is_snapped: bool = False
+    terminal: PoseRecord | None = None
+    num_rounds: int = 0
+    has_stopped: bool = False
+    """The agent ended the stage itself (otherwise the budget did). Success needs no stop (paper, Sec. C.2)."""
+    stop_reason: str = ""
+    start_distance_m: float | None = None
+    """Ground-plane distance to the target at the effective start."""
+    terminal_distance_m: float | None = None
+    """Ground-plane distance to the target at the end: the success criterion."""
+    path_length_m: float | None = None
+    """L_k: length of the executed polyline on the ground plane."""
+    reference_length_m: float | None = None
+    """L*_k: shortest path from the effective start to the target."""
+    spl: float | None = None
+    soft_spl: float | None = None
+    """SPL with success replaced by the share of the start distance that was covered."""
+    num_target_visible_rounds: int = 0
+
+    trace: tuple[RoundRecord, ...] = ()
+    entries: tuple[EntryRecord, ...] = ()
+    """The agent's object memory at the end of the stage."""
+
+    @property
+    def is_scored(self) -> bool:
+        """Whether the stage counts in rates."""
+        return self.state in (EndState.SUCCESS, EndState.FAILURE)
+
+
+class RoomFootprint(_Record):
+    """A room's floor."""
+
+    room_id: str
+    room_type: str
+    polygon_m: tuple[Point2, ...]
+
+
+class ObjectFootprint(_Record):
+    """An object seen from above."""
+
+    object_id: str
+    category: str
+    centre_m: Point3
+    size_m: Point3
+    """Of the axis-aligned box."""
+    polygon_m: tuple[Point2, ...]
+    """Corners of the footprint, turned with the object."""
+
+
+class Opening(_Record):
+    """A door, doorway or window from above."""
+
+    kind: Literal["door", "window"]
+    from_m: Point2
+    to_m: Point2
+
+
+class StageMap(_Record):
+    """A stage's house from above: the ground of every picture. The same for all agents."""
+
+    schema_version: Literal[1] = 1
+    task_id: str
+    house: str
+    stage: int
+    rooms: tuple[RoomFootprint, ...]
+    walls: tuple[tuple[Point2, Point2], ...]
+    """Wall segments on the floor plan; open-plan ones left out."""
+    openings: tuple[Opening, ...]
+    objects: tuple[ObjectFootprint, ...]

@@ -1,0 +1,187 @@
+"""A run on disk: one SQLite file (WAL) whose rows are whole stages.
+
+A finished stage is one transaction: wholly there or not at all. `INSERT` under a primary key makes a stage that is
+reported twice an error instead of a second row. Wall-clock figures sit in `timings`, apart from the records, so that
+records of equal runs are equal to the byte.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from pydantic import ValidationError
+from typing_extensions import Self
+
+from evonav.errors import StoreError
+from evonav.evaluation.records import SCHEMA_VERSION, EndState, StageMap, StageRecord
+
+FILE_NAME = "records.sqlite"
+
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS stages (
+    agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
+    state TEXT NOT NULL CHECK (state IN ('success', 'failure', 'errored', 'not_run')),
+    record TEXT NOT NULL,
+    PRIMARY KEY (agent, task_id, stage)
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS stage_maps (
+    task_id TEXT NOT NULL, stage INTEGER NOT NULL, map TEXT NOT NULL,
+    PRIMARY KEY (task_id, stage)
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS timings (
+    agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
+    wall_s REAL NOT NULL, cpu_s REAL NOT NULL,
+    PRIMARY KEY (agent, task_id, stage)
+) WITHOUT ROWID;
+"""
+
+
+class RunStore:
+    """Reads and writes `DIR/records.sqlite`. One process writes; any number read meanwhile."""
+
+    def __init__(self, run_dir: Path, *, create: bool = False) -> None:
+        """Opens the run in `run_dir`.
+
+        Raises:
+            StoreError: There is no run there and `create` is false, the file is not a run of this schema version, or
+                it cannot be opened.
+        """
+        self.path = run_dir / FILE_NAME
+        if not create and not self.path.is_file():
+            raise StoreError(f"{run_dir}: no run here ({FILE_NAME} not found)")
+        try:
+            if create:
+                run_dir.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(self.path, isolation_level=None, timeout=30.0)
+            self._db.execute("PRAGMA journal_mode = WAL")
+            self._db.execute("PRAGMA synchronous = FULL")
+            if create:
+                self._db.executescript(_SCHEMA)
+            version = self.meta("schema_version")
+        except (sqlite3.Error, OSError) as error:
+            raise StoreError(f"{self.path}: {error}") from error
+        if version is None and create:
+            self.set_meta("schema_version", SCHEMA_VERSION)
+        elif version != SCHEMA_VERSION:
+            raise StoreError(f"{self.path}: schema version {version}, this evonav reads {SCHEMA_VERSION}")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes the file; safe to call twice."""
+        self._db.close()
+
+    def meta(self, key: str) -> Any:  # noqa: ANN401 - JSON
+        """A JSON value of the run's header, or `None`."""
+        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        return None if row is None else json.loads(row[0])
+
+    def set_meta(self, key: str, value: Any) -> None:  # noqa: ANN401 - JSON
+        """Sets a JSON value of the run's header."""
+        self._execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, _json(value)))
+
+    def states(self) -> dict[tuple[str, str, int], EndState]:
+        """End state of every recorded (agent, task, stage)."""
+        rows = self._db.execute("SELECT agent, task_id, stage, state FROM stages")
+        return {(agent, task_id, stage): EndState(state) for agent, task_id, stage, state in rows}
+
+    def add_stage(self, record: StageRecord, *, wall_s: float, cpu_s: float) -> None:
+        """Commits a finished stage.
+
+        Raises:
+            StoreError: The stage is already recorded, or the file cannot be written.
+        """
+        key = (record.agent, record.task_id, record.stage)
+        try:
+            self._db.execute("BEGIN IMMEDIATE")
+            text = record.model_dump_json()
+            self._db.execute("INSERT INTO stages VALUES (?, ?, ?, ?, ?)", (*key, record.state.value, text))
+            self._db.execute("INSERT INTO timings VALUES (?, ?, ?, ?, ?)", (*key, wall_s, cpu_s))
+            self._db.execute("COMMIT")
+        except sqlite3.Error as error:
+            if self._db.in_transaction:
+                self._db.execute("ROLLBACK")
+            raise StoreError(f"{self.path}: stage {key}: {error}") from error
+
+    def add_map(self, stage_map: StageMap) -> None:
+        """Records a stage's house from above; the first writer wins, all of them would write the same."""
+        row = (stage_map.task_id, stage_map.stage, stage_map.model_dump_json())
+        self._execute("INSERT OR IGNORE INTO stage_maps VALUES (?, ?, ?)", row)
+
+    def forget_episode(self, agent: str, task_id: str, from_stage: int) -> None:
+        """Drops an episode's stages from `from_stage` on, so that they can be run again."""
+        key = (agent, task_id, from_stage)
+        try:
+            self._db.execute("BEGIN IMMEDIATE")
+            for table in ("stages", "timings"):
+                self._db.execute(f"DELETE FROM {table} WHERE agent = ? AND task_id = ? AND stage >= ?", key)  # noqa: S608
+            self._db.execute("COMMIT")
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.path}: {error}") from error
+
+    def records(self, agent: str | None = None, task_id: str | None = None) -> Iterator[StageRecord]:
+        """Stage records by agent, task and stage, whatever order they were finished in.
+
+        Raises:
+            StoreError: A row is not a valid record.
+        """
+        for text in self.record_texts(agent, task_id):
+            try:
+                yield StageRecord.model_validate_json(text)
+            except ValidationError as error:
+                raise StoreError(f"{self.path}: {error}") from error
+
+    def record_texts(self, agent: str | None = None, task_id: str | None = None) -> Iterator[str]:
+        """The records as stored, in the order of `records`: equal runs give equal texts."""
+        query = (
+            "SELECT record FROM stages WHERE (?1 IS NULL OR agent = ?1) AND (?2 IS NULL OR task_id = ?2) "
+            "ORDER BY agent, task_id, stage"
+        )
+        for (text,) in self._db.execute(query, (agent, task_id)):
+            yield text
+
+    def maps(self, task_id: str | None = None) -> Iterator[StageMap]:
+        """Stage maps by task and stage."""
+        query = "SELECT map FROM stage_maps WHERE ?1 IS NULL OR task_id = ?1 ORDER BY task_id, stage"
+        for (text,) in self._db.execute(query, (task_id,)):
+            try:
+                yield StageMap.model_validate_json(text)
+            except ValidationError as error:
+                raise StoreError(f"{self.path}: {error}") from error
+
+    def timings(self) -> dict[tuple[str, str, int], tuple[float, float]]:
+        """Wall and CPU seconds of every recorded stage; not deterministic, hence not in the records."""
+        rows = self._db.execute("SELECT agent, task_id, stage, wall_s, cpu_s FROM timings")
+        return {(agent, task_id, stage): (wall_s, cpu_s) for agent, task_id, stage, wall_s, cpu_s in rows}
+
+    def _execute(self, query: str, values: tuple[Any, ...]) -> None:
+        try:
+            self._db.execute(query, values)
+        except sqlite3.Error as error:
+            raise StoreError(f"{self.path}: {error}") from error
+
+
+def check_same_run(stored: Mapping[str, Any], asked: Mapping[str, Any], run_dir: Path) -> None:
+    """A folder holds one run: the same configuration, or an error that names what differs.
+
+    Raises:
+        StoreError: Any entry differs.
+    """
+    differing = sorted(key for key in stored.keys() | asked.keys() if stored.get(key) != asked.get(key))
+    if differing:
+        lines = "; ".join(f"{key}: there {stored.get(key)!r}, asked {asked.get(key)!r}" for key in differing)
+        raise StoreError(f"{run_dir} holds a run of another configuration ({lines}); use another folder")
+
+
+def _json(value: Any) -> str:  # noqa: ANN401 - JSON
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
