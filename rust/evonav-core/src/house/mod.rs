@@ -1,6 +1,20 @@
-//! ProcTHOR houses (schema 1.0.0): a lossless document and a checked, typed view of it.
+//! ProcTHOR houses (schemas 0.0.1 and 1.0.0): a lossless document and a checked, typed view of it.
 
-use crate::geometry::{Vec2, Vec3};
+mod delta;
+mod document;
+mod node;
+mod parse;
+mod validate;
+
+pub use delta::{HouseDelta, ObjectMove};
+
+use crate::{
+    Error,
+    geometry::{Vec2, Vec3, polygon_contains},
+};
+
+/// [`Wall::room_id`] of outer sides.
+pub const EXTERIOR: &str = "exterior";
 
 /// A house: the document as it was read, and what evonav understands of it.
 ///
@@ -20,10 +34,23 @@ pub struct House {
     pub windows: Vec<Opening>,
     /// Objects, in depth-first file order: a parent stands before its children.
     pub objects: Vec<Object>,
-    /// `metadata.agent`: the house's default start.
-    pub start: Start,
+    /// Material of the ceilings.
+    pub ceiling: Surface,
+    /// `metadata.agent`: the house's default start; absent in a few houses.
+    pub start: Option<Start>,
+    /// [`House::objects`] by id.
+    index: parse::ObjectIndex,
     /// Lossless source.
     pub(crate) document: serde_json::Value,
+}
+
+/// What a floor, wall or ceiling is made of.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Surface {
+    /// Name of the material, empty if none is given.
+    pub material: String,
+    /// Tint, 0..1, if given.
+    pub colour: Option<[f64; 3]>,
 }
 
 /// A room.
@@ -46,9 +73,9 @@ pub struct Wall {
     pub id: String,
     /// Room it faces; `exterior` for outer sides.
     pub room_id: String,
-    /// Foot of the wall, `[x, z]`: `polygon[0]`, origin of the wall's own frame.
+    /// Foot of the wall, `[x, z]`, origin of the wall's own frame: the first foot corner listed.
     pub from_m: Vec2,
-    /// Other end of the foot, `polygon[1]`.
+    /// Other end of the foot.
     pub to_m: Vec2,
     /// Height above the floor.
     pub height_m: f64,
@@ -77,7 +104,7 @@ pub struct Opening {
     pub hole_min_m: Vec2,
     /// ... and of its largest.
     pub hole_max_m: Vec2,
-    /// 0 closed, 1 open.
+    /// 0 closed, 1 open; where the file is silent, 1 for a `Doorframe_*` and 0 otherwise.
     pub openness: f64,
     /// Whether it can open at all (`Doorframe_*` have no leaf).
     pub is_openable: bool,
@@ -117,4 +144,51 @@ pub struct Start {
     pub yaw_deg: f64,
     /// `metadata.agent.horizon`, degrees.
     pub horizon_deg: f64,
+}
+
+impl House {
+    /// Reads and checks a house.
+    ///
+    /// # Arguments
+    /// * `name` - what errors call the house; usually the file and line.
+    /// * `json` - one house, schema 0.0.1 or 1.0.0.
+    ///
+    /// # Errors
+    /// [`Error::House`] naming the object, the field and the value found: for text that is not
+    /// JSON or gives a key twice, for missing or ill-typed fields, numbers out of range, polygons
+    /// without area, references to rooms or walls that are not there, holes off their wall, and
+    /// ids used twice.
+    pub fn from_json(name: &str, json: &str) -> Result<Self, Error> {
+        Self::from_document(name, document::parse(name, json)?)
+    }
+
+    fn from_document(name: &str, document: serde_json::Value) -> Result<Self, Error> {
+        let house = parse::view(name, document)?;
+        validate::check(&house)?;
+        Ok(house)
+    }
+
+    /// The document: every key and value as it was read, in order; compact.
+    pub fn to_json(&self) -> String {
+        self.document.to_string()
+    }
+
+    /// Index of the first room whose floor holds `point_m`.
+    pub fn room_of(&self, point_m: Vec2) -> Option<usize> {
+        self.rooms.iter().position(|room| polygon_contains(&room.polygon_m, point_m))
+    }
+
+    /// Index in [`House::objects`].
+    pub fn object_index(&self, id: &str) -> Option<usize> {
+        self.index.get(id).copied()
+    }
+
+    fn error(&self, object: &str, field: &str, message: &str) -> Error {
+        Error::House {
+            house: self.name.clone(),
+            object: object.to_owned(),
+            field: field.to_owned(),
+            message: message.to_owned(),
+        }
+    }
 }
