@@ -1,0 +1,126 @@
+//! The pinhole camera: AI2-THOR's, square pixels, no distortion.
+
+use crate::{
+    Error,
+    geometry::{Mat3, Pose, Vec2, Vec3, add, rotate, sub},
+};
+
+/// Most pixels an image may have along a side.
+pub const MAX_SIDE_PX: usize = 8192;
+
+/// A pinhole camera somewhere in the world.
+///
+/// Its own frame is OpenCV's: x right, y down, z forward. Pixel `(row, col)` covers
+/// `[col, col + 1) x [row, row + 1)` of the image plane; its centre is at half-integers. The
+/// principal point is the middle of the image. Depth is planar: the z coordinate, not the range.
+///
+/// # Examples
+/// ```
+/// # use evonav_core::sensors::camera::Camera;
+/// let camera = Camera {
+///     width_px: 300,
+///     height_px: 300,
+///     vertical_fov_rad: std::f64::consts::FRAC_PI_2,
+///     position_m: [0.0, 1.575, 0.0],
+///     yaw_rad: 0.0,
+///     horizon_rad: 0.0,
+/// };
+/// // Two metres ahead and one to the right: a quarter of the image right of its middle.
+/// assert_eq!(camera.project([1.0, 1.575, 2.0]).map(|p| p[0].round()), Some(225.0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// Columns of the image.
+    pub width_px: usize,
+    /// Rows of the image.
+    pub height_px: usize,
+    /// Field of view from the upper to the lower border (AI2-THOR's `fieldOfView`: 90 degrees).
+    pub vertical_fov_rad: f64,
+    /// Optical centre, world frame.
+    pub position_m: Vec3,
+    /// 0 along +z, growing towards +x.
+    pub yaw_rad: f64,
+    /// Pitch; positive looks down.
+    pub horizon_rad: f64,
+}
+
+impl Camera {
+    /// The camera of an agent: above `pose`, `height_m` over the floor (houses have one floor, at
+    /// y = 0, so the pose's own height, 0.9 m in AI2-THOR and 0 elsewhere, does not matter).
+    pub fn at(pose: &Pose, image_px: [usize; 2], vertical_fov_rad: f64, height_m: f64) -> Self {
+        let [x, _, z] = pose.position_m;
+        Self {
+            width_px: image_px[0],
+            height_px: image_px[1],
+            vertical_fov_rad,
+            position_m: [x, height_m, z],
+            yaw_rad: pose.yaw_rad,
+            horizon_rad: pose.horizon_rad,
+        }
+    }
+
+    /// Checks that an image can be formed.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if a side is 0 or above [`MAX_SIDE_PX`], the field of view not
+    /// in `(0, pi)`, or a number not finite.
+    pub fn check(&self) -> Result<(), Error> {
+        let is_side = |n: usize| (1..=MAX_SIDE_PX).contains(&n);
+        Error::require("width_px", self.width_px, "1 to 8192", is_side)?;
+        Error::require("height_px", self.height_px, "1 to 8192", is_side)?;
+        Error::require("vertical_fov_rad", self.vertical_fov_rad, "0.01 to 3.1", |v| {
+            (0.01..=3.1).contains(&v)
+        })?;
+        for value in self.position_m {
+            Error::require("position_m", value, "finite", f64::is_finite)?;
+        }
+        Error::require("yaw_rad", self.yaw_rad, "finite", f64::is_finite)?;
+        Error::require("horizon_rad", self.horizon_rad, "finite", f64::is_finite)
+    }
+
+    /// Focal length in pixels, the same along both axes.
+    pub fn focal_px(&self) -> f64 {
+        self.height_px as f64 / 2.0 / (self.vertical_fov_rad / 2.0).tan()
+    }
+
+    /// Principal point `[u, v]`: the middle of the image.
+    pub fn centre_px(&self) -> Vec2 {
+        [self.width_px as f64 / 2.0, self.height_px as f64 / 2.0]
+    }
+
+    /// Rows are the camera's right, down and forward axes in the world frame.
+    pub fn camera_from_world(&self) -> Mat3 {
+        let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
+        let (sin_pitch, cos_pitch) = self.horizon_rad.sin_cos();
+        [
+            [cos_yaw, 0.0, -sin_yaw],
+            [-sin_yaw * sin_pitch, -cos_pitch, -cos_yaw * sin_pitch],
+            [sin_yaw * cos_pitch, -sin_pitch, cos_yaw * cos_pitch],
+        ]
+    }
+
+    /// `[u, v, depth_m]` of a world point: image coordinates in pixels and planar depth.
+    ///
+    /// # Returns
+    /// `None` for points that are not in front of the camera; the image's borders are not checked.
+    pub fn project(&self, point_m: Vec3) -> Option<Vec3> {
+        let [x, y, z] = rotate(&self.camera_from_world(), sub(point_m, self.position_m));
+        let [centre_u, centre_v] = self.centre_px();
+        let scale = self.focal_px() / z;
+        (z > 0.0).then_some([centre_u + scale * x, centre_v + scale * y, z])
+    }
+
+    /// World point at planar depth `depth_m` behind image coordinates `[u, v]`; a pixel's own
+    /// are `[col + 0.5, row + 0.5]`. The inverse of [`Self::project`].
+    pub fn unproject(&self, image_px: Vec2, depth_m: f64) -> Vec3 {
+        add(self.position_m, self.ray(image_px).map(|d| d * depth_m))
+    }
+
+    /// World direction through image coordinates `[u, v]`, of length 1 along the optical axis.
+    pub fn ray(&self, image_px: Vec2) -> Vec3 {
+        let ([centre_u, centre_v], focal_px) = (self.centre_px(), self.focal_px());
+        let local = [(image_px[0] - centre_u) / focal_px, (image_px[1] - centre_v) / focal_px, 1.0];
+        let axes = self.camera_from_world();
+        std::array::from_fn(|i| (0..3).map(|j| axes[j][i] * local[j]).sum())
+    }
+}

@@ -1,0 +1,144 @@
+//! The inner loops of the rasteriser: convex polygons into a buffer of inverse depths.
+
+use crate::geometry::{Vec2, Vec3};
+
+/// Pixels that one step of the inner loops handles: plain arrays, which compilers turn into SIMD.
+pub(super) const LANES: usize = 8;
+const LANE_INDEX: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+
+/// Inverse depth (0: nothing drawn) and a tag a pixel; rows are padded to whole blocks.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Canvas {
+    pub width_px: usize,
+    pub height_px: usize,
+    pub inverse_depth: Vec<[f32; LANES]>,
+    pub tags: Vec<[u32; LANES]>,
+    /// First pixel of the polygon at hand, and the one after its last, by row.
+    left: Vec<u32>,
+    right: Vec<u32>,
+}
+
+impl Canvas {
+    pub fn clear(&mut self, width_px: usize, height_px: usize) {
+        (self.width_px, self.height_px) = (width_px, height_px);
+        let num_blocks = self.blocks_per_row() * height_px;
+        self.inverse_depth.clear();
+        self.inverse_depth.resize(num_blocks, [0.0; LANES]);
+        self.tags.clear();
+        self.tags.resize(num_blocks, [0; LANES]);
+        self.left.resize(height_px, 0);
+        self.right.resize(height_px, 0);
+    }
+
+    pub fn blocks_per_row(&self) -> usize {
+        self.width_px.div_ceil(LANES)
+    }
+
+    /// Draws a convex polygon that runs clockwise on the screen, where it is nearer than what is
+    /// there. `plane` gives the inverse depth at `[u, v]`: `plane . [u, v, 1]`.
+    ///
+    /// A pixel is covered when its centre is inside; a centre on an edge belongs to the polygon
+    /// to the right of or below that edge, so that neighbours neither overlap nor leave a gap.
+    pub fn fill(&mut self, corners_px: &[Vec2], plane: Vec3, tag: u32) {
+        let rows = self.scan(corners_px);
+        let blocks_per_row = self.blocks_per_row();
+        let step = plane[0] as f32;
+        for row in rows {
+            let (left, right) = (self.left[row] as usize, self.right[row] as usize);
+            if left >= right {
+                continue;
+            }
+            let blocks = left / LANES..(right - 1) / LANES + 1;
+            let u = (blocks.start * LANES) as f64 + 0.5;
+            let start = plane[0] * u + plane[1] * (row as f64 + 0.5) + plane[2];
+            let span = Span {
+                left: (left - blocks.start * LANES) as u32,
+                right: (right - blocks.start * LANES) as u32,
+                start: start as f32,
+                step,
+                tag,
+            };
+            let blocks = row * blocks_per_row + blocks.start..row * blocks_per_row + blocks.end;
+            span.draw(&mut self.inverse_depth[blocks.clone()], &mut self.tags[blocks]);
+        }
+    }
+
+    /// Sets `left` and `right` for the rows that the polygon covers, and returns those.
+    fn scan(&mut self, corners_px: &[Vec2]) -> std::ops::Range<usize> {
+        let (mut top, mut bottom) = (f64::INFINITY, f64::NEG_INFINITY);
+        for corner in corners_px {
+            top = top.min(corner[1]);
+            bottom = bottom.max(corner[1]);
+        }
+        let rows = first_centre(top, self.height_px)..first_centre(bottom, self.height_px);
+        if rows.is_empty() {
+            return 0..0;
+        }
+        // Rounding may leave a sliver's row without one of its two edges: then it is empty.
+        self.left[rows.clone()].fill(self.width_px as u32);
+        self.right[rows.clone()].fill(0);
+        let mut from = corners_px[corners_px.len() - 1];
+        for &to in corners_px {
+            // Clockwise with v downwards: right edges run down. Both directions compute the same
+            // numbers, so that two polygons agree on the edge they share.
+            if to[1] > from[1] {
+                self.edge(from, to, true);
+            } else if to[1] < from[1] {
+                self.edge(to, from, false);
+            }
+            from = to;
+        }
+        rows
+    }
+
+    fn edge(&mut self, upper: Vec2, lower: Vec2, is_right: bool) {
+        let rows = first_centre(upper[1], self.height_px)..first_centre(lower[1], self.height_px);
+        let columns = if is_right { &mut self.right } else { &mut self.left };
+        let slope = (lower[0] - upper[0]) / (lower[1] - upper[1]);
+        for row in rows {
+            let u = upper[0] + (row as f64 + 0.5 - upper[1]) * slope;
+            columns[row] = first_centre(u, self.width_px) as u32;
+        }
+    }
+}
+
+/// Index of the first pixel whose centre is at or after `coordinate_px`, within `0..=size_px`.
+fn first_centre(coordinate_px: f64, size_px: usize) -> usize {
+    let shifted = (coordinate_px - 0.5).clamp(0.0, size_px as f64);
+    // A ceiling by hand: baseline x86-64 has no instruction for it.
+    let whole = shifted as u32;
+    whole as usize + usize::from(f64::from(whole) < shifted)
+}
+
+/// A run of pixels in one row; positions are counted from the first block's first pixel.
+struct Span {
+    left: u32,
+    right: u32,
+    start: f32,
+    step: f32,
+    tag: u32,
+}
+
+impl Span {
+    fn draw(&self, inverse_depth: &mut [[f32; LANES]], tags: &mut [[u32; LANES]]) {
+        let in_block = LANE_INDEX.map(|lane| lane * self.step);
+        let block_step = LANES as f32 * self.step;
+        for (block, (stored, tags)) in inverse_depth.iter_mut().zip(tags).enumerate() {
+            let base = self.start + block as f32 * block_step;
+            let first = (block * LANES) as u32;
+            let mut candidate = in_block.map(|offset| base + offset);
+            if first < self.left || first + LANES as u32 > self.right {
+                for (lane, value) in candidate.iter_mut().enumerate() {
+                    let position = first + lane as u32;
+                    let is_covered = position >= self.left && position < self.right;
+                    *value = if is_covered { *value } else { 0.0 };
+                }
+            }
+            for lane in 0..LANES {
+                let is_nearer = candidate[lane] > stored[lane];
+                stored[lane] = if is_nearer { candidate[lane] } else { stored[lane] };
+                tags[lane] = if is_nearer { self.tag } else { tags[lane] };
+            }
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! Surfaces of a scene as convex planar faces: what is drawn and what rays hit.
+
+use std::ops::Range;
+
+use crate::{
+    assets::part::{Part, Primitive},
+    geometry::{Aabb, Vec3, add, rotate, sub},
+    world::scene::Scene,
+};
+
+/// Meridians of an ellipsoid; a multiple of 4, so that its box is exact.
+const ELLIPSOID_MERIDIANS: usize = 12;
+/// Bands of an ellipsoid from pole to pole; even, so that its box is exact.
+const ELLIPSOID_BANDS: usize = 6;
+/// Faces smaller than this (twice the area, in square metres) are left out.
+const LEAST_AREA_M2: f64 = 1e-12;
+
+/// A convex, planar, one-sided polygon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Face {
+    /// Outward unit normal, world frame.
+    pub normal: Vec3,
+    /// `normal . p` of its points `p`.
+    pub offset_m: f64,
+    /// First of its corners in [`SceneMesh::corners`].
+    first_corner: u32,
+    /// Number of corners, 3 or more.
+    num_corners: u32,
+    /// Index of its body in the scene.
+    pub body: u32,
+    /// Surface colour, sRGB.
+    pub colour: [u8; 3],
+}
+
+/// One convex part: its vertices and faces are consecutive.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct PartMesh {
+    pub vertices: Range<usize>,
+    pub faces: Range<usize>,
+    pub body: u32,
+    pub aabb: Aabb,
+}
+
+/// All surfaces of a scene, in the order of its bodies and their parts.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SceneMesh {
+    pub(crate) vertices_m: Vec<Vec3>,
+    /// Vertex indices, counted from the part's first vertex, clockwise seen from outside.
+    pub(crate) corners: Vec<u32>,
+    pub(crate) faces: Vec<Face>,
+    pub(crate) parts: Vec<PartMesh>,
+    num_bodies: usize,
+}
+
+/// A triangle of the world, for consumers that know no polygons.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Triangle {
+    /// Corners, world frame, clockwise seen from outside.
+    pub vertices_m: [Vec3; 3],
+    /// Index of its body in the scene.
+    pub body: u32,
+    /// Surface colour, sRGB.
+    pub colour: [u8; 3],
+}
+
+impl SceneMesh {
+    /// Tessellates every part of every body.
+    ///
+    /// Cuboids become 6 quads, frusta two polygons and a ring of quads, ellipsoids a globe of
+    /// quads and triangles inscribed in them. Faces without an area are left out.
+    ///
+    /// # Complexity
+    /// O(parts); about 0.2 ms for a house of a hundred objects.
+    pub fn build(scene: &Scene) -> Self {
+        let mut mesh = Self { num_bodies: scene.bodies.len(), ..Self::default() };
+        for (body, part) in
+            scene.bodies.iter().enumerate().flat_map(|(i, b)| b.parts.iter().map(move |p| (i, p)))
+        {
+            mesh.push(part, body as u32);
+        }
+        mesh
+    }
+
+    /// Number of bodies of the scene it was built from.
+    pub fn num_bodies(&self) -> usize {
+        self.num_bodies
+    }
+
+    /// The faces, grouped by body in rising order.
+    pub fn faces(&self) -> &[Face] {
+        &self.faces
+    }
+
+    /// The faces cut into triangles, in their order.
+    pub fn triangles(&self) -> impl Iterator<Item = Triangle> + '_ {
+        self.parts.iter().flat_map(move |part| {
+            let vertices_m = &self.vertices_m[part.vertices.clone()];
+            self.faces[part.faces.clone()].iter().flat_map(move |face| {
+                let corners = self.corners_of(face);
+                corners[1..].windows(2).map(move |pair| Triangle {
+                    vertices_m: [corners[0], pair[0], pair[1]].map(|i| vertices_m[i as usize]),
+                    body: face.body,
+                    colour: face.colour,
+                })
+            })
+        })
+    }
+
+    /// A face's vertex indices, counted from its part's first vertex.
+    pub(crate) fn corners_of(&self, face: &Face) -> &[u32] {
+        let first = face.first_corner as usize;
+        &self.corners[first..first + face.num_corners as usize]
+    }
+
+    fn push(&mut self, part: &Part, body: u32) {
+        let (first_vertex, first_face) = (self.vertices_m.len(), self.faces.len());
+        let (vertices_m, polygons) = outline(&part.primitive);
+        let to_world = |v: &Vec3| add(part.centre_m, rotate(&part.rotation, *v));
+        self.vertices_m.extend(vertices_m.iter().map(to_world));
+        for polygon in polygons {
+            self.push_polygon(&polygon, first_vertex, body, part.colour);
+        }
+        if self.faces.len() == first_face {
+            self.vertices_m.truncate(first_vertex);
+            return;
+        }
+        self.parts.push(PartMesh {
+            vertices: first_vertex..self.vertices_m.len(),
+            faces: first_face..self.faces.len(),
+            body,
+            aabb: Aabb::of_points(self.vertices_m[first_vertex..].iter().copied()),
+        });
+    }
+
+    /// Adds a polygon, in two halves where its four corners do not lie in a plane (the sides of a
+    /// frustum whose ends are ellipses of different shapes).
+    fn push_polygon(&mut self, polygon: &[u32], first_vertex: usize, body: u32, colour: [u8; 3]) {
+        let at = |i: u32| self.vertices_m[first_vertex + i as usize];
+        let (normal, area_m2) = newell(polygon.iter().map(|&i| at(i)));
+        if !area_m2.is_finite() || area_m2 <= LEAST_AREA_M2 {
+            return;
+        }
+        let offset_m =
+            polygon.iter().map(|&i| dot(normal, at(i))).sum::<f64>() / polygon.len() as f64;
+        let is_planar = polygon.iter().all(|&i| (dot(normal, at(i)) - offset_m).abs() < 1e-7);
+        if let (&[a, b, c, d], false) = (polygon, is_planar) {
+            // Of the two diagonals, the one that bulges outwards keeps the solid convex.
+            let (half, _) = newell([at(a), at(b), at(c)].into_iter());
+            let bulges = dot(half, sub(at(d), at(a))) <= 0.0;
+            let halves = if bulges { [[a, b, c], [a, c, d]] } else { [[b, c, d], [b, d, a]] };
+            halves.iter().for_each(|half| self.push_polygon(half, first_vertex, body, colour));
+            return;
+        }
+        self.faces.push(Face {
+            normal,
+            offset_m,
+            first_corner: self.corners.len() as u32,
+            num_corners: polygon.len() as u32,
+            body,
+            colour,
+        });
+        self.corners.extend_from_slice(polygon);
+    }
+}
+
+/// Unit normal (towards the side from which the polygon runs clockwise) and twice the area.
+fn newell(points_m: impl Iterator<Item = Vec3> + Clone) -> (Vec3, f64) {
+    let mut sum = [0.0; 3];
+    let next = points_m.clone().cycle().skip(1);
+    for (a, b) in points_m.zip(next) {
+        for (axis, sum) in sum.iter_mut().enumerate() {
+            let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+            *sum += (a[j] - b[j]) * (a[k] + b[k]);
+        }
+    }
+    // The frame is left-handed: clockwise from outside gives the outward normal by this formula.
+    let area_m2 = dot(sum, sum).sqrt();
+    (sum.map(|v| v / area_m2), area_m2)
+}
+
+pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Vertices of a primitive in its own frame, and its outward polygons as indices of them.
+fn outline(primitive: &Primitive) -> (Vec<Vec3>, Vec<Vec<u32>>) {
+    match *primitive {
+        Primitive::Cuboid { half_m } => {
+            let corner = |i: usize, axis: usize| {
+                if i >> axis & 1 == 1 { half_m[axis] } else { -half_m[axis] }
+            };
+            let vertices_m = (0..8).map(|i| std::array::from_fn(|axis| corner(i, axis))).collect();
+            let polygons = [
+                [1, 3, 7, 5],
+                [0, 4, 6, 2],
+                [2, 6, 7, 3],
+                [0, 1, 5, 4],
+                [4, 5, 7, 6],
+                [0, 2, 3, 1],
+            ];
+            (vertices_m, polygons.iter().map(|p| p.to_vec()).collect())
+        }
+        Primitive::Frustum { bottom_m, top_m, half_height_m, sides } => {
+            rings(usize::from(sides.max(3)), &[(bottom_m, -half_height_m), (top_m, half_height_m)])
+        }
+        Primitive::Ellipsoid { half_m: [x, y, z] } => {
+            let ring = |band: usize| {
+                let latitude_rad =
+                    std::f64::consts::PI * (band as f64 / ELLIPSOID_BANDS as f64 - 0.5);
+                // Exactly 0 at the poles, so that their corners coincide.
+                let is_pole = band == 0 || band == ELLIPSOID_BANDS;
+                let radius = if is_pole { 0.0 } else { latitude_rad.cos() };
+                ([x * radius, z * radius], y * latitude_rad.sin())
+            };
+            let levels: Vec<_> = (0..=ELLIPSOID_BANDS).map(ring).collect();
+            rings(ELLIPSOID_MERIDIANS, &levels)
+        }
+    }
+}
+
+/// The solid between elliptic rings `(half axes [x, z], y)`, lowest first, over a regular
+/// `sides`-gon with a corner on +x.
+fn rings(sides: usize, levels: &[([f64; 2], f64)]) -> (Vec<Vec3>, Vec<Vec<u32>>) {
+    let turn = |k: usize| (std::f64::consts::TAU * k as f64 / sides as f64).sin_cos();
+    let vertices_m: Vec<Vec3> = levels
+        .iter()
+        .flat_map(|&([x, z], y)| {
+            (0..sides).map(move |k| {
+                let (sin, cos) = turn(k);
+                [x * cos, y, z * sin]
+            })
+        })
+        .collect();
+    let sides = sides as u32;
+    let last = sides * (levels.len() as u32 - 1);
+    let mut polygons = vec![(0..sides).collect(), (last..last + sides).rev().collect()];
+    for low in (0..last).step_by(sides as usize) {
+        polygons.extend((0..sides).map(|k| {
+            let next = (k + 1) % sides;
+            vec![low + k, low + sides + k, low + sides + next, low + next]
+        }));
+    }
+    // Rings shrunk to a point have coinciding corners.
+    for polygon in &mut polygons {
+        polygon.dedup_by_key(|&mut i| vertices_m[i as usize]);
+        while polygon.len() > 1
+            && vertices_m[polygon[0] as usize] == vertices_m[polygon[polygon.len() - 1] as usize]
+        {
+            polygon.pop();
+        }
+    }
+    polygons.retain(|polygon| polygon.len() >= 3);
+    (vertices_m, polygons)
+}

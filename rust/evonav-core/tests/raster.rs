@@ -1,0 +1,280 @@
+//! The rasteriser and the ray caster against a ray tracer that tries every triangle.
+
+use evonav_core::{
+    assets::part::{Part, Primitive},
+    geometry::{Aabb, Vec3, euler_rotation_deg},
+    sensors::{
+        camera::Camera,
+        raster::{FrameBuffer, NEAR_M, Want, render},
+        raycast3d::RayCaster,
+    },
+    world::{
+        mesh::{SceneMesh, Triangle},
+        scene::{Body, BodyKind, Scene},
+    },
+};
+use proptest::{collection::vec, prelude::*};
+
+fn dot(a: Vec3, b: Vec3) -> f64 {
+    (0..3).map(|i| a[i] * b[i]).sum()
+}
+
+fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    std::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        a[j] * b[k] - a[k] * b[j]
+    })
+}
+
+/// Moeller & Trumbore 1997, front side only. Returns the distance and how deep inside the
+/// triangle the ray passes (smallest barycentric coordinate).
+fn intersect(triangle: &Triangle, origin_m: Vec3, direction: Vec3) -> Option<(f64, f64)> {
+    let [a, b, c] = triangle.vertices_m;
+    let (ab, ac, to_origin) = (sub(b, a), sub(c, a), sub(origin_m, a));
+    let normal = cross(ab, ac);
+    let facing = dot(normal, direction);
+    if facing >= 0.0 {
+        return None;
+    }
+    let distance = -dot(normal, to_origin) / facing;
+    let turn = cross(direction, to_origin);
+    let beta = dot(ac, turn) / facing;
+    let gamma = -dot(ab, turn) / facing;
+    let depth_inside = beta.min(gamma).min(1.0 - beta - gamma);
+    Some((distance, depth_inside))
+}
+
+/// Nearest front face along a ray: `(distance, body)`. Triangles grown (or, negative, shrunk) by
+/// `margin` of their size.
+fn cast_naive(
+    triangles: &[Triangle],
+    origin_m: Vec3,
+    direction: Vec3,
+    least: f64,
+    margin: f64,
+) -> Option<(f64, u32)> {
+    triangles
+        .iter()
+        .filter_map(|triangle| {
+            let (distance, inside) = intersect(triangle, origin_m, direction)?;
+            (distance >= least && inside >= -margin).then_some((distance, triangle.body))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+fn scene_of(parts: &[Part]) -> Scene {
+    let bodies: Vec<Body> = parts
+        .iter()
+        .enumerate()
+        .map(|(i, part)| Body {
+            id: format!("body|{i}"),
+            category: "Box".to_owned(),
+            kind: BodyKind::Object,
+            parts: vec![*part],
+            aabb: Aabb::EMPTY,
+        })
+        .collect();
+    Scene { bodies, first_object: 0, bounds: Aabb::EMPTY }
+}
+
+fn primitive() -> impl Strategy<Value = Primitive> {
+    let length = 0.02..1.5_f64;
+    let half_m = [length.clone(), length.clone(), length.clone()];
+    prop_oneof![
+        half_m.clone().prop_map(|half_m| Primitive::Cuboid { half_m }),
+        half_m.prop_map(|half_m| Primitive::Ellipsoid { half_m }),
+        ([length.clone(), length.clone()], [0.0..1.0_f64, 0.0..1.0_f64], length, 3..9_u8).prop_map(
+            |(bottom_m, top_m, half_height_m, sides)| Primitive::Frustum {
+                bottom_m,
+                top_m,
+                half_height_m,
+                sides
+            }
+        ),
+    ]
+}
+
+fn part() -> impl Strategy<Value = Part> {
+    let place = [-3.0..3.0_f64, -1.0..3.0_f64, -3.0..3.0_f64];
+    let angles = prop_oneof![
+        (0.0..360.0_f64).prop_map(|yaw_deg| [0.0, yaw_deg, 0.0]),
+        [0.0..360.0_f64, 0.0..360.0_f64, 0.0..360.0_f64]
+    ];
+    (primitive(), place, angles, any::<[u8; 3]>()).prop_map(
+        |(primitive, centre_m, angles_deg, colour)| Part {
+            primitive,
+            centre_m,
+            rotation: euler_rotation_deg(angles_deg),
+            colour,
+        },
+    )
+}
+
+fn camera() -> impl Strategy<Value = Camera> {
+    let place = [-3.0..3.0_f64, 0.0..2.0_f64, -3.0..3.0_f64];
+    (place, 0.0..6.3_f64, -1.2..1.2_f64, 1..50_usize, 1..40_usize, 0.6..2.0_f64).prop_map(
+        |(position_m, yaw_rad, horizon_rad, width_px, height_px, vertical_fov_rad)| Camera {
+            width_px,
+            height_px,
+            vertical_fov_rad,
+            position_m,
+            yaw_rad,
+            horizon_rad,
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    /// A scene of triangles shrunk by a hair is seen deeper, one of grown triangles nearer; where
+    /// both agree the image has no choice.
+    #[test]
+    fn images_lie_between_shrunk_and_grown_scenes(
+        parts in vec(part(), 0..12),
+        camera in camera(),
+    ) {
+        const HAIR: f64 = 1e-7;
+        let mesh = SceneMesh::build(&scene_of(&parts));
+        let triangles: Vec<Triangle> = mesh.triangles().collect();
+        let mut frame = FrameBuffer::default();
+        render(&mesh, &camera, Want { rgb: false, instances: true }, &mut frame).unwrap();
+        for index in 0..camera.width_px * camera.height_px {
+            let (row, col) = (index / camera.width_px, index % camera.width_px);
+            let ray = camera.ray([col as f64 + 0.5, row as f64 + 0.5]);
+            let nearest = |least, margin| {
+                cast_naive(&triangles, camera.position_m, ray, least, margin)
+            };
+            let (grown, shrunk) =
+                (nearest(NEAR_M - HAIR, HAIR), nearest(NEAR_M + HAIR, -HAIR));
+            let got = f64::from(frame.depth_m[index]);
+            let slack = |depth: f64| 1e-6 * depth * (1.0 + 10.0 * depth);
+            match grown {
+                Some((depth, _)) => prop_assert!(got >= depth - slack(depth), "{got} {depth}"),
+                None => prop_assert!(got.is_infinite(), "{got} where nothing is"),
+            }
+            if let Some((depth, _)) = shrunk {
+                prop_assert!(got <= depth + slack(depth), "{got} {depth}");
+            }
+            if let (Some(near), Some(far)) = (grown, shrunk)
+                && near == far
+            {
+                // Another body at the same depth within rounding may win.
+                let others: Vec<Triangle> =
+                    triangles.iter().filter(|t| t.body != near.1).copied().collect();
+                let second =
+                    cast_naive(&others, camera.position_m, ray, near.0 - slack(near.0), HAIR);
+                if second.is_none_or(|s| s.0 > near.0 + 2.0 * slack(near.0)) {
+                    prop_assert_eq!(frame.instances[index], near.1 as i32 + 1);
+                }
+            }
+            prop_assert_eq!(frame.instances[index] == 0, got.is_infinite());
+        }
+    }
+
+    /// Asking for more images changes none of them.
+    #[test]
+    fn wants_do_not_change_images(parts in vec(part(), 0..12), camera in camera()) {
+        let mesh = SceneMesh::build(&scene_of(&parts));
+        let mut frames = [false, true].map(|rgb| {
+            let mut frame = FrameBuffer::default();
+            render(&mesh, &camera, Want { rgb, instances: true }, &mut frame).unwrap();
+            frame
+        });
+        prop_assert_eq!(&frames[0].depth_m, &frames[1].depth_m);
+        prop_assert_eq!(&frames[0].instances, &frames[1].instances);
+        prop_assert_eq!(frames[1].rgb.len(), 3 * frames[1].depth_m.len());
+        // A used buffer gives what a new one gives.
+        let [depth_only, full] = &mut frames;
+        render(&mesh, &camera, Want { rgb: true, instances: false }, depth_only).unwrap();
+        prop_assert_eq!(&depth_only.rgb, &full.rgb);
+        prop_assert!(depth_only.instances.is_empty());
+    }
+
+    /// The hierarchy finds what trying every triangle finds.
+    #[test]
+    fn rays_hit_what_a_search_over_all_triangles_hits(
+        parts in vec(part(), 0..12),
+        origin_m in [-3.0..3.0_f64, 0.0..2.0_f64, -3.0..3.0_f64],
+        target_m in [-3.0..3.0_f64, 0.0..2.0_f64, -3.0..3.0_f64],
+    ) {
+        const HAIR: f64 = 1e-7;
+        let mesh = SceneMesh::build(&scene_of(&parts));
+        let caster = RayCaster::build(&mesh);
+        let triangles: Vec<Triangle> = mesh.triangles().collect();
+        let direction = sub(target_m, origin_m);
+        let got = caster.cast(&mesh, origin_m, direction, f64::INFINITY);
+        let distance = got.map_or(f64::INFINITY, |hit| hit.distance);
+        let naive = |least, margin| {
+            cast_naive(&triangles, origin_m, direction, least, margin)
+                .map_or(f64::INFINITY, |hit| hit.0)
+        };
+        let (grown, shrunk) = (naive(-HAIR, HAIR), naive(HAIR, -HAIR));
+        prop_assert!(grown - 1e-6 <= distance && distance <= shrunk + 1e-6);
+        let is_visible = caster.is_visible(&mesh, origin_m, target_m, |_| false);
+        prop_assert!(!is_visible || shrunk > 1.0 - 1e-6, "{shrunk}");
+        prop_assert!(is_visible || grown < 1.0 + 1e-6, "{grown}");
+        prop_assert!(caster.is_visible(&mesh, origin_m, target_m, |_| true));
+    }
+
+    /// Projecting what was unprojected gives the pixel and depth back.
+    #[test]
+    fn projection_inverts_unprojection(
+        camera in camera(),
+        image_px in [0.0..50.0_f64, 0.0..40.0_f64],
+        depth_m in 0.1..20.0_f64,
+    ) {
+        let [u, v, z] = camera.project(camera.unproject(image_px, depth_m)).unwrap();
+        prop_assert!((u - image_px[0]).abs() < 1e-8);
+        prop_assert!((v - image_px[1]).abs() < 1e-8);
+        prop_assert!((z - depth_m).abs() < 1e-9);
+    }
+}
+
+/// AI2-THOR's conventions: yaw 90 degrees looks along +x, a positive horizon looks down.
+#[test]
+fn camera_turns_clockwise_and_looks_down() {
+    let mut camera = Camera {
+        width_px: 300,
+        height_px: 300,
+        vertical_fov_rad: 90.0_f64.to_radians(),
+        position_m: [0.0, 1.575, 0.0],
+        yaw_rad: 90.0_f64.to_radians(),
+        horizon_rad: 0.0,
+    };
+    let close = |a: Vec3, b: Vec3| (0..3).all(|i| (a[i] - b[i]).abs() < 1e-9);
+    // Facing +x, -z is on the right hand.
+    assert!(close(camera.project([2.0, 1.575, -1.0]).unwrap(), [225.0, 150.0, 2.0]));
+    assert!(close(camera.project([2.0, 2.575, 0.0]).unwrap(), [150.0, 75.0, 2.0]));
+    camera.horizon_rad = 30.0_f64.to_radians();
+    let floor_m = camera.unproject([150.0, 150.0], 3.15);
+    assert!(close(floor_m, [3.15 * 0.75_f64.sqrt(), 0.0, 0.0]));
+    camera.vertical_fov_rad = f64::NAN;
+    assert!(camera.check().is_err());
+}
+
+#[test]
+fn numbers_that_are_not_finite_draw_nothing_and_do_not_panic() {
+    let part = Part {
+        primitive: Primitive::Cuboid { half_m: [f64::NAN, 1.0, f64::INFINITY] },
+        centre_m: [0.0, 1.0, 2.0],
+        rotation: euler_rotation_deg([0.0; 3]),
+        colour: [255; 3],
+    };
+    let mesh = SceneMesh::build(&scene_of(&[part]));
+    let camera = Camera {
+        width_px: 16,
+        height_px: 16,
+        vertical_fov_rad: 1.5,
+        position_m: [0.0; 3],
+        yaw_rad: 0.0,
+        horizon_rad: 0.0,
+    };
+    let mut frame = FrameBuffer::default();
+    render(&mesh, &camera, Want { rgb: true, instances: true }, &mut frame).unwrap();
+    assert!(frame.instances.iter().all(|&id| id == 0));
+}
