@@ -1,0 +1,161 @@
+//! The generator's draws against the probabilities that the paper states.
+
+use evonav_core::evolution::{
+    Candidate, GoalBias, Mode, Parameters, RoomHistory, evolved_room_weight, goal_room_weights,
+    sample_evolved_room, sample_goal, target_scores,
+};
+use evonav_core::rng::Stream;
+use proptest::{collection::vec, prelude::*};
+
+/// Pearson's statistic of `observed` counts against `expected` probabilities.
+fn chi_square(observed: &[usize], expected: &[f64]) -> f64 {
+    let total: usize = observed.iter().sum();
+    let terms = observed.iter().zip(expected).filter(|(_, p)| **p > 0.0).map(|(&n, &p)| {
+        let mean = total as f64 * p;
+        (n as f64 - mean).powi(2) / mean
+    });
+    terms.sum()
+}
+
+const NUM_DRAWS: usize = 40_000;
+
+#[test]
+fn modes_are_drawn_as_half_two_fifths_one_tenth() {
+    let mut stream = Stream::new(7, &["modes"]);
+    let mut counts = [0; 3];
+    for _ in 0..NUM_DRAWS {
+        let mode = Mode::sample(&Parameters::default(), &mut stream).unwrap();
+        counts[Mode::ALL.iter().position(|&m| m == mode).unwrap()] += 1;
+    }
+    assert!(chi_square(&counts, &[0.5, 0.4, 0.1]) < 13.8, "{counts:?}"); // p = 0.001, 2 d.o.f.
+}
+
+/// A house with one room of each kind: the weights by hand, and the draws by chi-square.
+#[test]
+fn rooms_are_drawn_by_assets_visits_transition_and_recent_change() {
+    let room = |num_assets, is_visited, is_transition_room, was_changed_recently| RoomHistory {
+        num_assets,
+        is_visited,
+        is_transition_room,
+        was_changed_recently,
+    };
+    let rooms = [
+        room(10, false, false, false),
+        room(10, true, false, false),
+        room(10, true, false, true),
+        room(40, true, true, false),
+        room(4, false, false, true),
+        room(0, true, false, false),
+    ];
+    let weights = [10.0, 30.0, 15.0, 0.0, 2.0, 0.0];
+    let parameters = Parameters::default();
+    let mut stream = Stream::new(1, &["rooms"]);
+    let mut counts = [0; 6];
+    for _ in 0..NUM_DRAWS {
+        let (index, found) = sample_evolved_room(&rooms, &parameters, &mut stream);
+        assert_eq!(found, weights);
+        counts[index.unwrap()] += 1;
+    }
+    assert_eq!([counts[3], counts[5]], [0, 0]);
+    let probabilities = weights.map(|w| w / 57.0);
+    assert!(chi_square(&counts, &probabilities) < 16.3, "{counts:?}"); // p = 0.001, 3 d.o.f.
+}
+
+#[test]
+fn no_room_is_drawn_when_only_the_transition_room_holds_objects() {
+    let held = RoomHistory {
+        num_assets: 5,
+        is_visited: true,
+        is_transition_room: true,
+        was_changed_recently: false,
+    };
+    let empty = RoomHistory { num_assets: 0, is_transition_room: false, ..held };
+    let mut stream = Stream::new(1, &[]);
+    let (room, weights) = sample_evolved_room(&[held, empty], &Parameters::default(), &mut stream);
+    assert_eq!((room, weights), (None, vec![0.0, 0.0]));
+}
+
+/// One kitchen, two bedrooms: scores by hand.
+#[test]
+fn scores_tell_unique_categories_from_common_ones() {
+    let of = |category, room| Candidate { category, room };
+    let candidates = [of("Mug", 0), of("Bed", 1), of("Bed", 2), of("Book", 1), of("Book", 1)];
+    assert_eq!(target_scores(&candidates), [2.0, 1.5, 1.5, 1.0, 1.0]);
+    let bias = GoalBias { changed_room: Some(1), previous_goal_room: Some(2), moved_object: None };
+    let weights = goal_room_weights(
+        &candidates,
+        &target_scores(&candidates),
+        3,
+        bias,
+        &Parameters::default(),
+    );
+    assert_eq!(weights, [2.0, 31.5, 1.5 * 0.2]);
+}
+
+#[test]
+fn goals_are_drawn_room_first_and_the_moved_object_nine_times_as_often() {
+    let of = |category, room| Candidate { category, room };
+    let candidates = [of("Mug", 0), of("Bed", 1), of("Lamp", 1), of("Sofa", 1)];
+    let bias =
+        GoalBias { changed_room: Some(1), previous_goal_room: Some(0), moved_object: Some(2) };
+    let mut stream = Stream::new(3, &["goals"]);
+    let mut counts = [0; 4];
+    for _ in 0..NUM_DRAWS {
+        let drawn =
+            sample_goal(&candidates, 2, bias, &Parameters::default(), &mut stream, |_| Some(()));
+        counts[drawn.unwrap().0] += 1;
+    }
+    let (kitchen, bedroom) = (2.0 * 0.2, 6.0 * 9.0);
+    let in_bedroom = bedroom / (kitchen + bedroom) / 11.0;
+    let expected = [kitchen / (kitchen + bedroom), in_bedroom, 9.0 * in_bedroom, in_bedroom];
+    assert!(chi_square(&counts, &expected) < 16.3, "{counts:?}");
+}
+
+proptest! {
+    /// The weight is the paper's product, written with its indicator sums.
+    #[test]
+    fn room_weight_is_the_papers_product(
+        num_assets in 0_usize..200,
+        flags in any::<[bool; 3]>(),
+        visited_factor in 0.0..10.0,
+        changed_factor in 0.0..10.0,
+    ) {
+        let [is_visited, is_transition_room, was_changed_recently] = flags;
+        let room = RoomHistory { num_assets, is_visited, is_transition_room, was_changed_recently };
+        let parameters = Parameters {
+            visited_factor,
+            recently_changed_factor: changed_factor,
+            ..Parameters::default()
+        };
+        let indicator = |flag: bool| f64::from(u8::from(flag));
+        let visited = visited_factor * indicator(is_visited) + (1.0 - indicator(is_visited));
+        let current = 1.0 - indicator(is_transition_room);
+        let evolved = changed_factor * indicator(was_changed_recently)
+            + (1.0 - indicator(was_changed_recently));
+        let expected = num_assets as f64 * visited * current * evolved;
+        prop_assert!((evolved_room_weight(room, &parameters) - expected).abs() < 1e-9);
+    }
+
+    /// Every candidate is offered once, and refusing all of them ends the draw.
+    #[test]
+    fn refused_goals_are_never_drawn_again(
+        rooms in vec(0_usize..4, 0..30),
+        seed in any::<u64>(),
+        num_refused in 0_usize..40,
+    ) {
+        let candidates: Vec<_> =
+            rooms.iter().map(|&room| Candidate { category: "Chair", room }).collect();
+        let mut offered = Vec::new();
+        let drawn = sample_goal(
+            &candidates, 4, GoalBias::default(), &Parameters::default(),
+            &mut Stream::new(seed, &["goal"]),
+            |index| { offered.push(index); (offered.len() > num_refused).then_some(()) },
+        );
+        let mut distinct = offered.clone();
+        distinct.sort_unstable();
+        distinct.dedup();
+        prop_assert_eq!(distinct.len(), offered.len());
+        prop_assert_eq!(drawn.is_some(), candidates.len() > num_refused);
+        prop_assert_eq!(offered.len(), candidates.len().min(num_refused + 1));
+    }
+}
