@@ -1,0 +1,357 @@
+//! The agent's capsule against the world, exactly, on the ground plane.
+//!
+//! An upright capsule that slides over a flat floor has two degrees of freedom, so collision is
+//! a question in the plane: each convex part leaves the projection of its slice between the step
+//! height and the agent's height (a convex polygon, [`crate::world::footprint`]), and the agent
+//! is in collision when its axis comes closer to that polygon than the capsule's radius *at
+//! those heights*: the rounded ends pass over low things and under high ones. That is exact for
+//! upright prisms, which nearly all parts are, and on the safe side for tapering ones; there is
+//! no cell size, so no gap is too narrow or too wide by a cell.
+
+use crate::{
+    Error,
+    geometry::Vec2,
+    world::{
+        footprint::{Footprint, footprint},
+        scene::{Body, BodyKind},
+    },
+};
+
+/// Edge of a bucket of the broad phase.
+const BUCKET_M: f64 = 0.5;
+/// Most buckets along an axis, whatever a house file says its size is.
+const MAX_BUCKETS: f64 = 1024.0;
+/// Margin of bucket look-ups, far above rounding and far below any geometry.
+const HAIR_M: f64 = 1e-7;
+
+/// An agent's body: an upright capsule standing on the floor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AgentBody {
+    /// Radius of the cylinder and of both rounded ends.
+    pub radius_m: f64,
+    /// From the floor to the crown, at least `2 * radius_m`.
+    pub height_m: f64,
+}
+
+impl AgentBody {
+    /// AI2-THOR's default agent (`PhysicsRemoteFPSAgentController`: radius 0.2, height 1.8).
+    pub const DEFAULT: Self = Self { radius_m: 0.2, height_m: 1.8 };
+    /// AI2-THOR's LoCoBot (agent mode "locobot": radius 0.175, height 0.9).
+    pub const LOCOBOT: Self = Self { radius_m: 0.175, height_m: 0.9 };
+
+    /// Largest radius of the capsule between two heights above the floor, 0 outside it.
+    pub fn radius_between_m(&self, bottom_m: f64, top_m: f64) -> f64 {
+        // Distance of the interval from the cylinder, into one of the rounded ends.
+        let beyond_m =
+            (self.radius_m - top_m).max(bottom_m - (self.height_m - self.radius_m)).max(0.0);
+        (self.radius_m * self.radius_m - beyond_m * beyond_m).max(0.0).sqrt()
+    }
+}
+
+/// A convex polygon that the agent's axis must keep `radius_m` away from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle {
+    /// Convex outline, interior on the left; one or two points if degenerate.
+    pub outline_m: Vec<Vec2>,
+    /// Distance to keep.
+    pub radius_m: f64,
+    /// Smallest corner of the box around the grown outline.
+    min_m: Vec2,
+    /// Largest corner.
+    max_m: Vec2,
+}
+
+/// Everything that blocks an agent, ready for exact queries.
+#[derive(Debug, Clone)]
+pub struct Obstacles {
+    obstacles: Vec<Obstacle>,
+    corner_m: Vec2,
+    bucket_m: f64,
+    shape: [usize; 2],
+    /// Bucket `i` holds `items[starts[i]..starts[i + 1]]`.
+    starts: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Obstacles {
+    /// Obstacles for `agent` among `bodies`: all but floors and ceilings, in what they have
+    /// between `step_height_m` and the agent's height.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`] naming the body if a part's geometry is not finite.
+    pub fn build(bodies: &[Body], agent: AgentBody, step_height_m: f64) -> Result<Self, Error> {
+        let mut obstacles = Vec::new();
+        for body in bodies {
+            if matches!(body.kind, BodyKind::Floor | BodyKind::Ceiling) {
+                continue;
+            }
+            let from = obstacles.len();
+            for part in &body.parts {
+                let Some(shadow) = footprint(part, step_height_m, agent.height_m) else {
+                    continue;
+                };
+                if !shadow.outline_m.iter().flatten().all(|v| v.is_finite()) {
+                    return Err(Error::Simulation {
+                        message: format!("{}: a part of its shape is not finite", body.id),
+                    });
+                }
+                let radius_m = agent.radius_between_m(shadow.bottom_m, shadow.top_m);
+                obstacles.push(Obstacle::new(shadow, radius_m));
+            }
+            drop_covered(&mut obstacles, from);
+        }
+        let mut obstacles = Self::with_buckets(obstacles);
+        obstacles.drop_covered_by_others();
+        Ok(obstacles)
+    }
+
+    /// The polygons, in the order of the bodies they come from.
+    pub fn iter(&self) -> impl Iterator<Item = &Obstacle> {
+        self.obstacles.iter()
+    }
+
+    /// Whether the agent fits at a point.
+    pub fn is_clear(&self, point_m: Vec2) -> bool {
+        let Some([row, col]) = self.bucket_of(point_m) else { return true };
+        self.bucket(row, col).iter().all(|&i| !self.obstacles[i as usize].blocks(point_m))
+    }
+
+    /// Whether the agent can slide straight from one point to the other.
+    ///
+    /// The answer is the same in both directions.
+    pub fn is_clear_between(&self, from_m: Vec2, to_m: Vec2) -> bool {
+        let (a, b) = if from_m <= to_m { (from_m, to_m) } else { (to_m, from_m) };
+        let length_m = (b[0] - a[0]).hypot(b[1] - a[1]);
+        if length_m == 0.0 {
+            return self.is_clear(a);
+        }
+        let sweep = Sweep { a, b, along: [(b[0] - a[0]) / length_m, (b[1] - a[1]) / length_m] };
+        self.buckets_along(a, b, |bucket| {
+            bucket.iter().all(|&i| !self.obstacles[i as usize].blocks_sweep(&sweep, length_m))
+        })
+    }
+
+    /// Calls `visit` for the buckets under a segment until it returns false; whether it never did.
+    fn buckets_along(&self, a: Vec2, b: Vec2, mut visit: impl FnMut(&[u32]) -> bool) -> bool {
+        let cell = |value: f64, axis: usize| {
+            (((value - self.corner_m[axis]) / self.bucket_m).floor()).max(0.0) as usize
+        };
+        let is_outside = (0..2).any(|i| a[i].max(b[i]) < self.corner_m[i]);
+        if is_outside || self.obstacles.is_empty() {
+            return true;
+        }
+        let last_row = cell(a[1].max(b[1]) + HAIR_M, 1).min(self.shape[0] - 1);
+        for row in cell(a[1].min(b[1]) - HAIR_M, 1)..=last_row {
+            // Stretch of the segment inside this row of buckets.
+            let low = self.corner_m[1] + row as f64 * self.bucket_m - HAIR_M;
+            let high = low + self.bucket_m + 2.0 * HAIR_M;
+            let at = |height: f64| ((height - a[1]) / (b[1] - a[1])).clamp(0.0, 1.0);
+            let is_level = (b[1] - a[1]).abs() < HAIR_M;
+            let span = if is_level { [0.0, 1.0] } else { [at(low), at(high)] };
+            let [x0, x1] = span.map(|t| a[0] + t * (b[0] - a[0]));
+            if x0.max(x1) + HAIR_M < self.corner_m[0] {
+                continue;
+            }
+            let last_col = cell(x0.max(x1) + HAIR_M, 0).min(self.shape[1] - 1);
+            for col in cell(x0.min(x1) - HAIR_M, 0)..=last_col {
+                if !visit(self.bucket(row, col)) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    fn with_buckets(obstacles: Vec<Obstacle>) -> Self {
+        let mut corner_m = [f64::INFINITY; 2];
+        let mut far_m = [f64::NEG_INFINITY; 2];
+        for obstacle in &obstacles {
+            for axis in 0..2 {
+                corner_m[axis] = corner_m[axis].min(obstacle.min_m[axis]);
+                far_m[axis] = far_m[axis].max(obstacle.max_m[axis]);
+            }
+        }
+        if obstacles.is_empty() {
+            (corner_m, far_m) = ([0.0; 2], [0.0; 2]);
+        }
+        let extent_m = (far_m[0] - corner_m[0]).max(far_m[1] - corner_m[1]);
+        let bucket_m = BUCKET_M.max(extent_m / MAX_BUCKETS);
+        let count = |axis: usize| ((far_m[axis] - corner_m[axis]) / bucket_m) as usize + 1;
+        let shape = [count(1), count(0)];
+        let mut built =
+            Self { obstacles, corner_m, bucket_m, shape, starts: Vec::new(), items: Vec::new() };
+        built.fill_buckets();
+        built
+    }
+
+    /// Counting sort of the obstacles into every bucket that their box touches.
+    fn fill_buckets(&mut self) {
+        let mut starts = vec![0_u32; self.shape[0] * self.shape[1] + 1];
+        for obstacle in &self.obstacles {
+            self.buckets_under(obstacle, |bucket| starts[bucket + 1] += 1);
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        let mut items = vec![0_u32; starts.last().copied().unwrap_or(0) as usize];
+        for (i, obstacle) in self.obstacles.iter().enumerate() {
+            self.buckets_under(obstacle, |bucket| {
+                items[next[bucket] as usize] = i as u32;
+                next[bucket] += 1;
+            });
+        }
+        (self.starts, self.items) = (starts, items);
+    }
+
+    fn buckets_under(&self, obstacle: &Obstacle, mut visit: impl FnMut(usize)) {
+        let cell = |value: f64, axis: usize| {
+            let last = self.shape[1 - axis] - 1;
+            (((value - self.corner_m[axis]) / self.bucket_m).max(0.0) as usize).min(last)
+        };
+        for row in cell(obstacle.min_m[1], 1)..=cell(obstacle.max_m[1], 1) {
+            for col in cell(obstacle.min_m[0], 0)..=cell(obstacle.max_m[0], 0) {
+                visit(row * self.shape[1] + col);
+            }
+        }
+    }
+
+    fn bucket(&self, row: usize, col: usize) -> &[u32] {
+        let i = row * self.shape[1] + col;
+        &self.items[self.starts[i] as usize..self.starts[i + 1] as usize]
+    }
+
+    fn bucket_of(&self, point_m: Vec2) -> Option<[usize; 2]> {
+        let cell = [1, 0].map(|i| ((point_m[i] - self.corner_m[i]) / self.bucket_m).floor());
+        let is_inside = (0..2).all(|i| cell[i] >= 0.0 && cell[i] < self.shape[i] as f64);
+        is_inside.then_some(cell.map(|v| v as usize))
+    }
+
+    /// Leaves out what lies wholly under another body: most of what stands on furniture.
+    fn drop_covered_by_others(&mut self) {
+        let is_covered = |i: usize| {
+            let obstacle = &self.obstacles[i];
+            self.bucket_of(obstacle.outline_m[0]).is_some_and(|[row, col]| {
+                self.bucket(row, col).iter().any(|&j| {
+                    let other = &self.obstacles[j as usize];
+                    j as usize != i
+                        && other.covers(obstacle)
+                        && !(obstacle.covers(other) && i < j as usize)
+                })
+            })
+        };
+        let keep: Vec<bool> = (0..self.obstacles.len()).map(|i| !is_covered(i)).collect();
+        let mut keep = keep.into_iter();
+        self.obstacles.retain(|_| keep.next().unwrap_or(true));
+        self.fill_buckets();
+    }
+}
+
+/// Removes from `obstacles[from..]`, the parts of one body, those that another part covers.
+fn drop_covered(obstacles: &mut Vec<Obstacle>, from: usize) {
+    let mut i = from;
+    while i < obstacles.len() {
+        let is_covered =
+            (from..obstacles.len()).any(|j| j != i && obstacles[j].covers(&obstacles[i]));
+        if is_covered {
+            obstacles.remove(i);
+        } else {
+            i += 1;
+        }
+    }
+}
+
+/// A straight move of a point.
+struct Sweep {
+    a: Vec2,
+    b: Vec2,
+    /// Unit vector from `a` to `b`.
+    along: Vec2,
+}
+
+impl Obstacle {
+    fn new(footprint: Footprint, radius_m: f64) -> Self {
+        let mut min_m = [f64::INFINITY; 2];
+        let mut max_m = [f64::NEG_INFINITY; 2];
+        for point in &footprint.outline_m {
+            for axis in 0..2 {
+                min_m[axis] = min_m[axis].min(point[axis] - radius_m);
+                max_m[axis] = max_m[axis].max(point[axis] + radius_m);
+            }
+        }
+        Self { outline_m: footprint.outline_m, radius_m, min_m, max_m }
+    }
+
+    /// Whether whatever the other blocks, this one blocks too (sufficient, not necessary).
+    fn covers(&self, other: &Self) -> bool {
+        self.radius_m >= other.radius_m
+            && (0..2).all(|i| self.min_m[i] <= other.min_m[i] && self.max_m[i] >= other.max_m[i])
+            && other.outline_m.iter().all(|&p| distance_squared(&self.outline_m, p) == 0.0)
+    }
+
+    /// Whether the agent's axis at `point_m` is too close.
+    fn blocks(&self, point_m: Vec2) -> bool {
+        let is_near = (0..2).all(|i| self.min_m[i] < point_m[i] && point_m[i] < self.max_m[i]);
+        is_near && distance_squared(&self.outline_m, point_m) < self.radius_m * self.radius_m
+    }
+
+    /// Whether the agent's axis comes too close while it moves.
+    ///
+    /// The least distance between a segment and a convex polygon that do not meet is taken at an
+    /// end of the segment or at a corner of the polygon.
+    fn blocks_sweep(&self, sweep: &Sweep, length_m: f64) -> bool {
+        let reach = self.radius_m;
+        let Sweep { a, b, along } = *sweep;
+        let is_near =
+            (0..2).all(|i| self.min_m[i] < a[i].max(b[i]) && a[i].min(b[i]) < self.max_m[i]);
+        if !is_near {
+            return false;
+        }
+        // Corners in the frame of the move: how far along it, how far to its left.
+        let in_frame = |p: Vec2| {
+            let w = [p[0] - a[0], p[1] - a[1]];
+            [along[0] * w[0] + along[1] * w[1], along[0] * w[1] - along[1] * w[0]]
+        };
+        let (mut right, mut left) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut before = in_frame(self.outline_m[self.outline_m.len() - 1]);
+        let mut is_hit = false;
+        for &corner in &self.outline_m {
+            let here = in_frame(corner);
+            right = right.min(here[1]);
+            left = left.max(here[1]);
+            is_hit |= here[1].abs() < reach && 0.0 < here[0] && here[0] < length_m;
+            if (here[1] < 0.0) != (before[1] < 0.0) {
+                let t = before[1] / (before[1] - here[1]);
+                let crossing = before[0] + t * (here[0] - before[0]);
+                is_hit |= (0.0..=length_m).contains(&crossing);
+            }
+            before = here;
+        }
+        if right >= reach || left <= -reach {
+            return false;
+        }
+        is_hit || self.blocks(a) || self.blocks(b)
+    }
+}
+
+/// Squared distance of a point from a convex polygon (0 inside), a segment or a point.
+pub fn distance_squared(outline_m: &[Vec2], point_m: Vec2) -> f64 {
+    let mut best = f64::INFINITY;
+    let mut is_inside = outline_m.len() > 2;
+    for (i, &a) in outline_m.iter().enumerate() {
+        let b = outline_m[(i + 1) % outline_m.len()];
+        let edge = [b[0] - a[0], b[1] - a[1]];
+        let offset = [point_m[0] - a[0], point_m[1] - a[1]];
+        // The nearest edge is one that has the point on its outer side.
+        if outline_m.len() > 2 && edge[0] * offset[1] - edge[1] * offset[0] >= 0.0 {
+            continue;
+        }
+        is_inside = false;
+        let length_squared = edge[0] * edge[0] + edge[1] * edge[1];
+        let t = ((edge[0] * offset[0] + edge[1] * offset[1]) / length_squared).clamp(0.0, 1.0);
+        let t = if t.is_nan() { 0.0 } else { t };
+        let gap = [offset[0] - t * edge[0], offset[1] - t * edge[1]];
+        best = best.min(gap[0] * gap[0] + gap[1] * gap[1]);
+    }
+    if is_inside { 0.0 } else { best }
+}

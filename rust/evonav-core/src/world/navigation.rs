@@ -1,0 +1,298 @@
+//! Where an agent can stand, how it can move, and the shortest way.
+
+use std::{
+    collections::{HashMap, VecDeque},
+    sync::OnceLock,
+};
+
+use crate::{
+    Error,
+    geometry::{Vec2, distance_2d_m},
+    grid::GridSpec,
+    world::{
+        collision::{AgentBody, Obstacles, distance_squared},
+        footprint::footprint,
+        paths::VisibilityGraph,
+        scene::{BodyKind, Scene},
+    },
+};
+
+/// What blocks an agent, and how far a point off the free space is pulled back to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NavigationConfig {
+    /// Things that end below this height are walked over: rugs, sheets of paper, door sills.
+    pub step_height_m: f64,
+    /// Farthest that [`Navigation::snap`] moves a point.
+    pub snap_m: f64,
+}
+
+impl Default for NavigationConfig {
+    fn default() -> Self {
+        Self { step_height_m: 0.03, snap_m: 0.5 }
+    }
+}
+
+/// Rooms' floors end under the walls; a centre this far off them is still indoors.
+const FLOOR_SLACK_M: f64 = 0.05;
+/// Margin of maps around the house, so that its walls are on them.
+const MAP_MARGIN_M: f64 = 0.5;
+/// Pitch of the places that [`Navigation::snap`] tries.
+const SNAP_PITCH_M: f64 = 0.025;
+
+/// Free space of one scene for one agent body: exact collision queries and shortest paths.
+///
+/// Building costs about a millisecond a house, so a changed scene gets a new one
+/// ([`Navigation::with_scene`]); what paths need is computed by the first searches and kept.
+#[derive(Debug)]
+pub struct Navigation {
+    agent: AgentBody,
+    config: NavigationConfig,
+    obstacles: Obstacles,
+    /// Footprints of the floors' parts.
+    floors_m: Vec<Vec<Vec2>>,
+    min_m: Vec2,
+    max_m: Vec2,
+    graph: OnceLock<VisibilityGraph>,
+}
+
+impl Navigation {
+    /// Free space of `scene` for an agent.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if a length is not finite and positive, the agent's height less
+    /// than twice its radius or the step not below its height; [`Error::Simulation`] if the scene
+    /// has no floor or its geometry is not finite.
+    pub fn build(scene: &Scene, agent: AgentBody, config: NavigationConfig) -> Result<Self, Error> {
+        let is_length = |v: f64| v.is_finite() && v > 0.0;
+        Error::require("radius_m", agent.radius_m, "finite and > 0", is_length)?;
+        Error::require("height_m", agent.height_m, "finite and at least 2 radius_m", |v| {
+            v.is_finite() && v >= 2.0 * agent.radius_m
+        })?;
+        Error::require("step_height_m", config.step_height_m, "0 or more, below height_m", |v| {
+            (0.0..agent.height_m).contains(&v)
+        })?;
+        Error::require("snap_m", config.snap_m, "between 0 and 10", |v| (0.0..=10.0).contains(&v))?;
+        let obstacles = Obstacles::build(&scene.bodies, agent, config.step_height_m)?;
+        let floors_m = floors_of(scene)?;
+        let (mut min_m, mut max_m) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for point in floors_m.iter().flatten() {
+            for axis in 0..2 {
+                min_m[axis] = min_m[axis].min(point[axis]);
+                max_m[axis] = max_m[axis].max(point[axis]);
+            }
+        }
+        Ok(Self { agent, config, obstacles, floors_m, min_m, max_m, graph: OnceLock::new() })
+    }
+
+    /// The same agent and settings in a changed scene.
+    ///
+    /// # Errors
+    /// As [`Navigation::build`].
+    pub fn with_scene(&self, scene: &Scene) -> Result<Self, Error> {
+        Self::build(scene, self.agent, self.config)
+    }
+
+    /// The agent's body.
+    pub fn agent(&self) -> AgentBody {
+        self.agent
+    }
+
+    /// What blocks the agent.
+    pub fn obstacles(&self) -> &Obstacles {
+        &self.obstacles
+    }
+
+    /// Whether the agent can stand at `[x, z]`: on a floor and in collision with nothing.
+    pub fn is_free(&self, point_m: Vec2) -> bool {
+        self.is_indoors(point_m) && self.obstacles.is_clear(point_m)
+    }
+
+    /// Whether the agent can move straight from one point to the other, the sweep of its whole
+    /// body touching nothing.
+    pub fn try_move(&self, from_m: Vec2, to_m: Vec2) -> bool {
+        self.is_free(from_m) && self.is_free(to_m) && self.obstacles.is_clear_between(from_m, to_m)
+    }
+
+    /// Points of a square grid through `from_m` that straight moves along the grid reach, as
+    /// AI2-THOR's `GetReachablePositions`: 4-connected, each step swept with the body.
+    ///
+    /// # Returns
+    /// `[x, z]`, by rising z, then x; empty if `from_m` is not free.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if `grid_m` is not finite and at least 0.01.
+    ///
+    /// # Source
+    /// `getReachablePositions` of AI2-THOR's `BaseFPSAgentController`.
+    pub fn reachable_positions(&self, from_m: Vec2, grid_m: f64) -> Result<Vec<Vec2>, Error> {
+        Error::require("grid_m", grid_m, "finite and at least 0.01", |v| {
+            v.is_finite() && v >= 0.01
+        })?;
+        if !self.is_free(from_m) {
+            return Ok(Vec::new());
+        }
+        // Offsets from the start, so that a point has the same coordinates by every way to it.
+        let point_of = |cell: [i64; 2]| [0, 1].map(|i| from_m[i] + cell[i] as f64 * grid_m);
+        let mut seen: HashMap<[i64; 2], bool> = HashMap::from([([0, 0], true)]);
+        let mut queue = VecDeque::from([[0_i64, 0]]);
+        let mut reached = Vec::new();
+        while let Some(cell) = queue.pop_front() {
+            reached.push(cell);
+            for step in [[1, 0], [0, 1], [-1, 0], [0, -1]] {
+                let next = [cell[0] + step[0], cell[1] + step[1]];
+                if seen.get(&next) == Some(&true) {
+                    continue;
+                }
+                let to = point_of(next);
+                let is_free = *seen.entry(next).or_insert_with(|| !self.is_free(to));
+                // `false` marks a free point that no move has reached yet.
+                if !is_free && self.obstacles.is_clear_between(point_of(cell), to) {
+                    seen.insert(next, true);
+                    queue.push_back(next);
+                }
+            }
+        }
+        reached.sort_unstable_by_key(|&[x, z]| (z, x));
+        Ok(reached.into_iter().map(point_of).collect())
+    }
+
+    /// The nearest of `reachable_m` to a point, the first of equals; `None` if there is none.
+    pub fn nearest_reachable(&self, point_m: Vec2, reachable_m: &[Vec2]) -> Option<Vec2> {
+        reachable_m
+            .iter()
+            .copied()
+            .min_by(|&a, &b| distance_2d_m(a, point_m).total_cmp(&distance_2d_m(b, point_m)))
+    }
+
+    /// The nearest free point within [`NavigationConfig::snap_m`], to 2.5 cm; the point itself if
+    /// it is free.
+    pub fn snap(&self, point_m: Vec2) -> Option<Vec2> {
+        if self.is_free(point_m) {
+            return Some(point_m);
+        }
+        let reach = (self.config.snap_m / SNAP_PITCH_M).floor() as i64;
+        let mut offsets: Vec<[i64; 2]> = (-reach..=reach)
+            .flat_map(|x| (-reach..=reach).map(move |z| [x, z]))
+            .filter(|[x, z]| x * x + z * z <= reach * reach)
+            .collect();
+        offsets.sort_unstable_by_key(|&[x, z]| (x * x + z * z, x, z));
+        offsets
+            .into_iter()
+            .map(|offset| [0, 1].map(|i| point_m[i] + offset[i] as f64 * SNAP_PITCH_M))
+            .find(|&candidate| self.is_free(candidate))
+    }
+
+    /// Shortest any-angle path of the agent's axis, with its whole body clear of everything.
+    ///
+    /// # Returns
+    /// Corners, both ends (snapped) included; `None` if an end is too far off the free space or
+    /// there is no way. The length is within 1.3% of its arcs around obstacles of the exact
+    /// shortest path's, the same in both directions up to rounding.
+    pub fn shortest_path(&self, start_m: Vec2, target_m: Vec2) -> Option<Vec<Vec2>> {
+        let (start_m, target_m) = (self.snap(start_m)?, self.snap(target_m)?);
+        self.graph().shortest_path(&self.obstacles, start_m, target_m)
+    }
+
+    /// Length of the shortest path to each target, infinite where there is none.
+    pub fn distances_m(&self, start_m: Vec2, targets_m: &[Vec2]) -> Vec<f64> {
+        let Some(start_m) = self.snap(start_m) else {
+            return vec![f64::INFINITY; targets_m.len()];
+        };
+        let snapped: Vec<Option<Vec2>> = targets_m.iter().map(|&t| self.snap(t)).collect();
+        let free: Vec<Vec2> = snapped.iter().copied().flatten().collect();
+        let mut lengths = self.graph().distances_m(&self.obstacles, start_m, &free).into_iter();
+        let length_of = |target: Option<Vec2>| target.and_then(|_| lengths.next());
+        snapped.into_iter().map(length_of).map(|l| l.unwrap_or(f64::INFINITY)).collect()
+    }
+
+    /// A grid over the whole house and its outer walls, aligned to multiples of `cell_m`: the
+    /// same for all stages of a task, since rooms stay.
+    ///
+    /// # Errors
+    /// As [`GridSpec::covering`].
+    pub fn map_spec(&self, cell_m: f64) -> Result<GridSpec, Error> {
+        GridSpec::covering(
+            self.min_m.map(|v| v - MAP_MARGIN_M),
+            self.max_m.map(|v| v + MAP_MARGIN_M),
+            cell_m,
+        )
+    }
+
+    /// Cells that something between the step height and the agent's height stands in, or that
+    /// are off the floors: 1 blocked, 0 free, row-major.
+    ///
+    /// A cell is blocked however little of it is covered, so no wall is too thin.
+    pub fn occupancy(&self, spec: &GridSpec) -> Vec<u8> {
+        let mut cells: Vec<u8> = (0..spec.len())
+            .map(|i| u8::from(!self.is_indoors(spec.centre_m([i / spec.cols, i % spec.cols]))))
+            .collect();
+        for obstacle in self.obstacles.iter() {
+            fill_outline(spec, &obstacle.outline_m, &mut cells);
+        }
+        cells
+    }
+
+    fn is_indoors(&self, point_m: Vec2) -> bool {
+        self.floors_m.iter().any(|f| distance_squared(f, point_m) <= FLOOR_SLACK_M * FLOOR_SLACK_M)
+    }
+
+    fn graph(&self) -> &VisibilityGraph {
+        self.graph
+            .get_or_init(|| VisibilityGraph::build(&self.obstacles, |point| self.is_free(point)))
+    }
+}
+
+fn floors_of(scene: &Scene) -> Result<Vec<Vec<Vec2>>, Error> {
+    let floors_m: Vec<Vec<Vec2>> = scene
+        .bodies
+        .iter()
+        .filter(|body| body.kind == BodyKind::Floor)
+        .flat_map(|body| &body.parts)
+        .filter_map(|part| footprint(part, f64::MIN, f64::MAX))
+        .map(|shadow| shadow.outline_m)
+        .collect();
+    let is_sound =
+        !floors_m.is_empty() && floors_m.iter().flatten().flatten().all(|v| v.is_finite());
+    let message = || "the house has no floor, or one that is not finite".to_owned();
+    if is_sound { Ok(floors_m) } else { Err(Error::Simulation { message: message() }) }
+}
+
+/// Marks the cells that share more than a border with a convex outline.
+fn fill_outline(spec: &GridSpec, outline_m: &[Vec2], cells: &mut [u8]) {
+    const BORDER: f64 = 1e-6; // of a cell
+    let in_cells: Vec<Vec2> =
+        outline_m.iter().map(|p| [0, 1].map(|i| (p[i] - spec.corner_m[i]) / spec.cell_m)).collect();
+    let range = |axis: usize, count: usize, band: [f64; 2]| {
+        let [low, high] = extent_in_band(&in_cells, axis, band);
+        // One cell at least, so that a sheet standing on a border is not lost.
+        let first = (low + BORDER).floor();
+        let last = (high - BORDER).ceil().max(first + 1.0);
+        if low <= high {
+            first.max(0.0) as usize..(last.max(0.0) as usize).min(count)
+        } else {
+            0..0
+        }
+    };
+    for row in range(1, spec.rows, [f64::NEG_INFINITY, f64::INFINITY]) {
+        for col in range(0, spec.cols, [row as f64 + BORDER, row as f64 + 1.0 - BORDER]) {
+            cells[spec.index([row, col])] = 1;
+        }
+    }
+}
+
+/// Extent along `axis` of what a convex outline has where the other axis is within `band`.
+fn extent_in_band(outline: &[Vec2], axis: usize, band: [f64; 2]) -> [f64; 2] {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for (i, a) in outline.iter().enumerate() {
+        let b = outline[(i + 1) % outline.len()];
+        let (u, v) = (a[1 - axis], b[1 - axis]);
+        let along = |at: f64| a[axis] + (at - u) / (v - u) * (b[axis] - a[axis]);
+        let is_in = |at: f64| band[0] <= at && at <= band[1];
+        let ends = [is_in(u).then_some(a[axis]), is_in(v).then_some(b[axis])];
+        let cuts = band.map(|at| ((u < at) != (v < at)).then(|| along(at)));
+        for value in ends.into_iter().chain(cuts).flatten() {
+            (low, high) = (low.min(value), high.max(value));
+        }
+    }
+    [low, high]
+}
