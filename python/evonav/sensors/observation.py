@@ -38,6 +38,7 @@ class View:
     """One camera pose's worth of sensing."""
 
     pose: Pose
+    """The camera's own, as in `Frame`: `y_m` is the height of its optical centre."""
     intrinsics: Intrinsics
     depth_m: NDArray[np.float32]
     """`(H, W)` planar z, `inf` where nothing is."""

@@ -57,6 +57,7 @@ class Frame:
     """What the simulator renders at one camera pose. For evaluators: holds instance ids."""
 
     pose: Pose
+    """The camera's own: `y_m` is the height of its optical centre (`config.camera_height_m`), not the agent's."""
     intrinsics: Intrinsics
     depth_m: NDArray[np.float32]
     """`(H, W)`, planar z in metres, `inf` where nothing is."""
@@ -91,7 +92,11 @@ class SceneObject:
 
 
 class Simulator(Protocol):
-    """One house at a time; `check_simulator` tests an implementation."""
+    """One house at a time; `evonav.world.check.check_simulator` tests an implementation.
+
+    Agent poses and positions that it returns have AI2-THOR's height, the middle of the body
+    (`config.agent_height_m / 2`); heights that it is given do not matter.
+    """
 
     config: SimulatorConfig
 
@@ -118,7 +123,11 @@ class Simulator(Protocol):
         ...
 
     def render(self, pose: Pose | None = None, *, rgb: bool = True, instances: bool = True) -> Frame:
-        """What the camera sees from `pose` (default: the agent's)."""
+        """What the camera sees when the agent is at `pose` (default: where it is).
+
+        The camera is `config.camera_height_m` over the floor, whatever `pose.y_m`. Colours cost more than the rest
+        together: pass `rgb=False` unless they are looked at.
+        """
         ...
 
     def reachable_positions(self) -> NDArray[np.float64]:
