@@ -115,10 +115,10 @@ fn recorded_houses_survive() {
             let name = format!("{}:{}", path.file_name().expect("a name").display(), index + 1);
             match House::from_json(&name, &document.to_string()) {
                 Ok(house) => assert_eq!(house.to_json(), document.to_string()),
-                Err(error) => println!("{error}"),
+                Err(error) => eprintln!("{error}"),
             }
             num_houses += 1;
         }
     }
-    println!("{num_houses} houses");
+    eprintln!("{num_houses} houses");
 }

@@ -1,0 +1,252 @@
+//! The asset catalogue that ships with evonav; `scripts/build_asset_catalogue.py` makes its data.
+
+use std::{collections::HashMap, sync::OnceLock};
+
+use serde::Deserialize;
+
+use super::{Asset, Split, placement::PlacementRule, unknown};
+use crate::{
+    Error,
+    geometry::Vec3,
+    house::{House, Object},
+};
+
+/// Facts about 1,653 assets of 109 categories and 1,245 materials.
+#[derive(Debug)]
+pub struct Catalogue {
+    assets: HashMap<String, Asset>,
+    categories: HashMap<String, Category>,
+    materials: HashMap<String, [u8; 3]>,
+}
+
+/// What to do about an asset id that the catalogue does not hold (Objaverse assets).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum UnknownAssets {
+    /// Refuse the house, naming the object.
+    #[default]
+    Error,
+    /// Take a size from the object's place and its category, as [`Catalogue::asset_of`] says.
+    CategoryDefault,
+}
+
+/// What is known of a category beyond its assets.
+#[derive(Debug, Default)]
+struct Category {
+    rule: Option<PlacementRule>,
+    /// Share of a receptacle category's instances on which one was seen.
+    supports: HashMap<String, f64>,
+    /// Its assets, sorted.
+    asset_ids: Vec<String>,
+    median_size_m: Vec3,
+}
+
+#[derive(Deserialize)]
+struct AssetFile {
+    assets: Vec<AssetRow>,
+}
+
+#[derive(Deserialize)]
+struct AssetRow {
+    id: String,
+    category: String,
+    size_m: Vec3,
+    #[serde(default)]
+    split: Option<Split>,
+    #[serde(default)]
+    surfaces_m: Vec<f64>,
+    #[serde(default)]
+    colours: Vec<String>,
+    #[serde(default)]
+    materials: Vec<String>,
+    #[serde(default)]
+    pickupable: bool,
+    #[serde(default)]
+    moveable: bool,
+    #[serde(default)]
+    receptacle: bool,
+    #[serde(default)]
+    openable: bool,
+}
+
+#[derive(Deserialize)]
+struct CategoryFile {
+    categories: Vec<CategoryRow>,
+}
+
+#[derive(Deserialize)]
+struct CategoryRow {
+    name: String,
+    #[serde(default)]
+    supports: HashMap<String, f64>,
+    #[serde(flatten)]
+    rule: Option<PlacementRule>,
+}
+
+#[derive(Deserialize)]
+struct MaterialFile {
+    materials: Vec<(String, String)>,
+}
+
+impl Catalogue {
+    /// The catalogue in this build; read once, on first use.
+    pub fn bundled() -> &'static Self {
+        static BUNDLED: OnceLock<Catalogue> = OnceLock::new();
+        BUNDLED.get_or_init(|| {
+            let assets = include_str!("../../data/assets.json");
+            let categories = include_str!("../../data/categories.json");
+            let materials = include_str!("../../data/materials.json");
+            // Part of the build, and a test reads it: no input of a user can make this fail.
+            #[allow(clippy::expect_used)]
+            Self::from_json(assets, categories, materials).expect("bundled catalogue is valid")
+        })
+    }
+
+    fn from_json(assets: &str, categories: &str, materials: &str) -> serde_json::Result<Self> {
+        let assets: AssetFile = serde_json::from_str(assets)?;
+        let categories: CategoryFile = serde_json::from_str(categories)?;
+        let materials: MaterialFile = serde_json::from_str(materials)?;
+        let mut by_name: HashMap<String, Category> = HashMap::new();
+        for row in categories.categories {
+            let category =
+                Category { rule: row.rule, supports: row.supports, ..Category::default() };
+            by_name.insert(row.name, category);
+        }
+        let mut by_id = HashMap::new();
+        for row in assets.assets {
+            let category = by_name.entry(row.category.clone()).or_default();
+            category.asset_ids.push(row.id.clone());
+            by_id.insert(row.id.clone(), Asset::from(row));
+        }
+        #[allow(clippy::iter_over_hash_type, reason = "each entry on its own")]
+        for category in by_name.values_mut() {
+            category.median_size_m =
+                median_size(category.asset_ids.iter().filter_map(|id| by_id.get(id)));
+        }
+        let colours = materials.materials.into_iter().map(|(name, hex)| (name, rgb(&hex)));
+        Ok(Self { assets: by_id, categories: by_name, materials: colours.collect() })
+    }
+
+    /// Facts about an asset; `None` if the catalogue does not hold it.
+    pub fn get(&self, asset_id: &str) -> Option<&Asset> {
+        self.assets.get(asset_id)
+    }
+
+    /// Ids of all assets, sorted.
+    pub fn asset_ids(&self) -> Vec<&str> {
+        let mut ids: Vec<&str> = self.assets.keys().map(String::as_str).collect();
+        ids.sort_unstable();
+        ids
+    }
+
+    /// Names of all categories, sorted.
+    pub fn categories(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = self.categories.keys().map(String::as_str).collect();
+        names.sort_unstable();
+        names
+    }
+
+    /// Ids of the assets of a category, sorted; empty if the category is unknown.
+    pub fn assets_in(&self, category: &str) -> &[String] {
+        self.categories.get(category).map_or(&[], |category| &category.asset_ids)
+    }
+
+    /// Median edge lengths of a category's assets.
+    pub fn median_size_m(&self, category: &str) -> Option<Vec3> {
+        self.categories.get(category).map(|category| category.median_size_m)
+    }
+
+    /// Asset of an object of `house`.
+    ///
+    /// With [`UnknownAssets::CategoryDefault`] an asset that the catalogue does not hold gets
+    /// * as category its `objectType`, without Objaverse's prefix `Obja`;
+    /// * the proportions of the nearest catalogue category (by name), or of a block;
+    /// * the height that its place implies: twice the height of its centre above the floor or
+    ///   the surface under it, since positions are box centres;
+    /// * on a wall, the depth that keeps it flush with the wall.
+    ///
+    /// # Errors
+    /// [`Error::House`] naming the object and its `assetId` if the asset is unknown and `unknown`
+    /// is [`UnknownAssets::Error`].
+    pub fn asset_of(
+        &self,
+        house: &House,
+        object: &Object,
+        unknown: UnknownAssets,
+    ) -> Result<Asset, Error> {
+        match (self.get(&object.asset_id), unknown) {
+            (Some(asset), _) => Ok(asset.clone()),
+            (None, UnknownAssets::CategoryDefault) => {
+                Ok(unknown::category_default(self, house, object))
+            }
+            (None, UnknownAssets::Error) => Err(Error::House {
+                house: house.name.clone(),
+                object: object.id.clone(),
+                field: "assetId".to_owned(),
+                message: format!(
+                    "is {:?}, of which the catalogue knows no size; category defaults would guess one",
+                    object.asset_id
+                ),
+            }),
+        }
+    }
+
+    /// Where a category stands; `None` if it was never annotated.
+    pub fn placement(&self, category: &str) -> Option<&PlacementRule> {
+        self.categories.get(category)?.rule.as_ref()
+    }
+
+    /// Share of `parent_category`'s instances on which a `child_category` was seen, 0..1.
+    pub fn rest_probability(&self, child_category: &str, parent_category: &str) -> f64 {
+        let supports = self.categories.get(child_category).map(|category| &category.supports);
+        supports.and_then(|supports| supports.get(parent_category)).copied().unwrap_or(0.0)
+    }
+
+    /// Whether a category was ever seen on or in another.
+    pub fn can_rest_on(&self, child_category: &str, parent_category: &str) -> bool {
+        self.rest_probability(child_category, parent_category) > 0.0
+    }
+
+    /// Heights above the box's bottom at which things stand on an asset, rising; empty if it is
+    /// unknown or holds nothing.
+    pub fn surface_heights(&self, asset_id: &str) -> &[f64] {
+        self.get(asset_id).map_or(&[], |asset| &asset.surfaces_m)
+    }
+
+    /// Mean albedo of a material, sRGB.
+    pub fn material_colour(&self, name: &str) -> Option<[u8; 3]> {
+        self.materials.get(name).copied()
+    }
+}
+
+impl From<AssetRow> for Asset {
+    fn from(row: AssetRow) -> Self {
+        Self {
+            id: row.id,
+            category: row.category,
+            size_m: row.size_m,
+            surfaces_m: row.surfaces_m,
+            colours: row.colours.iter().map(|hex| rgb(hex)).collect(),
+            materials: row.materials,
+            split: row.split,
+            is_pickupable: row.pickupable,
+            is_moveable: row.moveable,
+            is_receptacle: row.receptacle,
+            is_openable: row.openable,
+        }
+    }
+}
+
+/// `rrggbb`; black where it is malformed.
+fn rgb(hex: &str) -> [u8; 3] {
+    let [_, red, green, blue] = u32::from_str_radix(hex, 16).unwrap_or(0).to_be_bytes();
+    [red, green, blue]
+}
+
+/// Median of each edge; zeros for no assets.
+fn median_size<'a>(assets: impl Iterator<Item = &'a Asset> + Clone) -> Vec3 {
+    std::array::from_fn(|axis| {
+        let mut edges: Vec<f64> = assets.clone().map(|asset| asset.size_m[axis]).collect();
+        edges.sort_by(f64::total_cmp);
+        edges.get(edges.len() / 2).copied().unwrap_or(0.0)
+    })
+}

@@ -1,0 +1,140 @@
+//! Sizes for assets that the catalogue does not hold, from where the house puts them.
+
+use super::{Asset, catalogue::Catalogue};
+use crate::{
+    geometry::{Vec2, Vec3, distance_2d_m},
+    house::{House, Object},
+};
+
+/// Objaverse words and the ProcTHOR category of about the same proportions; first match counts.
+const ALIKE: [(&str, &str); 40] = [
+    ("Painting", "Painting"),
+    ("Poster", "Painting"),
+    ("Picture", "Painting"),
+    ("Photo", "Painting"),
+    ("Frame", "Painting"),
+    ("Artwork", "Painting"),
+    ("Mirror", "Painting"),
+    ("Plaque", "Painting"),
+    ("Board", "Painting"),
+    ("Sideboard", "Dresser"),
+    ("Cabinet", "Dresser"),
+    ("Commode", "Dresser"),
+    ("Wardrobe", "Dresser"),
+    ("Book", "Book"),
+    ("Bookcase", "ShelvingUnit"),
+    ("Bookshelf", "ShelvingUnit"),
+    ("Shel", "ShelvingUnit"),
+    ("Refrigerator", "Fridge"),
+    ("TrashCan", "GarbageCan"),
+    ("Mailbox", "GarbageCan"),
+    ("Bucket", "GarbageCan"),
+    ("Chair", "Chair"),
+    ("Stool", "Stool"),
+    ("Bench", "CoffeeTable"),
+    ("Bathtub", "Sofa"),
+    ("Couch", "Sofa"),
+    ("Table", "SideTable"),
+    ("Lamp", "DeskLamp"),
+    ("Soap", "SoapBottle"),
+    ("Lotion", "SoapBottle"),
+    ("Bottle", "Bottle"),
+    ("Phone", "CellPhone"),
+    ("Ipod", "CellPhone"),
+    ("Calculator", "CellPhone"),
+    ("Notebook", "Newspaper"),
+    ("Magazine", "Newspaper"),
+    ("Envelope", "Newspaper"),
+    ("Paper", "Newspaper"),
+    ("Flower", "Vase"),
+    ("Figure", "Statue"),
+];
+/// Proportions of what nothing is known of.
+const BLOCK: Vec3 = [0.8, 1.0, 0.8];
+/// Widest footprint that is guessed, so that a guess does not fill a corridor.
+const MAX_EDGE_M: f64 = 1.2;
+const MIN_EDGE_M: f64 = 0.02;
+const MAX_HEIGHT_M: f64 = 2.4;
+/// Wall objects of the recorded houses hang within 0.2 m of their wall.
+const MAX_WALL_DISTANCE_M: f64 = 0.25;
+
+/// The asset that [`Catalogue::asset_of`] describes.
+pub(super) fn category_default(catalogue: &Catalogue, house: &House, object: &Object) -> Asset {
+    let object_type = object.object_type.as_deref().unwrap_or("Unknown");
+    let category =
+        object_type.strip_prefix("Obja").filter(|rest| !rest.is_empty()).unwrap_or(object_type);
+    let alike = like(catalogue, category);
+    let model = alike.and_then(|name| catalogue.median_size_m(name)).unwrap_or(BLOCK);
+    let is_on_wall = object.id.contains("|wall|") || alike == Some("Painting");
+    let size_m =
+        match wall_distance_m(house, object).filter(|&d| is_on_wall && d < MAX_WALL_DISTANCE_M) {
+            Some(distance_m) => [model[0], model[1], (2.0 * distance_m).max(MIN_EDGE_M)],
+            None => scaled(model, 2.0 * height_above_support_m(catalogue, house, object)),
+        };
+    Asset {
+        id: object.asset_id.clone(),
+        category: category.to_owned(),
+        size_m,
+        colours: palette(catalogue, alike, &object.asset_id),
+        is_pickupable: object.parent.is_some() && !object.is_kinematic,
+        ..Asset::default()
+    }
+}
+
+/// Catalogue category of the same name, or of about the same proportions.
+fn like<'a>(catalogue: &Catalogue, category: &'a str) -> Option<&'a str> {
+    if catalogue.median_size_m(category).is_some() {
+        return Some(category);
+    }
+    // Longest word first: a bookcase is no book.
+    let matches = ALIKE.iter().filter(|(word, _)| category.contains(word));
+    matches.max_by_key(|(word, _)| word.len()).map(|&(_, name)| name)
+}
+
+/// `model` scaled to `height_m`, within sane bounds.
+fn scaled(model: Vec3, height_m: f64) -> Vec3 {
+    let height_m = height_m.clamp(MIN_EDGE_M, MAX_HEIGHT_M);
+    let scale = height_m / model[1].max(MIN_EDGE_M);
+    let edge = |length_m: f64| (length_m * scale).clamp(MIN_EDGE_M, MAX_EDGE_M);
+    [edge(model[0]), height_m, edge(model[2])]
+}
+
+/// Height of the object's centre above the floor, or above the highest surface of its parent
+/// that lies below the centre.
+fn height_above_support_m(catalogue: &Catalogue, house: &House, object: &Object) -> f64 {
+    let y = object.position_m[1];
+    let Some(parent) = object.parent.and_then(|index| house.objects.get(index)) else {
+        return y;
+    };
+    let Some(asset) = catalogue.get(&parent.asset_id) else {
+        // On another unknown asset, whose own centre lies below: half of what is left.
+        return 0.5 * (y - parent.position_m[1]).abs();
+    };
+    let bottom_m = parent.position_m[1] - 0.5 * asset.size_m[1];
+    let below = asset.surfaces_m.iter().map(|height_m| bottom_m + height_m).filter(|&top| top < y);
+    y - below.fold(bottom_m.min(y), f64::max)
+}
+
+/// Distance to the nearest wall that is there.
+fn wall_distance_m(house: &House, object: &Object) -> Option<f64> {
+    let point_m = [object.position_m[0], object.position_m[2]];
+    let walls = house.walls.iter().filter(|wall| !wall.is_empty);
+    walls.map(|wall| segment_distance_m(wall.from_m, wall.to_m, point_m)).min_by(f64::total_cmp)
+}
+
+fn segment_distance_m(from_m: Vec2, to_m: Vec2, point_m: Vec2) -> f64 {
+    let along = [to_m[0] - from_m[0], to_m[1] - from_m[1]];
+    let offset = [point_m[0] - from_m[0], point_m[1] - from_m[1]];
+    let length2 = along[0] * along[0] + along[1] * along[1];
+    let part = ((along[0] * offset[0] + along[1] * offset[1]) / length2).clamp(0.0, 1.0);
+    distance_2d_m([from_m[0] + part * along[0], from_m[1] + part * along[1]], point_m)
+}
+
+/// Colours of an asset of the like category, or of a vase, chosen by the id's checksum.
+fn palette(catalogue: &Catalogue, alike: Option<&str>, asset_id: &str) -> Vec<[u8; 3]> {
+    let ids = catalogue.assets_in(alike.unwrap_or("Vase"));
+    let sum =
+        asset_id.bytes().fold(0_usize, |sum, byte| (sum * 31 + usize::from(byte)) % 1_000_003);
+    let chosen = sum.checked_rem(ids.len()).and_then(|index| catalogue.get(&ids[index]));
+    chosen.map_or_else(Vec::new, |asset| asset.colours.clone())
+}
