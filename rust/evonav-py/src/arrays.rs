@@ -1,7 +1,7 @@
 //! Borrowing numpy arrays.
 
 use evonav_core::Error;
-use numpy::{Element, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error;
@@ -17,4 +17,32 @@ pub fn row_major<'a, T: Element>(
     }
     let shape = array.shape();
     Ok((array.as_slice()?, [shape[0], shape[1]]))
+}
+
+/// The `(N, 2)` `[row, col]` rows of an array.
+pub fn cells(name: &str, array: &PyReadonlyArray2<'_, i32>) -> PyResult<Vec<[i32; 2]>> {
+    let (values, shape) = row_major(name, array)?;
+    if shape[1] != 2 {
+        let found = format!("of shape ({}, {})", shape[0], shape[1]);
+        return Err(error::to_py(Error::invalid(name, found, "an array of shape (N, 2)")));
+    }
+    Ok(values.as_chunks::<2>().0.to_vec())
+}
+
+/// `(N, M)` array of `N` rows; the memory moves, nothing is copied.
+pub fn rows_of<T: Element, const M: usize>(
+    py: Python<'_>,
+    rows: Vec<[T; M]>,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let shape = [rows.len(), M];
+    image_of(py, rows.into_flattened(), shape)
+}
+
+/// Array of a shape, of elements in row-major order; the memory moves, nothing is copied.
+pub fn image_of<T: Element>(
+    py: Python<'_>,
+    elements: Vec<T>,
+    shape: [usize; 2],
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    PyArray1::from_vec(py, elements).reshape(shape)
 }

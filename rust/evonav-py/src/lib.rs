@@ -2,11 +2,15 @@
 
 mod arrays;
 mod error;
+mod memory;
+mod sensors;
 
 use pyo3::prelude::*;
 
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
-    error::register(module)
+    error::register(module)?;
+    sensors::register(module)?;
+    memory::register(module)
 }

@@ -1,1 +1,6 @@
-//! See the submodules.
+//! What an agent remembers: an occupancy map with frontiers, and object entries.
+
+pub mod bits;
+pub mod components;
+pub mod frontiers;
+pub mod occupancy;

@@ -1,7 +1,9 @@
-//! What the agent's sensors see.
+//! What a camera at a pose perceives.
 
 pub mod camera;
+pub mod ground_truth;
 pub mod raster;
+pub mod raycast;
+pub mod raycast3d;
 mod raster_fill;
 mod raster_shade;
-pub mod raycast3d;

@@ -1,0 +1,58 @@
+"""Ground-truth perception: the simulator's masks and labels, without its ids."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from evonav import _core
+from evonav.errors import InvalidArgumentError
+from evonav.sensors.observation import Detections
+from evonav.world.simulator import Frame, SceneObject
+
+
+@dataclass(frozen=True, slots=True)
+class GroundTruthPerception:
+    """Masks and labels of the objects in a frame (the paper's ground-truth setting).
+
+    3D-Mem's area filters hold here as well. Its limit on a mask's bounding box (half the image) is off by default: it
+    is there for a detector's mistakes, and would hide a bed from an agent that stands in front of it.
+    """
+
+    min_area_px: int = 25
+    """Fewest pixels of a mask."""
+    min_area_fraction: float = 0.001
+    """Smallest part of the image that a mask covers."""
+    max_box_fraction: float = 1.0
+    """Largest part of the image that a mask's bounding box covers."""
+
+    def detect(self, frame: Frame, objects: Sequence[SceneObject]) -> Detections:
+        """Objects in the frame; walls, floors, ceilings, doors and windows are background.
+
+        Detections are numbered anew in every frame, in the order of their first pixel: neither numbers nor their
+        order tell which instance a detection is.
+
+        Args:
+            frame: Rendered with instances.
+            objects: The simulator's bodies, in instance order.
+
+        Returns:
+            Detections labelled with ProcTHOR's object type, confidence 1, no features.
+
+        Raises:
+            InvalidArgumentError: The frame has no instances, they are outside `objects`, or a parameter of this
+                perception is outside its domain.
+        """
+        if frame.instances is None:
+            raise InvalidArgumentError("argument `frame` has no instances, expected a frame rendered with them")
+        masks, instances = _core.number_instances(
+            frame.instances,
+            np.fromiter((body.kind == "object" for body in objects), np.bool_, len(objects)),
+            min_area_px=max(self.min_area_px, round(self.min_area_fraction * frame.instances.size)),
+            max_box_fraction=self.max_box_fraction,
+        )
+        return Detections(
+            masks=masks,
+            labels=tuple(objects[index].category for index in instances),
+            confidences=np.ones(len(instances), np.float32),
+        )

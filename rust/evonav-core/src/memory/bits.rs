@@ -1,0 +1,128 @@
+//! One bit a cell, 64 cells a word: a 400 x 400 map is 22 kB and stays in cache.
+
+/// A grid of bits, `[row, col]`. Bits outside the grid read as 0.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BitGrid {
+    rows: usize,
+    cols: usize,
+    /// Words a row; the bits beyond `cols` stay 0.
+    stride: usize,
+    words: Vec<u64>,
+}
+
+impl BitGrid {
+    /// All bits 0.
+    pub fn new(rows: usize, cols: usize) -> Self {
+        let stride = cols.div_ceil(64);
+        Self { rows, cols, stride, words: vec![0; rows * stride] }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    pub fn cols(&self) -> usize {
+        self.cols
+    }
+
+    /// The bit of a cell; 0 outside.
+    pub fn get(&self, row: usize, col: usize) -> bool {
+        row < self.rows
+            && col < self.cols
+            && self.words[row * self.stride + col / 64] >> (col % 64) & 1 != 0
+    }
+
+    /// Sets the bit of a cell to 1; nothing outside.
+    pub fn insert(&mut self, row: usize, col: usize) {
+        if row < self.rows && col < self.cols {
+            self.words[row * self.stride + col / 64] |= 1 << (col % 64);
+        }
+    }
+
+    /// Sets the bit of a cell to 0.
+    pub fn remove(&mut self, row: usize, col: usize) {
+        if row < self.rows && col < self.cols {
+            self.words[row * self.stride + col / 64] &= !(1 << (col % 64));
+        }
+    }
+
+    /// Sets the bits `start..end` of a row to 1.
+    pub fn insert_run(&mut self, row: usize, start: usize, end: usize) {
+        let end = end.min(self.cols);
+        if row >= self.rows || start >= end {
+            return;
+        }
+        let words = &mut self.words[row * self.stride..][..self.stride];
+        let (first, last) = (start / 64, (end - 1) / 64);
+        for (index, word) in words.iter_mut().enumerate().take(last + 1).skip(first) {
+            let low = if index == first { start % 64 } else { 0 };
+            let high = if index == last { (end - 1) % 64 } else { 63 };
+            *word |= (u64::MAX >> (63 - (high - low))) << low;
+        }
+    }
+
+    /// Sets all bits to 0.
+    pub fn clear(&mut self) {
+        self.words.fill(0);
+    }
+
+    /// Number of bits that are 1.
+    pub fn count(&self) -> usize {
+        self.words.iter().map(|word| word.count_ones() as usize).sum()
+    }
+
+    /// The words of a row, bit `col % 64` of word `col / 64`; empty for a row outside.
+    pub fn row(&self, row: usize) -> &[u64] {
+        if row < self.rows { &self.words[row * self.stride..][..self.stride] } else { &[] }
+    }
+
+    /// The words of a row, to write; bits beyond the last column must stay 0.
+    pub(crate) fn row_mut(&mut self, row: usize) -> &mut [u64] {
+        &mut self.words[row * self.stride..][..self.stride]
+    }
+
+    /// The bits of a word that lie on the grid.
+    pub(crate) fn word_mask(&self, word: usize) -> u64 {
+        let cols = self.cols - (word * 64).min(self.cols);
+        if cols >= 64 { u64::MAX } else { (1 << cols) - 1 }
+    }
+
+    /// `[row, col]` of the bits that are 1, row-major.
+    pub fn cells(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
+        (0..self.rows).flat_map(move |row| {
+            self.row(row)
+                .iter()
+                .enumerate()
+                .flat_map(move |(index, &word)| ones(word).map(move |bit| [row, index * 64 + bit]))
+        })
+    }
+
+    /// Number of 1 bits among the 5 x 5 cells around a cell.
+    pub(crate) fn count_5x5(&self, row: usize, col: usize) -> u32 {
+        (row.saturating_sub(2)..=row + 2)
+            .map(|r| {
+                let words = self.row(r);
+                let at = |word: usize| words.get(word).copied().unwrap_or(0);
+                // The five bits from col - 2, across a word's border if need be.
+                let first = (col + 62) / 64;
+                let pair = if first == 0 {
+                    u128::from(at(0)) << 64
+                } else {
+                    u128::from(at(first - 1)) | u128::from(at(first)) << 64
+                };
+                ((pair >> ((col + 62) % 64)) & 0b11111).count_ones()
+            })
+            .sum()
+    }
+}
+
+/// Positions of the 1 bits of a word, ascending.
+pub(crate) fn ones(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (word != 0).then(|| word.trailing_zeros() as usize)?;
+        word &= word - 1;
+        Some(bit)
+    })
+}

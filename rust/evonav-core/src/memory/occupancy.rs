@@ -1,0 +1,271 @@
+//! The agent's occupancy map: what it has seen of the floor so far.
+
+use crate::{
+    Error, geometry::Vec2, grid::GridSpec, memory::bits::BitGrid, sensors::raycast::VisibleCells,
+};
+
+/// Value of a cell in [`OccupancyMap::cells`].
+pub const UNKNOWN: u8 = 0;
+/// Value of a cell in [`OccupancyMap::cells`].
+pub const FREE: u8 = 1;
+/// Value of a cell in [`OccupancyMap::cells`].
+pub const BLOCKED: u8 = 2;
+
+/// Seen cells whose state contradicts the map, `[row, col]`.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Conflicts {
+    /// Remembered blocked, now seen free.
+    pub freed: Vec<[i32; 2]>,
+    /// Remembered free, now seen blocked.
+    pub obstructed: Vec<[i32; 2]>,
+}
+
+impl Conflicts {
+    /// Number of contradicting cells.
+    pub fn len(&self) -> usize {
+        self.freed.len() + self.obstructed.len()
+    }
+
+    /// Whether nothing contradicts.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Unknown, free and blocked cells, and which of them were seen from close by (*explored*).
+///
+/// Cells are told only by [`OccupancyMap::integrate`]; the last observation of a cell wins. Cells
+/// that [`OccupancyMap::assume_free`] has filled in count as free until seen, and contradict nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OccupancyMap {
+    spec: GridSpec,
+    free: BitGrid,
+    blocked: BitGrid,
+    explored: BitGrid,
+    /// Free by assumption, not by sight.
+    assumed: BitGrid,
+}
+
+impl OccupancyMap {
+    /// A map of unknown cells.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the grid has no cell, too many, or its place is not finite.
+    pub fn new(spec: GridSpec) -> Result<Self, Error> {
+        Error::require("cell_m", spec.cell_m, "finite and > 0", |v| v.is_finite() && v > 0.0)?;
+        for value in spec.corner_m {
+            Error::require("corner_m", value, "finite", f64::is_finite)?;
+        }
+        let num_cells = spec.rows as f64 * spec.cols as f64;
+        Error::require("rows * cols", num_cells, "in 1..=2^26", |n| {
+            n >= 1.0 && n <= crate::grid::MAX_CELLS as f64
+        })?;
+        let empty = BitGrid::new(spec.rows, spec.cols);
+        Ok(Self {
+            spec,
+            free: empty.clone(),
+            blocked: empty.clone(),
+            explored: empty.clone(),
+            assumed: empty,
+        })
+    }
+
+    /// Shape and place.
+    pub fn spec(&self) -> &GridSpec {
+        &self.spec
+    }
+
+    /// Cells known or assumed to be free.
+    pub fn free(&self) -> &BitGrid {
+        &self.free
+    }
+
+    /// Cells known to be blocked.
+    pub fn blocked(&self) -> &BitGrid {
+        &self.blocked
+    }
+
+    /// Cells seen from close by.
+    pub fn explored(&self) -> &BitGrid {
+        &self.explored
+    }
+
+    /// Seen cells that contradict the map; the map stays as it is.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if a cell is off the grid.
+    pub fn conflicts(&self, seen: &VisibleCells) -> Result<Conflicts, Error> {
+        self.check(&seen.free, "free")?;
+        self.check(&seen.blocked, "blocked")?;
+        let among = |cells: &[[i32; 2]], remembered: &BitGrid, but: Option<&BitGrid>| {
+            let contradicts = |cell: &[i32; 2]| {
+                let [row, col] = cell.map(|i| i as usize);
+                remembered.get(row, col) && !but.is_some_and(|but| but.get(row, col))
+            };
+            cells.iter().copied().filter(contradicts).collect()
+        };
+        Ok(Conflicts {
+            freed: among(&seen.free, &self.blocked, None),
+            obstructed: among(&seen.blocked, &self.free, Some(&self.assumed)),
+        })
+    }
+
+    /// Takes over what one view saw, and says what of it contradicted the map.
+    ///
+    /// # Arguments
+    /// * `origin_m` - `[x, z]` from where the cells were seen.
+    /// * `explored_range_m` - seen cells whose centre is nearer than this become explored.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if a cell is off the grid or a number not finite; the map is then unchanged.
+    pub fn integrate(
+        &mut self,
+        seen: &VisibleCells,
+        origin_m: Vec2,
+        explored_range_m: f64,
+    ) -> Result<Conflicts, Error> {
+        check_disc(origin_m, explored_range_m, "origin_m", "explored_range_m")?;
+        let conflicts = self.conflicts(seen)?;
+        let range2 = explored_range_m * explored_range_m;
+        let lists = [(&seen.free, true), (&seen.blocked, false)];
+        for (cells, is_free) in lists {
+            for cell in cells {
+                let [row, col] = cell.map(|i| i as usize);
+                let (now, before) = if is_free {
+                    (&mut self.free, &mut self.blocked)
+                } else {
+                    (&mut self.blocked, &mut self.free)
+                };
+                now.insert(row, col);
+                before.remove(row, col);
+                self.assumed.remove(row, col);
+                if self.distance2_m2([row, col], origin_m) < range2 {
+                    self.explored.insert(row, col);
+                }
+            }
+        }
+        Ok(conflicts)
+    }
+
+    /// Marks the free cells around a place explored (3D-Mem: 0.7 m around the agent after each move).
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if a number is not finite.
+    pub fn explore_around(&mut self, centre_m: Vec2, radius_m: f64) -> Result<(), Error> {
+        check_disc(centre_m, radius_m, "centre_m", "radius_m")?;
+        for [row, col] in self.disc(centre_m, radius_m) {
+            if self.free.get(row, col) {
+                self.explored.insert(row, col);
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the unknown cells around a place for free and explored until they are seen (3D-Mem:
+    /// 0.6 m around the agent's start, which no camera sees).
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if a number is not finite.
+    pub fn assume_free(&mut self, centre_m: Vec2, radius_m: f64) -> Result<(), Error> {
+        check_disc(centre_m, radius_m, "centre_m", "radius_m")?;
+        for [row, col] in self.disc(centre_m, radius_m) {
+            if !self.free.get(row, col) && !self.blocked.get(row, col) {
+                self.free.insert(row, col);
+                self.assumed.insert(row, col);
+            }
+            if self.free.get(row, col) {
+                self.explored.insert(row, col);
+            }
+        }
+        Ok(())
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        for plane in [&mut self.free, &mut self.blocked, &mut self.explored, &mut self.assumed] {
+            plane.clear();
+        }
+    }
+
+    /// Forgets the given cells; they become unknown and unexplored.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if a cell is off the grid; the map is then unchanged.
+    pub fn forget(&mut self, cells: &[[i32; 2]]) -> Result<(), Error> {
+        self.check(cells, "cells")?;
+        for cell in cells {
+            let [row, col] = cell.map(|i| i as usize);
+            for plane in [&mut self.free, &mut self.blocked, &mut self.explored, &mut self.assumed]
+            {
+                plane.remove(row, col);
+            }
+        }
+        Ok(())
+    }
+
+    /// A value a cell, row-major: [`UNKNOWN`], [`FREE`] or [`BLOCKED`].
+    pub fn cells(&self) -> Vec<u8> {
+        let mut cells = vec![UNKNOWN; self.spec.len()];
+        for (plane, value) in [(&self.free, FREE), (&self.blocked, BLOCKED)] {
+            for cell in plane.cells() {
+                cells[self.spec.index(cell)] = value;
+            }
+        }
+        cells
+    }
+
+    /// Whether each cell is explored, row-major.
+    pub fn explored_cells(&self) -> Vec<bool> {
+        let mut cells = vec![false; self.spec.len()];
+        for cell in self.explored.cells() {
+            cells[self.spec.index(cell)] = true;
+        }
+        cells
+    }
+
+    fn check(&self, cells: &[[i32; 2]], name: &str) -> Result<(), Error> {
+        let (rows, cols) = (self.spec.rows, self.spec.cols);
+        let is_outside = |cell: &&[i32; 2]| {
+            let [row, col] = cell.map(|i| usize::try_from(i).unwrap_or(usize::MAX));
+            row >= rows || col >= cols
+        };
+        match cells.iter().find(is_outside) {
+            None => Ok(()),
+            Some(cell) => Err(Error::invalid(name, format!("{cell:?}"), "cells of the map")),
+        }
+    }
+
+    fn distance2_m2(&self, cell: [usize; 2], point_m: Vec2) -> f64 {
+        let centre_m = self.spec.centre_m(cell);
+        (centre_m[0] - point_m[0]).powi(2) + (centre_m[1] - point_m[1]).powi(2)
+    }
+
+    /// Cells whose centre is nearer than `radius_m`.
+    fn disc(&self, centre_m: Vec2, radius_m: f64) -> Vec<[usize; 2]> {
+        let index = |value_m: f64, axis: usize, num: usize| {
+            ((value_m - self.spec.corner_m[axis]) / self.spec.cell_m).clamp(0.0, num as f64)
+                as usize
+        };
+        let span = |axis: usize, num: usize| {
+            let end = index(centre_m[axis] + radius_m, axis, num) + 1;
+            index(centre_m[axis] - radius_m, axis, num)..end.min(num)
+        };
+        let cols = span(0, self.spec.cols);
+        span(1, self.spec.rows)
+            .flat_map(|row| cols.clone().map(move |col| [row, col]))
+            .filter(|&cell| self.distance2_m2(cell, centre_m) < radius_m * radius_m)
+            .collect()
+    }
+}
+
+fn check_disc(
+    centre_m: Vec2,
+    radius_m: f64,
+    centre_name: &str,
+    radius_name: &str,
+) -> Result<(), Error> {
+    for value in centre_m {
+        Error::require(centre_name, value, "finite", f64::is_finite)?;
+    }
+    Error::require(radius_name, radius_m, "finite and >= 0", |v| v.is_finite() && v >= 0.0)
+}

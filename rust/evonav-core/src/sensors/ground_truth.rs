@@ -1,0 +1,99 @@
+//! Ground-truth perception: the simulator's instance image as anonymous detections.
+
+use crate::Error;
+
+/// What counts as a detection.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MaskFilter {
+    /// Fewest pixels of a mask.
+    pub min_area_px: usize,
+    /// Largest part of the image that a mask's bounding box may cover.
+    pub max_box_fraction: f64,
+}
+
+/// An instance image renumbered.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Masks {
+    /// Detection of each pixel, -1 where none.
+    pub labels: Vec<i32>,
+    /// Instance (index into the caller's table) of each detection.
+    pub instances: Vec<usize>,
+}
+
+/// Renumbers an instance image: detections count up in the order of their first pixel, so their
+/// numbers say nothing about which instance they are.
+///
+/// # Arguments
+/// * `image` - row-major, `width_px` a row; 0 where nothing is, else 1 + index into `is_detectable`.
+/// * `is_detectable` - by instance, whether it may be detected (walls may not).
+///
+/// # Errors
+/// [`Error::InvalidArgument`] if the image is not whole rows, holds a number outside the table, or the filter is not a number.
+///
+/// # Complexity
+/// O(pixels + instances), two passes.
+pub fn number_instances(
+    image: &[i32],
+    width_px: usize,
+    is_detectable: &[bool],
+    filter: MaskFilter,
+) -> Result<Masks, Error> {
+    Error::require("max_box_fraction", filter.max_box_fraction, "in 0..=1", |v| {
+        (0.0..=1.0).contains(&v)
+    })?;
+    if width_px == 0 || !image.len().is_multiple_of(width_px) {
+        return Err(Error::invalid("instances", image.len(), "whole rows of pixels"));
+    }
+    let mut extents = vec![Extent::EMPTY; is_detectable.len()];
+    let mut order = Vec::new();
+    for (row, pixels) in image.chunks_exact(width_px).enumerate() {
+        for (col, &value) in pixels.iter().enumerate() {
+            let Some(instance) = usize::try_from(value).ok().and_then(|v| v.checked_sub(1)) else {
+                Error::require("instances", value, "0 or 1 + an index of an object", |v| v == 0)?;
+                continue;
+            };
+            let extent = extents.get_mut(instance).ok_or_else(|| {
+                Error::invalid("instances", value, "0 or 1 + an index of an object")
+            })?;
+            if extent.area_px == 0 {
+                order.push(instance);
+            }
+            extent.add(row, col);
+        }
+    }
+    let max_box_px = filter.max_box_fraction * image.len() as f64;
+    order.retain(|&instance| {
+        let extent = &extents[instance];
+        is_detectable[instance]
+            && extent.area_px >= filter.min_area_px
+            && extent.box_px() as f64 <= max_box_px
+    });
+    let mut number_of = vec![-1; is_detectable.len() + 1];
+    for (number, &instance) in order.iter().enumerate() {
+        number_of[instance + 1] = number as i32;
+    }
+    let labels = image.iter().map(|&value| number_of[value as usize]).collect();
+    Ok(Masks { labels, instances: order })
+}
+
+/// Area and bounding box of one instance's pixels.
+#[derive(Debug, Clone, Copy)]
+struct Extent {
+    area_px: usize,
+    rows: [usize; 2],
+    cols: [usize; 2],
+}
+
+impl Extent {
+    const EMPTY: Self = Self { area_px: 0, rows: [usize::MAX, 0], cols: [usize::MAX, 0] };
+
+    fn add(&mut self, row: usize, col: usize) {
+        self.area_px += 1;
+        self.rows = [self.rows[0].min(row), self.rows[1].max(row)];
+        self.cols = [self.cols[0].min(col), self.cols[1].max(col)];
+    }
+
+    fn box_px(&self) -> usize {
+        (self.rows[1] - self.rows[0] + 1) * (self.cols[1] - self.cols[0] + 1)
+    }
+}

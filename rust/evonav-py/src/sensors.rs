@@ -1,0 +1,59 @@
+//! `evonav_core::sensors`. Shapes, units and errors: `_core.pyi`.
+
+use evonav_core::{grid::GridSpec, sensors::ground_truth, sensors::raycast};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::{arrays, error};
+
+/// Cells that rays reach: free ones and blocked ones.
+#[pyfunction]
+#[pyo3(signature = (blocked, *, cell_m, corner_m, origin_m, yaw_rad, horizontal_fov_rad, range_m))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
+#[expect(clippy::type_complexity, reason = "a pair of arrays")]
+fn visible_cells<'py>(
+    py: Python<'py>,
+    blocked: PyReadonlyArray2<'py, u8>,
+    cell_m: f64,
+    corner_m: [f64; 2],
+    origin_m: [f64; 2],
+    yaw_rad: f64,
+    horizontal_fov_rad: f64,
+    range_m: f64,
+) -> PyResult<(Bound<'py, PyArray2<i32>>, Bound<'py, PyArray2<i32>>)> {
+    let (cells, [rows, cols]) = arrays::row_major("blocked", &blocked)?;
+    let spec = GridSpec { rows, cols, cell_m, corner_m };
+    let seen = py
+        .detach(|| {
+            raycast::visible_cells(cells, &spec, origin_m, yaw_rad, horizontal_fov_rad, range_m)
+        })
+        .map_err(error::to_py)?;
+    Ok((arrays::rows_of(py, seen.free)?, arrays::rows_of(py, seen.blocked)?))
+}
+
+/// Detections of an instance image: their masks and their instances.
+#[pyfunction]
+#[pyo3(signature = (instances, is_detectable, *, min_area_px, max_box_fraction))]
+#[expect(clippy::type_complexity, reason = "a pair of arrays")]
+fn number_instances<'py>(
+    py: Python<'py>,
+    instances: PyReadonlyArray2<'py, i32>,
+    is_detectable: PyReadonlyArray1<'py, bool>,
+    min_area_px: usize,
+    max_box_fraction: f64,
+) -> PyResult<(Bound<'py, PyArray2<i32>>, Bound<'py, PyArray1<i64>>)> {
+    let (image, shape) = arrays::row_major("instances", &instances)?;
+    let is_detectable = is_detectable.as_slice()?;
+    let filter = ground_truth::MaskFilter { min_area_px, max_box_fraction };
+    let masks = py
+        .detach(|| ground_truth::number_instances(image, shape[1], is_detectable, filter))
+        .map_err(error::to_py)?;
+    let instances = masks.instances.into_iter().map(|index| index as i64).collect();
+    Ok((arrays::image_of(py, masks.labels, shape)?, PyArray1::from_vec(py, instances)))
+}
+
+/// Adds the functions to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(visible_cells, module)?)?;
+    module.add_function(wrap_pyfunction!(number_instances, module)?)
+}
