@@ -3,7 +3,7 @@
 pub mod camera;
 pub mod ground_truth;
 pub mod raster;
-pub mod raycast;
-pub mod raycast3d;
 mod raster_fill;
 mod raster_shade;
+pub mod raycast;
+pub mod raycast3d;
