@@ -3,6 +3,7 @@
 pub mod catalogue;
 pub mod part;
 pub mod placement;
+pub mod shapes;
 mod unknown;
 
 pub use catalogue::{Catalogue, UnknownAssets};

@@ -1,6 +1,6 @@
 //! Convex primitives: what every body in the world is made of.
 
-use crate::geometry::{Mat3, Vec3};
+use crate::geometry::{Aabb, Mat3, Vec3, add, compose, rotate};
 
 /// A convex solid about its own origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +11,9 @@ pub enum Primitive {
         half_m: Vec3,
     },
     /// A prism, cylinder, cone or frustum about y over regular `sides`-gons stretched to ellipses.
+    ///
+    /// The polygons are inscribed: corner `k` is at `2 pi k / sides` from +x towards +z
+    /// ([`Primitive::ring_m`]), so with `sides` a multiple of 4 they touch the ellipse's box.
     Frustum {
         /// Half axes `[x, z]` of the lower face.
         bottom_m: [f64; 2],
@@ -28,6 +31,26 @@ pub enum Primitive {
     },
 }
 
+impl Primitive {
+    /// Corners of one face of a frustum, at height `y_m`, from +x towards +z.
+    pub fn ring_m(half_axes_m: [f64; 2], y_m: f64, sides: u8) -> impl Iterator<Item = Vec3> {
+        (0..sides).map(move |k| {
+            let [x, z] = unit_corner(k, sides);
+            [half_axes_m[0] * x, y_m, half_axes_m[1] * z]
+        })
+    }
+}
+
+/// Corner `k` of a regular polygon, exact where it lies on an axis.
+fn unit_corner(k: u8, sides: u8) -> [f64; 2] {
+    let (k, sides) = (u32::from(k), u32::from(sides.max(1)));
+    if 4 * k % sides == 0 {
+        return [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]][(4 * k / sides % 4) as usize];
+    }
+    let (sin, cos) = (std::f64::consts::TAU * f64::from(k) / f64::from(sides)).sin_cos();
+    [cos, sin]
+}
+
 /// A primitive in the frame of the body that owns it (object frame: origin at the box's centre).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
@@ -39,4 +62,45 @@ pub struct Part {
     pub rotation: Mat3,
     /// Surface colour, sRGB.
     pub colour: [u8; 3],
+}
+
+impl Part {
+    /// Smallest box around the part, in the frame the part is in.
+    pub fn aabb(&self) -> Aabb {
+        let row = |i: usize| self.rotation[i];
+        let reach = match self.primitive {
+            Primitive::Cuboid { half_m } => std::array::from_fn(|i| {
+                row(i).iter().zip(half_m).map(|(r, h)| (r * h).abs()).sum()
+            }),
+            Primitive::Ellipsoid { half_m } => std::array::from_fn(|i| {
+                row(i).iter().zip(half_m).map(|(r, h)| (r * h).powi(2)).sum::<f64>().sqrt()
+            }),
+            Primitive::Frustum { bottom_m, top_m, half_height_m, sides } => {
+                let lower = Primitive::ring_m(bottom_m, -half_height_m, sides);
+                let upper = Primitive::ring_m(top_m, half_height_m, sides);
+                let place = |p| add(self.centre_m, rotate(&self.rotation, p));
+                return Aabb::of_points(lower.chain(upper).map(place));
+            }
+        };
+        let reach: Vec3 = reach;
+        Aabb {
+            min_m: std::array::from_fn(|i| self.centre_m[i] - reach[i]),
+            max_m: std::array::from_fn(|i| self.centre_m[i] + reach[i]),
+        }
+    }
+
+    /// The part seen from a frame in which its own frame stands at `origin_m`, turned by `rotation`.
+    #[must_use]
+    pub fn placed(&self, origin_m: Vec3, rotation: &Mat3) -> Self {
+        Self {
+            centre_m: add(origin_m, rotate(rotation, self.centre_m)),
+            rotation: compose(rotation, &self.rotation),
+            ..*self
+        }
+    }
+}
+
+/// Smallest box around all `parts`; [`Aabb::EMPTY`] if there are none.
+pub fn aabb_of(parts: &[Part]) -> Aabb {
+    parts.iter().fold(Aabb::EMPTY, |bounds, part| bounds.union(part.aabb()))
 }

@@ -6,3 +6,5 @@ pub mod mesh;
 pub mod navigation;
 pub mod paths;
 pub mod scene;
+mod openings;
+mod structure;

@@ -1,6 +1,22 @@
 //! Bodies of a house in the world frame.
 
-use crate::{assets::part::Part, geometry::Aabb};
+use std::collections::HashMap;
+
+use super::{
+    openings::{door_parts, window_parts},
+    structure::{Openings, SLAB_M, room_height_m, slab_parts, wall_parts},
+};
+use crate::{
+    assets::{
+        Asset,
+        catalogue::{Catalogue, UnknownAssets},
+        part::{Part, aabb_of},
+        shapes::{shape_of, surface_colour},
+    },
+    error::Error,
+    geometry::{Aabb, IDENTITY, Mat3, Vec3, euler_rotation_deg},
+    house::{House, Object, Opening, Room, Wall},
+};
 
 /// What a body is to the simulator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,19 +35,63 @@ pub enum BodyKind {
     Window,
 }
 
+/// A box that may be turned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OrientedBox {
+    /// Middle.
+    pub centre_m: Vec3,
+    /// Half edge lengths along its own axes.
+    pub half_m: Vec3,
+    /// `world = rotation * own`.
+    pub rotation: Mat3,
+}
+
 /// A thing in the world; its instance id in images is its index in [`Scene::bodies`] plus 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
     /// Id of the object, wall, room, door or window in the house file.
     pub id: String,
-    /// Asset category for objects; `Wall`, `Floor`, `Ceiling`, `Doorway`, `Window` otherwise.
+    /// Asset category for objects, doors (`Doorway`, `Doorframe`) and windows (`Window`); `Wall`,
+    /// `Floor` or `Ceiling` otherwise.
     pub category: String,
     /// Its kind.
     pub kind: BodyKind,
-    /// Convex parts, world frame.
+    /// Convex parts, world frame; none for open-plan walls.
     pub parts: Vec<Part>,
-    /// Box around the parts.
+    /// Box around the parts; [`Aabb::EMPTY`] if there are none.
     pub aabb: Aabb,
+    /// For objects the asset's box as it is placed, for the rest `aabb`.
+    pub oriented: OrientedBox,
+}
+
+impl Body {
+    fn fixed(id: &str, category: &str, kind: BodyKind, parts: Vec<Part>) -> Self {
+        let aabb = aabb_of(&parts);
+        let is_empty = parts.is_empty();
+        let oriented = OrientedBox {
+            centre_m: if is_empty { [0.0; 3] } else { aabb.centre_m() },
+            half_m: if is_empty { [0.0; 3] } else { aabb.size_m().map(|edge| 0.5 * edge) },
+            rotation: IDENTITY,
+        };
+        let (id, category) = (id.to_owned(), category.to_owned());
+        Self { id, category, kind, parts, aabb, oriented }
+    }
+
+    fn object(object: &Object, asset: &Asset) -> Self {
+        let rotation = euler_rotation_deg(object.rotation_deg);
+        let place = |part: &Part| part.placed(object.position_m, &rotation);
+        let parts: Vec<Part> = shape_of(asset).iter().map(place).collect();
+        let centre_m = object.position_m;
+        let half_m = asset.size_m.map(|edge| 0.5 * edge);
+        Self {
+            id: object.id.clone(),
+            category: asset.category.clone(),
+            kind: BodyKind::Object,
+            aabb: aabb_of(&parts),
+            parts,
+            oriented: OrientedBox { centre_m, half_m, rotation },
+        }
+    }
 }
 
 /// All bodies of a house.
@@ -44,4 +104,103 @@ pub struct Scene {
     pub first_object: usize,
     /// Box around the structure.
     pub bounds: Aabb,
+}
+
+impl Scene {
+    /// The world of a house.
+    ///
+    /// # Arguments
+    /// * `house` - where everything stands.
+    /// * `catalogue` - what the assets are.
+    /// * `unknown` - what to do about assets the catalogue does not know.
+    ///
+    /// # Errors
+    /// [`Error::House`] naming the object whose asset is unknown, unless `unknown` allows it.
+    pub fn build(
+        house: &House,
+        catalogue: &Catalogue,
+        unknown: UnknownAssets,
+    ) -> Result<Self, Error> {
+        let mut bodies = structure(house, catalogue);
+        let first_object = bodies.len();
+        let bounds = bodies.iter().fold(Aabb::EMPTY, |bounds, body| bounds.union(body.aabb));
+        for object in &house.objects {
+            let asset = catalogue.asset_of(house, object, unknown)?;
+            bodies.push(Body::object(object, &asset));
+        }
+        Ok(Self { bodies, first_object, bounds })
+    }
+
+    /// This scene after some objects moved: equal to [`Scene::build`] of the new house.
+    ///
+    /// # Arguments
+    /// * `house` - the house after the move; its structure must be this scene's.
+    /// * `catalogue`, `unknown` - as the scene was built with.
+    /// * `moved` - indices in `house.objects` of all objects whose pose or asset changed. Objects
+    ///   that this scene does not hold are built in any case.
+    ///
+    /// # Errors
+    /// Those of [`Scene::build`].
+    pub fn rebuild(
+        &self,
+        house: &House,
+        catalogue: &Catalogue,
+        unknown: UnknownAssets,
+        moved: &[usize],
+    ) -> Result<Self, Error> {
+        let (fixed, placed) = self.bodies.split_at(self.first_object.min(self.bodies.len()));
+        let known: HashMap<&str, &Body> = placed.iter().map(|b| (b.id.as_str(), b)).collect();
+        let mut is_moved = vec![false; house.objects.len()];
+        for &index in moved {
+            if let Some(flag) = is_moved.get_mut(index) {
+                *flag = true;
+            }
+        }
+        let mut bodies = Vec::with_capacity(fixed.len() + house.objects.len());
+        bodies.extend_from_slice(fixed);
+        for (object, is_moved) in house.objects.iter().zip(is_moved) {
+            let old = known.get(object.id.as_str()).filter(|_| !is_moved);
+            bodies.push(match old {
+                Some(&body) => body.clone(),
+                None => Body::object(object, &catalogue.asset_of(house, object, unknown)?),
+            });
+        }
+        Ok(Self { bodies, ..*self })
+    }
+}
+
+/// Floors, ceilings, walls, doors and windows.
+fn structure(house: &House, catalogue: &Catalogue) -> Vec<Body> {
+    let openings = Openings::of(house);
+    let floor = |room: &Room| {
+        let colour = surface_colour(&room.floor_material, catalogue, [170, 150, 125]);
+        let parts = slab_parts(&room.polygon_m, [-SLAB_M, 0.0], colour);
+        Body::fixed(&room.id, "Floor", BodyKind::Floor, parts)
+    };
+    let ceiling = |room: &Room| {
+        let height_m = room_height_m(house, room);
+        let parts = slab_parts(&room.polygon_m, [height_m, height_m + SLAB_M], [238, 236, 230]);
+        Body::fixed(&room.id, "Ceiling", BodyKind::Ceiling, parts)
+    };
+    let wall = |wall: &Wall| {
+        let colour = match wall.colour {
+            Some(rgb) => rgb.map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8),
+            None => surface_colour(&wall.material, catalogue, [222, 215, 200]),
+        };
+        Body::fixed(&wall.id, "Wall", BodyKind::Wall, wall_parts(house, wall, &openings, colour))
+    };
+    let door = |door: &Opening| {
+        let has_leaf = !door.asset_id.starts_with("Doorframe");
+        let category = if has_leaf { "Doorway" } else { "Doorframe" };
+        let parts = door_parts(house, door, catalogue.get(&door.asset_id));
+        Body::fixed(&door.id, category, BodyKind::Door, parts)
+    };
+    let window = |window: &Opening| {
+        let parts = window_parts(house, window, catalogue.get(&window.asset_id));
+        Body::fixed(&window.id, "Window", BodyKind::Window, parts)
+    };
+    let rooms = house.rooms.iter().map(floor).chain(house.rooms.iter().map(ceiling));
+    let walls = house.walls.iter().map(wall);
+    let fillings = house.doors.iter().map(door).chain(house.windows.iter().map(window));
+    rooms.chain(walls).chain(fillings).collect()
 }

@@ -1,0 +1,161 @@
+//! Bathroom fixtures, laundry machines and textiles that hang.
+
+use super::{
+    colour::{CERAMIC, DARK, FABRICS, STEEL, WOODS, shade},
+    sketch::{Along, Sketch, between, ends, inside},
+};
+
+/// Tank at the back, bowl in front, seat and open lid.
+pub fn toilet(s: &mut Sketch<'_>) {
+    let [_, h, _] = s.size();
+    let [x, y, z] = s.spans();
+    let white = s.tint(0, CERAMIC);
+    let rim = 0.42 * h;
+    s.cuboid(x, [rim, h - 0.03], between(z, 0.0, 0.26), white);
+    s.cuboid(x, between(y, 1.0 - 0.03 / h, 1.0), between(z, 0.0, 0.28), shade(white, 0.95));
+    s.column(between(x, 0.25, 0.75), [0.0, 0.55 * rim], between(z, 0.05, 0.75), 0.85, 12, white);
+    s.column(between(x, 0.12, 0.88), [0.5 * rim, rim - 0.03], between(z, 0.2, 1.0), 1.5, 12, white);
+    s.column(between(x, 0.1, 0.9), [rim - 0.03, rim], between(z, 0.22, 1.0), 1.0, 12, shade(white, 0.92));
+    s.column(between(x, 0.22, 0.78), [rim, rim + 0.004], between(z, 0.34, 0.92), 1.0, 12, [120, 150, 165]);
+    s.cuboid(between(x, 0.12, 0.88), [rim, 0.8 * h], between(z, 0.28, 0.32), shade(white, 0.97));
+}
+
+/// A tub: bottom and four sides.
+pub fn bathtub(s: &mut Sketch<'_>) {
+    let h = s.size()[1];
+    let [x, y, z] = s.spans();
+    let white = s.tint(0, CERAMIC);
+    let side = 0.07;
+    s.cuboid(inside(x, side), [0.0, 0.25 * h], inside(z, side), shade(white, 0.93));
+    for x in ends(x, side, 0.0) {
+        s.cuboid(x, y, z, white);
+    }
+    for z in ends(z, side, 0.0) {
+        s.cuboid(inside(x, side), y, z, white);
+    }
+}
+
+/// Basins: set into counters (flat), or standing on a pedestal or a cabinet (tall).
+pub fn sink(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, _, z] = s.spans();
+    let white = s.tint(0, CERAMIC);
+    // Recorded children lie on the rim; in tall sinks a tap or splashback may rise above it.
+    let rim = s.levels().into_iter().find(|&y| y > 0.6 * h).unwrap_or(h);
+    let basin = rim - (0.6 * rim).min(0.14);
+    if h > 0.4 {
+        if s.choose(&[true, false], true) {
+            s.column(between(x, 0.3, 0.7), [0.0, basin], between(z, 0.1, 0.6), 0.8, 12, white);
+        } else {
+            let wood = s.tint(1, s.choose(&WOODS, WOODS[1]));
+            s.cuboid(inside(x, 0.03), [0.0, basin], [z[0], z[1] - 0.05], wood);
+            for half in [between(x, 0.07, 0.49), between(x, 0.51, 0.93)] {
+                s.cuboid(half, [0.08, basin - 0.05], [z[1] - 0.05, z[1] - 0.03], shade(wood, 1.15));
+            }
+        }
+        s.cuboid(between(x, 0.46, 0.54), [rim, h], between(z, 0.02, 0.1), STEEL);
+        s.cuboid(between(x, 0.47, 0.53), [h - 0.02, h], between(z, 0.02, 0.3), STEEL);
+    }
+    let side = 0.09 * w.min(d);
+    s.cuboid(inside(x, side), [basin, basin + 0.25 * (rim - basin)], inside(z, side), shade(white, 0.8));
+    for x in ends(x, side, 0.0) {
+        s.cuboid(x, [basin, rim], z, white);
+    }
+    let [back, front] = ends(z, side, 0.0);
+    s.cuboid(inside(x, side), [basin, rim], [back[0], back[1] + 0.5 * side], white);
+    s.cuboid(inside(x, side), [basin, rim], front, white);
+    if rim >= h {
+        s.cuboid(inside(x, side), [0.0, basin], inside(z, side), white);
+    }
+}
+
+/// A base, a riser, a spout forward and two handles where the box is wide.
+pub fn faucet(s: &mut Sketch<'_>) {
+    let [w, _, _] = s.size();
+    let [x, y, z] = s.spans();
+    let metal = s.tint(0, STEEL);
+    let thick = (0.5 * w).min(0.03) / w;
+    let middle = between(x, 0.5 - 0.5 * thick, 0.5 + 0.5 * thick);
+    s.cuboid(x, between(y, 0.0, 0.12), between(z, 0.0, 0.25), metal);
+    s.cuboid(middle, between(y, 0.12, 1.0), between(z, 0.04, 0.18), metal);
+    s.cuboid(middle, between(y, 0.85, 1.0), between(z, 0.18, 1.0), metal);
+    s.cuboid(middle, between(y, 0.7, 0.85), between(z, 0.86, 1.0), metal);
+    if w > 0.15 {
+        for end in ends(x, 0.04, 0.0) {
+            s.cuboid(end, between(y, 0.12, 0.5), between(z, 0.02, 0.22), metal);
+        }
+    }
+}
+
+/// A rail on the wall, an arm and a rose.
+pub fn shower_head(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let metal = s.tint(0, STEEL);
+    s.cuboid(between(x, 0.4, 0.6), y, between(z, 0.0, 0.12), metal);
+    s.cuboid(between(x, 0.42, 0.58), between(y, 0.96, 0.98), between(z, 0.12, 0.8), metal);
+    s.column(x, between(y, 0.93, 0.96), between(z, 0.45, 1.0), 0.7, 12, metal);
+    s.cuboid(between(x, 0.3, 0.7), between(y, 0.3, 0.36), between(z, 0.0, 0.35), shade(metal, 0.8));
+}
+
+/// A rail with folds hanging from it.
+pub fn curtain(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let cloth = s.tint(0, [225, 228, 230]);
+    s.cuboid(x, between(y, 0.97, 1.0), between(z, 0.4, 0.6), STEEL);
+    for i in 0..6 {
+        let i = f64::from(i);
+        let depth = if i % 2.0 == 0.0 { [0.0, 0.6] } else { [0.4, 1.0] };
+        let fold = between(x, i / 6.0, (i + 1.0) / 6.0);
+        let colour = if i % 2.0 == 0.0 { cloth } else { shade(cloth, 0.9) };
+        s.cuboid(fold, between(y, 0.0, 0.97), between(z, depth[0], depth[1]), colour);
+    }
+}
+
+/// A hanging or lying cloth.
+pub fn towel(s: &mut Sketch<'_>) {
+    let [_, h, d] = s.size();
+    let [x, y, z] = s.spans();
+    let cloth = s.tint(0, s.choose(&[[225, 225, 220], [120, 150, 170], [170, 110, 100]], FABRICS[5]));
+    if h > d {
+        s.cuboid(x, y, between(z, 0.55, 1.0), cloth);
+        s.cuboid(inside(x, 0.005), between(y, 0.3, 1.0), between(z, 0.0, 0.45), shade(cloth, 0.9));
+        s.cuboid(x, between(y, 0.96, 1.0), z, cloth);
+    } else {
+        s.cuboid(x, between(y, 0.0, 0.6), z, cloth);
+        s.cuboid(between(x, 0.1, 0.95), between(y, 0.6, 1.0), between(z, 0.08, 0.9), shade(cloth, 0.93));
+    }
+}
+
+/// A plate on the wall (-z) and a bar.
+pub fn holder(s: &mut Sketch<'_>) {
+    let [w, _, _] = s.size();
+    let [x, y, z] = s.spans();
+    let metal = s.tint(0, STEEL);
+    for end in ends(x, 0.12 * w, 0.0) {
+        s.cuboid(end, y, between(z, 0.0, 0.2), metal);
+        s.cuboid(end, between(y, 0.3, 0.7), between(z, 0.2, 1.0), metal);
+    }
+    s.cuboid(inside(x, 0.12 * w), between(y, 0.35, 0.65), between(z, 0.75, 1.0), metal);
+}
+
+/// A stick with a cup or a brush at its foot.
+pub fn brush(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let rubber = s.tint(1, [150, 60, 50]);
+    s.column(x, between(y, 0.0, 0.25), z, 0.5, 12, rubber);
+    s.column(between(x, 0.42, 0.58), between(y, 0.25, 1.0), between(z, 0.42, 0.58), 1.0, 8, s.tint(0, WOODS[0]));
+}
+
+/// A white box with a round door and a panel.
+pub fn washer(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let white = s.tint(0, [232, 233, 235]);
+    let front = z[1] - 0.04;
+    s.cuboid(x, between(y, 0.0, 0.9), [z[0], front], white);
+    s.cuboid(x, between(y, 0.9, 1.0), between(z, 0.0, 0.25), shade(white, 0.85));
+    s.cuboid(between(x, 0.04, 0.96), between(y, 0.76, 0.88), [front, front + 0.01], shade(white, 0.75));
+    let door = [between(x, 0.2, 0.8), between(y, 0.2, 0.72), [front, z[1] - 0.01]];
+    s.round(Along::Z, 1.0, 16, door, STEEL);
+    let glass = [between(x, 0.28, 0.72), between(y, 0.27, 0.65), [z[1] - 0.01, z[1]]];
+    s.round(Along::Z, 1.0, 16, glass, DARK);
+}

@@ -1,0 +1,80 @@
+//! Beds and what belongs on them.
+
+use super::{
+    colour::{FABRICS, WOODS, shade},
+    sketch::{Sketch, Span, between, ends, inside},
+};
+
+const LINEN: [[u8; 3]; 6] =
+    [[90, 120, 160], [190, 185, 175], [150, 90, 90], [110, 135, 115], [225, 220, 212], [70, 80, 105]];
+
+/// Frame, mattress, blanket, pillows, headboard; above 1.5 m a bunk or canopy bed on four posts.
+pub fn bed(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, _, z] = s.spans();
+    let wood = s.tint(0, s.choose(&WOODS, WOODS[2]));
+    let linen = s.tint(1, s.choose(&LINEN, LINEN[0]));
+    let levels = s.levels();
+    let is_tall = h > 1.5;
+    let lying = levels.iter().copied().find(|&y| y > 0.2 && y < 0.9);
+    let mattress = lying.unwrap_or((0.62 * h).min(0.55)).min(h);
+    let head = if is_tall { (mattress + 0.4).min(h) } else { h };
+    let foot = mattress.min(mattress - 0.04 + 0.08 * h).min(h);
+    let board = 0.05;
+    let [head_z, foot_z] = ends(z, board, 0.0);
+    s.cuboid(x, [0.0, head], head_z, wood);
+    s.cuboid(x, [0.0, foot], foot_z, wood);
+    bunk(s, [wood, linen], mattress, x);
+    if is_tall {
+        s.legs([0.0, h], 0.06, 0.0, wood);
+        let upper = levels.iter().copied().find(|&y| y > 1.0 && y < h);
+        match upper {
+            Some(y) if w < 1.4 => bunk(s, [wood, linen], y, x),
+            _ => {}
+        }
+        for rail in ends(x, 0.05, 0.0) {
+            s.cuboid(rail, [h - 0.06, h], z, wood);
+        }
+    }
+    let _ = d;
+}
+
+/// Slats, mattress, blanket and pillows at one height.
+fn bunk(s: &mut Sketch<'_>, [wood, linen]: [[u8; 3]; 2], top: f64, x: Span) {
+    let z = s.spans()[2];
+    let length = inside(z, 0.05);
+    let depth = (0.55 * top).min(0.26);
+    s.cuboid(x, [(top - depth - 0.08).max(0.02), top - 0.7 * depth], length, wood);
+    let blanket = between(length, 0.3, 1.0);
+    s.cuboid(inside(x, 0.02), [top - 0.7 * depth, top - 0.012], length, [235, 232, 225]);
+    s.cuboid(inside(x, 0.008), [top - 0.6 * depth, top], blanket, linen);
+    let width = x[1] - x[0];
+    let pillows = if width > 1.25 { 2 } else { 1 };
+    for i in 0..pillows {
+        let n = f64::from(pillows);
+        let side = inside(between(x, f64::from(i) / n, (f64::from(i) + 1.0) / n), 0.08 * width);
+        s.cuboid(side, [top - 0.012, top + 0.07], between(length, 0.03, 0.2), [245, 243, 238]);
+    }
+}
+
+/// A cushion with a raised rim.
+pub fn dog_bed(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, y, z] = s.spans();
+    let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[2]));
+    let rim = 0.15 * w.min(d);
+    s.cuboid(inside(x, 0.5 * rim), [0.0, 0.5 * h], inside(z, 0.5 * rim), shade(fabric, 1.2));
+    for x in ends(x, rim, 0.0) {
+        s.cuboid(x, y, z, fabric);
+    }
+    s.cuboid(inside(x, rim), y, ends(z, rim, 0.0)[0], fabric);
+    s.cuboid(inside(x, rim), [0.0, 0.7 * h], ends(z, rim, 0.0)[1], fabric);
+}
+
+/// A pillow.
+pub fn pillow(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[5]));
+    s.ellipsoid(x, y, z, fabric);
+    s.cuboid(between(x, 0.06, 0.94), between(y, 0.3, 0.7), between(z, 0.06, 0.94), fabric);
+}

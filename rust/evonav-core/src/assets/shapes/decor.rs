@@ -1,0 +1,202 @@
+//! Plants, pictures, openings seen as assets, ornaments and sports goods.
+
+use super::{
+    colour::{DARK, STEEL, WOODS, shade},
+    sketch::{Along, Sketch, between, ends, inside},
+};
+
+/// Pot, soil, stem and foliage.
+pub fn plant(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, _, z] = s.spans();
+    let pots = [[180, 100, 70], [225, 220, 212], [80, 85, 90], [150, 125, 100]];
+    let pot = s.choose(&pots, pots[0]);
+    let leaf = s.choose(&[[70, 120, 60], [55, 100, 55], [95, 135, 70]], [70, 120, 60]);
+    let pot_top = (0.32 * h).min(0.5);
+    let radius = (0.32 * w.min(d)).min(0.5 * pot_top + 0.05);
+    let around = |span| inside(span, 0.5 * (span_length(span) - 2.0 * radius));
+    s.column(around(x), [0.0, pot_top], around(z), 1.3, 10, pot);
+    s.column(inside(around(x), 0.1 * radius), [pot_top, pot_top + 0.005], inside(around(z), 0.1 * radius), 1.0, 10, [60, 45, 35]);
+    s.pole([0.0, 0.0], 0.05 * w.min(d), [pot_top, 0.6 * h], 6, [95, 80, 50]);
+    let crown = 0.75 * h;
+    s.ellipsoid(between(x, 0.12, 0.88), [crown - 0.25 * h, h], between(z, 0.12, 0.88), leaf);
+    s.ellipsoid(between(x, 0.0, 0.6), [pot_top, crown], between(z, 0.3, 1.0), shade(leaf, 0.85));
+    s.ellipsoid(between(x, 0.4, 1.0), [1.1 * pot_top, crown + 0.1 * h], between(z, 0.0, 0.6), shade(leaf, 1.15));
+}
+
+fn span_length(span: [f64; 2]) -> f64 {
+    span[1] - span[0]
+}
+
+/// Frame and canvas with a horizon.
+pub fn painting(s: &mut Sketch<'_>) {
+    let [w, h, _] = s.size();
+    let [x, y, z] = s.spans();
+    let frame = s.tint(0, s.choose(&[WOODS[3], DARK, [210, 205, 195], WOODS[1]], WOODS[3]));
+    let skies = [[150, 185, 210], [225, 190, 140], [200, 200, 205], [120, 140, 165]];
+    let grounds = [[95, 120, 80], [150, 95, 70], [70, 90, 110], [180, 160, 120]];
+    let bar = 0.07 * w.min(h);
+    s.cuboid(x, y, between(z, 0.0, 0.7), frame);
+    let (inner, canvas) = (inside(x, bar), inside(y, bar));
+    s.cuboid(inner, between(canvas, 0.4, 1.0), between(z, 0.7, 0.85), s.choose(&skies, skies[0]));
+    s.cuboid(inner, between(canvas, 0.0, 0.4), between(z, 0.7, 0.85), s.choose(&grounds, grounds[0]));
+    for x in ends(x, bar, 0.0) {
+        s.cuboid(x, y, between(z, 0.7, 1.0), frame);
+    }
+    for y in ends(y, bar, 0.0) {
+        s.cuboid(inner, y, between(z, 0.7, 1.0), frame);
+    }
+}
+
+/// A window as an asset of its own.
+pub fn window(s: &mut Sketch<'_>) {
+    let [w, h, _] = s.size();
+    let [x, y, z] = s.spans();
+    let frame = s.tint(0, [235, 235, 230]);
+    let bar = 0.07 * w.min(h);
+    s.cuboid(inside(x, bar), inside(y, bar), between(z, 0.4, 0.6), [190, 215, 235]);
+    for x in ends(x, bar, 0.0) {
+        s.cuboid(x, y, z, frame);
+    }
+    for y in ends(y, bar, 0.0) {
+        s.cuboid(inside(x, bar), y, z, frame);
+    }
+}
+
+/// A door as an asset of its own: frame, and a closed leaf unless it is a bare frame.
+pub fn doorway(s: &mut Sketch<'_>) {
+    let [w, h, _] = s.size();
+    let [x, y, z] = s.spans();
+    let frame = s.tint(1, [225, 220, 210]);
+    let bar = 0.05 * w.min(h);
+    for x in ends(x, bar, 0.0) {
+        s.cuboid(x, y, z, frame);
+    }
+    s.cuboid(inside(x, bar), [h - bar, h], z, frame);
+    if s.asset().category == "Doorway" {
+        s.cuboid(inside(x, bar), [0.0, h - bar], between(z, 0.35, 0.65), s.tint(0, WOODS[2]));
+    }
+}
+
+/// A plinth and a figure.
+pub fn statue(s: &mut Sketch<'_>) {
+    let [w, h, _] = s.size();
+    let [x, y, z] = s.spans();
+    let stone = s.tint(0, s.choose(&[[190, 180, 160], [120, 110, 100], [160, 120, 60]], [190, 180, 160]));
+    if w > h {
+        // An animal: body, head, legs.
+        s.cuboid(between(x, 0.1, 0.8), between(y, 0.35, 0.75), between(z, 0.15, 0.85), stone);
+        s.ellipsoid(between(x, 0.65, 1.0), between(y, 0.5, 1.0), between(z, 0.1, 0.9), stone);
+        for end in ends(between(x, 0.0, 0.8), 0.15 * w, 0.0) {
+            s.cuboid(end, between(y, 0.0, 0.4), z, shade(stone, 0.9));
+        }
+        return;
+    }
+    s.column(x, between(y, 0.0, 0.12), z, 0.9, 8, shade(stone, 0.7));
+    s.column(between(x, 0.15, 0.85), between(y, 0.12, 0.75), between(z, 0.15, 0.85), 0.55, 8, stone);
+    s.ellipsoid(between(x, 0.28, 0.72), between(y, 0.72, 1.0), between(z, 0.28, 0.72), stone);
+}
+
+/// Body, head, ears, arms and legs.
+pub fn teddy_bear(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let fur = s.tint(0, [150, 105, 65]);
+    s.ellipsoid(between(x, 0.22, 0.78), between(y, 0.05, 0.62), between(z, 0.05, 0.7), fur);
+    s.ellipsoid(between(x, 0.27, 0.73), between(y, 0.52, 0.95), between(z, 0.05, 0.65), shade(fur, 1.1));
+    for ear in [between(x, 0.22, 0.38), between(x, 0.62, 0.78)] {
+        s.cuboid(ear, between(y, 0.86, 1.0), between(z, 0.3, 0.4), fur);
+    }
+    for side in ends(x, 0.3 * span_length(x), 0.0) {
+        s.cuboid(side, between(y, 0.38, 0.5), between(z, 0.25, 0.5), fur);
+        s.cuboid(inside(side, 0.05 * span_length(x)), between(y, 0.0, 0.16), between(z, 0.4, 1.0), fur);
+    }
+    s.cuboid(between(x, 0.4, 0.6), between(y, 0.1, 0.3), between(z, 0.0, 0.1), fur);
+}
+
+/// A ball.
+pub fn ball(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    s.ellipsoid(x, y, z, s.tint(0, [205, 105, 45]));
+}
+
+/// Two boots.
+pub fn boots(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let leather = s.tint(0, [75, 55, 40]);
+    for foot in [between(x, 0.0, 0.45), between(x, 0.55, 1.0)] {
+        s.cuboid(foot, between(y, 0.0, 0.22), z, leather);
+        s.cuboid(foot, between(y, 0.22, 1.0), between(z, 0.0, 0.5), leather);
+    }
+}
+
+/// A long cone.
+pub fn bat(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    s.column(x, y, z, 0.45, 8, s.tint(0, WOODS[0]));
+}
+
+/// Head and handle along the box's longest side.
+pub fn racket(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, y, z] = s.spans();
+    let frame = s.tint(0, [60, 90, 150]);
+    let (head, grip) = ([0.42, 1.0], [0.0, 0.45]);
+    if h >= w && h >= d {
+        s.round(Along::Z, 1.0, 12, [x, between(y, head[0], head[1]), z], frame);
+        s.cuboid(between(x, 0.45, 0.55), between(y, grip[0], grip[1]), between(z, 0.1, 0.9), DARK);
+    } else if d >= w {
+        s.column(x, y, between(z, head[0], head[1]), 1.0, 12, frame);
+        s.cuboid(between(x, 0.45, 0.55), between(y, 0.1, 0.9), between(z, grip[0], grip[1]), DARK);
+    } else {
+        s.column(between(x, head[0], head[1]), y, z, 1.0, 12, frame);
+        s.cuboid(between(x, grip[0], grip[1]), between(y, 0.1, 0.9), between(z, 0.45, 0.55), DARK);
+    }
+}
+
+/// Two weights and a bar.
+pub fn dumbbell(s: &mut Sketch<'_>) {
+    let [w, _, d] = s.size();
+    let [x, y, z] = s.spans();
+    let iron = s.tint(0, DARK);
+    if d >= w {
+        for end in ends(z, 0.3 * d, 0.0) {
+            s.round(Along::Z, 1.0, 8, [x, y, end], iron);
+        }
+        s.cuboid(between(x, 0.4, 0.6), between(y, 0.4, 0.6), z, STEEL);
+    } else {
+        for end in ends(x, 0.3 * w, 0.0) {
+            s.round(Along::X, 1.0, 8, [end, y, z], iron);
+        }
+        s.cuboid(x, between(y, 0.4, 0.6), between(z, 0.4, 0.6), STEEL);
+    }
+}
+
+/// Wax and wick.
+pub fn candle(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    s.column(x, between(y, 0.0, 0.9), z, 1.0, 8, s.tint(0, [235, 225, 195]));
+    s.column(between(x, 0.44, 0.56), between(y, 0.9, 1.0), between(z, 0.44, 0.56), 1.0, 4, DARK);
+}
+
+/// Books and other flat things: a block with a lighter core that shows at the edges.
+pub fn slab(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let covers = [[150, 55, 50], [50, 80, 130], [60, 110, 80], [190, 150, 70], [95, 65, 110]];
+    let category = s.asset().category.as_str();
+    let plain = match category {
+        "Newspaper" => [225, 222, 210],
+        "DishSponge" => [225, 195, 70],
+        "SoapBar" => [235, 220, 200],
+        "KeyChain" => STEEL,
+        "TableTopDecor" => WOODS[1],
+        _ => s.choose(&covers, covers[0]),
+    };
+    let cover = if category == "Book" { s.choose(&covers, plain) } else { s.tint(0, plain) };
+    if category != "Book" {
+        return s.block(cover);
+    }
+    s.cuboid(x, between(y, 0.0, 0.12), z, cover);
+    s.cuboid(between(x, 0.02, 0.97), between(y, 0.12, 0.88), between(z, 0.03, 0.97), [235, 230, 215]);
+    s.cuboid(x, between(y, 0.88, 1.0), z, cover);
+    s.cuboid(between(x, 0.0, 0.04), y, z, shade(cover, 0.9));
+}

@@ -1,0 +1,93 @@
+//! Screens, lamps and gadgets.
+
+use super::{
+    colour::{DARK, STEEL, shade},
+    sketch::{Along, Sketch, between, inside},
+};
+
+const SCREEN: [u8; 3] = [25, 28, 34];
+
+/// A flat screen; on a foot, or bare where the box is too thin for one.
+pub fn television(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, y, z] = s.spans();
+    let frame = s.tint(0, DARK);
+    if d < 0.15 {
+        s.cuboid(x, y, [z[0], z[1] - 0.01], frame);
+        s.cuboid(inside(x, 0.03 * w), inside(y, 0.04 * h), [z[1] - 0.01, z[1]], SCREEN);
+        return;
+    }
+    let panel = [-0.03, 0.03];
+    let bottom = 0.1 * h;
+    s.cuboid(x, [bottom, h], panel, frame);
+    s.cuboid(inside(x, 0.03 * w), [bottom + 0.04 * h, 0.97 * h], [panel[1], panel[1] + 0.006], SCREEN);
+    s.cuboid(between(x, 0.44, 0.56), [0.015, 0.5 * h], [panel[0] - 0.03, panel[0]], shade(frame, 1.3));
+    s.cuboid(between(x, 0.25, 0.75), [0.0, 0.02], z, shade(frame, 1.3));
+}
+
+/// Base with keyboard, lid upright at the back.
+pub fn laptop(s: &mut Sketch<'_>) {
+    let [w, h, _] = s.size();
+    let [x, _, z] = s.spans();
+    let shell = s.tint(0, s.choose(&[STEEL, DARK, [90, 95, 105]], STEEL));
+    let base = (0.1 * h).min(0.025);
+    let lid = between(z, 0.0, 0.06);
+    s.cuboid(x, [0.0, base], z, shell);
+    s.cuboid(inside(x, 0.06 * w), [base, base + 0.004], between(z, 0.15, 0.6), DARK);
+    s.cuboid(x, [base, h], lid, shell);
+    s.cuboid(inside(x, 0.04 * w), [base + 0.06 * h, 0.95 * h], [lid[1], lid[1] + 0.004], SCREEN);
+}
+
+/// A screen, a keyboard in front and a tower beside.
+pub fn desktop(s: &mut Sketch<'_>) {
+    let h = s.size()[1];
+    let [x, _, z] = s.spans();
+    s.cuboid(between(x, 0.0, 0.72), [0.25 * h, h], between(z, 0.2, 0.32), DARK);
+    s.cuboid(between(x, 0.02, 0.7), [0.29 * h, 0.97 * h], between(z, 0.32, 0.34), SCREEN);
+    s.cuboid(between(x, 0.3, 0.42), [0.0, 0.3 * h], between(z, 0.1, 0.2), DARK);
+    s.cuboid(between(x, 0.1, 0.62), [0.0, 0.02], between(z, 0.65, 1.0), shade(DARK, 1.5));
+    s.cuboid(between(x, 0.78, 1.0), [0.0, 0.8 * h], z, shade(DARK, 1.2));
+}
+
+/// Foot, pole and shade.
+pub fn lamp(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, y, z] = s.spans();
+    let metal = s.tint(0, s.choose(&[DARK, STEEL, [150, 115, 70]], DARK));
+    let cloth = s.tint(1, s.choose(&[[240, 228, 200], [225, 225, 220], [215, 180, 130]], [240, 228, 200]));
+    let is_floor = s.asset().category == "FloorLamp";
+    let (foot, shade_from) = if is_floor { (0.02, 0.82) } else { (0.07, 0.55) };
+    let pole = (0.012 + 0.01 * w) / w.max(d);
+    s.column(between(x, 0.2, 0.8), [0.0, foot * h], between(z, 0.2, 0.8), 0.9, 12, metal);
+    let middle = |span| between(span, 0.5 - pole, 0.5 + pole);
+    s.column(middle(x), [foot * h, 0.9 * h], middle(z), 1.0, 6, metal);
+    s.column(x, between(y, shade_from, 1.0), z, s.choose(&[0.6, 0.75, 1.0], 0.75), 16, cloth);
+}
+
+/// A body with a face: phones, remote controls, switches, clocks, watches.
+pub fn gadget(s: &mut Sketch<'_>) {
+    let [_, h, d] = s.size();
+    let [x, y, z] = s.spans();
+    let is_switch = s.asset().category == "LightSwitch";
+    let body = s.tint(0, if is_switch { [235, 233, 225] } else { s.choose(&[DARK, [180, 60, 55], STEEL], DARK) });
+    if h > d {
+        s.cuboid(x, y, between(z, 0.0, 0.7), body);
+        let face = if is_switch { shade(body, 0.8) } else { [230, 232, 225] };
+        let inner = if is_switch { [0.38, 0.62] } else { [0.15, 0.85] };
+        s.cuboid(between(x, inner[0], inner[1]), between(y, 0.25, 0.75), between(z, 0.7, 1.0), face);
+    } else {
+        s.cuboid(x, between(y, 0.0, 0.8), z, body);
+        s.cuboid(between(x, 0.1, 0.9), between(y, 0.8, 1.0), between(z, 0.1, 0.9), [60, 70, 85]);
+    }
+}
+
+/// A head on the floor, a body and a slanting handle drawn upright.
+pub fn vacuum_cleaner(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let body = s.tint(0, [160, 45, 45]);
+    s.cuboid(x, between(y, 0.0, 0.1), between(z, 0.45, 1.0), DARK);
+    s.column(between(x, 0.25, 0.75), between(y, 0.08, 0.6), between(z, 0.1, 0.6), 0.8, 8, body);
+    s.cuboid(between(x, 0.44, 0.56), between(y, 0.55, 1.0), between(z, 0.0, 0.15), STEEL);
+    let wheel = [between(x, 0.1, 0.9), between(y, 0.0, 0.14), between(z, 0.2, 0.45)];
+    s.round(Along::X, 1.0, 8, wheel, DARK);
+}

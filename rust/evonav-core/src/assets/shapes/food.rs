@@ -1,0 +1,58 @@
+//! Food, and what it is eaten with.
+
+use super::{
+    colour::{DARK, STEEL, WOODS, shade},
+    sketch::{Along, Sketch, between},
+};
+
+/// Fruit, vegetables, eggs and bread.
+pub fn food(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    match s.asset().category.as_str() {
+        "Apple" => {
+            let skin = s.choose(&[[185, 40, 40], [120, 165, 60], [205, 70, 50]], [185, 40, 40]);
+            s.ellipsoid(x, between(y, 0.0, 0.88), z, skin);
+            s.cuboid(between(x, 0.46, 0.54), between(y, 0.8, 1.0), between(z, 0.46, 0.54), [80, 55, 30]);
+        }
+        "Tomato" => {
+            s.ellipsoid(x, between(y, 0.0, 0.92), z, [200, 45, 35]);
+            s.column(between(x, 0.3, 0.7), between(y, 0.9, 1.0), between(z, 0.3, 0.7), 0.4, 5, [70, 120, 50]);
+        }
+        "Potato" => s.ellipsoid(x, y, z, [170, 130, 85]),
+        "Egg" => s.ellipsoid(x, y, z, s.choose(&[[235, 215, 190], [245, 240, 232]], [235, 215, 190])),
+        "Lettuce" => {
+            s.ellipsoid(x, y, z, [120, 165, 80]);
+            s.cuboid(between(x, 0.3, 0.7), between(y, 0.2, 0.7), between(z, 0.0, 1.0), [185, 205, 150]);
+        }
+        _ => {
+            // Bread: a loaf with a rounded top.
+            let crust = [190, 130, 70];
+            s.cuboid(x, between(y, 0.0, 0.6), z, crust);
+            s.round(Along::Z, 1.0, 12, [x, between(y, 0.2, 1.0), z], shade(crust, 1.1));
+        }
+    }
+}
+
+/// Cutlery, cooking and writing tools: a handle and a tip along the longest side.
+pub fn utensil(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, y, z] = s.spans();
+    let (tip, grip) = match s.asset().category.as_str() {
+        "Pen" => ([40, 60, 140], [35, 35, 40]),
+        "Pencil" => ([60, 50, 45], [225, 175, 60]),
+        "Spatula" => (DARK, WOODS[0]),
+        "Knife" => (STEEL, DARK),
+        _ => (STEEL, shade(STEEL, 0.85)),
+    };
+    let middle = |span| between(span, 0.3, 0.7);
+    if d >= w && d >= h {
+        s.cuboid(x, y, between(z, 0.55, 1.0), tip);
+        s.cuboid(middle(x), middle(y), between(z, 0.0, 0.55), grip);
+    } else if w >= h {
+        s.cuboid(between(x, 0.55, 1.0), y, z, tip);
+        s.cuboid(between(x, 0.0, 0.55), middle(y), middle(z), grip);
+    } else {
+        s.cuboid(x, between(y, 0.0, 0.45), z, tip);
+        s.cuboid(middle(x), between(y, 0.45, 1.0), middle(z), grip);
+    }
+}

@@ -1,0 +1,169 @@
+//! Counters, the fridge, appliances and cookware.
+
+use super::{
+    colour::{Colour, DARK, STEEL, WOODS, shade},
+    sketch::{Along, Sketch, Span, between, ends, inside},
+};
+
+/// Depth of ProcTHOR's counters and of each wing of its corner counters.
+const COUNTER_DEPTH_M: f64 = 0.61;
+
+/// Counters. `Countertop_L_*` have a wing along the back (-z) and one along +x, `Countertop_C_*`
+/// wings along the back and both sides; the rest is free floor (measured on what stands on them).
+pub fn counter(s: &mut Sketch<'_>) {
+    let [w, _, d] = s.size();
+    let [x, _, z] = s.spans();
+    let id = s.asset().id.as_str();
+    let (is_l, is_c) = (id.starts_with("Countertop_L_"), id.starts_with("Countertop_C_"));
+    let depth = COUNTER_DEPTH_M;
+    let back = [z[0], (z[0] + depth).min(z[1])];
+    let front = [back[1], z[1]];
+    if is_l && w > depth && d > depth {
+        cabinets(s, x, back, Face::Front([x[0], x[1] - depth]));
+        cabinets(s, [x[1] - depth, x[1]], front, Face::Left);
+    } else if is_c && w > 2.0 * depth && d > depth {
+        cabinets(s, x, back, Face::Front(inside(x, depth)));
+        cabinets(s, [x[0], x[0] + depth], front, Face::Right);
+        cabinets(s, [x[1] - depth, x[1]], front, Face::Left);
+    } else {
+        cabinets(s, x, z, Face::Front(x));
+    }
+}
+
+/// Which side of a run of cabinets has the doors.
+#[derive(Clone, Copy)]
+enum Face {
+    /// +z, along this part of x.
+    Front(Span),
+    /// -x.
+    Left,
+    /// +x.
+    Right,
+}
+
+/// Plinth, carcass, doors and worktop.
+fn cabinets(s: &mut Sketch<'_>, x: Span, z: Span, face: Face) {
+    let h = s.size()[1];
+    let wood = s.tint(0, s.choose(&[[225, 220, 210], WOODS[1], [120, 130, 135], WOODS[2]], WOODS[1]));
+    let stone = s.tint(1, s.choose(&[[95, 95, 98], [200, 195, 188], [70, 66, 64]], [95, 95, 98]));
+    let (plinth, worktop) = (0.1 * h, h - 0.04);
+    s.cuboid(inside(x, 0.03), [0.0, plinth], inside(z, 0.03), shade(wood, 0.4));
+    s.cuboid(inside(x, 0.015), [plinth, worktop], inside(z, 0.015), wood);
+    s.cuboid(x, [worktop, h], z, stone);
+    let door: Colour = shade(wood, 1.1);
+    let y = [plinth + 0.01, worktop - 0.01];
+    let run = match face {
+        Face::Front(run) => run,
+        Face::Left | Face::Right => z,
+    };
+    let count = ((run[1] - run[0]) / 0.6).round().clamp(1.0, 5.0) as usize;
+    for i in 0..count {
+        let n = count as f64;
+        let span = inside(between(run, i as f64 / n, (i as f64 + 1.0) / n), 0.015);
+        match face {
+            Face::Front(_) => s.cuboid(span, y, [z[1] - 0.015, z[1] - 0.005], door),
+            Face::Left => s.cuboid([x[0] + 0.005, x[0] + 0.015], y, span, door),
+            Face::Right => s.cuboid([x[1] - 0.015, x[1] - 0.005], y, span, door),
+        }
+    }
+}
+
+/// A fridge: two doors over each other, with handles.
+pub fn fridge(s: &mut Sketch<'_>) {
+    let [w, h, _] = s.size();
+    let [x, _, z] = s.spans();
+    let steel = s.tint(0, s.choose(&[[215, 217, 220], [235, 235, 232], [160, 163, 167]], STEEL));
+    let door = shade(steel, 1.06);
+    let (split, grip) = (0.68 * h, shade(steel, 0.55));
+    s.cuboid(x, [0.0, h], [z[0], z[1] - 0.09], shade(steel, 0.9));
+    for y in [[0.05, split - 0.005], [split + 0.005, h - 0.01]] {
+        s.cuboid(x, y, [z[1] - 0.085, z[1] - 0.04], door);
+        let reach = 0.35 * (y[1] - y[0]);
+        let y = if y[0] < 0.5 * h { [y[1] - 0.05 - reach, y[1] - 0.05] } else { [y[0] + 0.05, y[0] + 0.05 + reach] };
+        s.cuboid([x[0] + 0.06 * w, x[0] + 0.06 * w + 0.03], y, [z[1] - 0.04, z[1]], grip);
+    }
+}
+
+/// A microwave: body, dark window, panel.
+pub fn microwave(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let body = s.tint(0, s.choose(&[[200, 200, 202], [60, 60, 64], [230, 230, 228]], STEEL));
+    s.cuboid(x, y, [z[0], z[1] - 0.03], body);
+    s.cuboid(between(x, 0.03, 0.74), between(y, 0.08, 0.92), [z[1] - 0.03, z[1] - 0.015], DARK);
+    s.cuboid(between(x, 0.77, 0.98), between(y, 0.08, 0.92), [z[1] - 0.03, z[1] - 0.015], shade(body, 0.7));
+    s.cuboid(between(x, 0.7, 0.73), between(y, 0.15, 0.85), [z[1] - 0.03, z[1]], STEEL);
+}
+
+/// Back column, head, drip tray and pot.
+pub fn coffee_machine(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let body = s.tint(0, s.choose(&[DARK, [150, 40, 40], [180, 182, 185]], DARK));
+    s.cuboid(x, y, between(z, 0.0, 0.45), body);
+    s.cuboid(between(x, 0.05, 0.95), between(y, 0.72, 1.0), between(z, 0.45, 1.0), body);
+    s.cuboid(between(x, 0.0, 1.0), between(y, 0.0, 0.08), between(z, 0.45, 1.0), shade(body, 1.3));
+    s.column(between(x, 0.28, 0.72), between(y, 0.08, 0.5), between(z, 0.5, 0.92), 0.8, 8, [70, 50, 40]);
+}
+
+/// Body, two slots, a lever.
+pub fn toaster(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let body = s.tint(0, s.choose(&[STEEL, [190, 60, 55], [235, 230, 220], DARK], STEEL));
+    s.cuboid(x, between(y, 0.0, 0.96), between(z, 0.0, 0.94), body);
+    for slot in [between(x, 0.2, 0.4), between(x, 0.6, 0.8)] {
+        s.cuboid(slot, between(y, 0.95, 1.0), between(z, 0.12, 0.82), DARK);
+    }
+    s.cuboid(between(x, 0.42, 0.58), between(y, 0.55, 0.65), between(z, 0.94, 1.0), DARK);
+}
+
+/// A shallow dish with a long handle along the box's longer side.
+pub fn pan(s: &mut Sketch<'_>) {
+    let [w, _, d] = s.size();
+    let [x, y, z] = s.spans();
+    let metal = s.tint(0, DARK);
+    let handle = shade(metal, 0.7);
+    let (rim, grip) = (between(y, 0.0, 0.7), between(y, 0.55, 1.0));
+    if d >= w {
+        let dish = [z[0], z[0] + w.min(d)];
+        s.column(x, rim, dish, 1.15, 12, metal);
+        s.cuboid(between(x, 0.44, 0.56), grip, [dish[1] - 0.02, z[1]], handle);
+    } else {
+        let dish = [x[0], x[0] + d];
+        s.column(dish, rim, z, 1.15, 12, metal);
+        s.cuboid([dish[1] - 0.02, x[1]], grip, between(z, 0.44, 0.56), handle);
+    }
+}
+
+/// A deep round vessel with two ears and a lid.
+pub fn pot(s: &mut Sketch<'_>) {
+    let [w, _, d] = s.size();
+    let [x, y, z] = s.spans();
+    let metal = s.tint(0, s.choose(&[STEEL, [160, 60, 50], DARK], STEEL));
+    let (long, body) = if d >= w { (z, w / d) } else { (x, d / w) };
+    let middle = between(long, 0.5 - 0.5 * body.clamp(0.5, 1.0), 0.5 + 0.5 * body.clamp(0.5, 1.0));
+    let ear = [long, [0.0; 2]][0];
+    let y_ear = between(y, 0.55, 0.68);
+    if d >= w {
+        s.column(x, between(y, 0.0, 0.9), middle, 1.0, 12, metal);
+        s.cuboid(between(x, 0.35, 0.65), y_ear, ear, shade(metal, 0.5));
+        s.column(between(x, 0.4, 0.6), between(y, 0.9, 1.0), between(z, 0.45, 0.55), 1.0, 8, DARK);
+    } else {
+        s.column(middle, between(y, 0.0, 0.9), z, 1.0, 12, metal);
+        s.cuboid(ear, y_ear, between(z, 0.35, 0.65), shade(metal, 0.5));
+        s.column(between(x, 0.45, 0.55), between(y, 0.9, 1.0), between(z, 0.4, 0.6), 1.0, 8, DARK);
+    }
+}
+
+/// A round body with lid, spout and handle.
+pub fn kettle(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let metal = s.tint(0, STEEL);
+    s.column(between(x, 0.05, 0.95), between(y, 0.0, 0.75), between(z, 0.12, 0.78), 0.7, 12, metal);
+    s.column(between(x, 0.3, 0.7), between(y, 0.75, 0.85), between(z, 0.3, 0.6), 0.6, 8, DARK);
+    s.cuboid(between(x, 0.45, 0.55), between(y, 0.92, 1.0), between(z, 0.1, 0.8), DARK);
+    for end in ends(between(z, 0.1, 0.8), 0.015, 0.0) {
+        s.cuboid(between(x, 0.45, 0.55), between(y, 0.6, 0.92), end, DARK);
+    }
+    let spout = [between(x, 0.42, 0.58), between(y, 0.5, 0.68), between(z, 0.7, 1.0)];
+    s.round(Along::Z, 0.6, 8, spout, metal);
+    s.cuboid(x, [0.0, 0.01], between(z, 0.0, 0.8), shade(metal, 0.6));
+}

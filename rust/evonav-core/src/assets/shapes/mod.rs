@@ -1,0 +1,110 @@
+//! From an asset's facts to the compound of convex parts that stands for it.
+//!
+//! Every shape fills its asset's box exactly: the box around its parts is the asset's box. Object
+//! frame: origin at the box's centre, y up, front towards +z (measured on ProcTHOR houses: what
+//! stands against a wall has its -z side there). What things stand on lies at the heights the
+//! catalogue knows.
+
+mod bathroom;
+mod beds;
+mod colour;
+mod decor;
+mod devices;
+mod food;
+mod kitchen;
+mod seats;
+mod sketch;
+mod storage;
+mod tables;
+mod vessels;
+
+use crate::assets::{Asset, part::Part};
+pub(crate) use colour::surface_colour;
+use sketch::Sketch;
+
+/// The parts of an asset, in the object frame.
+///
+/// # Returns
+/// At least one part; the box around them is `asset.size_m` about the origin, within rounding.
+/// Sizes that are not positive are taken as 1 mm.
+pub fn shape_of(asset: &Asset) -> Vec<Part> {
+    let mut sketch = Sketch::new(asset);
+    draw(&mut sketch);
+    sketch.finish()
+}
+
+/// Draws by category; categories without a shape of their own are drawn as a cuboid.
+fn draw(s: &mut Sketch<'_>) {
+    let asset = s.asset();
+    match asset.category.as_str() {
+        "DiningTable" | "CoffeeTable" | "SideTable" => tables::table(s),
+        "Desk" => tables::desk(s),
+        "TVStand" | "Dresser" | "Cabinet" | "Drawer" => storage::carcass(s),
+        "ShelvingUnit" | "Shelf" | "Bookcase" => storage::shelves(s),
+        "Cart" => storage::cart(s),
+        "CounterTop" => kitchen::counter(s),
+        "Fridge" => kitchen::fridge(s),
+        "Microwave" => kitchen::microwave(s),
+        "CoffeeMachine" => kitchen::coffee_machine(s),
+        "Toaster" => kitchen::toaster(s),
+        "Pan" => kitchen::pan(s),
+        "Pot" => kitchen::pot(s),
+        "Kettle" | "WateringCan" => kitchen::kettle(s),
+        "Chair" => seats::chair(s),
+        "Stool" => seats::stool(s),
+        "ArmChair" | "Sofa" => seats::sofa(s),
+        "Ottoman" | "Footstool" => seats::ottoman(s),
+        "Bed" => beds::bed(s),
+        "DogBed" => beds::dog_bed(s),
+        "Pillow" => beds::pillow(s),
+        "Toilet" => bathroom::toilet(s),
+        "Bathtub" | "BathtubBasin" => bathroom::bathtub(s),
+        "Sink" | "SinkBasin" => bathroom::sink(s),
+        "Faucet" => bathroom::faucet(s),
+        "ShowerHead" => bathroom::shower_head(s),
+        "ShowerCurtain" | "Blinds" => bathroom::curtain(s),
+        "Towel" | "HandTowel" | "Cloth" => bathroom::towel(s),
+        "TowelHolder" | "HandTowelHolder" | "ToiletPaperHanger" => bathroom::holder(s),
+        "Plunger" | "ScrubBrush" => bathroom::brush(s),
+        "WashingMachine" | "ClothesDryer" => bathroom::washer(s),
+        "Television" => devices::television(s),
+        "Laptop" => devices::laptop(s),
+        "Desktop" => devices::desktop(s),
+        "FloorLamp" | "DeskLamp" => devices::lamp(s),
+        "CellPhone" | "RemoteControl" | "LightSwitch" | "AlarmClock" | "Watch" => {
+            devices::gadget(s);
+        }
+        "VacuumCleaner" => devices::vacuum_cleaner(s),
+        "HousePlant" => decor::plant(s),
+        "Painting" => decor::painting(s),
+        "Window" => decor::window(s),
+        "Doorway" | "Doorframe" => decor::doorway(s),
+        "Statue" | "RoomDecor" => decor::statue(s),
+        "TeddyBear" => decor::teddy_bear(s),
+        "BasketBall" => decor::ball(s),
+        "Boots" => decor::boots(s),
+        "BaseballBat" => decor::bat(s),
+        "TennisRacket" => decor::racket(s),
+        "Dumbbell" => decor::dumbbell(s),
+        "Candle" => decor::candle(s),
+        "GarbageCan" | "LaundryHamper" => vessels::bin(s),
+        "GarbageBag" => vessels::bag(s),
+        "Box" => vessels::open_box(s),
+        "Safe" => storage::safe(s),
+        "Bottle" | "WineBottle" | "SoapBottle" | "SprayBottle" => vessels::bottle(s),
+        "PepperShaker" | "SaltShaker" => vessels::shaker(s),
+        "Mug" | "Cup" => vessels::mug(s),
+        "Bowl" => vessels::bowl(s),
+        "Plate" | "CD" => vessels::plate(s),
+        "Vase" => vessels::vase(s),
+        "TissueBox" => vessels::tissue_box(s),
+        "PaperTowelRoll" | "ToiletPaper" | "AluminumFoil" => vessels::roll(s),
+        "Book" | "Newspaper" | "CreditCard" | "DishSponge" | "SoapBar" => decor::slab(s),
+        "Apple" | "Tomato" | "Potato" | "Egg" | "Lettuce" | "Bread" => food::food(s),
+        "Knife" | "ButterKnife" | "Fork" | "Spoon" | "Spatula" | "Ladle" | "Pen" | "Pencil" => {
+            food::utensil(s);
+        }
+        "KeyChain" | "TableTopDecor" => decor::slab(s),
+        _ => s.block(s.tint(0, [165, 150, 135])),
+    }
+}

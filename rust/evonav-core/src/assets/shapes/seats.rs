@@ -1,0 +1,124 @@
+//! What people sit on.
+
+use super::{
+    colour::{DARK, FABRICS, STEEL, WOODS, shade},
+    sketch::{Sketch, Span, between, ends, inside},
+};
+
+/// Seat height: recorded, or `otherwise`.
+fn seat_height(s: &Sketch<'_>, otherwise: f64) -> f64 {
+    let h = s.size()[1];
+    let seat = s.levels().into_iter().find(|&y| y > 0.2 * h && y < 0.75 * h);
+    seat.unwrap_or(otherwise)
+}
+
+/// Chairs and office chairs.
+pub fn chair(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, _, z] = s.spans();
+    let id = s.asset().id.to_ascii_lowercase();
+    let seat = seat_height(s, (0.5 * h).clamp(0.25 * h, 0.5));
+    let wood = s.tint(0, s.choose(&WOODS, WOODS[2]));
+    let cushion = s.tint(1, wood);
+    let back = [z[0], z[0] + 0.09 * d];
+    if id.contains("office") || id.contains("chair_313") {
+        let hub = 0.06 * w;
+        s.cuboid(x, [0.02, 0.06], between(z, 0.46, 0.54), DARK);
+        s.cuboid(between(x, 0.46, 0.54), [0.02, 0.06], z, DARK);
+        s.column(between(x, 0.3, 0.7), [0.0, 0.03], between(z, 0.3, 0.7), 1.0, 8, DARK);
+        s.pole([0.0, 0.0], hub, [0.06, seat - 0.06], 8, STEEL);
+        s.cuboid(inside(x, 0.08 * w), [seat - 0.06, seat], between(z, 0.08, 0.95), cushion);
+        s.cuboid(inside(x, 0.12 * w), [seat + 0.1, h], [z[0] + 0.02 * d, z[0] + 0.12 * d], cushion);
+        s.cuboid(between(x, 0.46, 0.54), [seat - 0.05, seat + 0.2], back, DARK);
+        return;
+    }
+    let leg = (0.08 * w.min(d)).clamp(0.02, 0.045);
+    s.legs([0.0, seat - 0.03], leg, 0.01, wood);
+    s.cuboid(x, [seat - 0.04, seat], z, cushion);
+    let [left, right] = ends(x, leg, 0.0);
+    s.cuboid(left, [seat, h], back, wood);
+    s.cuboid(right, [seat, h], back, wood);
+    let is_slatted = s.choose(&[true, false], true);
+    let inner = inside(x, leg);
+    if is_slatted {
+        let rise = h - seat;
+        s.cuboid(inner, [h - 0.25 * rise, h], back, wood);
+        s.cuboid(inner, [seat + 0.35 * rise, seat + 0.5 * rise], back, wood);
+    } else {
+        s.cuboid(inner, [seat + 0.15 * (h - seat), h], back, cushion);
+    }
+    if w > 0.58 && h > 0.7 {
+        let arm = seat + 0.45 * (h - seat);
+        for side in [left, right] {
+            s.cuboid(side, [arm - 0.03, arm], between(z, 0.05, 0.9), wood);
+            s.cuboid(side, [seat, arm - 0.03], between(z, 0.8, 0.87), wood);
+        }
+    }
+}
+
+/// A seat on legs without a back.
+pub fn stool(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, _, z] = s.spans();
+    let wood = s.tint(0, s.choose(&WOODS, WOODS[1]));
+    let leg = (0.1 * w.min(d)).clamp(0.02, 0.04);
+    if (w - d).abs() < 0.03 {
+        s.column(x, [h - 0.05, h], z, 1.0, 12, s.tint(1, wood));
+    } else {
+        s.cuboid(x, [h - 0.05, h], z, s.tint(1, wood));
+    }
+    s.legs([0.0, h - 0.05], leg, 0.15 * w.min(d), wood);
+    let rung = inside(x, 0.15 * w.min(d));
+    for z in ends(z, 0.02, 0.15 * w.min(d)) {
+        s.cuboid(rung, [0.3 * h, 0.3 * h + 0.02], z, wood);
+    }
+}
+
+/// Sofas and armchairs: base, back, arms, cushions.
+pub fn sofa(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, _, z] = s.spans();
+    let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[0]));
+    let soft = shade(fabric, 1.1);
+    let is_sofa = w > 1.45;
+    let seat = seat_height(s, (0.46 * h).min(0.48));
+    let arm = (if is_sofa { 0.09 * w } else { 0.15 * w }).clamp(0.06, 0.24);
+    let arm_top = (seat + 0.35 * (h - seat)).min(seat + 0.22);
+    let back_depth = (0.26 * d).min(0.3).max(0.24 * d);
+    let back = [z[0], z[0] + back_depth];
+    let [left, right] = ends(x, arm, 0.0);
+    let inner = inside(x, arm);
+    let foot = (0.15 * seat).min(0.08);
+    let feet = s.tint(1, WOODS[4]);
+    s.legs([0.0, foot], 0.05, 0.03, feet);
+    let pad = (0.3 * seat).min(0.14);
+    s.cuboid(inner, [foot, seat - pad], [back[1], z[1] - 0.02], fabric);
+    s.cuboid(inner, [foot, h], back, fabric);
+    s.cuboid(left, [foot, arm_top], z, fabric);
+    s.cuboid(right, [foot, arm_top], z, fabric);
+    let count = (if is_sofa { (w / 0.8).round() } else { 1.0 }).clamp(1.0, 4.0) as usize;
+    for i in 0..count {
+        let cushion = slot(inner, i, count);
+        s.cuboid(cushion, [seat - pad, seat], [back[1], z[1]], soft);
+        if is_sofa {
+            let lean = [back[1], back[1] + 0.12 * d];
+            s.cuboid(inside(cushion, 0.01), [seat, seat + 0.75 * (h - seat)], lean, soft);
+        }
+    }
+}
+
+fn slot(span: Span, index: usize, count: usize) -> Span {
+    let n = count as f64;
+    inside(between(span, index as f64 / n, (index as f64 + 1.0) / n), 0.006)
+}
+
+/// A padded block on feet.
+pub fn ottoman(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, _, z] = s.spans();
+    let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[2]));
+    let foot = (0.2 * h).min(0.12);
+    s.legs([0.0, foot], (0.12 * w.min(d)).min(0.06), 0.03 * w, s.tint(1, WOODS[3]));
+    s.cuboid(inside(x, 0.01), [foot, 0.6 * h], inside(z, 0.01), fabric);
+    s.cuboid(x, [0.6 * h, h], z, shade(fabric, 1.1));
+}

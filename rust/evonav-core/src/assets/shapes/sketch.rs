@@ -1,0 +1,212 @@
+//! Drawing aid: parts given by where they begin and end inside an asset's box.
+
+use super::colour::{self, Colour};
+use crate::{
+    assets::{
+        Asset,
+        part::{Part, Primitive, aabb_of},
+    },
+    geometry::{IDENTITY, Mat3, Vec3},
+};
+
+/// From where to where along one axis, metres.
+pub type Span = [f64; 2];
+
+/// Axis of a round part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Along {
+    X,
+    Y,
+    Z,
+}
+
+/// Parts being drawn in an asset's box. x and z run about 0, y from the floor (0) up.
+pub struct Sketch<'a> {
+    asset: &'a Asset,
+    size_m: Vec3,
+    parts: Vec<Part>,
+}
+
+impl<'a> Sketch<'a> {
+    pub fn new(asset: &'a Asset) -> Self {
+        let positive = |edge: f64| if edge.is_finite() { edge.max(1e-3) } else { 1e-3 };
+        Self { asset, size_m: asset.size_m.map(positive), parts: Vec::new() }
+    }
+
+    pub fn asset(&self) -> &'a Asset {
+        self.asset
+    }
+
+    /// Width, height, depth.
+    pub fn size(&self) -> Vec3 {
+        self.size_m
+    }
+
+    /// The box: all of x, of y and of z.
+    pub fn spans(&self) -> [Span; 3] {
+        let [w, h, d] = self.size_m;
+        [[-0.5 * w, 0.5 * w], [0.0, h], [-0.5 * d, 0.5 * d]]
+    }
+
+    /// Heights at which things stand, rising, within the box; of two less than 8 cm apart the
+    /// lower (recorded children hover up to 5 cm over what they stand on).
+    pub fn levels(&self) -> Vec<f64> {
+        let mut levels: Vec<f64> = Vec::new();
+        for &level in &self.asset.surfaces_m {
+            let level = level.min(self.size_m[1]);
+            if level > 0.0 && levels.last().is_none_or(|&last| level - last >= 0.08) {
+                levels.push(level);
+            }
+        }
+        levels
+    }
+
+    /// The asset's colour number `index`, or `otherwise` where it tells nothing.
+    pub fn tint(&self, index: usize, otherwise: Colour) -> Colour {
+        colour::tint(self.asset, index, otherwise)
+    }
+
+    /// One of `choices`, always the same for the same asset.
+    pub fn choose<T: Copy>(&self, choices: &[T], otherwise: T) -> T {
+        let index = colour::hash(&self.asset.id) as usize % choices.len().max(1);
+        choices.get(index).copied().unwrap_or(otherwise)
+    }
+
+    pub fn cuboid(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+        let spans = self.clamped([x, y, z]);
+        let half_m = spans.map(|[low, high]| 0.5 * (high - low));
+        self.push(Primitive::Cuboid { half_m }, spans, IDENTITY, colour);
+    }
+
+    /// One cuboid that fills the box.
+    pub fn block(&mut self, colour: Colour) {
+        let [x, y, z] = self.spans();
+        self.cuboid(x, y, z, colour);
+    }
+
+    pub fn ellipsoid(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+        let spans = self.clamped([x, y, z]);
+        let half_m = spans.map(|[low, high]| 0.5 * (high - low));
+        self.push(Primitive::Ellipsoid { half_m }, spans, IDENTITY, colour);
+    }
+
+    /// Upright cylinder (`taper` 1) or cone; see [`Sketch::round`].
+    pub fn column(&mut self, x: Span, y: Span, z: Span, taper: f64, sides: u8, colour: Colour) {
+        self.round(Along::Y, taper, sides, [x, y, z], colour);
+    }
+
+    /// Upright cylinder of radius `radius` about `[x, z]`.
+    pub fn pole(&mut self, centre: [f64; 2], radius: f64, y: Span, sides: u8, colour: Colour) {
+        let [x, z] = centre.map(|c| [c - radius, c + radius]);
+        self.column(x, y, z, 1.0, sides, colour);
+    }
+
+    /// Cylinder (`taper` 1) or cone whose far end along its axis is `taper` times as wide as its
+    /// near end; the spans hold the wider one.
+    pub fn round(
+        &mut self,
+        along: Along,
+        taper: f64,
+        sides: u8,
+        spans: [Span; 3],
+        colour: Colour,
+    ) {
+        let spans = self.clamped(spans);
+        let half = spans.map(|[low, high]| 0.5 * (high - low));
+        // Columns of the rotations are where the part's own x, y and z point.
+        let (half_height_m, across, rotation): (f64, [f64; 2], Mat3) = match along {
+            Along::Y => (half[1], [half[0], half[2]], IDENTITY),
+            Along::X => {
+                (half[0], [half[1], half[2]], [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+            }
+            Along::Z => {
+                (half[2], [half[0], half[1]], [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+            }
+        };
+        let scaled = |factor: f64| across.map(|a| a * factor);
+        let (bottom_m, top_m) =
+            if taper <= 1.0 { (across, scaled(taper)) } else { (scaled(1.0 / taper), across) };
+        let primitive = Primitive::Frustum { bottom_m, top_m, half_height_m, sides };
+        self.push(primitive, spans, rotation, colour);
+    }
+
+    /// Four uprights at the corners of the box, `thick` square, `inset` from its sides.
+    pub fn legs(&mut self, y: Span, thick: f64, inset: f64, colour: Colour) {
+        let [x, _, z] = self.spans();
+        for x in ends(x, thick, inset) {
+            for z in ends(z, thick, inset) {
+                self.cuboid(x, y, z, colour);
+            }
+        }
+    }
+
+    /// Nothing is drawn outside the box.
+    fn clamped(&self, spans: [Span; 3]) -> [Span; 3] {
+        let all = self.spans();
+        std::array::from_fn(|i| spans[i].map(|end| end.clamp(all[i][0], all[i][1])))
+    }
+
+    fn push(&mut self, primitive: Primitive, spans: [Span; 3], rotation: Mat3, colour: Colour) {
+        if spans.iter().any(|[low, high]| high - low <= 1e-9) {
+            return;
+        }
+        let [x, y, z] = spans.map(|[low, high]| 0.5 * (low + high));
+        let centre_m = [x, y - 0.5 * self.size_m[1], z];
+        self.parts.push(Part { primitive, centre_m, rotation, colour });
+    }
+
+    /// The parts, stretched (by a little, or not at all) to fill the box.
+    pub fn finish(mut self) -> Vec<Part> {
+        if self.parts.is_empty() {
+            self.block([160, 150, 140]);
+        }
+        let drawn = aabb_of(&self.parts);
+        let (middle, size) = (drawn.centre_m(), drawn.size_m());
+        let is_full =
+            |i: usize| (size[i] - self.size_m[i]).abs() < 1e-9 && middle[i].abs() < 1e-9;
+        if !(0..3).all(is_full) {
+            let scale: Vec3 = std::array::from_fn(|i| self.size_m[i] / size[i]);
+            for part in &mut self.parts {
+                stretch(part, middle, scale);
+            }
+        }
+        self.parts
+    }
+}
+
+/// The two pieces of a span `thick` long that end `inset` before its ends.
+pub fn ends(span: Span, thick: f64, inset: f64) -> [Span; 2] {
+    let [low, high] = [span[0] + inset, span[1] - inset];
+    let thick = thick.min(0.5 * (high - low));
+    [[low, low + thick], [high - thick, high]]
+}
+
+/// The span without `by` at both ends.
+pub fn inside(span: Span, by: f64) -> Span {
+    let by = by.min(0.49 * (span[1] - span[0]));
+    [span[0] + by, span[1] - by]
+}
+
+/// The part of a span between two fractions of it.
+pub fn between(span: Span, from: f64, to: f64) -> Span {
+    let length = span[1] - span[0];
+    [span[0] + from * length, span[0] + to * length]
+}
+
+/// Scales a part whose rotation maps axes to axes, about `middle`, which moves to the origin.
+fn stretch(part: &mut Part, middle: Vec3, scale: Vec3) {
+    part.centre_m = std::array::from_fn(|i| (part.centre_m[i] - middle[i]) * scale[i]);
+    // Own axis j points along the box's axis i where rotation[i][j] is 1 or -1.
+    let own = |j: usize| (0..3).map(|i| part.rotation[i][j].powi(2) * scale[i]).sum::<f64>();
+    let [x, y, z] = [own(0), own(1), own(2)];
+    match &mut part.primitive {
+        Primitive::Cuboid { half_m } | Primitive::Ellipsoid { half_m } => {
+            *half_m = [half_m[0] * x, half_m[1] * y, half_m[2] * z];
+        }
+        Primitive::Frustum { bottom_m, top_m, half_height_m, .. } => {
+            *bottom_m = [bottom_m[0] * x, bottom_m[1] * z];
+            *top_m = [top_m[0] * x, top_m[1] * z];
+            *half_height_m *= y;
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Things that hold things: carcasses with drawers, doors or open boards, shelving, carts, safes.
+
+use super::{
+    colour::{Colour, DARK, STEEL, WOODS, shade},
+    sketch::{Along, Sketch, between, ends, inside},
+};
+
+/// Dressers, television stands, nightstands: open where things were seen inside, drawers elsewhere.
+///
+/// Open compartments have the boards at the recorded heights, so that what lies in them shows.
+pub fn carcass(s: &mut Sketch<'_>) {
+    let [w, h, _] = s.size();
+    let [x, _, z] = s.spans();
+    let wood = s.tint(0, s.choose(&WOODS, WOODS[1]));
+    let front = s.tint(1, shade(wood, 1.12));
+    let board = (0.03_f64).min(0.08 * h);
+    let inner: Vec<f64> = s.levels().into_iter().filter(|&y| y < h - 0.1).collect();
+    let shell = [z[0], z[1] - 0.012];
+    if inner.is_empty() {
+        let foot = if h > 0.4 { 0.06 } else { 0.02 };
+        s.cuboid(inside(x, 0.02), [0.0, foot], inside(z, 0.03), shade(wood, 0.5));
+        s.cuboid(x, [foot, h - board], shell, wood);
+        s.cuboid(x, [h - board, h], z, wood);
+        let (columns, rows) = ((w / 0.7).round().clamp(1.0, 3.0), (h / 0.28).round().clamp(1.0, 5.0));
+        drawers(s, [columns as usize, rows as usize], [foot, h - board], front);
+        return;
+    }
+    let side = (0.03_f64).min(0.06 * w);
+    let [left, right] = ends(x, side, 0.0);
+    let width = inside(x, side);
+    s.cuboid(left, [0.0, h - board], z, wood);
+    s.cuboid(right, [0.0, h - board], z, wood);
+    s.cuboid(x, [h - board, h], z, wood);
+    s.cuboid(width, [0.0, h - board], [z[0], z[0] + 0.01], shade(wood, 0.7));
+    let bottom = inner[0];
+    if bottom > 0.25 {
+        // Nothing was ever seen below the first board: a drawer or a door closes it.
+        s.cuboid(width, [0.02, bottom], [z[0] + 0.01, shell[1]], front);
+    } else {
+        s.cuboid(width, [(bottom - board).max(0.0), bottom], [z[0] + 0.01, z[1]], wood);
+    }
+    for &level in &inner[1..] {
+        s.cuboid(width, [level - 0.5 * board, level], [z[0] + 0.01, z[1] - 0.005], wood);
+    }
+}
+
+/// Fronts with a handle each, on the +z side.
+fn drawers(s: &mut Sketch<'_>, [columns, rows]: [usize; 2], y: [f64; 2], colour: Colour) {
+    let [x, _, z] = s.spans();
+    let face = [z[1] - 0.012, z[1] - 0.004];
+    for column in 0..columns {
+        for row in 0..rows {
+            let part = |span, i: usize, n: usize| {
+                let n = n as f64;
+                inside(between(span, i as f64 / n, (i as f64 + 1.0) / n), 0.01)
+            };
+            let (x, y) = (part(x, column, columns), part(y, row, rows));
+            s.cuboid(x, y, face, colour);
+            let grip = between(x, 0.4, 0.6);
+            let level = 0.5 * (y[0] + y[1]);
+            s.cuboid(grip, [level - 0.008, level + 0.008], [face[1], z[1]], shade(colour, 0.45));
+        }
+    }
+}
+
+/// Open shelving: sides, back and boards at the recorded heights.
+pub fn shelves(s: &mut Sketch<'_>) {
+    let [w, h, _] = s.size();
+    let [x, _, z] = s.spans();
+    let wood = s.tint(0, s.choose(&WOODS, WOODS[0]));
+    let board = (0.025_f64).min(0.05 * h);
+    let side = (0.025_f64).min(0.06 * w);
+    let [left, right] = ends(x, side, 0.0);
+    s.cuboid(left, [0.0, h], z, wood);
+    s.cuboid(right, [0.0, h], z, wood);
+    let mut levels = s.levels();
+    if levels.len() < 2 {
+        let count = (h / 0.38).round().max(2.0) as usize;
+        levels = (0..=count).map(|i| 0.06 + (h - 0.06) * i as f64 / count as f64).collect();
+    }
+    if levels.last().is_some_and(|&last| last < h - 0.1) {
+        levels.push(h);
+    }
+    let width = inside(x, side);
+    for level in levels {
+        s.cuboid(width, [(level - board).max(0.0), level], z, wood);
+    }
+    s.cuboid(width, [0.0, h], [z[0], z[0] + 0.008], shade(wood, 0.75));
+}
+
+/// A serving cart: boards on four posts, with castors.
+pub fn cart(s: &mut Sketch<'_>) {
+    let h = s.size()[1];
+    let [x, _, z] = s.spans();
+    let wood = s.tint(0, WOODS[1]);
+    s.legs([0.0, h], 0.03, 0.0, s.tint(1, STEEL));
+    let mut levels = s.levels();
+    if levels.is_empty() {
+        levels = vec![0.15 * h, 0.5 * h, 0.8 * h];
+    }
+    for level in levels {
+        s.cuboid(x, [level - 0.025, level], z, wood);
+    }
+}
+
+/// A safe: a body, a door with a dial.
+pub fn safe(s: &mut Sketch<'_>) {
+    let [w, h, _] = s.size();
+    let [x, y, z] = s.spans();
+    let steel = s.tint(0, [90, 95, 100]);
+    s.cuboid(x, y, [z[0], z[1] - 0.03], steel);
+    s.cuboid(inside(x, 0.08 * w), inside(y, 0.08 * h), [z[1] - 0.03, z[1] - 0.015], shade(steel, 1.2));
+    let dial = [between(x, 0.42, 0.58), between(y, 0.42, 0.58), [z[1] - 0.015, z[1]]];
+    s.round(Along::Z, 1.0, 8, dial, DARK);
+}

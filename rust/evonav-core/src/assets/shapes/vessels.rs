@@ -1,0 +1,146 @@
+//! Bins, boxes, bottles, cups and other vessels.
+
+use super::{
+    colour::{CERAMIC, DARK, STEEL, shade},
+    sketch::{Along, Sketch, between, ends, inside},
+};
+
+/// An open bin: four sides (or a round wall where the box is square) and a dark inside.
+pub fn bin(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, y, z] = s.spans();
+    let plastic = s.tint(0, s.choose(&[[110, 112, 115], [70, 85, 80], [60, 62, 66], [180, 175, 165]], DARK));
+    let floor = s.levels().first().copied().unwrap_or(0.04 * h).min(0.6 * h);
+    if (w - d).abs() < 0.02 {
+        s.column(x, between(y, 0.0, 0.97), z, 1.12, 12, plastic);
+        s.column(between(x, 0.06, 0.94), between(y, 0.97, 1.0), between(z, 0.06, 0.94), 1.0, 12, shade(plastic, 0.5));
+        return;
+    }
+    let wall = 0.06 * w.min(d);
+    s.cuboid(inside(x, wall), [0.0, floor], inside(z, wall), shade(plastic, 0.6));
+    for x in ends(x, wall, 0.0) {
+        s.cuboid(x, y, z, plastic);
+    }
+    for z in ends(z, wall, 0.0) {
+        s.cuboid(inside(x, wall), y, z, plastic);
+    }
+}
+
+/// A full bag with a knot.
+pub fn bag(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let plastic = s.tint(0, [40, 42, 46]);
+    s.ellipsoid(x, between(y, 0.0, 0.85), z, plastic);
+    s.column(between(x, 0.4, 0.6), between(y, 0.78, 1.0), between(z, 0.4, 0.6), 1.6, 6, shade(plastic, 1.4));
+}
+
+/// An open cardboard box.
+pub fn open_box(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let [x, y, z] = s.spans();
+    let card = s.tint(0, [176, 132, 86]);
+    let wall = (0.03 * w.min(d)).min(0.012);
+    s.cuboid(inside(x, wall), [0.0, 0.04 * h], inside(z, wall), shade(card, 0.8));
+    for x in ends(x, wall, 0.0) {
+        s.cuboid(x, y, z, card);
+    }
+    for z in ends(z, wall, 0.0) {
+        s.cuboid(inside(x, wall), y, z, shade(card, 0.93));
+    }
+}
+
+/// Body, shoulder, neck and cap.
+pub fn bottle(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let glasses = [[60, 100, 70], [190, 205, 215], [120, 70, 45], [210, 160, 90], [130, 160, 190]];
+    let glass = s.tint(0, s.choose(&glasses, glasses[0]));
+    let is_pump = matches!(s.asset().category.as_str(), "SoapBottle" | "SprayBottle");
+    s.column(x, between(y, 0.0, 0.58), z, 1.0, 10, glass);
+    s.column(x, between(y, 0.58, 0.74), z, 0.4, 10, glass);
+    s.column(between(x, 0.32, 0.68), between(y, 0.74, 0.9), between(z, 0.32, 0.68), 1.0, 8, glass);
+    let cap = if is_pump { [230, 230, 230] } else { shade(glass, 0.5) };
+    s.column(between(x, 0.28, 0.72), between(y, 0.9, 1.0), between(z, 0.28, 0.72), 1.0, 8, cap);
+    if is_pump {
+        s.cuboid(between(x, 0.42, 0.58), between(y, 0.94, 1.0), between(z, 0.5, 1.0), cap);
+    }
+}
+
+/// A body and a perforated cap.
+pub fn shaker(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let is_salt = s.asset().category == "SaltShaker";
+    let body = if is_salt { [235, 235, 230] } else { [70, 55, 50] };
+    s.column(x, between(y, 0.0, 0.78), z, 0.85, 8, s.tint(0, body));
+    s.column(between(x, 0.1, 0.9), between(y, 0.78, 1.0), between(z, 0.1, 0.9), 0.7, 8, STEEL);
+}
+
+/// A cup with dark content, and a handle where the box is longer one way.
+pub fn mug(s: &mut Sketch<'_>) {
+    let [w, _, d] = s.size();
+    let [x, y, z] = s.spans();
+    let colours = [CERAMIC, [180, 70, 60], [70, 100, 140], [95, 125, 95], [215, 180, 110]];
+    let glaze = s.tint(0, s.choose(&colours, CERAMIC));
+    let long = w.max(d);
+    let body = (w.min(d) / long).max(0.6);
+    let (x_body, z_body) =
+        if w >= d { (between(x, 0.0, body), z) } else { (x, between(z, 0.0, body)) };
+    s.column(x_body, between(y, 0.0, 0.97), z_body, 1.1, 10, glaze);
+    let inner = |span: [f64; 2]| between(span, 0.1, 0.9);
+    s.column(inner(x_body), between(y, 0.97, 1.0), inner(z_body), 1.0, 10, [85, 60, 45]);
+    if body < 0.92 {
+        let (x, z) = if w >= d {
+            ([x_body[1] - 0.005, x[1]], between(z, 0.42, 0.58))
+        } else {
+            (between(x, 0.42, 0.58), [z_body[1] - 0.005, z[1]])
+        };
+        s.cuboid(x, between(y, 0.25, 0.75), z, glaze);
+    }
+}
+
+/// A wide cone standing on its narrow end.
+pub fn bowl(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let glaze = s.tint(0, s.choose(&[CERAMIC, [150, 180, 190], [200, 150, 110]], CERAMIC));
+    s.column(x, between(y, 0.0, 0.96), z, 2.0, 12, glaze);
+    s.column(between(x, 0.06, 0.94), between(y, 0.96, 1.0), between(z, 0.06, 0.94), 1.0, 12, shade(glaze, 0.75));
+}
+
+/// A flat disc with a rim.
+pub fn plate(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let glaze = s.tint(0, s.choose(&[CERAMIC, [190, 205, 215], [225, 205, 180]], CERAMIC));
+    s.column(x, between(y, 0.0, 0.9), z, 1.5, 12, glaze);
+    s.column(between(x, 0.15, 0.85), between(y, 0.9, 1.0), between(z, 0.15, 0.85), 1.0, 12, shade(glaze, 0.88));
+}
+
+/// Foot, belly and neck.
+pub fn vase(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    let glazes = [[110, 150, 165], [190, 120, 90], [220, 215, 205], [90, 80, 110], [70, 70, 72]];
+    let glaze = s.tint(0, s.choose(&glazes, glazes[0]));
+    s.column(x, between(y, 0.0, 0.45), z, 1.7, 10, glaze);
+    s.column(x, between(y, 0.45, 0.82), z, 0.45, 10, glaze);
+    s.column(between(x, 0.22, 0.78), between(y, 0.82, 1.0), between(z, 0.22, 0.78), 1.3, 10, shade(glaze, 1.1));
+}
+
+/// A box with a tissue standing out.
+pub fn tissue_box(s: &mut Sketch<'_>) {
+    let [x, y, z] = s.spans();
+    s.cuboid(x, between(y, 0.0, 0.7), z, s.tint(0, [140, 170, 190]));
+    s.column(between(x, 0.35, 0.65), between(y, 0.7, 1.0), between(z, 0.35, 0.65), 0.3, 6, [245, 245, 245]);
+}
+
+/// A roll along its longest side, with its core.
+pub fn roll(s: &mut Sketch<'_>) {
+    let [w, h, d] = s.size();
+    let spans = s.spans();
+    let paper = s.tint(0, if s.asset().category == "AluminumFoil" { STEEL } else { [242, 240, 235] });
+    let along = if h >= w && h >= d {
+        Along::Y
+    } else if w >= d {
+        Along::X
+    } else {
+        Along::Z
+    };
+    s.round(along, 1.0, 12, spans, paper);
+}
