@@ -8,7 +8,7 @@ use evonav_core::{
         collision::AgentBody,
         navigation::{Navigation, NavigationConfig},
         paths::path_length_m,
-        scene::{Body, BodyKind, Scene},
+        scene::{Body, BodyKind, OrientedBox, Scene},
     },
 };
 use proptest::prelude::*;
@@ -26,7 +26,8 @@ fn cuboid(centre_m: Vec3, half_m: Vec3, yaw_rad: f64) -> Part {
 
 fn body(id: &str, kind: BodyKind, parts: Vec<Part>) -> Body {
     let aabb = Aabb { min_m: [0.0; 3], max_m: [ROOM_M, 2.5, ROOM_M] };
-    Body { id: id.to_owned(), category: id.to_owned(), kind, parts, aabb }
+    let oriented = OrientedBox::of_aabb(&aabb);
+    Body { id: id.to_owned(), category: id.to_owned(), kind, parts, aabb, oriented }
 }
 
 /// A square room with walls 2 cm thick outside its floor, and boxes.

@@ -10,7 +10,7 @@ use evonav_core::{
     },
     world::{
         mesh::{SceneMesh, Triangle},
-        scene::{Body, BodyKind, Scene},
+        scene::{Body, BodyKind, OrientedBox, Scene},
     },
 };
 use proptest::{collection::vec, prelude::*};
@@ -76,6 +76,7 @@ fn scene_of(parts: &[Part]) -> Scene {
             kind: BodyKind::Object,
             parts: vec![*part],
             aabb: Aabb::EMPTY,
+            oriented: OrientedBox::of_aabb(&Aabb::EMPTY),
         })
         .collect();
     Scene { bodies, first_object: 0, bounds: Aabb::EMPTY }

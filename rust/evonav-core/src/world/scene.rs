@@ -11,12 +11,17 @@ use crate::{
         Asset,
         catalogue::{Catalogue, UnknownAssets},
         part::{Part, aabb_of},
-        shapes::{shape_of, surface_colour},
+        shapes::shape_of,
     },
     error::Error,
     geometry::{Aabb, IDENTITY, Mat3, Vec3, euler_rotation_deg},
     house::{House, Object, Opening, Room, Wall},
 };
+
+/// Colours of surfaces whose material is not known.
+const FLOOR: [u8; 3] = [170, 150, 125];
+const WALL: [u8; 3] = [222, 215, 200];
+const CEILING: [u8; 3] = [238, 236, 230];
 
 /// What a body is to the simulator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +51,17 @@ pub struct OrientedBox {
     pub rotation: Mat3,
 }
 
+impl OrientedBox {
+    /// The box with no turn; of size zero at the origin for [`Aabb::EMPTY`].
+    pub fn of_aabb(aabb: &Aabb) -> Self {
+        if *aabb == Aabb::EMPTY {
+            return Self { centre_m: [0.0; 3], half_m: [0.0; 3], rotation: IDENTITY };
+        }
+        let half_m = aabb.size_m().map(|edge| 0.5 * edge);
+        Self { centre_m: aabb.centre_m(), half_m, rotation: IDENTITY }
+    }
+}
+
 /// A thing in the world; its instance id in images is its index in [`Scene::bodies`] plus 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
@@ -67,12 +83,7 @@ pub struct Body {
 impl Body {
     fn fixed(id: &str, category: &str, kind: BodyKind, parts: Vec<Part>) -> Self {
         let aabb = aabb_of(&parts);
-        let is_empty = parts.is_empty();
-        let oriented = OrientedBox {
-            centre_m: if is_empty { [0.0; 3] } else { aabb.centre_m() },
-            half_m: if is_empty { [0.0; 3] } else { aabb.size_m().map(|edge| 0.5 * edge) },
-            rotation: IDENTITY,
-        };
+        let oriented = OrientedBox::of_aabb(&aabb);
         let (id, category) = (id.to_owned(), category.to_owned());
         Self { id, category, kind, parts, aabb, oriented }
     }
@@ -172,21 +183,23 @@ impl Scene {
 /// Floors, ceilings, walls, doors and windows.
 fn structure(house: &House, catalogue: &Catalogue) -> Vec<Body> {
     let openings = Openings::of(house);
+    let paint = |material: &str, tint: Option<[f64; 3]>, otherwise: [u8; 3]| match tint {
+        Some(rgb) => rgb.map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8),
+        None => catalogue.material_colour(material).unwrap_or(otherwise),
+    };
     let floor = |room: &Room| {
-        let colour = surface_colour(&room.floor_material, catalogue, [170, 150, 125]);
+        let colour = paint(&room.floor_material, None, FLOOR);
         let parts = slab_parts(&room.polygon_m, [-SLAB_M, 0.0], colour);
         Body::fixed(&room.id, "Floor", BodyKind::Floor, parts)
     };
     let ceiling = |room: &Room| {
         let height_m = room_height_m(house, room);
-        let parts = slab_parts(&room.polygon_m, [height_m, height_m + SLAB_M], [238, 236, 230]);
+        let colour = paint(&house.ceiling.material, house.ceiling.colour, CEILING);
+        let parts = slab_parts(&room.polygon_m, [height_m, height_m + SLAB_M], colour);
         Body::fixed(&room.id, "Ceiling", BodyKind::Ceiling, parts)
     };
     let wall = |wall: &Wall| {
-        let colour = match wall.colour {
-            Some(rgb) => rgb.map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8),
-            None => surface_colour(&wall.material, catalogue, [222, 215, 200]),
-        };
+        let colour = paint(&wall.material, wall.colour, WALL);
         Body::fixed(&wall.id, "Wall", BodyKind::Wall, wall_parts(house, wall, &openings, colour))
     };
     let door = |door: &Opening| {

@@ -19,7 +19,6 @@ mod tables;
 mod vessels;
 
 use crate::assets::{Asset, part::Part};
-pub(crate) use colour::surface_colour;
 use sketch::Sketch;
 
 /// The parts of an asset, in the object frame.

@@ -1,0 +1,257 @@
+//! Scenes of whole houses: openings are open, walls are not, rebuilds equal builds.
+
+use std::{io::Read, path::PathBuf};
+
+use evonav_core::{
+    assets::{
+        Catalogue, UnknownAssets,
+        part::{Part, Primitive},
+    },
+    geometry::{Vec2, Vec3, add, polygon_contains, rotate, sub},
+    house::{House, HouseDelta, ObjectMove},
+    world::scene::{BodyKind, Scene},
+};
+
+const UNKNOWN: UnknownAssets = UnknownAssets::CategoryDefault;
+
+/// Two rooms of 4 x 4 m side by side, a doorway between them, a window, an L counter and a table
+/// with a mug. `DOOR` is replaced by the door's asset, `EMPTY` by whether the wall is open plan.
+const TWO_ROOMS: &str = r#"{
+  "rooms": [
+    {"id": "room|1", "roomType": "Kitchen", "floorMaterial": {"name": "DarkWoodFloors"},
+     "floorPolygon": [{"x":0,"y":0,"z":0},{"x":0,"y":0,"z":4},{"x":4,"y":0,"z":4},{"x":4,"y":0,"z":0}]},
+    {"id": "room|2", "roomType": "Bedroom", "floorMaterial": {"name": "GreyFloor"},
+     "floorPolygon": [{"x":4,"y":0,"z":0},{"x":4,"y":0,"z":4},{"x":8,"y":0,"z":4},{"x":8,"y":0,"z":0}]}
+  ],
+  "walls": [
+    {"id":"wall|1|0.00|0.00|0.00|4.00","roomId":"room|1","material":{"name":"PureWhite"},
+     "polygon":[{"x":0,"y":0,"z":0},{"x":0,"y":0,"z":4},{"x":0,"y":2.5,"z":0},{"x":0,"y":2.5,"z":4}]},
+    {"id":"wall|1|4.00|0.00|4.00|4.00","roomId":"room|1","material":{"name":"RedBrick"},"empty":EMPTY,
+     "polygon":[{"x":4,"y":0,"z":4},{"x":4,"y":0,"z":0},{"x":4,"y":2.5,"z":4},{"x":4,"y":2.5,"z":0}]},
+    {"id":"wall|2|4.00|0.00|4.00|4.00","roomId":"room|2","material":{"name":"PureWhite"},"empty":EMPTY,
+     "polygon":[{"x":4,"y":0,"z":0},{"x":4,"y":0,"z":4},{"x":4,"y":2.5,"z":0},{"x":4,"y":2.5,"z":4}]},
+    {"id":"wall|exterior|0.00|0.00|0.00|4.00","roomId":"exterior","material":{"name":"PureWhite"},
+     "polygon":[{"x":0,"y":0,"z":4},{"x":0,"y":0,"z":0},{"x":0,"y":2.5,"z":4},{"x":0,"y":2.5,"z":0}]}
+  ],
+  "doors": [
+    {"id":"door|1|2","room0":"room|1","room1":"room|2","wall0":"wall|1|4.00|0.00|4.00|4.00",
+     "wall1":"wall|2|4.00|0.00|4.00|4.00","assetId":"DOOR","openable":true,"openness":OPENNESS,
+     "assetPosition":{"x":1.5,"y":1.05,"z":0},
+     "holePolygon":[{"x":1,"y":0,"z":0},{"x":2,"y":2.1,"z":0}]}
+  ],
+  "windows": [
+    {"id":"window|1|0","room0":"room|1","room1":"room|1","wall0":"wall|1|0.00|0.00|0.00|4.00",
+     "wall1":"wall|exterior|0.00|0.00|0.00|4.00","assetId":"Window_Fixed_36x48",
+     "assetPosition":{"x":2,"y":1.5,"z":0},
+     "holePolygon":[{"x":1.5,"y":1,"z":0},{"x":2.5,"y":2,"z":0}]}
+  ],
+  "objects": [
+    {"id":"1|0","assetId":"Countertop_L_6x6","position":{"x":1.0,"y":0.472,"z":1.0},
+     "rotation":{"x":0,"y":90,"z":0},"kinematic":true},
+    {"id":"1|1","assetId":"Dining_Table_201_1","position":{"x":6,"y":0.34,"z":2},
+     "rotation":{"x":0,"y":30,"z":0},"kinematic":true,
+     "children":[{"id":"small|1|1","assetId":"Mug_1","position":{"x":6,"y":0.73,"z":2},
+                  "rotation":{"x":0,"y":0,"z":0},"kinematic":false}]}
+  ],
+  "proceduralParameters": {"ceilingMaterial": {"name": "PureWhite"}},
+  "metadata": {"schema": "1.0.0", "agent": {"position": {"x":2,"y":0.95,"z":3},
+    "rotation": {"x":0,"y":0,"z":0}, "standing": true, "horizon": 30}}
+}"#;
+
+fn two_rooms(door: &str, openness: &str, is_open_plan: bool) -> (House, Scene) {
+    let json = TWO_ROOMS
+        .replace("DOOR", door)
+        .replace("OPENNESS", openness)
+        .replace("EMPTY", if is_open_plan { "true" } else { "false" });
+    let house = House::from_json("two rooms", &json).expect("a valid house");
+    let scene = Scene::build(&house, Catalogue::bundled(), UNKNOWN).expect("known assets");
+    (house, scene)
+}
+
+/// Whether the segment meets a part, by sampling it every half millimetre.
+fn is_blocked(scene: &Scene, from_m: Vec3, to_m: Vec3, kinds: &[BodyKind]) -> bool {
+    let length = sub(to_m, from_m).iter().map(|d| d * d).sum::<f64>().sqrt();
+    let steps = (length / 0.0005).ceil() as usize;
+    let bodies = scene.bodies.iter().filter(|body| kinds.contains(&body.kind));
+    let parts: Vec<&Part> = bodies.flat_map(|body| &body.parts).collect();
+    (0..=steps).any(|i| {
+        let t = i as f64 / steps as f64;
+        let point = add(from_m, sub(to_m, from_m).map(|d| d * t));
+        parts.iter().any(|part| holds(part, point))
+    })
+}
+
+fn holds(part: &Part, point_m: Vec3) -> bool {
+    let offset = sub(point_m, part.centre_m);
+    let own: Vec3 = std::array::from_fn(|j| (0..3).map(|i| part.rotation[i][j] * offset[i]).sum());
+    match part.primitive {
+        Primitive::Cuboid { half_m } => (0..3).all(|i| own[i].abs() <= half_m[i]),
+        Primitive::Ellipsoid { half_m } => {
+            (0..3).map(|i| (own[i] / half_m[i]).powi(2)).sum::<f64>() <= 1.0
+        }
+        Primitive::Frustum { bottom_m, top_m, half_height_m, .. } => {
+            let t = 0.5 * (own[1] / half_height_m + 1.0);
+            let half = |i: usize| bottom_m[i] + t * (top_m[i] - bottom_m[i]);
+            (0.0..=1.0).contains(&t)
+                && (own[0] / half(0)).powi(2) + (own[2] / half(1)).powi(2) <= 1.0
+        }
+    }
+}
+
+const BUILT: [BodyKind; 3] = [BodyKind::Wall, BodyKind::Door, BodyKind::Window];
+
+#[test]
+fn a_ray_passes_through_an_open_door_and_not_beside_it() {
+    // wall0 runs from z = 4 to z = 0: its hole at 1..2 m is at z = 2..3.
+    let (_, scene) = two_rooms("Doorway_1", "1", false);
+    assert!(!is_blocked(&scene, [3.0, 1.0, 2.5], [5.0, 1.0, 2.5], &BUILT));
+    assert!(is_blocked(&scene, [3.0, 1.0, 1.5], [5.0, 1.0, 1.5], &BUILT));
+    assert!(is_blocked(&scene, [3.0, 2.3, 2.5], [5.0, 2.3, 2.5], &BUILT), "the lintel");
+    let (_, closed) = two_rooms("Doorway_1", "0", false);
+    assert!(is_blocked(&closed, [3.0, 1.0, 2.5], [5.0, 1.0, 2.5], &BUILT));
+    let (_, frame) = two_rooms("Doorframe_1", "0", false);
+    assert!(!is_blocked(&frame, [3.0, 1.0, 2.5], [5.0, 1.0, 2.5], &BUILT));
+}
+
+#[test]
+fn the_leaf_stands_in_the_room_that_the_generator_keeps_free() {
+    let (_, scene) = two_rooms("Doorway_1", "1", false);
+    let door = scene.bodies.iter().find(|b| b.kind == BodyKind::Door).expect("a door");
+    // wall0 runs towards -z; its left is +x.
+    assert!(door.aabb.max_m[0] > 4.8 && door.aabb.min_m[0] > 3.8, "{:?}", door.aabb);
+    assert_eq!(door.category, "Doorway");
+}
+
+#[test]
+fn windows_close_their_hole_and_open_plan_walls_are_not_there() {
+    let (_, scene) = two_rooms("Doorway_1", "1", false);
+    assert!(is_blocked(&scene, [-1.0, 1.4, 1.9], [1.0, 1.4, 1.9], &[BodyKind::Window]));
+    assert!(!is_blocked(&scene, [-1.0, 1.4, 1.9], [1.0, 1.4, 1.9], &[BodyKind::Wall]));
+    let (_, open) = two_rooms("Doorframe_1", "1", true);
+    assert!(!is_blocked(&open, [3.0, 1.0, 1.5], [5.0, 1.0, 1.5], &BUILT));
+}
+
+#[test]
+fn sides_of_a_wall_keep_their_own_colour_and_room() {
+    let (_, scene) = two_rooms("Doorway_1", "1", false);
+    let wall = |id: &str| scene.bodies.iter().find(|b| b.id == id).expect("a wall");
+    let (brick, white) = (wall("wall|1|4.00|0.00|4.00|4.00"), wall("wall|2|4.00|0.00|4.00|4.00"));
+    assert!(brick.aabb.max_m[0] <= 4.0 && white.aabb.min_m[0] >= 4.0);
+    assert_ne!(brick.parts[0].colour, white.parts[0].colour);
+    let outer = wall("wall|exterior|0.00|0.00|0.00|4.00");
+    assert!(outer.aabb.max_m[0] <= 0.0);
+}
+
+#[test]
+fn the_corner_of_a_turned_counter_is_free() {
+    let (_, scene) = two_rooms("Doorway_1", "1", false);
+    let counter = &scene.bodies[scene.first_object];
+    // At yaw 90 degrees its back (-z) is at -x and its wing (+x) at -z.
+    let filled = |x: f64, z: f64| counter.parts.iter().any(|part| holds(part, [x, 0.4, z]));
+    assert!(filled(0.3, 1.5) && filled(1.5, 0.3) && !filled(1.5, 1.5));
+    let corner = rotate(&counter.oriented.rotation, counter.oriented.half_m);
+    assert!((corner[0].abs() - counter.oriented.half_m[2]).abs() < 1e-9);
+}
+
+#[test]
+fn a_rebuilt_scene_is_the_built_scene() {
+    let (house, scene) = two_rooms("Doorway_1", "1", false);
+    let moves = vec![
+        ObjectMove {
+            id: "1|1".to_owned(),
+            position_m: [6.5, 0.34, 2.2],
+            rotation_deg: [0.0, 120.0, 0.0],
+            parent: None,
+        },
+        ObjectMove {
+            id: "small|1|1".to_owned(),
+            position_m: [1.0, 0.99, 0.3],
+            rotation_deg: [0.0, 45.0, 0.0],
+            parent: Some("1|0".to_owned()),
+        },
+    ];
+    let moved: Vec<String> = moves.iter().map(|m| m.id.clone()).collect();
+    let after = house.apply(&HouseDelta { moves }).expect("known objects");
+    let indices: Vec<usize> = moved.iter().filter_map(|id| after.object_index(id)).collect();
+    let catalogue = Catalogue::bundled();
+    let rebuilt = scene.rebuild(&after, catalogue, UNKNOWN, &indices).expect("known assets");
+    let built = Scene::build(&after, catalogue, UNKNOWN).expect("known assets");
+    assert_eq!(rebuilt, built);
+    assert_ne!(rebuilt, scene);
+}
+
+#[test]
+fn floors_of_slanted_rooms_are_covered() {
+    let polygon: [Vec2; 4] = [[0.0, 0.0], [0.0, 4.0], [4.0, 5.5], [4.0, 0.0]];
+    let corners: Vec<String> =
+        polygon.iter().map(|[x, z]| format!(r#"{{"x":{x},"y":0,"z":{z}}}"#)).collect();
+    let json = format!(
+        r#"{{"rooms":[{{"id":"room|1","roomType":"Bedroom","floorMaterial":"Wood","floorPolygon":[{}]}}],
+        "walls":[],"doors":[],"windows":[],"objects":[],"proceduralParameters":{{}},"metadata":{{}}}}"#,
+        corners.join(",")
+    );
+    let house = House::from_json("slanted", &json).expect("a valid house");
+    let scene = Scene::build(&house, Catalogue::bundled(), UNKNOWN).expect("no objects");
+    let floor = &scene.bodies[0];
+    for i in 0..39 {
+        for j in 0..56 {
+            let [x, z] = [0.053 + 0.1 * f64::from(i), 0.057 + 0.1 * f64::from(j)];
+            let is_covered = floor.parts.iter().any(|part| holds(part, [x, -0.01, z]));
+            assert!(is_covered || !polygon_contains(&polygon, [x, z]), "{x} {z}");
+        }
+    }
+    assert_eq!(scene.bodies[1].kind, BodyKind::Ceiling);
+}
+
+/// Every house of the recorded data, if it is there.
+fn shared_houses() -> Vec<(String, String)> {
+    let root = std::env::var_os("EVONAV_SHARED").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
+        PathBuf::from,
+    );
+    let mut houses = Vec::new();
+    let Ok(folders) = std::fs::read_dir(root.join("data")) else { return houses };
+    for folder in folders.flatten() {
+        let Ok(files) = std::fs::read_dir(folder.path()) else { continue };
+        for file in files.flatten().map(|file| file.path()) {
+            let name = file.display().to_string();
+            if !name.ends_with(".jsonl.gz") {
+                continue;
+            }
+            let output = std::process::Command::new("gzip").arg("-dc").arg(&file).output();
+            let mut text = String::new();
+            let Ok(output) = output else { continue };
+            if output.stdout.as_slice().read_to_string(&mut text).is_err() {
+                continue;
+            }
+            for (line, json) in text.lines().enumerate().filter(|(_, l)| l.contains("\"rooms\"")) {
+                houses.push((format!("{name}:{}", line + 1), json.to_owned()));
+            }
+        }
+    }
+    houses.sort();
+    houses
+}
+
+#[test]
+fn every_recorded_house_builds() {
+    let houses = shared_houses();
+    if houses.is_empty() {
+        eprintln!("skipped: no recorded houses under EVONAV_SHARED or ../shared");
+        return;
+    }
+    let mut num_built = 0;
+    for (name, json) in houses {
+        let Ok(house) = House::from_json(&name, &json) else { continue };
+        let scene = Scene::build(&house, Catalogue::bundled(), UNKNOWN).expect("defaults allowed");
+        assert_eq!(scene.bodies.len(), scene.first_object + house.objects.len(), "{name}");
+        let is_finite = |v: &Vec3| v.iter().all(|c| c.is_finite());
+        for body in &scene.bodies {
+            let is_sound = body.parts.is_empty() || is_finite(&body.aabb.min_m);
+            assert!(is_sound && body.parts.iter().all(|p| is_finite(&p.centre_m)), "{name}");
+        }
+        num_built += 1;
+    }
+    eprintln!("{num_built} recorded houses built");
+    assert!(num_built > 1800);
+}

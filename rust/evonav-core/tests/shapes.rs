@@ -1,0 +1,140 @@
+//! Shapes of all catalogue assets: exact boxes, sane parts, free room where there should be some.
+
+use evonav_core::{
+    assets::{
+        Asset, Catalogue,
+        part::{Part, Primitive, aabb_of},
+        shapes::shape_of,
+    },
+    geometry::{Vec3, sub},
+};
+use proptest::prelude::*;
+
+fn asset(id: &str) -> Asset {
+    Catalogue::bundled().get(id).expect("an asset of the catalogue").clone()
+}
+
+/// Triangles that tessellation makes of a part (ellipsoids: 12 meridians, 6 bands).
+fn num_triangles(part: &Part) -> usize {
+    match part.primitive {
+        Primitive::Cuboid { .. } => 12,
+        Primitive::Frustum { sides, .. } => 4 * usize::from(sides) - 4,
+        Primitive::Ellipsoid { .. } => 120,
+    }
+}
+
+/// Whether a point lies in a part, tested from the definition of each primitive.
+fn holds(part: &Part, point_m: Vec3) -> bool {
+    let offset = sub(point_m, part.centre_m);
+    let own: Vec3 = std::array::from_fn(|j| (0..3).map(|i| part.rotation[i][j] * offset[i]).sum());
+    match part.primitive {
+        Primitive::Cuboid { half_m } => (0..3).all(|i| own[i].abs() <= half_m[i]),
+        Primitive::Ellipsoid { half_m } => {
+            (0..3).map(|i| (own[i] / half_m[i]).powi(2)).sum::<f64>() <= 1.0
+        }
+        Primitive::Frustum { bottom_m, top_m, half_height_m, .. } => {
+            let t = 0.5 * (own[1] / half_height_m + 1.0);
+            let half = |i: usize| bottom_m[i] + t * (top_m[i] - bottom_m[i]);
+            (0.0..=1.0).contains(&t)
+                && (own[0] / half(0)).powi(2) + (own[2] / half(1)).powi(2) <= 1.0
+        }
+    }
+}
+
+fn is_filled(parts: &[Part], point_m: Vec3) -> bool {
+    parts.iter().any(|part| holds(part, point_m))
+}
+
+fn is_sane(parts: &[Part]) -> bool {
+    let positive = |edges: &[f64]| edges.iter().all(|edge| edge.is_finite() && *edge > 0.0);
+    parts.iter().all(|part| match part.primitive {
+        Primitive::Cuboid { half_m } | Primitive::Ellipsoid { half_m } => positive(&half_m),
+        Primitive::Frustum { bottom_m, top_m, half_height_m, sides } => {
+            positive(&bottom_m) && positive(&top_m) && positive(&[half_height_m]) && sides >= 3
+        }
+    })
+}
+
+#[test]
+fn every_asset_fills_its_box_and_nothing_else() {
+    let catalogue = Catalogue::bundled();
+    let ids = catalogue.asset_ids();
+    assert_eq!(ids.len(), 1653);
+    let mut costliest = (0, "");
+    for id in ids {
+        let asset = catalogue.get(id).expect("listed");
+        let parts = shape_of(asset);
+        assert!(!parts.is_empty() && is_sane(&parts), "{id}");
+        let bounds = aabb_of(&parts);
+        for axis in 0..3 {
+            let half = 0.5 * asset.size_m[axis];
+            assert!((bounds.max_m[axis] - half).abs() < 1e-6, "{id} {bounds:?} {half}");
+            assert!((bounds.min_m[axis] + half).abs() < 1e-6, "{id} {bounds:?} {half}");
+        }
+        costliest = costliest.max((parts.iter().map(num_triangles).sum(), id));
+    }
+    assert!(costliest.0 <= 700, "{costliest:?}");
+}
+
+#[test]
+fn corner_counters_leave_their_inside_free() {
+    let inner = |id: &str, x: f64, z: f64| {
+        let asset = asset(id);
+        let [w, h, d] = asset.size_m;
+        is_filled(&shape_of(&asset), [x * w, 0.3 * h, z * d])
+    };
+    assert!(!inner("Countertop_L_10x10", -0.3, 0.3));
+    assert!(inner("Countertop_L_10x10", 0.4, 0.3) && inner("Countertop_L_10x10", -0.3, -0.45));
+    assert!(!inner("Countertop_C_8x10", 0.0, 0.3));
+    assert!(inner("Countertop_C_8x10", -0.45, 0.3) && inner("Countertop_C_8x10", 0.45, 0.3));
+    assert!(inner("Countertop_I_4x2", 0.0, 0.0) && inner("Countertop_Island_6x3", 0.0, 0.0));
+}
+
+#[test]
+fn there_is_room_under_tables_and_chairs_but_not_in_their_tops() {
+    for id in ["Dining_Table_201_1", "Dining_Table_7_1", "RoboTHOR_desk_lisabo", "Stool_1_1"] {
+        let asset = asset(id);
+        let h = asset.size_m[1];
+        let parts = shape_of(&asset);
+        assert!(is_filled(&parts, [0.0, 0.5 * h - 0.01, 0.0]), "{id}: top");
+        let quarter = [0.25 * asset.size_m[0], -0.1 * h, 0.25 * asset.size_m[2]];
+        assert!(!is_filled(&parts, quarter), "{id}: room underneath");
+    }
+    let chair = asset("Chair_203_1");
+    let [_, h, d] = chair.size_m;
+    let parts = shape_of(&chair);
+    assert!(!is_filled(&parts, [0.0, 0.4 * h, 0.2 * d]), "nothing above the seat");
+    assert!(is_filled(&parts, [0.0, 0.49 * h, -0.49 * d]), "the back is at -z");
+}
+
+#[test]
+fn the_same_asset_always_looks_the_same() {
+    let catalogue = Catalogue::bundled();
+    for id in catalogue.asset_ids() {
+        let asset = catalogue.get(id).expect("listed");
+        assert_eq!(shape_of(asset), shape_of(asset));
+    }
+}
+
+proptest! {
+    /// Any category at any size, with any surfaces and colours, fills its box.
+    #[test]
+    fn odd_sizes_still_fill_their_box(
+        index in 0_usize..200,
+        size_m in [0.002..4.0, 0.002..4.0, 0.002..4.0],
+        surfaces_m in proptest::collection::vec(-1.0..3.0, 0..6),
+        colours in proptest::collection::vec(any::<[u8; 3]>(), 0..3),
+        id in "[A-Za-z_]{0,8}",
+    ) {
+        let categories = Catalogue::bundled().categories();
+        let category = categories.get(index).copied().unwrap_or("Bathtub").to_owned();
+        let asset = Asset { id, category, size_m, surfaces_m, colours, ..Asset::default() };
+        let parts = shape_of(&asset);
+        prop_assert!(is_sane(&parts), "{asset:?}");
+        let bounds = aabb_of(&parts);
+        for axis in 0..3 {
+            prop_assert!((bounds.max_m[axis] - 0.5 * size_m[axis]).abs() < 1e-6, "{asset:?}");
+            prop_assert!((bounds.min_m[axis] + 0.5 * size_m[axis]).abs() < 1e-6, "{asset:?}");
+        }
+    }
+}
