@@ -69,9 +69,9 @@ impl Part {
     pub fn aabb(&self) -> Aabb {
         let row = |i: usize| self.rotation[i];
         let reach = match self.primitive {
-            Primitive::Cuboid { half_m } => std::array::from_fn(|i| {
-                row(i).iter().zip(half_m).map(|(r, h)| (r * h).abs()).sum()
-            }),
+            Primitive::Cuboid { half_m } => {
+                std::array::from_fn(|i| row(i).iter().zip(half_m).map(|(r, h)| (r * h).abs()).sum())
+            }
             Primitive::Ellipsoid { half_m } => std::array::from_fn(|i| {
                 row(i).iter().zip(half_m).map(|(r, h)| (r * h).powi(2)).sum::<f64>().sqrt()
             }),

@@ -4,7 +4,7 @@ pub mod collision;
 pub mod footprint;
 pub mod mesh;
 pub mod navigation;
+mod openings;
 pub mod paths;
 pub mod scene;
-mod openings;
 mod structure;

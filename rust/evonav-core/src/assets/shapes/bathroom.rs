@@ -15,8 +15,22 @@ pub fn toilet(s: &mut Sketch<'_>) {
     s.cuboid(x, between(y, 1.0 - 0.03 / h, 1.0), between(z, 0.0, 0.28), shade(white, 0.95));
     s.column(between(x, 0.25, 0.75), [0.0, 0.55 * rim], between(z, 0.05, 0.75), 0.85, 12, white);
     s.column(between(x, 0.12, 0.88), [0.5 * rim, rim - 0.03], between(z, 0.2, 1.0), 1.5, 12, white);
-    s.column(between(x, 0.1, 0.9), [rim - 0.03, rim], between(z, 0.22, 1.0), 1.0, 12, shade(white, 0.92));
-    s.column(between(x, 0.22, 0.78), [rim, rim + 0.004], between(z, 0.34, 0.92), 1.0, 12, [120, 150, 165]);
+    s.column(
+        between(x, 0.1, 0.9),
+        [rim - 0.03, rim],
+        between(z, 0.22, 1.0),
+        1.0,
+        12,
+        shade(white, 0.92),
+    );
+    s.column(
+        between(x, 0.22, 0.78),
+        [rim, rim + 0.004],
+        between(z, 0.34, 0.92),
+        1.0,
+        12,
+        [120, 150, 165],
+    );
     s.cuboid(between(x, 0.12, 0.88), [rim, 0.8 * h], between(z, 0.28, 0.32), shade(white, 0.97));
 }
 
@@ -57,7 +71,12 @@ pub fn sink(s: &mut Sketch<'_>) {
         s.cuboid(between(x, 0.47, 0.53), [h - 0.02, h], between(z, 0.02, 0.3), STEEL);
     }
     let side = 0.09 * w.min(d);
-    s.cuboid(inside(x, side), [basin, basin + 0.25 * (rim - basin)], inside(z, side), shade(white, 0.8));
+    s.cuboid(
+        inside(x, side),
+        [basin, basin + 0.25 * (rim - basin)],
+        inside(z, side),
+        shade(white, 0.8),
+    );
     for x in ends(x, side, 0.0) {
         s.cuboid(x, [basin, rim], z, white);
     }
@@ -115,14 +134,20 @@ pub fn curtain(s: &mut Sketch<'_>) {
 pub fn towel(s: &mut Sketch<'_>) {
     let [_, h, d] = s.size();
     let [x, y, z] = s.spans();
-    let cloth = s.tint(0, s.choose(&[[225, 225, 220], [120, 150, 170], [170, 110, 100]], FABRICS[5]));
+    let cloth =
+        s.tint(0, s.choose(&[[225, 225, 220], [120, 150, 170], [170, 110, 100]], FABRICS[5]));
     if h > d {
         s.cuboid(x, y, between(z, 0.55, 1.0), cloth);
         s.cuboid(inside(x, 0.005), between(y, 0.3, 1.0), between(z, 0.0, 0.45), shade(cloth, 0.9));
         s.cuboid(x, between(y, 0.96, 1.0), z, cloth);
     } else {
         s.cuboid(x, between(y, 0.0, 0.6), z, cloth);
-        s.cuboid(between(x, 0.1, 0.95), between(y, 0.6, 1.0), between(z, 0.08, 0.9), shade(cloth, 0.93));
+        s.cuboid(
+            between(x, 0.1, 0.95),
+            between(y, 0.6, 1.0),
+            between(z, 0.08, 0.9),
+            shade(cloth, 0.93),
+        );
     }
 }
 
@@ -143,7 +168,14 @@ pub fn brush(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let rubber = s.tint(1, [150, 60, 50]);
     s.column(x, between(y, 0.0, 0.25), z, 0.5, 12, rubber);
-    s.column(between(x, 0.42, 0.58), between(y, 0.25, 1.0), between(z, 0.42, 0.58), 1.0, 8, s.tint(0, WOODS[0]));
+    s.column(
+        between(x, 0.42, 0.58),
+        between(y, 0.25, 1.0),
+        between(z, 0.42, 0.58),
+        1.0,
+        8,
+        s.tint(0, WOODS[0]),
+    );
 }
 
 /// A white box with a round door and a panel.
@@ -153,7 +185,12 @@ pub fn washer(s: &mut Sketch<'_>) {
     let front = z[1] - 0.04;
     s.cuboid(x, between(y, 0.0, 0.9), [z[0], front], white);
     s.cuboid(x, between(y, 0.9, 1.0), between(z, 0.0, 0.25), shade(white, 0.85));
-    s.cuboid(between(x, 0.04, 0.96), between(y, 0.76, 0.88), [front, front + 0.01], shade(white, 0.75));
+    s.cuboid(
+        between(x, 0.04, 0.96),
+        between(y, 0.76, 0.88),
+        [front, front + 0.01],
+        shade(white, 0.75),
+    );
     let door = [between(x, 0.2, 0.8), between(y, 0.2, 0.72), [front, z[1] - 0.01]];
     s.round(Along::Z, 1.0, 16, door, STEEL);
     let glass = [between(x, 0.28, 0.72), between(y, 0.27, 0.65), [z[1] - 0.01, z[1]]];

@@ -5,8 +5,14 @@ use super::{
     sketch::{Sketch, Span, between, ends, inside},
 };
 
-const LINEN: [[u8; 3]; 6] =
-    [[90, 120, 160], [190, 185, 175], [150, 90, 90], [110, 135, 115], [225, 220, 212], [70, 80, 105]];
+const LINEN: [[u8; 3]; 6] = [
+    [90, 120, 160],
+    [190, 185, 175],
+    [150, 90, 90],
+    [110, 135, 115],
+    [225, 220, 212],
+    [70, 80, 105],
+];
 
 /// Frame, mattress, blanket, pillows, headboard; above 1.5 m a bunk or canopy bed on four posts.
 pub fn bed(s: &mut Sketch<'_>) {

@@ -6,14 +6,8 @@ use crate::assets::Asset;
 pub type Colour = [u8; 3];
 
 /// Woods, light to dark.
-pub const WOODS: [Colour; 6] = [
-    [205, 170, 125],
-    [176, 132, 86],
-    [150, 105, 70],
-    [120, 78, 48],
-    [92, 60, 40],
-    [188, 140, 100],
-];
+pub const WOODS: [Colour; 6] =
+    [[205, 170, 125], [176, 132, 86], [150, 105, 70], [120, 78, 48], [92, 60, 40], [188, 140, 100]];
 /// Upholstery.
 pub const FABRICS: [Colour; 6] = [
     [130, 135, 145],

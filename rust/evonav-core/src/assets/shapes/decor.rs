@@ -16,12 +16,24 @@ pub fn plant(s: &mut Sketch<'_>) {
     let radius = (0.32 * w.min(d)).min(0.5 * pot_top + 0.05);
     let around = |span| inside(span, 0.5 * (span_length(span) - 2.0 * radius));
     s.column(around(x), [0.0, pot_top], around(z), 1.3, 10, pot);
-    s.column(inside(around(x), 0.1 * radius), [pot_top, pot_top + 0.005], inside(around(z), 0.1 * radius), 1.0, 10, [60, 45, 35]);
+    s.column(
+        inside(around(x), 0.1 * radius),
+        [pot_top, pot_top + 0.005],
+        inside(around(z), 0.1 * radius),
+        1.0,
+        10,
+        [60, 45, 35],
+    );
     s.pole([0.0, 0.0], 0.05 * w.min(d), [pot_top, 0.6 * h], 6, [95, 80, 50]);
     let crown = 0.75 * h;
     s.ellipsoid(between(x, 0.12, 0.88), [crown - 0.25 * h, h], between(z, 0.12, 0.88), leaf);
     s.ellipsoid(between(x, 0.0, 0.6), [pot_top, crown], between(z, 0.3, 1.0), shade(leaf, 0.85));
-    s.ellipsoid(between(x, 0.4, 1.0), [1.1 * pot_top, crown + 0.1 * h], between(z, 0.0, 0.6), shade(leaf, 1.15));
+    s.ellipsoid(
+        between(x, 0.4, 1.0),
+        [1.1 * pot_top, crown + 0.1 * h],
+        between(z, 0.0, 0.6),
+        shade(leaf, 1.15),
+    );
 }
 
 fn span_length(span: [f64; 2]) -> f64 {
@@ -39,7 +51,12 @@ pub fn painting(s: &mut Sketch<'_>) {
     s.cuboid(x, y, between(z, 0.0, 0.7), frame);
     let (inner, canvas) = (inside(x, bar), inside(y, bar));
     s.cuboid(inner, between(canvas, 0.4, 1.0), between(z, 0.7, 0.85), s.choose(&skies, skies[0]));
-    s.cuboid(inner, between(canvas, 0.0, 0.4), between(z, 0.7, 0.85), s.choose(&grounds, grounds[0]));
+    s.cuboid(
+        inner,
+        between(canvas, 0.0, 0.4),
+        between(z, 0.7, 0.85),
+        s.choose(&grounds, grounds[0]),
+    );
     for x in ends(x, bar, 0.0) {
         s.cuboid(x, y, between(z, 0.7, 1.0), frame);
     }
@@ -82,7 +99,8 @@ pub fn doorway(s: &mut Sketch<'_>) {
 pub fn statue(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
-    let stone = s.tint(0, s.choose(&[[190, 180, 160], [120, 110, 100], [160, 120, 60]], [190, 180, 160]));
+    let stone =
+        s.tint(0, s.choose(&[[190, 180, 160], [120, 110, 100], [160, 120, 60]], [190, 180, 160]));
     if w > h {
         // An animal: body, head, legs.
         s.cuboid(between(x, 0.1, 0.8), between(y, 0.35, 0.75), between(z, 0.15, 0.85), stone);
@@ -93,7 +111,14 @@ pub fn statue(s: &mut Sketch<'_>) {
         return;
     }
     s.column(x, between(y, 0.0, 0.12), z, 0.9, 8, shade(stone, 0.7));
-    s.column(between(x, 0.15, 0.85), between(y, 0.12, 0.75), between(z, 0.15, 0.85), 0.55, 8, stone);
+    s.column(
+        between(x, 0.15, 0.85),
+        between(y, 0.12, 0.75),
+        between(z, 0.15, 0.85),
+        0.55,
+        8,
+        stone,
+    );
     s.ellipsoid(between(x, 0.28, 0.72), between(y, 0.72, 1.0), between(z, 0.28, 0.72), stone);
 }
 
@@ -102,13 +127,23 @@ pub fn teddy_bear(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let fur = s.tint(0, [150, 105, 65]);
     s.ellipsoid(between(x, 0.22, 0.78), between(y, 0.05, 0.62), between(z, 0.05, 0.7), fur);
-    s.ellipsoid(between(x, 0.27, 0.73), between(y, 0.52, 0.95), between(z, 0.05, 0.65), shade(fur, 1.1));
+    s.ellipsoid(
+        between(x, 0.27, 0.73),
+        between(y, 0.52, 0.95),
+        between(z, 0.05, 0.65),
+        shade(fur, 1.1),
+    );
     for ear in [between(x, 0.22, 0.38), between(x, 0.62, 0.78)] {
         s.cuboid(ear, between(y, 0.86, 1.0), between(z, 0.3, 0.4), fur);
     }
     for side in ends(x, 0.3 * span_length(x), 0.0) {
         s.cuboid(side, between(y, 0.38, 0.5), between(z, 0.25, 0.5), fur);
-        s.cuboid(inside(side, 0.05 * span_length(x)), between(y, 0.0, 0.16), between(z, 0.4, 1.0), fur);
+        s.cuboid(
+            inside(side, 0.05 * span_length(x)),
+            between(y, 0.0, 0.16),
+            between(z, 0.4, 1.0),
+            fur,
+        );
     }
     s.cuboid(between(x, 0.4, 0.6), between(y, 0.1, 0.3), between(z, 0.0, 0.1), fur);
 }
@@ -196,7 +231,12 @@ pub fn slab(s: &mut Sketch<'_>) {
         return s.block(cover);
     }
     s.cuboid(x, between(y, 0.0, 0.12), z, cover);
-    s.cuboid(between(x, 0.02, 0.97), between(y, 0.12, 0.88), between(z, 0.03, 0.97), [235, 230, 215]);
+    s.cuboid(
+        between(x, 0.02, 0.97),
+        between(y, 0.12, 0.88),
+        between(z, 0.03, 0.97),
+        [235, 230, 215],
+    );
     s.cuboid(x, between(y, 0.88, 1.0), z, cover);
     s.cuboid(between(x, 0.0, 0.04), y, z, shade(cover, 0.9));
 }

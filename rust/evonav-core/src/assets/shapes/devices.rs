@@ -20,8 +20,18 @@ pub fn television(s: &mut Sketch<'_>) {
     let panel = [-0.03, 0.03];
     let bottom = 0.1 * h;
     s.cuboid(x, [bottom, h], panel, frame);
-    s.cuboid(inside(x, 0.03 * w), [bottom + 0.04 * h, 0.97 * h], [panel[1], panel[1] + 0.006], SCREEN);
-    s.cuboid(between(x, 0.44, 0.56), [0.015, 0.5 * h], [panel[0] - 0.03, panel[0]], shade(frame, 1.3));
+    s.cuboid(
+        inside(x, 0.03 * w),
+        [bottom + 0.04 * h, 0.97 * h],
+        [panel[1], panel[1] + 0.006],
+        SCREEN,
+    );
+    s.cuboid(
+        between(x, 0.44, 0.56),
+        [0.015, 0.5 * h],
+        [panel[0] - 0.03, panel[0]],
+        shade(frame, 1.3),
+    );
     s.cuboid(between(x, 0.25, 0.75), [0.0, 0.02], z, shade(frame, 1.3));
 }
 
@@ -54,7 +64,8 @@ pub fn lamp(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
     let metal = s.tint(0, s.choose(&[DARK, STEEL, [150, 115, 70]], DARK));
-    let cloth = s.tint(1, s.choose(&[[240, 228, 200], [225, 225, 220], [215, 180, 130]], [240, 228, 200]));
+    let cloth =
+        s.tint(1, s.choose(&[[240, 228, 200], [225, 225, 220], [215, 180, 130]], [240, 228, 200]));
     let is_floor = s.asset().category == "FloorLamp";
     let (foot, shade_from) = if is_floor { (0.02, 0.82) } else { (0.07, 0.55) };
     let pole = (0.012 + 0.01 * w) / w.max(d);
@@ -69,12 +80,20 @@ pub fn gadget(s: &mut Sketch<'_>) {
     let [_, h, d] = s.size();
     let [x, y, z] = s.spans();
     let is_switch = s.asset().category == "LightSwitch";
-    let body = s.tint(0, if is_switch { [235, 233, 225] } else { s.choose(&[DARK, [180, 60, 55], STEEL], DARK) });
+    let body = s.tint(
+        0,
+        if is_switch { [235, 233, 225] } else { s.choose(&[DARK, [180, 60, 55], STEEL], DARK) },
+    );
     if h > d {
         s.cuboid(x, y, between(z, 0.0, 0.7), body);
         let face = if is_switch { shade(body, 0.8) } else { [230, 232, 225] };
         let inner = if is_switch { [0.38, 0.62] } else { [0.15, 0.85] };
-        s.cuboid(between(x, inner[0], inner[1]), between(y, 0.25, 0.75), between(z, 0.7, 1.0), face);
+        s.cuboid(
+            between(x, inner[0], inner[1]),
+            between(y, 0.25, 0.75),
+            between(z, 0.7, 1.0),
+            face,
+        );
     } else {
         s.cuboid(x, between(y, 0.0, 0.8), z, body);
         s.cuboid(between(x, 0.1, 0.9), between(y, 0.8, 1.0), between(z, 0.1, 0.9), [60, 70, 85]);

@@ -12,17 +12,36 @@ pub fn food(s: &mut Sketch<'_>) {
         "Apple" => {
             let skin = s.choose(&[[185, 40, 40], [120, 165, 60], [205, 70, 50]], [185, 40, 40]);
             s.ellipsoid(x, between(y, 0.0, 0.88), z, skin);
-            s.cuboid(between(x, 0.46, 0.54), between(y, 0.8, 1.0), between(z, 0.46, 0.54), [80, 55, 30]);
+            s.cuboid(
+                between(x, 0.46, 0.54),
+                between(y, 0.8, 1.0),
+                between(z, 0.46, 0.54),
+                [80, 55, 30],
+            );
         }
         "Tomato" => {
             s.ellipsoid(x, between(y, 0.0, 0.92), z, [200, 45, 35]);
-            s.column(between(x, 0.3, 0.7), between(y, 0.9, 1.0), between(z, 0.3, 0.7), 0.4, 5, [70, 120, 50]);
+            s.column(
+                between(x, 0.3, 0.7),
+                between(y, 0.9, 1.0),
+                between(z, 0.3, 0.7),
+                0.4,
+                5,
+                [70, 120, 50],
+            );
         }
         "Potato" => s.ellipsoid(x, y, z, [170, 130, 85]),
-        "Egg" => s.ellipsoid(x, y, z, s.choose(&[[235, 215, 190], [245, 240, 232]], [235, 215, 190])),
+        "Egg" => {
+            s.ellipsoid(x, y, z, s.choose(&[[235, 215, 190], [245, 240, 232]], [235, 215, 190]))
+        }
         "Lettuce" => {
             s.ellipsoid(x, y, z, [120, 165, 80]);
-            s.cuboid(between(x, 0.3, 0.7), between(y, 0.2, 0.7), between(z, 0.0, 1.0), [185, 205, 150]);
+            s.cuboid(
+                between(x, 0.3, 0.7),
+                between(y, 0.2, 0.7),
+                between(z, 0.0, 1.0),
+                [185, 205, 150],
+            );
         }
         _ => {
             // Bread: a loaf with a rounded top.

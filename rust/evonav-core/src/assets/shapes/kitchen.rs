@@ -44,7 +44,8 @@ enum Face {
 /// Plinth, carcass, doors and worktop.
 fn cabinets(s: &mut Sketch<'_>, x: Span, z: Span, face: Face) {
     let h = s.size()[1];
-    let wood = s.tint(0, s.choose(&[[225, 220, 210], WOODS[1], [120, 130, 135], WOODS[2]], WOODS[1]));
+    let wood =
+        s.tint(0, s.choose(&[[225, 220, 210], WOODS[1], [120, 130, 135], WOODS[2]], WOODS[1]));
     let stone = s.tint(1, s.choose(&[[95, 95, 98], [200, 195, 188], [70, 66, 64]], [95, 95, 98]));
     let (plinth, worktop) = (0.1 * h, h - 0.04);
     s.cuboid(inside(x, 0.03), [0.0, plinth], inside(z, 0.03), shade(wood, 0.4));
@@ -79,7 +80,11 @@ pub fn fridge(s: &mut Sketch<'_>) {
     for y in [[0.05, split - 0.005], [split + 0.005, h - 0.01]] {
         s.cuboid(x, y, [z[1] - 0.085, z[1] - 0.04], door);
         let reach = 0.35 * (y[1] - y[0]);
-        let y = if y[0] < 0.5 * h { [y[1] - 0.05 - reach, y[1] - 0.05] } else { [y[0] + 0.05, y[0] + 0.05 + reach] };
+        let y = if y[0] < 0.5 * h {
+            [y[1] - 0.05 - reach, y[1] - 0.05]
+        } else {
+            [y[0] + 0.05, y[0] + 0.05 + reach]
+        };
         s.cuboid([x[0] + 0.06 * w, x[0] + 0.06 * w + 0.03], y, [z[1] - 0.04, z[1]], grip);
     }
 }
@@ -90,7 +95,12 @@ pub fn microwave(s: &mut Sketch<'_>) {
     let body = s.tint(0, s.choose(&[[200, 200, 202], [60, 60, 64], [230, 230, 228]], STEEL));
     s.cuboid(x, y, [z[0], z[1] - 0.03], body);
     s.cuboid(between(x, 0.03, 0.74), between(y, 0.08, 0.92), [z[1] - 0.03, z[1] - 0.015], DARK);
-    s.cuboid(between(x, 0.77, 0.98), between(y, 0.08, 0.92), [z[1] - 0.03, z[1] - 0.015], shade(body, 0.7));
+    s.cuboid(
+        between(x, 0.77, 0.98),
+        between(y, 0.08, 0.92),
+        [z[1] - 0.03, z[1] - 0.015],
+        shade(body, 0.7),
+    );
     s.cuboid(between(x, 0.7, 0.73), between(y, 0.15, 0.85), [z[1] - 0.03, z[1]], STEEL);
 }
 
@@ -101,7 +111,14 @@ pub fn coffee_machine(s: &mut Sketch<'_>) {
     s.cuboid(x, y, between(z, 0.0, 0.45), body);
     s.cuboid(between(x, 0.05, 0.95), between(y, 0.72, 1.0), between(z, 0.45, 1.0), body);
     s.cuboid(between(x, 0.0, 1.0), between(y, 0.0, 0.08), between(z, 0.45, 1.0), shade(body, 1.3));
-    s.column(between(x, 0.28, 0.72), between(y, 0.08, 0.5), between(z, 0.5, 0.92), 0.8, 8, [70, 50, 40]);
+    s.column(
+        between(x, 0.28, 0.72),
+        between(y, 0.08, 0.5),
+        between(z, 0.5, 0.92),
+        0.8,
+        8,
+        [70, 50, 40],
+    );
 }
 
 /// Body, two slots, a lever.

@@ -103,14 +103,7 @@ impl<'a> Sketch<'a> {
 
     /// Cylinder (`taper` 1) or cone whose far end along its axis is `taper` times as wide as its
     /// near end; the spans hold the wider one.
-    pub fn round(
-        &mut self,
-        along: Along,
-        taper: f64,
-        sides: u8,
-        spans: [Span; 3],
-        colour: Colour,
-    ) {
+    pub fn round(&mut self, along: Along, taper: f64, sides: u8, spans: [Span; 3], colour: Colour) {
         let spans = self.clamped(spans);
         let half = spans.map(|[low, high]| 0.5 * (high - low));
         // Columns of the rotations are where the part's own x, y and z point.
@@ -162,8 +155,7 @@ impl<'a> Sketch<'a> {
         }
         let drawn = aabb_of(&self.parts);
         let (middle, size) = (drawn.centre_m(), drawn.size_m());
-        let is_full =
-            |i: usize| (size[i] - self.size_m[i]).abs() < 1e-9 && middle[i].abs() < 1e-9;
+        let is_full = |i: usize| (size[i] - self.size_m[i]).abs() < 1e-9 && middle[i].abs() < 1e-9;
         if !(0..3).all(is_full) {
             let scale: Vec3 = std::array::from_fn(|i| self.size_m[i] / size[i]);
             for part in &mut self.parts {

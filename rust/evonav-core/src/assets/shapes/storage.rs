@@ -21,7 +21,8 @@ pub fn carcass(s: &mut Sketch<'_>) {
         s.cuboid(inside(x, 0.02), [0.0, foot], inside(z, 0.03), shade(wood, 0.5));
         s.cuboid(x, [foot, h - board], shell, wood);
         s.cuboid(x, [h - board, h], z, wood);
-        let (columns, rows) = ((w / 0.7).round().clamp(1.0, 3.0), (h / 0.28).round().clamp(1.0, 5.0));
+        let (columns, rows) =
+            ((w / 0.7).round().clamp(1.0, 3.0), (h / 0.28).round().clamp(1.0, 5.0));
         drawers(s, [columns as usize, rows as usize], [foot, h - board], front);
         return;
     }
@@ -109,7 +110,12 @@ pub fn safe(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let steel = s.tint(0, [90, 95, 100]);
     s.cuboid(x, y, [z[0], z[1] - 0.03], steel);
-    s.cuboid(inside(x, 0.08 * w), inside(y, 0.08 * h), [z[1] - 0.03, z[1] - 0.015], shade(steel, 1.2));
+    s.cuboid(
+        inside(x, 0.08 * w),
+        inside(y, 0.08 * h),
+        [z[1] - 0.03, z[1] - 0.015],
+        shade(steel, 1.2),
+    );
     let dial = [between(x, 0.42, 0.58), between(y, 0.42, 0.58), [z[1] - 0.015, z[1]]];
     s.round(Along::Z, 1.0, 8, dial, DARK);
 }

@@ -28,7 +28,8 @@ const ROUND: [&str; 14] = [
 pub fn table(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let low_levels = s.levels().iter().filter(|&&y| y < 0.8 * h).count();
-    if low_levels >= 2 || (s.asset().category == "SideTable" && h < 0.75 && w < 0.7 && low_levels > 0)
+    if low_levels >= 2
+        || (s.asset().category == "SideTable" && h < 0.75 && w < 0.7 && low_levels > 0)
     {
         return storage::carcass(s);
     }
@@ -94,7 +95,12 @@ pub fn desk(s: &mut Sketch<'_>) {
         let handle = between(block, 0.35, 0.65);
         for k in 1..4 {
             let y = 0.08 + (desk_top - top - 0.08) * (f64::from(k) - 0.5) / 3.0;
-            s.cuboid(handle, [y - 0.008, y + 0.008], [z[1] - 0.025, z[1] - 0.008], shade(front, 0.5));
+            s.cuboid(
+                handle,
+                [y - 0.008, y + 0.008],
+                [z[1] - 0.025, z[1] - 0.008],
+                shade(front, 0.5),
+            );
         }
     }
     if h > desk_top + 0.1 {

@@ -9,11 +9,19 @@ use super::{
 pub fn bin(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
-    let plastic = s.tint(0, s.choose(&[[110, 112, 115], [70, 85, 80], [60, 62, 66], [180, 175, 165]], DARK));
+    let plastic =
+        s.tint(0, s.choose(&[[110, 112, 115], [70, 85, 80], [60, 62, 66], [180, 175, 165]], DARK));
     let floor = s.levels().first().copied().unwrap_or(0.04 * h).min(0.6 * h);
     if (w - d).abs() < 0.02 {
         s.column(x, between(y, 0.0, 0.97), z, 1.12, 12, plastic);
-        s.column(between(x, 0.06, 0.94), between(y, 0.97, 1.0), between(z, 0.06, 0.94), 1.0, 12, shade(plastic, 0.5));
+        s.column(
+            between(x, 0.06, 0.94),
+            between(y, 0.97, 1.0),
+            between(z, 0.06, 0.94),
+            1.0,
+            12,
+            shade(plastic, 0.5),
+        );
         return;
     }
     let wall = 0.06 * w.min(d);
@@ -31,7 +39,14 @@ pub fn bag(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let plastic = s.tint(0, [40, 42, 46]);
     s.ellipsoid(x, between(y, 0.0, 0.85), z, plastic);
-    s.column(between(x, 0.4, 0.6), between(y, 0.78, 1.0), between(z, 0.4, 0.6), 1.6, 6, shade(plastic, 1.4));
+    s.column(
+        between(x, 0.4, 0.6),
+        between(y, 0.78, 1.0),
+        between(z, 0.4, 0.6),
+        1.6,
+        6,
+        shade(plastic, 1.4),
+    );
 }
 
 /// An open cardboard box.
@@ -102,7 +117,14 @@ pub fn bowl(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let glaze = s.tint(0, s.choose(&[CERAMIC, [150, 180, 190], [200, 150, 110]], CERAMIC));
     s.column(x, between(y, 0.0, 0.96), z, 2.0, 12, glaze);
-    s.column(between(x, 0.06, 0.94), between(y, 0.96, 1.0), between(z, 0.06, 0.94), 1.0, 12, shade(glaze, 0.75));
+    s.column(
+        between(x, 0.06, 0.94),
+        between(y, 0.96, 1.0),
+        between(z, 0.06, 0.94),
+        1.0,
+        12,
+        shade(glaze, 0.75),
+    );
 }
 
 /// A flat disc with a rim.
@@ -110,7 +132,14 @@ pub fn plate(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let glaze = s.tint(0, s.choose(&[CERAMIC, [190, 205, 215], [225, 205, 180]], CERAMIC));
     s.column(x, between(y, 0.0, 0.9), z, 1.5, 12, glaze);
-    s.column(between(x, 0.15, 0.85), between(y, 0.9, 1.0), between(z, 0.15, 0.85), 1.0, 12, shade(glaze, 0.88));
+    s.column(
+        between(x, 0.15, 0.85),
+        between(y, 0.9, 1.0),
+        between(z, 0.15, 0.85),
+        1.0,
+        12,
+        shade(glaze, 0.88),
+    );
 }
 
 /// Foot, belly and neck.
@@ -120,21 +149,36 @@ pub fn vase(s: &mut Sketch<'_>) {
     let glaze = s.tint(0, s.choose(&glazes, glazes[0]));
     s.column(x, between(y, 0.0, 0.45), z, 1.7, 10, glaze);
     s.column(x, between(y, 0.45, 0.82), z, 0.45, 10, glaze);
-    s.column(between(x, 0.22, 0.78), between(y, 0.82, 1.0), between(z, 0.22, 0.78), 1.3, 10, shade(glaze, 1.1));
+    s.column(
+        between(x, 0.22, 0.78),
+        between(y, 0.82, 1.0),
+        between(z, 0.22, 0.78),
+        1.3,
+        10,
+        shade(glaze, 1.1),
+    );
 }
 
 /// A box with a tissue standing out.
 pub fn tissue_box(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     s.cuboid(x, between(y, 0.0, 0.7), z, s.tint(0, [140, 170, 190]));
-    s.column(between(x, 0.35, 0.65), between(y, 0.7, 1.0), between(z, 0.35, 0.65), 0.3, 6, [245, 245, 245]);
+    s.column(
+        between(x, 0.35, 0.65),
+        between(y, 0.7, 1.0),
+        between(z, 0.35, 0.65),
+        0.3,
+        6,
+        [245, 245, 245],
+    );
 }
 
 /// A roll along its longest side, with its core.
 pub fn roll(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let spans = s.spans();
-    let paper = s.tint(0, if s.asset().category == "AluminumFoil" { STEEL } else { [242, 240, 235] });
+    let paper =
+        s.tint(0, if s.asset().category == "AluminumFoil" { STEEL } else { [242, 240, 235] });
     let along = if h >= w && h >= d {
         Along::Y
     } else if w >= d {
