@@ -1,6 +1,6 @@
 """Stub of the Rust extension; `mypy.stubtest evonav._core` holds it to the binary."""
 
-from typing import final
+from typing import Any, TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,119 @@ class SimulationError(EvonavError): ...
 class DecisionError(EvonavError): ...
 class StoreError(EvonavError): ...
 class InvalidArgumentError(EvonavError): ...
+
+# house
+
+_Vec2: TypeAlias = tuple[float, float]
+_Vec3: TypeAlias = tuple[float, float, float]
+
+@final
+class House:
+    """A ProcTHOR house (schema 0.0.1 or 1.0.0), checked; its document is kept losslessly.
+
+    Metres in AI2-THOR's frame: x right, y up, z forward.
+    """
+
+    def __new__(cls, json: str, *, name: str) -> House:
+        """Reads and checks one house; `HouseError` names house, object, field and value."""
+
+    @property
+    def name(self) -> str:
+        """What errors call the house."""
+
+    @property
+    def start(self) -> tuple[_Vec3, float, float] | None:
+        """Position, yaw and horizon (radians) of `metadata.agent`, if the file gives one."""
+
+    @property
+    def rooms(self) -> list[Room]:
+        """In file order."""
+
+    @property
+    def walls(self) -> list[Wall]:
+        """In file order: inner walls once a room, outer ones twice."""
+
+    @property
+    def doors(self) -> list[Opening]:
+        """In file order."""
+
+    @property
+    def windows(self) -> list[Opening]:
+        """In file order."""
+
+    @property
+    def objects(self) -> list[HouseObject]:
+        """Depth first: a parent stands before its children."""
+
+    def room_of(self, x_m: float, z_m: float) -> str | None:
+        """Id of the room whose floor holds the point."""
+
+    def to_json(self) -> str:
+        """The document, compact: every key and value as it was read, in order."""
+
+    def apply(self, delta_json: str) -> House:
+        """The house after `{"moves": [{"id", "position_m", "rotation_deg", "parent"}]}`."""
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+    def __getnewargs_ex__(self) -> tuple[tuple[str], dict[str, Any]]: ...
+
+@final
+class Room:
+    """A room: its floor outline is a list of `(x, z)`."""
+
+    id: str
+    room_type: str
+    polygon_m: list[_Vec2]
+    floor_material: str
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+
+@final
+class Wall:
+    """One side of a wall; `room_id` is `exterior` on outer sides, `is_empty` means open plan."""
+
+    id: str
+    room_id: str
+    from_m: _Vec2
+    to_m: _Vec2
+    height_m: float
+    is_empty: bool
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+
+@final
+class Opening:
+    """A door or window; the hole is `(along, up)` in the frame of the first wall."""
+
+    id: str
+    asset_id: str
+    wall_ids: tuple[str, str]
+    room_ids: tuple[str, str]
+    hole_min_m: _Vec2
+    hole_max_m: _Vec2
+    openness: float
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
+
+@final
+class HouseObject:
+    """An object; its position is its box's centre. `category` is None if nothing tells it."""
+
+    id: str
+    asset_id: str
+    category: str | None
+    position_m: _Vec3
+    rotation_deg: _Vec3
+    parent_id: str | None
+    child_ids: list[str]
+    room_id: str | None
+
+    def __eq__(self, other: object, /) -> bool: ...
+    def __ne__(self, other: object, /) -> bool: ...
 
 # sensors
 

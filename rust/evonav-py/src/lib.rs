@@ -2,6 +2,7 @@
 
 mod arrays;
 mod error;
+mod house;
 mod memory;
 mod sensors;
 
@@ -11,6 +12,7 @@ use pyo3::prelude::*;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     error::register(module)?;
+    house::register(module)?;
     sensors::register(module)?;
     memory::register(module)
 }

@@ -29,6 +29,23 @@ pub struct ObjectMove {
     pub parent: Option<String>,
 }
 
+impl HouseDelta {
+    /// Reads a delta: `{"moves": [{"id", "position_m", "rotation_deg", "parent"}]}`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] saying what is malformed, and where.
+    pub fn from_json(json: &str) -> Result<Self, Error> {
+        let malformed = |error: serde_json::Error| {
+            Error::invalid(
+                "delta",
+                error,
+                "{\"moves\": [{\"id\", \"position_m\", \"rotation_deg\", \"parent\"}]}",
+            )
+        };
+        serde_json::from_str(json).map_err(malformed)
+    }
+}
+
 /// An object of the document, taken out of the tree.
 struct Loose {
     fields: Map<String, Value>,

@@ -1,0 +1,119 @@
+"""Houses from files."""
+
+import gzip
+import json
+import zlib
+from collections.abc import Iterator
+from importlib import resources
+from itertools import islice
+from pathlib import Path
+from typing import IO
+
+from evonav._core import House
+from evonav.errors import HouseError, InvalidArgumentError
+
+SUFFIXES = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
+
+
+def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
+    """Houses of a file or a directory, one after the other, in order.
+
+    Args:
+        path: A `.json` file with a house or a list of houses, a `.jsonl` file with a house a line, either with `.gz`;
+            or a directory with such files, taken by name.
+        limit: Stop after so many.
+
+    Yields:
+        Each house, checked; its `name` is `file:line`, for lists `file:line[index]`.
+
+    Raises:
+        HouseError: A file cannot be read or a house is malformed; it names file, line, object and field.
+        InvalidArgumentError: `limit` is negative.
+    """
+    if limit is not None and limit < 0:
+        message = f"argument `limit` is {limit}, expected None or at least 0"
+        raise InvalidArgumentError(message)
+    return islice(_houses(Path(path)), limit)
+
+
+def bundled_houses(limit: int | None = None) -> Iterator[House]:
+    """The multi-room houses that come with evonav (generated with the published `procthor` generator).
+
+    Args:
+        limit: Stop after so many.
+
+    Yields:
+        Each house, in a fixed order; its `name` is `bundled:line`.
+    """
+    file = resources.files("evonav") / "data" / "houses.jsonl.gz"
+    with file.open("rb") as packed, gzip.open(packed, "rt", encoding="utf-8") as lines:
+        for number, line in islice(enumerate(lines, start=1), limit):
+            yield House(line, name=f"bundled:{number}")
+
+
+def _houses(path: Path) -> Iterator[House]:
+    if path.is_dir():
+        files = sorted(file for file in path.iterdir() if file.name.endswith(SUFFIXES) and file.is_file())
+        if not files:
+            message = f"{path}: no {', '.join(SUFFIXES)} file in this directory"
+            raise HouseError(message)
+        for file in files:
+            yield from _houses(file)
+        return
+    if not path.name.endswith(SUFFIXES):
+        message = f"{path}: expected a directory or a file with one of {', '.join(SUFFIXES)}"
+        raise HouseError(message)
+    try:
+        with _open(path) as text:
+            yield from _lines(path, text) if ".jsonl" in path.suffixes else _document(path, text.read())
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+        message = f"{path}: cannot be read: {error}"
+        raise HouseError(message) from error
+
+
+def _open(path: Path) -> IO[str]:
+    return gzip.open(path, "rt", encoding="utf-8") if path.suffix == ".gz" else path.open(encoding="utf-8")
+
+
+def _lines(path: Path, text: IO[str]) -> Iterator[House]:
+    for number, line in enumerate(text, start=1):
+        if line.strip():
+            yield House(line, name=f"{path}:{number}")
+
+
+def _document(path: Path, text: str) -> Iterator[House]:
+    """One house, or a list. List entries are cut out of the text, so that numbers stay as they were written."""
+    start = _after_space(text, 0)
+    if not text.startswith("[", start):
+        yield House(text, name=f"{path}:1")
+        return
+    decoder = json.JSONDecoder()
+    line, counted, position = 1, 0, _after_space(text, start + 1)
+    for index in range(len(text)):
+        if index == 0 and text.startswith("]", position):
+            break
+        line, counted = line + text.count("\n", counted, position), position
+        name = f"{path}:{line}[{index}]"
+        try:
+            _, end = decoder.raw_decode(text, position)
+        except (ValueError, RecursionError) as error:
+            message = f"house {name}: document: field `JSON`: {error}"
+            raise HouseError(message) from error
+        yield House(text[position:end], name=name)
+        after = _after_space(text, end)
+        if text.startswith("]", after):
+            position = after
+            break
+        if not text.startswith(",", after):
+            message = f"house {name}: document: field `JSON`: expected `,` or `]` after the entry"
+            raise HouseError(message)
+        position = _after_space(text, after + 1)
+    if text[position + 1 :].strip():
+        message = f"house {path}: document: field `JSON`: text follows the list"
+        raise HouseError(message)
+
+
+def _after_space(text: str, position: int) -> int:
+    while position < len(text) and text[position] in " \t\r\n":
+        position += 1
+    return position

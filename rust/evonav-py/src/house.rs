@@ -1,0 +1,201 @@
+//! Houses.
+
+use evonav_core::{
+    assets::Catalogue,
+    house::{self, HouseDelta},
+};
+use pyo3::prelude::*;
+
+use crate::error;
+
+/// Shapes, units and errors: `_core.pyi` and `evonav_core::house`.
+#[pyclass(frozen, eq, module = "evonav._core")]
+#[derive(PartialEq)]
+pub struct House {
+    /// The core's house.
+    pub inner: house::House,
+}
+
+/// A room: see `evonav_core::house::Room`.
+#[pyclass(frozen, get_all, eq, module = "evonav._core")]
+#[derive(PartialEq)]
+pub struct Room {
+    id: String,
+    room_type: String,
+    polygon_m: Vec<(f64, f64)>,
+    floor_material: String,
+}
+
+/// One side of a wall: see `evonav_core::house::Wall`.
+#[pyclass(frozen, get_all, eq, module = "evonav._core")]
+#[derive(PartialEq)]
+pub struct Wall {
+    id: String,
+    room_id: String,
+    from_m: (f64, f64),
+    to_m: (f64, f64),
+    height_m: f64,
+    is_empty: bool,
+}
+
+/// A door or window: see `evonav_core::house::Opening`.
+#[pyclass(frozen, get_all, eq, module = "evonav._core")]
+#[derive(PartialEq)]
+pub struct Opening {
+    id: String,
+    asset_id: String,
+    wall_ids: (String, String),
+    room_ids: (String, String),
+    hole_min_m: (f64, f64),
+    hole_max_m: (f64, f64),
+    openness: f64,
+}
+
+/// An object of a house: see `evonav_core::house::Object`.
+#[pyclass(frozen, get_all, eq, module = "evonav._core")]
+#[derive(PartialEq)]
+pub struct HouseObject {
+    id: String,
+    asset_id: String,
+    category: Option<String>,
+    position_m: (f64, f64, f64),
+    rotation_deg: (f64, f64, f64),
+    parent_id: Option<String>,
+    child_ids: Vec<String>,
+    room_id: Option<String>,
+}
+
+#[pymethods]
+impl House {
+    #[new]
+    #[pyo3(signature = (json, *, name))]
+    fn new(py: Python<'_>, json: &str, name: &str) -> PyResult<Self> {
+        let inner = py.detach(|| house::House::from_json(name, json)).map_err(error::to_py)?;
+        Ok(Self { inner })
+    }
+
+    fn __getnewargs_ex__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<((String,), Bound<'py, pyo3::types::PyDict>)> {
+        let keywords = pyo3::types::PyDict::new(py);
+        keywords.set_item("name", &self.inner.name)?;
+        Ok(((self.inner.to_json(),), keywords))
+    }
+
+    fn __repr__(&self) -> String {
+        let house = &self.inner;
+        format!(
+            "House({:?}, {} rooms, {} objects)",
+            house.name,
+            house.rooms.len(),
+            house.objects.len()
+        )
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.inner.name
+    }
+
+    fn to_json(&self, py: Python<'_>) -> String {
+        py.detach(|| self.inner.to_json())
+    }
+
+    fn apply(&self, py: Python<'_>, delta_json: &str) -> PyResult<Self> {
+        let changed = py.detach(|| self.inner.apply(&HouseDelta::from_json(delta_json)?));
+        Ok(Self { inner: changed.map_err(error::to_py)? })
+    }
+
+    fn room_of(&self, x_m: f64, z_m: f64) -> Option<&str> {
+        Some(self.inner.rooms[self.inner.room_of([x_m, z_m])?].id.as_str())
+    }
+
+    /// Position `(x, y, z)`, yaw and horizon of `metadata.agent`.
+    #[getter]
+    fn start(&self) -> Option<((f64, f64, f64), f64, f64)> {
+        let start = self.inner.start?;
+        Some((start.position_m.into(), start.yaw_deg.to_radians(), start.horizon_deg.to_radians()))
+    }
+
+    #[getter]
+    fn rooms(&self) -> Vec<Room> {
+        self.inner.rooms.iter().map(room).collect()
+    }
+
+    #[getter]
+    fn walls(&self) -> Vec<Wall> {
+        self.inner.walls.iter().map(wall).collect()
+    }
+
+    #[getter]
+    fn doors(&self) -> Vec<Opening> {
+        self.inner.doors.iter().map(opening).collect()
+    }
+
+    #[getter]
+    fn windows(&self) -> Vec<Opening> {
+        self.inner.windows.iter().map(opening).collect()
+    }
+
+    #[getter]
+    fn objects(&self) -> Vec<HouseObject> {
+        self.inner.objects.iter().map(|entry| object(&self.inner, entry)).collect()
+    }
+}
+
+fn room(room: &house::Room) -> Room {
+    Room {
+        id: room.id.clone(),
+        room_type: room.room_type.clone(),
+        polygon_m: room.polygon_m.iter().copied().map(Into::into).collect(),
+        floor_material: room.floor_material.clone(),
+    }
+}
+
+fn wall(wall: &house::Wall) -> Wall {
+    Wall {
+        id: wall.id.clone(),
+        room_id: wall.room_id.clone(),
+        from_m: wall.from_m.into(),
+        to_m: wall.to_m.into(),
+        height_m: wall.height_m,
+        is_empty: wall.is_empty,
+    }
+}
+
+fn opening(opening: &house::Opening) -> Opening {
+    Opening {
+        id: opening.id.clone(),
+        asset_id: opening.asset_id.clone(),
+        wall_ids: (opening.wall0.clone(), opening.wall1.clone()),
+        room_ids: opening.room_ids.clone().into(),
+        hole_min_m: opening.hole_min_m.into(),
+        hole_max_m: opening.hole_max_m.into(),
+        openness: opening.openness,
+    }
+}
+
+fn object(house: &house::House, object: &house::Object) -> HouseObject {
+    let id = |&index: &usize| house.objects[index].id.clone();
+    let known = Catalogue::bundled().get(&object.asset_id);
+    HouseObject {
+        id: object.id.clone(),
+        asset_id: object.asset_id.clone(),
+        category: known.map(|asset| asset.category.clone()).or_else(|| object.object_type.clone()),
+        position_m: object.position_m.into(),
+        rotation_deg: object.rotation_deg.into(),
+        parent_id: object.parent.as_ref().map(id),
+        child_ids: object.children.iter().map(id).collect(),
+        room_id: object.room.map(|index| house.rooms[index].id.clone()),
+    }
+}
+
+/// Adds the classes to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<House>()?;
+    module.add_class::<Room>()?;
+    module.add_class::<Wall>()?;
+    module.add_class::<Opening>()?;
+    module.add_class::<HouseObject>()
+}
