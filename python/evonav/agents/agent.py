@@ -1,7 +1,8 @@
-"""The agent contract."""
+"""The agent contract: what evonav evaluates, and all that an agent may answer."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
@@ -17,7 +18,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class NavigateTo:
-    """Go towards a point along planner waypoints, at most `max_travel_m` this round."""
+    """Go towards a point along planner waypoints, at most `Sensing.max_travel_m` this round."""
 
     position_m: tuple[float, float]
     """`(x, z)`; snapped to the nearest free point."""
@@ -46,7 +47,7 @@ class ViewSchedule:
 
 @dataclass(frozen=True, slots=True)
 class Sensing:
-    """What an agent asks of its sensors (3D-Mem's schedule by default)."""
+    """What an agent asks of its sensors (3D-Mem's schedule by default). The protocol caps it; see `ProtocolConfig`."""
 
     first_round: ViewSchedule = ViewSchedule(7, 40.0)
     later_rounds: ViewSchedule = ViewSchedule(3, 60.0)
@@ -73,10 +74,6 @@ class Agent(Protocol):
         """One decision round."""
         ...
 
-    def diagnostics(self) -> "RoundDiagnostics":
-        """What the agent believed and chose in the last round; for records and pictures, never for scoring."""
-        ...
-
 
 @dataclass(frozen=True, slots=True)
 class EntryBelief:
@@ -86,6 +83,7 @@ class EntryBelief:
     label: str
     centre_m: tuple[float, float, float]
     size_m: tuple[float, float, float]
+    """Of the axis-aligned box."""
     num_detections: int
 
 
@@ -102,3 +100,16 @@ class RoundDiagnostics:
     """Cumulative, such as `conflicts`, `cells_cleared`, `rejected_entries`."""
     details: dict[str, Any] = field(default_factory=dict)
     """JSON-ready extras."""
+
+
+@runtime_checkable
+class ExplainingAgent(Protocol):
+    """An agent that can be asked what it believes; for records and pictures, never for scoring."""
+
+    def diagnostics(self) -> RoundDiagnostics:
+        """What the agent chose in the last round, and its counters."""
+        ...
+
+    def entries(self) -> Sequence[EntryBelief]:
+        """The object memory; asked once, at the end of a stage."""
+        ...

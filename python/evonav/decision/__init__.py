@@ -1,1 +1,1 @@
-"""Typed questions and who answers them."""
+"""Decision models: what agents ask, and a model that answers without a network."""

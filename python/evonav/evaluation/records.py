@@ -230,10 +230,13 @@ class ObjectFootprint(_Record):
     """Corners of the footprint, turned with the object."""
 
 
+OpeningKind = Literal["door", "window"]
+
+
 class Opening(_Record):
     """A door, doorway or window from above."""
 
-    kind: Literal["door", "window"]
+    kind: OpeningKind
     from_m: Point2
     to_m: Point2
 

@@ -13,7 +13,6 @@ from types import TracebackType
 from typing import Any
 
 from pydantic import ValidationError
-from typing_extensions import Self
 
 from evonav.errors import StoreError
 from evonav.evaluation.records import SCHEMA_VERSION, EndState, StageMap, StageRecord
@@ -69,7 +68,7 @@ class RunStore:
         elif version != SCHEMA_VERSION:
             raise StoreError(f"{self.path}: schema version {version}, this evonav reads {SCHEMA_VERSION}")
 
-    def __enter__(self) -> Self:
+    def __enter__(self) -> "RunStore":
         return self
 
     def __exit__(
@@ -149,6 +148,12 @@ class RunStore:
         )
         for (text,) in self._db.execute(query, (agent, task_id)):
             yield text
+
+    def record_text(self, agent: str, task_id: str, stage: int) -> str | None:
+        """One record as stored, or `None`."""
+        query = "SELECT record FROM stages WHERE agent = ? AND task_id = ? AND stage = ?"
+        row = self._db.execute(query, (agent, task_id, stage)).fetchone()
+        return None if row is None else str(row[0])
 
     def maps(self, task_id: str | None = None) -> Iterator[StageMap]:
         """Stage maps by task and stage."""

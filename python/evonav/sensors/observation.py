@@ -11,7 +11,7 @@ from evonav.world.simulator import Intrinsics
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """Objects found in one image. Detection `i` is the pixels where `masks == i`; numbering means nothing across views."""
+    """Objects found in one image. Detection `i` is where `masks == i`; numbering means nothing across views."""
 
     masks: NDArray[np.int32]
     """`(H, W)`, -1 where nothing was detected."""
@@ -25,7 +25,7 @@ class Detections:
 
 @dataclass(frozen=True, slots=True)
 class VisibleOccupancy:
-    """The oracle occupancy's cells that rays from one camera pose reach: free ones and the first blocked one of each ray."""
+    """Cells of the oracle occupancy that rays from a camera pose reach: free ones and each ray's first blocked one."""
 
     free: NDArray[np.int32]
     """`(F, 2)` `[row, col]`, sorted."""
@@ -70,3 +70,5 @@ class Observation:
     """Whether the last action was carried out as asked."""
     num_rounds_left: int
     """Decision rounds left in this stage, this one included."""
+    has_arrived: bool = False
+    """Whether the last action was a `NavigateTo` that reached its (snapped) point."""

@@ -1,0 +1,6 @@
+"""`python -m evonav` is the `evonav` command."""
+
+from evonav.cli import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,62 @@
+"""Agents by name: evonav's own, those of installed packages, and any class by its import path."""
+
+from collections.abc import Callable
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import cast
+
+from evonav.agents.agent import Agent
+from evonav.errors import InvalidArgumentError
+
+ENTRY_POINT_GROUP = "evonav.agents"
+"""A package adds agents by naming classes (or functions that make one) in this entry-point group."""
+
+BUILT_IN: dict[str, tuple[str, str]] = {
+    "fu": ("evonav.agents.frontier_update:FrontierUpdate", "Frontier-Update: rebuilds its map when it is contradicted"),
+    "stage-reset": ("evonav.agents.stage_reset:StageReset", "Frontier-Update that forgets everything at each stage"),
+    "ftu": ("evonav.agents.fail_then_update:FailThenUpdate", "Frontier-Update that checks its target on arrival"),
+    "random-walk": ("evonav.agents.random_walk:RandomWalk", "yardstick: walks in random directions"),
+}
+"""Import path and description by name."""
+
+
+def agent_factory(name: str) -> Callable[[], Agent]:
+    """What makes an agent.
+
+    Args:
+        name: A built-in name, an entry point of the group `evonav.agents`, or `package.module:Class`.
+
+    Raises:
+        InvalidArgumentError: There is no such agent, or importing it fails.
+    """
+    if name in BUILT_IN:
+        return imported(BUILT_IN[name][0])
+    for entry in entry_points(group=ENTRY_POINT_GROUP):
+        if entry.name == name:
+            return imported(entry.value)
+    if ":" in name:
+        return imported(name)
+    known = ", ".join(sorted(agent_descriptions()))
+    raise InvalidArgumentError(f"no agent `{name}`; there are {known}, or name a class as `package.module:Class`")
+
+
+def agent_descriptions() -> dict[str, str]:
+    """Names and what they are: built-in agents and those of installed packages."""
+    installed = {entry.name: f"plug-in: {entry.value}" for entry in entry_points(group=ENTRY_POINT_GROUP)}
+    return {**installed, **{name: description for name, (_, description) in BUILT_IN.items()}}
+
+
+def imported(path: str) -> Callable[[], Agent]:
+    """The callable at `package.module:name`.
+
+    Raises:
+        InvalidArgumentError: It cannot be imported, or is not callable.
+    """
+    module, _, attribute = path.partition(":")
+    try:
+        found = getattr(import_module(module), attribute)
+    except Exception as error:  # importing runs a stranger's code: whatever it raises belongs to the name
+        raise InvalidArgumentError(f"agent `{path}` cannot be imported: {type(error).__name__}: {error}") from error
+    if not callable(found):
+        raise InvalidArgumentError(f"agent `{path}` is not callable: name a class or a function that makes an agent")
+    return cast("Callable[[], Agent]", found)

@@ -1,0 +1,262 @@
+"""The `evonav` command. Exit codes: 0 done, 1 an error that is told, 2 wrong usage, 3 incomplete, 130 interrupted."""
+
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
+    from collections.abc import Callable, Iterator
+
+    from evonav.evaluation.engine import Progress, TaskFile
+    from evonav.evaluation.metrics import AgentSummary
+
+EXIT_ERROR = 1
+EXIT_INCOMPLETE = 3
+EXIT_INTERRUPTED = 130
+HEURISTICS = "fu,stage-reset,ftu"
+
+app = typer.Typer(
+    name="evonav",
+    help="EvoNav-Bench: lifelong navigation in homes that change.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Agents = Annotated[str, typer.Option(help="Names, comma-separated; see `evonav agents`.")]
+Houses = Annotated[Path | None, typer.Option(help="ProcTHOR JSON, JSONL or JSONL.gz to generate tasks from.")]
+Tasks = Annotated[Path | None, typer.Option(help="Folder of tasks; default: the bundled ones.")]
+Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-room) houses or tasks.")]
+Seed = Annotated[int, typer.Option(min=0, help="Decides everything random.")]
+Workers = Annotated[int | None, typer.Option(min=0, help="Processes; default: one a core. 0: in this process.")]
+Out = Annotated[Path, typer.Option(help="Folder of the run; an unfinished one is resumed.")]
+
+
+@app.command()
+def evaluate(
+    out: Out,
+    agents: Agents = HEURISTICS,
+    houses: Houses = None,
+    tasks: Tasks = None,
+    limit: Limit = None,
+    seed: Seed = 0,
+    workers: Workers = None,
+    retry_errored: Annotated[bool, typer.Option(help="Run errored stages again.")] = False,
+) -> None:
+    """Evaluates agents on tasks; run again to resume. Leaves records.sqlite and summary.json in OUT."""
+    if houses is not None and tasks is not None:
+        raise typer.BadParameter("give --houses or --tasks, not both")
+    num_workers = _num_workers(workers)
+    with _tasks(out, houses, tasks, limit, seed, num_workers) as task_files:
+        summaries = _evaluate(out, agents.split(","), task_files, seed, num_workers, retry_errored)
+    _finish(summaries)
+
+
+@app.command()
+def demo(
+    out: Out = Path("out/demo"),
+    agents: Agents = HEURISTICS,
+    limit: Limit = None,
+    seed: Seed = 0,
+    workers: Workers = None,
+) -> None:
+    """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report."""
+    num_workers = _num_workers(workers)
+    with _tasks(out, None, None, limit, seed, num_workers) as task_files:
+        summaries = _evaluate(out, agents.split(","), task_files, seed, num_workers, retry_errored=False)
+    _report(out)
+    _finish(summaries)
+
+
+@app.command()
+def report(run: Annotated[Path, typer.Argument(help="Folder of a run.")]) -> None:
+    """Writes a run's HTML report, from its records alone."""
+    from evonav.evaluation.engine import write_summary
+
+    _print_table(write_summary(run))
+    _report(run)
+
+
+@app.command()
+def generate(
+    houses: Annotated[Path, typer.Option(help="ProcTHOR JSON, JSONL or JSONL.gz.")],
+    out: Annotated[Path, typer.Option(help="Folder for the tasks.")],
+    limit: Limit = None,
+    seed: Seed = 0,
+) -> None:
+    """Generates tasks from multi-room houses."""
+    from evonav.evaluation.datasets import generate_tasks
+
+    with _status("Generating tasks") as tell:
+        num_tasks = len(generate_tasks(houses, out, limit=limit, seed=seed, on_task=tell))
+    typer.echo(f"{num_tasks} tasks in {out}")
+
+
+@app.command(name="houses")
+def list_houses(
+    path: Annotated[Path | None, typer.Argument(help="ProcTHOR JSON, JSONL or JSONL.gz; default: bundled.")] = None,
+    limit: Limit = None,
+) -> None:
+    """Lists houses: rooms and objects of each."""
+    from evonav.evaluation.datasets import house_facts
+
+    for name, num_rooms, num_objects in house_facts(path, limit):
+        typer.echo(f"{name}\t{num_rooms} rooms\t{num_objects} objects")
+
+
+@app.command(name="agents")
+def list_agents() -> None:
+    """Lists agents and yardsticks by name."""
+    from evonav.agents.registry import agent_descriptions
+    from evonav.evaluation.yardstick_names import YARDSTICK_DESCRIPTIONS
+
+    for name, description in {**agent_descriptions(), **YARDSTICK_DESCRIPTIONS}.items():
+        typer.echo(f"{name:18}{description}")
+    typer.echo(f"{'module:Class':18}any class of yours with the methods of evonav.agents.agent.Agent")
+
+
+@app.command()
+def version() -> None:
+    """Prints the version."""
+    from evonav import __version__
+
+    typer.echo(__version__)
+
+
+def main() -> None:
+    """Runs the command; errors of evonav are one line, not a traceback."""
+    from evonav.errors import EvonavError
+
+    try:
+        app()
+    except EvonavError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(EXIT_ERROR)
+
+
+@contextmanager
+def _tasks(
+    out: Path, houses: Path | None, tasks: Path | None, limit: int | None, seed: int, num_workers: int
+) -> "Iterator[list[TaskFile]]":
+    """The tasks of a run: given, generated into the run's folder, or bundled."""
+    from evonav.evaluation.datasets import bundled_tasks, generate_tasks
+    from evonav.evaluation.engine import task_files
+
+    with ExitStack() as stack:
+        if houses is not None:
+            with _status("Generating tasks") as tell:
+                generated = generate_tasks(
+                    houses, out / "tasks", limit=limit, seed=seed, num_workers=num_workers, on_task=tell
+                )
+            yield [task for root in generated for task in task_files(root.parent, only=root.name)]
+        else:
+            directory = tasks if tasks is not None else stack.enter_context(bundled_tasks())
+            yield task_files(directory, limit)
+
+
+def _evaluate(
+    out: Path, agents: Sequence[str], task_files: "list[TaskFile]", seed: int, num_workers: int, retry_errored: bool
+) -> "list[AgentSummary]":
+    from evonav.evaluation.engine import RunConfig, evaluate
+
+    try:
+        with _progress() as show:
+            return evaluate(
+                agents,
+                task_files,
+                out,
+                config=RunConfig(seed=seed),
+                num_workers=num_workers,
+                retry_errored=retry_errored,
+                on_progress=show,
+            )
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted; finished stages are in {out}, the same command goes on from there", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def _finish(summaries: "list[AgentSummary]") -> None:
+    _print_table(summaries)
+    if any(summary.is_incomplete for summary in summaries):
+        raise typer.Exit(EXIT_INCOMPLETE)
+
+
+def _report(run: Path) -> None:
+    from evonav.report import write_report
+
+    typer.echo(f"report: {write_report(run)}")
+
+
+def _num_workers(workers: int | None) -> int:
+    if workers is not None:
+        return workers
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _print_table(summaries: "list[AgentSummary]") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="Success rate and SPL (%), 95% intervals over tasks")
+    for heading in ("agent", "n", "SR", "", "SPL", "", "states"):
+        table.add_column(heading, justify="left" if heading in ("agent", "states") else "right")
+    for summary in summaries:
+        states = ", ".join(f"{count} {state}" for state, count in summary.counts.items() if count)
+        name = f"{summary.agent} incomplete ({summary.n})" if summary.is_incomplete else summary.agent
+        table.add_row(
+            name,
+            str(summary.n),
+            _percent(summary.sr),
+            _percent_interval(summary.sr_ci95),
+            _percent(summary.spl),
+            _percent_interval(summary.spl_ci95),
+            states,
+        )
+    Console().print(table)
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.1f}"
+
+
+def _percent_interval(interval: tuple[float, float] | None) -> str:
+    return "" if interval is None else f"{100 * interval[0]:.1f}-{100 * interval[1]:.1f}"
+
+
+@contextmanager
+def _status(text: str) -> "Iterator[Callable[[str], None]]":
+    """A line that moves while something takes its time."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    with console.status(text) as status:
+        yield lambda name: status.update(f"{text}: {name}")
+
+
+@contextmanager
+def _progress() -> "Iterator[Callable[[Progress], None]]":
+    """A bar over stages."""
+    from rich.console import Console
+    from rich import progress as bars
+
+    columns = (
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
+        bars.MofNCompleteColumn(),
+        bars.TimeElapsedColumn(),
+        bars.TimeRemainingColumn(),
+    )
+    with bars.Progress(*columns, console=Console(stderr=True)) as bar:
+        stages = bar.add_task("stages")
+
+        def show(news: "Progress") -> None:
+            latest = news.latest
+            described = "stages" if latest is None else f"{latest.agent} {latest.task_id}/{latest.stage}"
+            bar.update(stages, completed=news.num_done, total=news.num_stages, description=described)
+
+        yield show

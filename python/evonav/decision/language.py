@@ -1,0 +1,232 @@
+"""Reads navigation instructions by rule: what to find, in which room, on what, beside what.
+
+The grammar of evonav's own instructions is in `evonav.tasks.language`; this reads that and freer wording, since
+released tasks carry sentences of a language model. Words are compared as nouns: lower case, CamelCase split, synonyms
+folded.
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import zip_longest
+from typing import Literal
+
+from evonav.tasks.language import COLOURS, SIZES, noun_of
+
+RelationKind = Literal["in", "on", "near"]
+
+SYNONYMS: dict[str, str] = {
+    "armchair": "arm chair",
+    "bath tub": "bathtub",
+    "bedside table": "side table",
+    "bin": "garbage can",
+    "bookcase": "shelving unit",
+    "bookshelf": "shelving unit",
+    "cellphone": "cell phone",
+    "coffee maker": "coffee machine",
+    "computer": "desktop",
+    "couch": "sofa",
+    "counter top": "countertop",
+    "counter": "countertop",
+    "door": "doorway",
+    "dryer": "clothes dryer",
+    "dust bin": "garbage can",
+    "dustbin": "garbage can",
+    "end table": "side table",
+    "floor plant": "house plant",
+    "houseplant": "house plant",
+    "kitchen counter": "countertop",
+    "lounge": "living room",
+    "mobile phone": "cell phone",
+    "night stand": "side table",
+    "nightstand": "side table",
+    "phone": "cell phone",
+    "picture": "painting",
+    "plant": "house plant",
+    "poster": "painting",
+    "potted plant": "house plant",
+    "refrigerator": "fridge",
+    "remote": "remote control",
+    "restroom": "bathroom",
+    "settee": "sofa",
+    "shelf": "shelving unit",
+    "shelves": "shelving unit",
+    "teddy": "teddy bear",
+    "television set": "television",
+    "television stand": "tv stand",
+    "trash bin": "garbage can",
+    "trash can": "garbage can",
+    "trashcan": "garbage can",
+    "tv": "television",
+    "washer": "washing machine",
+    "washroom": "bathroom",
+    "waste basket": "garbage can",
+    "wastebasket": "garbage can",
+}
+"""Other words for ProcTHOR's types, as `canonical` writes them."""
+
+ROOMS = ("bedroom", "kitchen", "living room", "bathroom")
+"""ProcTHOR's room types."""
+
+_NOUNS = frozenset(
+    """
+    alarm clock; aluminum foil; apple; arm chair; baseball bat; basket ball; bathtub; bed; blinds; book; boots; bottle;
+    bowl; box; bread; butter knife; cd; candle; cart; cell phone; chair; cloth; clothes dryer; coffee machine;
+    coffee table; countertop; credit card; cup; desk; desk lamp; desktop; dining table; dish sponge; dog bed; doorframe;
+    doorway; dresser; dumbbell; egg; faucet; floor lamp; footstool; fork; fridge; garbage bag; garbage can; hand towel;
+    hand towel holder; house plant; kettle; key chain; knife; ladle; laptop; laundry hamper; lettuce; light switch;
+    microwave; mug; newspaper; ottoman; painting; pan; paper towel roll; pen; pencil; pepper shaker; pillow; plate;
+    plunger; pot; potato; remote control; room decor; safe; salt shaker; scrub brush; shelving unit; shower curtain;
+    shower head; side table; sink; soap bar; soap bottle; sofa; spatula; spoon; spray bottle; statue; stool; tv stand;
+    table top decor; teddy bear; television; tennis racket; tissue box; toaster; toilet; toilet paper;
+    toilet paper hanger; tomato; towel; towel holder; vacuum cleaner; vase; washing machine; watch; watering can;
+    window; wine bottle; bedroom; kitchen; living room; bathroom; table; lamp
+    """.replace("\n", " ")
+    .replace("    ", "")
+    .strip()
+    .split("; ")
+)
+"""ProcTHOR's types and rooms, canonical: common knowledge of the benchmark, used to tell nouns from adjectives."""
+
+_ARTICLES = {"a", "an", "the", "its", "some", "any", "that", "this"}
+_RELATIONS: tuple[tuple[RelationKind, str], ...] = (
+    ("near", r"in front of|to the (?:left|right) of|left of|right of"),
+    ("on", r"on top of|atop|resting on|placed on|sitting on|standing on|lying on|located on|on|upon"),
+    ("on", r"inside of|inside|within"),
+    ("near", r"next to|adjacent to|close to|close by|nearby|near|beside|alongside|by|against|opposite|behind|between"),
+    ("near", r"directly below|just below|below|underneath|beneath|under|above|over"),
+    ("in", r"located in|in"),
+)
+_RELATION = re.compile("|".join(f"(?P<r{i}>\\b(?:{words})\\b)" for i, (_, words) in enumerate(_RELATIONS)))
+_GOAL = re.compile(
+    r"\b(?:navigate|go|head|walk|move|drive|proceed|get|come)\s+(?:over\s+)?(?:to|towards?)\b"
+    r"|\b(?:find|locate|reach|approach|search for|look for|looking for|visit)\b"
+)
+_STOP = re.compile(r"[.;:!?,]|\b(?:and|which|that is|that has|with|where|made|featuring|has|is|are)\b")
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """The target is in, on or near something."""
+
+    kind: RelationKind
+    noun: str
+    """Canonical."""
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What an instruction asks for."""
+
+    noun: str
+    """Canonical name of what to find."""
+    relations: tuple[Relation, ...] = ()
+    adjectives: tuple[str, ...] = ()
+    """Size and colour words said of it."""
+
+    @property
+    def room(self) -> str | None:
+        """The room it is in, if said."""
+        return next((relation.noun for relation in self.relations if relation.kind == "in"), None)
+
+
+@lru_cache(maxsize=4096)
+def canonical(words: str) -> str:
+    """One spelling a thing: "DiningTable", "the dining tables" and "dining table" are all `dining table`."""
+    words = noun_of(words) if re.fullmatch(r"[A-Z]\w*", words) and any(c.islower() for c in words) else words
+    tokens = [token for token in re.findall(r"[a-z0-9]+", words.lower()) if token not in _ARTICLES]
+    noun = " ".join(tokens)
+    for spelling in (noun, _singular(noun)):
+        if spelling in SYNONYMS:
+            return SYNONYMS[spelling]
+        if spelling in _NOUNS:
+            return spelling
+    return noun
+
+
+def _singular(noun: str) -> str:
+    if noun.endswith("shelves"):
+        return noun
+    return noun[:-1] if noun.endswith("s") and not noun.endswith("ss") else noun
+
+
+def similarity(noun: str, label: str) -> float:
+    """How well a label names a canonical noun: 1 the same, 0 no word in common.
+
+    Args:
+        noun: Canonical.
+        label: A detector's word, in any spelling.
+    """
+    other = canonical(label)
+    if noun == other or _singular(noun) == other:
+        return 1.0
+    a, b = set(noun.split()), set(other.split())
+    # The last word says what a thing is: a side table is a table, a table lamp is none.
+    shared = len(a & b) / len(a | b) if a and b else 0.0
+    return shared * (0.9 if a and b and noun.split()[-1] == other.split()[-1] else 0.4)
+
+
+def parse_goal(instruction: str, category: str | None = None) -> Goal:
+    """Reads an instruction.
+
+    Args:
+        instruction: English, in evonav's grammar or freer.
+        category: Of the target, when it is given; else it is read from the sentence.
+
+    Returns:
+        What was understood; never fails. A noun that cannot be made out is empty.
+    """
+    text = " ".join(instruction.replace("’", "'").split()).lower()
+    start = _GOAL.search(text)
+    text = text[start.end() :] if start else text
+    matches = list(_RELATION.finditer(text))
+    head = _phrase(text[: matches[0].start()] if matches else text)
+    noun = canonical(category) if category else canonical(_without_adjectives(head))
+    relations: list[Relation] = []
+    for match, following in zip_longest(matches, matches[1:]):
+        kind = next(_RELATIONS[i][0] for i in range(len(_RELATIONS)) if match.group(f"r{i}"))
+        said = text[match.end() : following.start() if following else len(text)]
+        for thing in _things(said):
+            relation = _relation(kind, thing)
+            if relation is not None and relation.noun != noun and relation not in relations:
+                relations.append(relation)
+    tokens = re.findall(r"[a-z]+", text[: matches[0].start()] if matches else text)
+    adjectives = tuple(dict.fromkeys(token for token in tokens if token in COLOURS or token in SIZES))
+    return Goal(noun, tuple(relations), adjectives)
+
+
+def _relation(kind: RelationKind, thing: str) -> Relation | None:
+    noun = canonical(_without_adjectives(thing))
+    room = next((room for room in ROOMS if noun.endswith(room)), None)
+    if room is not None:
+        return Relation("in", room)
+    if not noun or noun in {"room", "floor", "ground", "wall", "house", "home", "corner", "left", "right", "side"}:
+        return None
+    # "In the sink" is a support, not a room.
+    return Relation("on" if kind == "in" else kind, noun)
+
+
+def _things(said: str) -> Iterable[str]:
+    """Noun phrases of `the sink and the mug`."""
+    for part in re.split(r"\band\b|,", said):
+        phrase = _phrase(part)
+        if phrase:
+            yield phrase
+
+
+def _phrase(said: str) -> str:
+    """The first noun phrase: up to punctuation or a clause."""
+    end = _STOP.search(said)
+    return (said[: end.start()] if end else said).strip()
+
+
+def _without_adjectives(phrase: str) -> str:
+    """The last known noun of the phrase, or all of it without articles, sizes and colours."""
+    tokens = [t for t in re.findall(r"[a-z0-9']+", phrase) if t not in _ARTICLES]
+    for end in range(len(tokens), 0, -1):
+        for length in range(min(3, end), 0, -1):
+            words = " ".join(tokens[end - length : end])
+            if canonical(words) in _NOUNS:
+                return words
+    return " ".join(t for t in tokens if t not in COLOURS and t not in SIZES)

@@ -1,0 +1,92 @@
+"""What a worker builds for itself, named by import path so that it crosses process borders without pickle."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from evonav.agents.agent import Agent
+from evonav.agents.registry import agent_factory
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.privileged import YARDSTICKS, yardstick
+from evonav.evaluation.protocol import EpisodeCase
+from evonav.evaluation.sensing import Perception
+from evonav.world.simulator import Simulator
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """Import paths (`module:function`) of what an episode needs."""
+
+    cases: str = "evonav.evaluation.backend:load_case"
+    """Takes a task's directory, returns an `EpisodeCase`."""
+    simulator: str = "evonav.evaluation.backend:embedded_simulator"
+    """Makes a `Simulator`."""
+    perception: str = "evonav.evaluation.backend:ground_truth"
+    """Makes a `Perception`."""
+
+    def load_case(self, path: Path) -> EpisodeCase:
+        """A task as the evaluator runs it."""
+        case: EpisodeCase = _imported(self.cases)(path)
+        return case
+
+    def make_simulator(self) -> Simulator:
+        """A simulator of the worker's own."""
+        simulator: Simulator = _imported(self.simulator)()
+        return simulator
+
+    def make_perception(self) -> Perception:
+        """A perception of the worker's own."""
+        perception: Perception = _imported(self.perception)()
+        return perception
+
+
+def make_agent(name: str) -> Agent:
+    """A fresh agent or yardstick.
+
+    Raises:
+        InvalidArgumentError: There is none of this name.
+    """
+    return yardstick(name) if name in YARDSTICKS else agent_factory(name)()
+
+
+def check_agent_name(name: str) -> None:
+    """Refuses a name that no worker could make an agent of.
+
+    Raises:
+        InvalidArgumentError: There is none of this name, or it cannot be imported.
+    """
+    if name not in YARDSTICKS:
+        agent_factory(name)
+
+
+def load_case(path: Path) -> EpisodeCase:
+    """A task on disk."""
+    from evonav.evaluation.cases import episode_case
+    from evonav.tasks import load_task
+
+    return episode_case(load_task(path))
+
+
+def embedded_simulator() -> Simulator:
+    """Evonav's own simulator, AI2-THOR's defaults."""
+    from evonav.world.embedded import EmbeddedSimulator
+
+    return EmbeddedSimulator()
+
+
+def ground_truth() -> Perception:
+    """The simulator's masks and labels."""
+    from evonav.sensors.ground_truth import GroundTruthPerception
+
+    return GroundTruthPerception()
+
+
+def _imported(path: str) -> Callable[..., Any]:
+    module, _, attribute = path.partition(":")
+    try:
+        found: Callable[..., Any] = getattr(import_module(module), attribute)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise InvalidArgumentError(f"`{path}` cannot be imported: {error}") from error
+    return found

@@ -1,0 +1,281 @@
+"""A run: agents x tasks into one folder, resumable, with any number of workers."""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from evonav._core import __version__
+from evonav.errors import InvalidArgumentError, StoreError, TaskError
+from evonav.evaluation.backend import Backend, check_agent_name
+from evonav.evaluation.metrics import AgentSummary, paired_differences, summarise, summary_json
+from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, as_errored, as_not_run
+from evonav.evaluation.records import EndState, ErrorKind, StageRecord
+from evonav.evaluation.store import RunStore, check_same_run
+from evonav.evaluation.workers import EpisodeJob, JobEvent, run_here, run_in_workers
+
+SUMMARY_NAME = "summary.json"
+
+
+@dataclass(frozen=True, slots=True)
+class RunConfig:
+    """What decides the records of a run, beside agents and tasks."""
+
+    seed: int = 0
+    protocol: ProtocolConfig = field(default_factory=ProtocolConfig)
+    backend: Backend = field(default_factory=Backend)
+    stage_timeout_s: float = 900.0
+    """After which a stage is errored; not part of what makes runs the same."""
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFile:
+    """A task of a run."""
+
+    task_id: str
+    path: Path
+    num_stages: int
+    digest: str
+    """Of `task.json`, which holds the checksums of all other files."""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a run is."""
+
+    num_done: int
+    """Recorded stages, those of earlier calls included."""
+    num_stages: int
+    latest: StageRecord | None
+
+
+def task_files(directory: Path, limit: int | None = None) -> list[TaskFile]:
+    """The tasks of a directory, by task id; contents are checked when they are run.
+
+    Raises:
+        TaskError: There is no task, or a header is malformed.
+    """
+    roots = sorted(path.parent for path in directory.glob("*/task.json"))
+    if not roots:
+        raise TaskError(f"{directory}: no tasks here (expected TASK_ID/task.json)")
+    return [_task_file(root) for root in roots[:limit]]
+
+
+def _task_file(root: Path) -> TaskFile:
+    path = root / "task.json"
+    try:
+        data = path.read_bytes()
+        header = json.loads(data)
+        num_stages = int(header["num_stages"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise TaskError(f"{path}: no task header ({type(error).__name__}: {error})") from error
+    return TaskFile(root.name, root, num_stages, hashlib.sha256(data).hexdigest())
+
+
+def evaluate(
+    agents: Sequence[str],
+    tasks: Sequence[TaskFile],
+    run_dir: Path,
+    *,
+    config: RunConfig | None = None,
+    num_workers: int = 1,
+    retry_errored: bool = False,
+    on_progress: Callable[[Progress], None] = lambda _: None,
+) -> list[AgentSummary]:
+    """Evaluates agents on tasks; called again on the same folder, does what is left.
+
+    Args:
+        agents: Names, see `evonav agents`.
+        tasks: See `task_files`.
+        run_dir: Holds `records.sqlite` and `summary.json`.
+        config: Must be the run's own when the folder already holds one.
+        num_workers: Processes; 0 runs everything in this one.
+        retry_errored: Run errored stages again, and those that were not run because of them.
+        on_progress: Called after every recorded stage.
+
+    Returns:
+        One summary an agent asked for.
+
+    Raises:
+        InvalidArgumentError: An agent is unknown, or asked for twice.
+        StoreError: The folder holds a run of another configuration or cannot be written.
+        TaskError: A task is malformed.
+    """
+    config = config or RunConfig()
+    _check_request(agents, tasks, num_workers)
+    with RunStore(run_dir, create=True) as store:
+        _claim(store, run_dir, tasks, config)
+        store.set_meta("agents", sorted({*(store.meta("agents") or []), *agents}))
+        run = _Run(store, agents, tasks, config)
+        if retry_errored:
+            run.forget_errored()
+        jobs = run.jobs()
+        on_progress(run.progress(None))
+        if num_workers == 0:
+            events = run_here(jobs, config.backend, config.protocol)
+        else:
+            events = run_in_workers(
+                jobs,
+                config.backend,
+                config.protocol,
+                num_workers=num_workers,
+                stage_timeout_s=config.stage_timeout_s,
+            )
+        for record in run.record_all(events):
+            on_progress(run.progress(record))
+    return write_summary(run_dir, only=agents)
+
+
+def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[AgentSummary]:
+    """Computes every agent's measures from the records, and writes `summary.json`.
+
+    Args:
+        run_dir: A run.
+        only: Agents to return, in this order; default all.
+
+    Raises:
+        StoreError: There is no run, or it cannot be read or written.
+    """
+    with RunStore(run_dir) as store:
+        agents: list[str] = store.meta("agents") or []
+        num_stages = sum(store.meta("num_stages").values())
+        records = {agent: list(store.records(agent)) for agent in agents}
+    summaries = {agent: summarise(agent, records[agent], num_stages) for agent in agents}
+    content = summary_json(list(summaries.values()), paired_differences(records))
+    _write_atomically(run_dir / SUMMARY_NAME, json.dumps(content, indent=2, sort_keys=True) + "\n")
+    return [summaries[agent] for agent in only or agents]
+
+
+class _Run:
+    """The bookkeeping of one call."""
+
+    def __init__(self, store: RunStore, agents: Sequence[str], tasks: Sequence[TaskFile], config: RunConfig) -> None:
+        self._store = store
+        self._agents = agents
+        self._tasks = {task.task_id: task for task in tasks}
+        self._config = config
+        self._states = store.states()
+        self._num_stages = len(agents) * sum(task.num_stages for task in tasks)
+
+    def jobs(self) -> list[EpisodeJob]:
+        """Episodes with a stage that has no record, task by task."""
+        return [
+            EpisodeJob(agent, task.task_id, str(task.path), agent_seed(self._config.seed, agent, task.task_id))
+            for task in self._tasks.values()
+            for agent in self._agents
+            if any((agent, task.task_id, stage) not in self._states for stage in range(1, task.num_stages + 1))
+        ]
+
+    def forget_errored(self) -> None:
+        """Drops episodes' stages from the first errored one on."""
+        for task in self._tasks.values():
+            for agent in self._agents:
+                stages = range(1, task.num_stages + 1)
+                first = next(
+                    (k for k in stages if self._states.get((agent, task.task_id, k)) is EndState.ERRORED), None
+                )
+                if first is not None:
+                    self._store.forget_episode(agent, task.task_id, first)
+        self._states = self._store.states()
+
+    def progress(self, latest: StageRecord | None) -> Progress:
+        num_done = sum(agent in self._agents and task_id in self._tasks for agent, task_id, _ in self._states)
+        return Progress(num_done, self._num_stages, latest)
+
+    def record_all(self, events: Iterator[JobEvent]) -> Iterator[StageRecord]:
+        """Records every outcome. Stages that a job leaves behind are errored or not run, never missing."""
+        for event in events:
+            if event.outcome is not None:
+                record, plan = event.outcome.record, event.outcome.stage_map
+                if plan is not None:
+                    self._store.add_map(plan)
+                if self._add(record, event.outcome.wall_s, event.outcome.cpu_s):
+                    yield record
+            elif event.failure is not None:
+                for record in self._left_behind(event.job, *event.failure):
+                    if self._add(record, 0.0, 0.0):
+                        yield record
+
+    def _add(self, record: StageRecord, wall_s: float, cpu_s: float) -> bool:
+        """Commits a record, unless the same was there: a resumed episode runs its recorded stages again.
+
+        An agent that is not deterministic may do otherwise than recorded. Mixing two rollouts in one episode would join
+        what never happened, so the newer rollout then replaces the older from that stage on.
+        """
+        key = (record.agent, record.task_id, record.stage)
+        if key in self._states:
+            if self._store.record_text(*key) == record.model_dump_json():
+                return False
+            self._store.forget_episode(*key)
+            self._states = self._store.states()
+        self._store.add_stage(record, wall_s=wall_s, cpu_s=cpu_s)
+        self._states[key] = record.state
+        return True
+
+    def _left_behind(self, job: EpisodeJob, kind: ErrorKind, message: str) -> Iterator[StageRecord]:
+        """Records of the stages of a job that ended early: the first errored, the rest not run."""
+        task = self._tasks[job.task_id]
+        case: EpisodeCase = self._config.backend.load_case(task.path)
+        failed: StageRecord | None = None
+        for stage in range(1, task.num_stages + 1):
+            if (job.agent, job.task_id, stage) in self._states:
+                continue
+            blank = case.blank_record(job.agent, stage)
+            if failed is None or failed.error is None:
+                failed = as_errored(blank, kind, message)
+                yield failed
+            else:
+                yield as_not_run(blank, failed.error, failed.stage)
+
+
+def agent_seed(seed: int, agent: str, task_id: str) -> int:
+    """The seed of an agent's random choices: a function of names, not of order or workers."""
+    digest = hashlib.sha256(f"{seed}\0{agent}\0{task_id}".encode()).digest()
+    return int.from_bytes(digest[:6], "big")
+
+
+def _check_request(agents: Sequence[str], tasks: Sequence[TaskFile], num_workers: int) -> None:
+    if not agents:
+        raise InvalidArgumentError("no agent to evaluate")
+    if len(set(agents)) != len(agents):
+        raise InvalidArgumentError(f"an agent is named twice: {', '.join(agents)}")
+    if not tasks:
+        raise InvalidArgumentError("no task to evaluate on")
+    if num_workers < 0:
+        raise InvalidArgumentError(f"num_workers = {num_workers}: must be >= 0")
+    for agent in agents:
+        check_agent_name(agent)
+
+
+def _claim(store: RunStore, run_dir: Path, tasks: Sequence[TaskFile], config: RunConfig) -> None:
+    """Makes the folder this run's, or checks that it is."""
+    asked: dict[str, Any] = {
+        "evonav": __version__,
+        "seed": config.seed,
+        "protocol": asdict(config.protocol),
+        "backend": asdict(config.backend),
+        "tasks": hashlib.sha256("".join(f"{t.task_id} {t.digest}\n" for t in tasks).encode()).hexdigest(),
+        "num_tasks": len(tasks),
+    }
+    there = store.meta("config")
+    if there is None:
+        store.set_meta("config", asked)
+        store.set_meta("num_stages", {task.task_id: task.num_stages for task in tasks})
+    else:
+        check_same_run(there, asked, run_dir)
+
+
+def _write_atomically(path: Path, text: str) -> None:
+    """Writes beside and renames, so that a reader sees the old file or the new one."""
+    beside = path.with_name(path.name + ".partial")
+    try:
+        with beside.open("w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        beside.replace(path)
+    except OSError as error:
+        raise StoreError(f"{path}: {error}") from error

@@ -1,0 +1,133 @@
+"""The constants of the paper's evaluation protocol (Sec. C.1), and what a stage is to the evaluator."""
+
+from dataclasses import dataclass, field
+
+from evonav.agents.agent import Sensing
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.metrics import SUCCESS_RADIUS_M
+from evonav.evaluation.records import (
+    EndState,
+    ErrorKind,
+    GoalRecord,
+    StageError,
+    StageMap,
+    StageRecord,
+    TargetRecord,
+    TransitionRecord,
+)
+from evonav.tasks.public import StageInput
+from evonav.world.pose import Pose
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolConfig:
+    """What every agent of a run is held to."""
+
+    max_rounds: int = 50
+    """Decision rounds a stage."""
+    success_radius_m: float = SUCCESS_RADIUS_M
+    waypoint_m: float = 0.25
+    """Longest teleport while following planner waypoints."""
+    max_travel_m: float = 1.0
+    max_views: int = 7
+    """A round; the cap on what an agent may ask for."""
+    max_occupancy_range_m: float = 3.0
+    min_visible_px: int = 25
+    """Pixels from which on the target counts as seen in a view (diagnostics and yardsticks)."""
+
+    def check(self, sensing: Sensing) -> None:
+        """Refuses sensing that the protocol does not grant.
+
+        Raises:
+            InvalidArgumentError: A schedule has no or too many views, or travel or range exceed the caps.
+        """
+        for name, schedule in (("first_round", sensing.first_round), ("later_rounds", sensing.later_rounds)):
+            if not 1 <= schedule.count <= self.max_views:
+                raise InvalidArgumentError(f"sensing.{name}.count = {schedule.count}: must be 1..{self.max_views}")
+        if not 0.0 < sensing.max_travel_m <= self.max_travel_m:
+            raise InvalidArgumentError(
+                f"sensing.max_travel_m = {sensing.max_travel_m}: must be in (0, {self.max_travel_m}]"
+            )
+        if not 0.0 < sensing.occupancy_range_m <= self.max_occupancy_range_m:
+            raise InvalidArgumentError(
+                f"sensing.occupancy_range_m = {sensing.occupancy_range_m}: must be in (0, {self.max_occupancy_range_m}]"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class StageCase:
+    """A stage as the evaluator knows it; only `public` ever reaches an agent."""
+
+    public: StageInput
+    house_json: str
+    target: TargetRecord
+    transition: TransitionRecord
+
+    @property
+    def goal(self) -> GoalRecord:
+        """What the agent is told, for the record."""
+        return GoalRecord(
+            category=self.public.category,
+            instruction=self.public.unified_instruction,
+            basic_instruction=self.public.basic_instruction,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeCase:
+    """A task as the evaluator knows it."""
+
+    task_id: str
+    house: str
+    start: Pose
+    """The manifest's, of stage 1."""
+    stages: tuple[StageCase, ...] = field(repr=False)
+
+    def blank_record(self, agent: str, stage: int) -> StageRecord:
+        """The record of a stage that was not run; everything else is this plus what happened.
+
+        Args:
+            agent: The name it was asked for by.
+            stage: 1-based.
+        """
+        case = self.stages[stage - 1]
+        return StageRecord(
+            agent=agent,
+            task_id=self.task_id,
+            house=self.house,
+            stage=stage,
+            num_stages=len(self.stages),
+            state=EndState.NOT_RUN,
+            goal=case.goal,
+            target=case.target,
+            transition=case.transition,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class StageOutcome:
+    """A finished stage, and what it cost."""
+
+    record: StageRecord
+    stage_map: StageMap | None
+    """Of the stage's house; `None` when the stage never got one."""
+    wall_s: float
+    cpu_s: float
+
+
+def as_errored(record: StageRecord, kind: ErrorKind, message: str) -> StageRecord:
+    """The record with its stage errored; an errored stage has no measures."""
+    return record.model_copy(
+        update={
+            "state": EndState.ERRORED,
+            "error": StageError(kind=kind, message=message),
+            "spl": None,
+            "soft_spl": None,
+        }
+    )
+
+
+def as_not_run(record: StageRecord, cause: StageError, stage: int) -> StageRecord:
+    """The record of a stage that could not run because an earlier one of its episode is errored."""
+    error = StageError(kind=cause.kind, message=f"stage {stage} is errored: {cause.message}")
+    return record.model_copy(update={"state": EndState.NOT_RUN, "error": error})

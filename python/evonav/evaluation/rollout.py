@@ -1,0 +1,346 @@
+"""An episode: one agent through the stages of one task, by the paper's multi-stage protocol (Sec. C.1)."""
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from evonav.agents.agent import (
+    Agent,
+    AgentAction,
+    EntryBelief,
+    ExplainingAgent,
+    Move,
+    NavigateTo,
+    RoundDiagnostics,
+    Stop,
+)
+from evonav.errors import DecisionError, InvalidArgumentError, SimulationError
+from evonav.evaluation import motion
+from evonav.evaluation.cases import room_at, stage_map
+from evonav.evaluation.metrics import stage_soft_spl, stage_spl
+from evonav.evaluation.privileged import Sighting, privileges_of
+from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome, as_errored, as_not_run
+from evonav.evaluation.records import (
+    ActionRecord,
+    EndState,
+    EntryRecord,
+    ErrorKind,
+    Point3,
+    PoseRecord,
+    RoundRecord,
+    StageMap,
+    StageRecord,
+)
+from evonav.evaluation.sensing import Perception, Sensed, Sensors, map_frame
+from evonav.tasks.public import TaskInfo
+from evonav.world.pose import Pose
+from evonav.world.simulator import Action, SceneObject, Simulator
+
+STALE_MARGIN_M = 0.3
+"""An entry whose centre is this near the box of an object of its label is not stale."""
+
+
+class _StageError(Exception):
+    """A stage that cannot go on; carries whose fault it is."""
+
+    def __init__(self, kind: ErrorKind, message: str) -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
+@contextmanager
+def _blame(kind: ErrorKind) -> Iterator[None]:
+    """Turns what is raised inside into a stage failure of `kind`; errors that name their own cause keep it."""
+    try:
+        yield
+    except _StageError:
+        raise
+    except DecisionError as error:
+        raise _StageError(ErrorKind.DECISION, str(error)) from error
+    except SimulationError as error:
+        raise _StageError(ErrorKind.SIMULATION, str(error)) from error
+    except Exception as error:
+        raise _StageError(kind, f"{type(error).__name__}: {error}") from error
+
+
+class Episode:
+    """One agent's run through one task."""
+
+    def __init__(
+        self,
+        case: EpisodeCase,
+        agent_name: str,
+        agent: Agent,
+        simulator: Simulator,
+        perception: Perception,
+        protocol: ProtocolConfig,
+        seed: int,
+    ) -> None:
+        self._case = case
+        self._agent_name = agent_name
+        self._agent = agent
+        self._simulator = simulator
+        self._perception = perception
+        self._protocol = protocol
+        self._seed = seed
+
+    def run(self) -> Iterator[StageOutcome]:
+        """Runs the stages in order.
+
+        Yields:
+            The outcome of every stage as it ends. An error ends the episode: the later stages are not run, since the
+            agent's memory of the errored one is not what it would have been.
+        """
+        pose = self._case.start
+        failure = None
+        for stage in range(1, len(self._case.stages) + 1):
+            record = self._case.blank_record(self._agent_name, stage)
+            if failure is not None and failure.error is not None:
+                yield StageOutcome(as_not_run(record, failure.error, failure.stage), None, 0.0, 0.0)
+                continue
+            wall_s, cpu_s = time.perf_counter(), time.process_time()
+            run = _StageRun(self, record, pose)
+            record = run.run()
+            yield StageOutcome(record, run.plan, time.perf_counter() - wall_s, time.process_time() - cpu_s)
+            if run.is_broken:
+                failure = record
+            else:
+                pose = self._simulator.pose
+
+
+class _StageRun:
+    """One stage of an episode: start, rounds, measures."""
+
+    def __init__(self, episode: Episode, record: StageRecord, requested: Pose) -> None:
+        self._case = episode._case
+        self._agent = episode._agent
+        self._simulator = episode._simulator
+        self._perception = episode._perception
+        self._protocol = episode._protocol
+        self._seed = episode._seed
+        self._stage = self._case.stages[record.stage - 1]
+        self._record = record
+        self._requested = requested
+        self._trace: list[RoundRecord] = []
+        self._length_m = 0.0
+        self.plan: StageMap | None = None
+        self.is_broken = False
+        """The episode cannot go on."""
+
+    def run(self) -> StageRecord:
+        try:
+            with _blame(ErrorKind.HARNESS):
+                self._start()
+                with _blame(ErrorKind.SIMULATION):
+                    reference_length_m = self._reference_length_m()
+                stop_reason = self._rounds()
+                return self._measured(reference_length_m, stop_reason)
+        except _StageError as failure:
+            self.is_broken = True
+            return as_errored(self._with_trace(self._record), failure.kind, str(failure))
+
+    def _start(self) -> None:
+        """Loads the stage's house, puts the agent where it ended, and tells it the goal."""
+        stage = self._record.stage
+        with _blame(ErrorKind.SIMULATION):
+            start = self._simulator.reset(self._stage.house_json, self._requested)
+            is_snapped = math.dist((start.x_m, start.z_m), (self._requested.x_m, self._requested.z_m)) > 1e-6
+        self.plan = stage_map(self._case, stage, self._simulator.objects)
+        room_id = room_at(self.plan, (self._requested.x_m, self._requested.z_m))
+        evolved_room_id = self._record.transition.room_id
+        self._record = self._record.model_copy(
+            update={
+                "requested_start": pose_record(self._requested),
+                "effective_start": pose_record(start),
+                "is_snapped": is_snapped,
+                "transition": self._record.transition.model_copy(
+                    update={"is_agent_in_room": evolved_room_id is not None and room_id == evolved_room_id}
+                ),
+            }
+        )
+        with _blame(ErrorKind.AGENT):
+            if stage == 1:
+                self._protocol.check(self._agent.sensing)
+                self._agent.begin_task(
+                    TaskInfo(
+                        task_id=self._case.task_id,
+                        num_stages=len(self._case.stages),
+                        max_rounds=self._protocol.max_rounds,
+                        map_frame=map_frame(self._simulator.occupancy()),
+                        seed=self._seed,
+                    )
+                )
+            self._agent.begin_stage(self._stage.public)
+            if (privileged := privileges_of(self._agent)) is not None:
+                privileged.reveal_target(self._stage.target.position_m)
+
+    def _reference_length_m(self) -> float | None:
+        """L*: the planner's path from the effective start to the target, or `None` when there is none."""
+        path = self._simulator.shortest_path(self._simulator.pose.position_m, self._stage.target.position_m)
+        if len(path) == 0:
+            return None
+        return motion.polyline_length_m([(float(x), float(z)) for x, _, z in path])
+
+    def _rounds(self) -> str | None:
+        """Decision rounds until the agent stops (returns why) or the budget ends (returns `None`)."""
+        sensing = self._agent.sensing
+        with _blame(ErrorKind.SIMULATION):
+            sensors = Sensors(
+                self._simulator, self._perception, sensing, self._stage.target.object_id, self._protocol.min_visible_px
+            )
+        last = motion.Motion((), is_success=True)
+        for number in range(self._protocol.max_rounds):
+            with _blame(ErrorKind.SIMULATION):
+                sensed = sensors.observe(
+                    is_first=number == 0,
+                    is_action_success=last.is_success,
+                    has_arrived=last.has_arrived,
+                    num_rounds_left=self._protocol.max_rounds - number,
+                )
+            with _blame(ErrorKind.AGENT):
+                if (privileged := privileges_of(self._agent)) is not None:
+                    privileged.reveal_sighting(Sighting(sensed.is_target_visible))
+                action = checked_action(self._agent.act(sensed.observation))
+            with _blame(ErrorKind.SIMULATION):
+                last = self._carry_out(action)
+            self._length_m += last.length_m
+            self._trace.append(self._round_record(number, sensed, action, last))
+            if isinstance(action, Stop):
+                return action.reason
+        return None
+
+    def _carry_out(self, action: AgentAction) -> motion.Motion:
+        if isinstance(action, NavigateTo):
+            return motion.navigate(
+                self._simulator,
+                action,
+                spacing_m=self._protocol.waypoint_m,
+                max_travel_m=self._agent.sensing.max_travel_m,
+            )
+        if isinstance(action, Move):
+            return motion.move(self._simulator, action)
+        pose = self._simulator.pose
+        return motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
+
+    def _round_record(self, number: int, sensed: Sensed, action: AgentAction, done: motion.Motion) -> RoundRecord:
+        with _blame(ErrorKind.AGENT):
+            told = self._agent.diagnostics() if isinstance(self._agent, ExplainingAgent) else RoundDiagnostics()
+            return RoundRecord(
+                round=number,
+                pose=pose_record(sensed.observation.pose),
+                action=_action_record(action),
+                path_m=done.path_m,
+                is_action_success=done.is_success,
+                is_target_visible=sensed.is_target_visible,
+                choice=told.choice,
+                chosen_entry=None if told.chosen_entry is None else self._entry_record(told.chosen_entry),
+                num_entries=told.num_entries,
+                num_frontiers=told.num_frontiers,
+                counters=dict(told.counters),
+                details=dict(told.details),
+            )
+
+    def _measured(self, reference_length_m: float | None, stop_reason: str | None) -> StageRecord:
+        start, end = self._record.effective_start, self._simulator.pose
+        assert start is not None  # set by _start
+        x_m, _, z_m = self._stage.target.position_m
+        start_distance_m = math.dist((start.x_m, start.z_m), (x_m, z_m))
+        distance_m = math.dist((end.x_m, end.z_m), (x_m, z_m))
+        is_success = distance_m < self._protocol.success_radius_m
+        record = self._with_trace(self._record).model_copy(
+            update={
+                "state": EndState.SUCCESS if is_success else EndState.FAILURE,
+                "terminal": pose_record(end),
+                "has_stopped": stop_reason is not None,
+                "stop_reason": stop_reason or "",
+                "start_distance_m": start_distance_m,
+                "terminal_distance_m": distance_m,
+                "path_length_m": self._length_m,
+                "reference_length_m": reference_length_m,
+                "entries": self._entries(),
+            }
+        )
+        if reference_length_m is None:
+            # The agent's memory and pose are sound, so the episode goes on; only this stage has no measure.
+            return as_errored(record, ErrorKind.REFERENCE, "no path from the effective start to the target")
+        return record.model_copy(
+            update={
+                "spl": stage_spl(is_success, self._length_m, reference_length_m),
+                "soft_spl": stage_soft_spl(start_distance_m, distance_m, self._length_m, reference_length_m),
+            }
+        )
+
+    def _with_trace(self, record: StageRecord) -> StageRecord:
+        return record.model_copy(
+            update={
+                "num_rounds": len(self._trace),
+                "num_target_visible_rounds": sum(entry.is_target_visible for entry in self._trace),
+                "trace": tuple(self._trace),
+            }
+        )
+
+    def _entries(self) -> tuple[EntryRecord, ...]:
+        if not isinstance(self._agent, ExplainingAgent):
+            return ()
+        with _blame(ErrorKind.AGENT):
+            return tuple(self._entry_record(belief) for belief in self._agent.entries())
+
+    def _entry_record(self, belief: EntryBelief) -> EntryRecord:
+        return EntryRecord(
+            entry_id=belief.entry_id,
+            label=belief.label,
+            centre_m=belief.centre_m,
+            size_m=belief.size_m,
+            num_detections=belief.num_detections,
+            is_stale=not any(
+                body.category == belief.label and _distance_to_box_m(belief.centre_m, body) <= STALE_MARGIN_M
+                for body in self._simulator.objects
+            ),
+        )
+
+
+def pose_record(pose: Pose) -> PoseRecord:
+    """A pose for the record."""
+    return PoseRecord(x_m=pose.x_m, y_m=pose.y_m, z_m=pose.z_m, yaw_rad=pose.yaw_rad, horizon_rad=pose.horizon_rad)
+
+
+def checked_action(action: object) -> AgentAction:
+    """What an agent answered, if it is an action.
+
+    Raises:
+        InvalidArgumentError: It is not, or has a coordinate that is not a finite number.
+    """
+    if isinstance(action, Move) and isinstance(action.action, Action):
+        return Stop() if action.action is Action.STOP else action
+    if isinstance(action, NavigateTo):
+        position_m = _finite_point("position_m", action.position_m)
+        face_m = None if action.face_m is None else _finite_point("face_m", action.face_m)
+        return replace(action, position_m=position_m, face_m=face_m)
+    if isinstance(action, Stop):
+        return action
+    raise InvalidArgumentError(f"{action!r} is no action: answer Move(Action), NavigateTo((x, z)) or Stop()")
+
+
+def _finite_point(name: str, point_m: object) -> tuple[float, float]:
+    try:
+        x_m, z_m = (float(value) for value in point_m)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        raise InvalidArgumentError(f"NavigateTo.{name} = {point_m!r}: must be (x, z)") from None
+    if not (math.isfinite(x_m) and math.isfinite(z_m)):
+        raise InvalidArgumentError(f"NavigateTo.{name} = {point_m!r}: must be finite")
+    return x_m, z_m
+
+
+def _action_record(action: AgentAction) -> ActionRecord:
+    if isinstance(action, NavigateTo):
+        return ActionRecord(kind="navigate_to", position_m=action.position_m)
+    if isinstance(action, Move):
+        return ActionRecord(kind="move", action=action.action.value)
+    return ActionRecord(kind="stop", reason=str(action.reason))
+
+
+def _distance_to_box_m(point_m: Point3, body: SceneObject) -> float:
+    gaps_m = (max(0.0, abs(p - c) - s / 2) for p, c, s in zip(point_m, body.centre_m, body.size_m, strict=True))
+    return math.hypot(*gaps_m)

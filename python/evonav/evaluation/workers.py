@@ -1,0 +1,229 @@
+"""Worker processes: an episode each, contained. A worker that dies or hangs costs its stage, not the run.
+
+Parent and workers exchange JSON only: nothing a worker sends is unpickled.
+"""
+
+import json
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+
+from evonav.evaluation.backend import Backend, make_agent
+from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
+from evonav.evaluation.records import ErrorKind, StageMap, StageRecord
+from evonav.evaluation.rollout import Episode
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeJob:
+    """One agent, one task."""
+
+    agent: str
+    task_id: str
+    path: str
+    """Of the task."""
+    seed: int
+    """The agent's."""
+
+
+@dataclass(frozen=True, slots=True)
+class JobEvent:
+    """News of a job: a finished stage, or its end."""
+
+    job: EpisodeJob
+    outcome: StageOutcome | None = None
+    is_end: bool = False
+    failure: tuple[ErrorKind, str] | None = None
+    """Why the job ended before its last stage."""
+
+
+def run_job(job: EpisodeJob, backend: Backend, protocol: ProtocolConfig) -> Iterator[StageOutcome]:
+    """Runs an episode in this process."""
+    case = backend.load_case(Path(job.path))
+    yield from run_case(case, job, backend, protocol)
+
+
+def run_case(case: EpisodeCase, job: EpisodeJob, backend: Backend, protocol: ProtocolConfig) -> Iterator[StageOutcome]:
+    """Runs an episode of a loaded task in this process."""
+    simulator = backend.make_simulator()
+    try:
+        agent = make_agent(job.agent)
+        yield from Episode(case, job.agent, agent, simulator, backend.make_perception(), protocol, job.seed).run()
+    finally:
+        simulator.close()
+
+
+def run_here(jobs: Sequence[EpisodeJob], backend: Backend, protocol: ProtocolConfig) -> Iterator[JobEvent]:
+    """Runs jobs one after another in this process: for debuggers. Nothing is contained but exceptions."""
+    for job in jobs:
+        try:
+            for outcome in run_job(job, backend, protocol):
+                yield JobEvent(job, outcome)
+        except Exception as error:
+            yield JobEvent(job, is_end=True, failure=(ErrorKind.HARNESS, f"{type(error).__name__}: {error}"))
+        else:
+            yield JobEvent(job, is_end=True)
+
+
+def run_in_workers(
+    jobs: Sequence[EpisodeJob],
+    backend: Backend,
+    protocol: ProtocolConfig,
+    *,
+    num_workers: int,
+    stage_timeout_s: float,
+) -> Iterator[JobEvent]:
+    """Runs jobs in processes, in any order; events of one job come in order.
+
+    Closing the iterator ends the workers at once.
+    """
+    pending = list(reversed(jobs))
+    num_workers = min(num_workers, len(jobs))
+    workers = [_Worker(backend, protocol) for _ in range(num_workers)]
+    try:
+        while True:
+            for index, worker in enumerate(workers):
+                if worker.job is None and pending:
+                    if not worker.is_alive:
+                        worker = workers[index] = _Worker(backend, protocol)
+                    worker.start(pending.pop())
+            busy = [worker for worker in workers if worker.job is not None]
+            if not busy:
+                return
+            timeout_s = max(0.0, min(worker.last_news_s for worker in busy) + stage_timeout_s - time.monotonic())
+            ready = wait([worker.connection for worker in busy], timeout_s)
+            now_s = time.monotonic()
+            for worker in busy:
+                if worker.connection in ready:
+                    yield worker.receive()
+                elif now_s - worker.last_news_s >= stage_timeout_s:
+                    yield worker.give_up(ErrorKind.TIMEOUT, f"no stage ended within {stage_timeout_s:g} s")
+    finally:
+        for worker in workers:
+            worker.close()
+
+
+class _Worker:
+    """The parent's side of a worker process."""
+
+    def __init__(self, backend: Backend, protocol: ProtocolConfig) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.connection, far_end = context.Pipe()
+        # One thread a worker: the parallelism is over episodes.
+        with _environment({"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}):
+            self._process = context.Process(
+                target=_serve, args=(far_end, json.dumps(asdict(backend)), json.dumps(asdict(protocol))), daemon=True
+            )
+            self._process.start()
+        far_end.close()
+        self.job: EpisodeJob | None = None
+        self.last_news_s = 0.0
+
+    @property
+    def is_alive(self) -> bool:
+        return self._process.is_alive() and not self.connection.closed
+
+    def start(self, job: EpisodeJob) -> None:
+        self.job = job
+        self.last_news_s = time.monotonic()
+        # A worker that died meanwhile is found out by the read that follows.
+        with suppress(BrokenPipeError):
+            self.connection.send_bytes(json.dumps(asdict(job)).encode())
+
+    def receive(self) -> JobEvent:
+        """The next event; a closed connection means that the process died."""
+        assert self.job is not None
+        try:
+            message = json.loads(self.connection.recv_bytes())
+        except (EOFError, OSError):
+            self._process.join(timeout=5.0)
+            code = self._process.exitcode
+            cause = f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+            return self.give_up(ErrorKind.CRASH, f"the worker process died ({cause})")
+        self.last_news_s = time.monotonic()
+        job = self.job
+        if message["kind"] == "stage":
+            plan = message["map"]
+            outcome = StageOutcome(
+                StageRecord.model_validate_json(message["record"]),
+                None if plan is None else StageMap.model_validate_json(plan),
+                message["wall_s"],
+                message["cpu_s"],
+            )
+            return JobEvent(job, outcome)
+        self.job = None
+        failure = message["failure"]
+        return JobEvent(job, is_end=True, failure=failure and (ErrorKind(failure[0]), failure[1]))
+
+    def give_up(self, kind: ErrorKind, message: str) -> JobEvent:
+        """Ends the process and its job."""
+        assert self.job is not None
+        event = JobEvent(self.job, is_end=True, failure=(kind, message))
+        self.job = None
+        self.close()
+        return event
+
+    def close(self) -> None:
+        self.connection.close()
+        if self._process.is_alive():
+            self._process.terminate()
+            self._process.join(timeout=2.0)
+            if self._process.is_alive():
+                self._process.kill()
+        self._process.join(timeout=5.0)
+
+
+def _serve(connection: Connection, backend_json: str, protocol_json: str) -> None:
+    """A worker's life: jobs in, stages out, until the parent hangs up."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt means
+    backend = Backend(**json.loads(backend_json))
+    protocol = ProtocolConfig(**json.loads(protocol_json))
+    while True:
+        try:
+            job = EpisodeJob(**json.loads(connection.recv_bytes()))
+        except (EOFError, OSError):
+            return
+        failure: tuple[str, str] | None = None
+        try:
+            for outcome in run_job(job, backend, protocol):
+                plan = outcome.stage_map
+                _send(
+                    connection,
+                    {
+                        "kind": "stage",
+                        "record": outcome.record.model_dump_json(),
+                        "map": None if plan is None else plan.model_dump_json(),
+                        "wall_s": outcome.wall_s,
+                        "cpu_s": outcome.cpu_s,
+                    },
+                )
+        except BrokenPipeError:
+            return
+        except Exception as error:
+            failure = (ErrorKind.HARNESS.value, f"{type(error).__name__}: {error}")
+        with suppress(BrokenPipeError):
+            _send(connection, {"kind": "end", "failure": failure})
+
+
+def _send(connection: Connection, message: dict[str, object]) -> None:
+    connection.send_bytes(json.dumps(message).encode())
+
+
+class _environment:  # noqa: N801 - a context manager used as a function
+    """Sets environment variables that are not set, for children started inside."""
+
+    def __init__(self, values: dict[str, str]) -> None:
+        self._values = {key: value for key, value in values.items() if key not in os.environ}
+
+    def __enter__(self) -> None:
+        os.environ.update(self._values)
+
+    def __exit__(self, *_: object) -> None:
+        for key in self._values:
+            del os.environ[key]
