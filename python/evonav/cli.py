@@ -52,7 +52,7 @@ def evaluate(
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
     num_workers = _num_workers(workers)
-    with _tasks(out, houses, tasks, limit, seed, num_workers) as task_files:
+    with _tasks(out, houses, tasks, limit, seed) as task_files:
         summaries = _evaluate(out, agents.split(","), task_files, seed, num_workers, retry_errored)
     _finish(summaries)
 
@@ -67,7 +67,7 @@ def demo(
 ) -> None:
     """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report."""
     num_workers = _num_workers(workers)
-    with _tasks(out, None, None, limit, seed, num_workers) as task_files:
+    with _tasks(out, None, None, limit, seed) as task_files:
         summaries = _evaluate(out, agents.split(","), task_files, seed, num_workers, retry_errored=False)
     _report(out)
     _finish(summaries)
@@ -113,9 +113,10 @@ def list_houses(
 def list_agents() -> None:
     """Lists agents and yardsticks by name."""
     from evonav.agents.registry import agent_descriptions
-    from evonav.evaluation.yardstick_names import YARDSTICK_DESCRIPTIONS
+    from evonav.evaluation.privileged import YARDSTICKS
 
-    for name, description in {**agent_descriptions(), **YARDSTICK_DESCRIPTIONS}.items():
+    yardsticks = {name: f"yardstick: {kind.description}" for name, kind in YARDSTICKS.items()}
+    for name, description in {**agent_descriptions(), **yardsticks}.items():
         typer.echo(f"{name:18}{description}")
     typer.echo(f"{'module:Class':18}any class of yours with the methods of evonav.agents.agent.Agent")
 
@@ -141,19 +142,17 @@ def main() -> None:
 
 @contextmanager
 def _tasks(
-    out: Path, houses: Path | None, tasks: Path | None, limit: int | None, seed: int, num_workers: int
+    out: Path, houses: Path | None, tasks: Path | None, limit: int | None, seed: int
 ) -> "Iterator[list[TaskFile]]":
     """The tasks of a run: given, generated into the run's folder, or bundled."""
     from evonav.evaluation.datasets import bundled_tasks, generate_tasks
-    from evonav.evaluation.engine import task_files
+    from evonav.evaluation.engine import task_file, task_files
 
     with ExitStack() as stack:
         if houses is not None:
             with _status("Generating tasks") as tell:
-                generated = generate_tasks(
-                    houses, out / "tasks", limit=limit, seed=seed, num_workers=num_workers, on_task=tell
-                )
-            yield [task for root in generated for task in task_files(root.parent, only=root.name)]
+                generated = generate_tasks(houses, out / "tasks", limit=limit, seed=seed, on_task=tell)
+            yield [task_file(root) for root in generated]
         else:
             directory = tasks if tasks is not None else stack.enter_context(bundled_tasks())
             yield task_files(directory, limit)
@@ -241,8 +240,8 @@ def _status(text: str) -> "Iterator[Callable[[str], None]]":
 @contextmanager
 def _progress() -> "Iterator[Callable[[Progress], None]]":
     """A bar over stages."""
-    from rich.console import Console
     from rich import progress as bars
+    from rich.console import Console
 
     columns = (
         bars.TextColumn("{task.description}"),

@@ -61,10 +61,15 @@ def task_files(directory: Path, limit: int | None = None) -> list[TaskFile]:
     roots = sorted(path.parent for path in directory.glob("*/task.json"))
     if not roots:
         raise TaskError(f"{directory}: no tasks here (expected TASK_ID/task.json)")
-    return [_task_file(root) for root in roots[:limit]]
+    return [task_file(root) for root in roots[:limit]]
 
 
-def _task_file(root: Path) -> TaskFile:
+def task_file(root: Path) -> TaskFile:
+    """A task by its folder.
+
+    Raises:
+        TaskError: The header is malformed.
+    """
     path = root / "task.json"
     try:
         data = path.read_bytes()

@@ -28,6 +28,7 @@ class Sighting:
 class PrivilegedAgent:
     """A yardstick: an agent that the evaluator also tells where the target is and when it is in view."""
 
+    description = ""
     sensing: Sensing = Sensing()
 
     def __init__(self) -> None:
@@ -62,6 +63,8 @@ class PrivilegedAgent:
 class ShortestPath(PrivilegedAgent):
     """Walks the planner's path to the target: SR and SPL are 1 by construction, or the harness is wrong."""
 
+    description = "the planner's path to the target, SR = SPL = 1 by construction"
+
     def act(self, observation: Observation) -> AgentAction:
         """Follows the path until the target is near."""
         return self._approach(observation)
@@ -69,6 +72,8 @@ class ShortestPath(PrivilegedAgent):
 
 class PerfectRecognition(PrivilegedAgent):
     """Nearest-frontier exploration that recognises the target instance at first sight: what search alone can reach."""
+
+    description = "nearest-frontier exploration that recognises the target at first sight"
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,0 +1,111 @@
+"""Mapping and exploration, as all agents of the Frontier-Update family share it."""
+
+import math
+from dataclasses import dataclass
+
+from evonav.memory import Frontier, OccupancyMap
+from evonav.memory.occupancy import FREE, UNKNOWN
+from evonav.sensors.observation import MapFrame, Observation
+
+Point2 = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ExplorerConfig:
+    """3D-Mem's constants, and what the paper leaves open."""
+
+    explored_range_m: float = 1.7
+    """Seen cells nearer than this are explored."""
+    near_radius_m: float = 0.7
+    """Free cells this near the agent are explored wherever it looks."""
+    start_radius_m: float = 0.6
+    """Cells this near the first pose are taken for free: no camera sees them."""
+    min_conflict_cells: int = 1
+    """Contradicting cells from which on the map is outdated (1: the paper's oracle occupancy has no noise)."""
+    reached_m: float = 0.3
+    """A frontier this near that is still there after a look is given up."""
+
+
+class Explorer:
+    """An occupancy map that is rebuilt when an observation contradicts it, and the frontiers that are left."""
+
+    def __init__(self, map_frame: MapFrame, config: ExplorerConfig | None = None) -> None:
+        self.config = config or ExplorerConfig()
+        self.map = OccupancyMap(map_frame, explored_range_m=self.config.explored_range_m)
+        self.num_conflicts = 0
+        self.num_cells_cleared = 0
+        self._is_blank = True
+        self._given_up: set[int] = set()
+        self._last: Frontier | None = None
+
+    def clear(self) -> None:
+        """Forgets cells, frontiers and what was given up."""
+        self.map.clear()
+        self._is_blank = True
+        self._given_up.clear()
+        self._last = None
+
+    def observe(self, observation: Observation) -> bool:
+        """Takes over a round's views. All of them are compared with the map before any is integrated.
+
+        Returns:
+            Whether they contradicted the map, which then holds this round's views alone.
+        """
+        num_conflicting = sum(len(self.map.conflicts(view.occupancy)) for view in observation.views)
+        is_outdated = num_conflicting >= self.config.min_conflict_cells
+        if is_outdated:
+            self.num_conflicts += 1
+            self.num_cells_cleared += int((self.map.cells != UNKNOWN).sum())
+            self.clear()
+        here = (observation.pose.x_m, observation.pose.z_m)
+        if self._is_blank:
+            self.map.assume_free(here, self.config.start_radius_m)
+            self._is_blank = False
+        for view in observation.views:
+            self.map.integrate(view.occupancy, (view.pose.x_m, view.pose.z_m))
+        self.map.explore_around(here, self.config.near_radius_m)
+        self.map.update_frontiers(here)
+        self._give_up_unseeable(observation, here)
+        return is_outdated
+
+    def _give_up_unseeable(self, observation: Observation, here: Point2) -> None:
+        """A frontier that was reached, or could not be, and that is still there, would be chosen for ever."""
+        last = self._last
+        if last is None:
+            return
+        is_done = observation.has_arrived or not observation.is_action_success
+        if is_done or math.dist(here, last.position_m) <= self.config.reached_m:
+            self._given_up.add(last.id)
+            self._last = None
+
+    @property
+    def frontiers(self) -> list[Frontier]:
+        """Those left to explore, by ascending id."""
+        return [frontier for frontier in self.map.frontiers if frontier.id not in self._given_up]
+
+    def go_to(self, frontier: Frontier) -> tuple[Point2, Point2]:
+        """Remembers that the agent goes there.
+
+        Returns:
+            Where to stand, and a point to face.
+        """
+        self._last = frontier
+        x_m, z_m = frontier.position_m
+        ahead = (x_m + math.sin(frontier.direction_rad), z_m + math.cos(frontier.direction_rad))
+        return frontier.position_m, ahead
+
+    def stop_exploring(self) -> None:
+        """The agent goes elsewhere: arriving there says nothing about a frontier."""
+        self._last = None
+
+    def is_free(self, point_m: Point2) -> bool:
+        """Whether the map knows the cell of a point to be free."""
+        frame = self.map.map_frame
+        row = math.floor((point_m[1] - frame.corner_m[1]) / frame.cell_m)
+        col = math.floor((point_m[0] - frame.corner_m[0]) / frame.cell_m)
+        return 0 <= row < frame.rows and 0 <= col < frame.cols and bool(self.map.cells[row, col] == FREE)
+
+
+def nearest_frontier(frontiers: list[Frontier], point_m: Point2) -> Frontier | None:
+    """The frontier whose position is nearest to a point; the older one of two as near."""
+    return min(frontiers, key=lambda f: (math.dist(f.position_m, point_m), f.id), default=None)

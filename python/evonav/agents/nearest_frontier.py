@@ -1,0 +1,56 @@
+"""Exploration alone: always the nearest frontier."""
+
+from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
+from evonav.agents.explorer import Explorer, nearest_frontier
+from evonav.sensors.observation import Observation
+from evonav.tasks.public import StageInput, TaskInfo
+
+
+class NearestFrontier:
+    """Explores, nearest frontier first, and recognises nothing: the search half of a yardstick.
+
+    Each stage starts with a blank map: what was seen on the way to another goal was not looked at for this one.
+    """
+
+    def __init__(self) -> None:
+        self.sensing = Sensing()
+        self._explorer: Explorer | None = None
+        self._choice = ""
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """A blank map."""
+        self._explorer = Explorer(task.map_frame)
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """A blank map."""
+        if self._explorer is not None:
+            self._explorer.clear()
+
+    def act(self, observation: Observation) -> AgentAction:
+        """Towards the nearest frontier."""
+        explorer = self._explorer
+        assert explorer is not None, "begin_task comes first"
+        explorer.observe(observation)
+        here = (observation.pose.x_m, observation.pose.z_m)
+        frontier = nearest_frontier(explorer.frontiers, here)
+        if frontier is None:
+            self._choice = "none"
+            return Stop("nothing left to explore")
+        self._choice = f"frontier {frontier.id}"
+        position_m, face_m = explorer.go_to(frontier)
+        return NavigateTo(position_m, face_m)
+
+    def diagnostics(self) -> RoundDiagnostics:
+        """Choice and counters of the last round."""
+        explorer = self._explorer
+        if explorer is None:
+            return RoundDiagnostics()
+        return RoundDiagnostics(
+            choice=self._choice,
+            num_frontiers=len(explorer.frontiers),
+            counters={"conflicts": explorer.num_conflicts, "cells_cleared": explorer.num_cells_cleared},
+        )
+
+    def entries(self) -> tuple[EntryBelief, ...]:
+        """It remembers no objects."""
+        return ()

@@ -1,0 +1,60 @@
+"""The protocol on the toy house."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from toy_house import ToySimulator, episode_case
+
+from evonav.evaluation.backend import make_agent
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.rollout import Episode
+from evonav.sensors.ground_truth import GroundTruthPerception
+
+
+def run_episode(task_id, agent, protocol=None, simulator=None):
+    episode = Episode(
+        episode_case(task_id),
+        "agent",
+        make_agent(agent) if isinstance(agent, str) else agent,
+        simulator or ToySimulator(),
+        GroundTruthPerception(),
+        protocol or ProtocolConfig(),
+        seed=7,
+    )
+    return [outcome.record for outcome in episode.run()]
+
+
+@pytest.mark.parametrize("task_id", ["toy-static", "toy-moved"])
+def test_shortest_path_yardstick_scores_one(task_id):
+    records = run_episode(task_id, "shortest-path")
+    assert [record.state for record in records] == [EndState.SUCCESS] * 3
+    assert [record.spl for record in records] == [1.0] * 3
+    assert all(record.has_stopped for record in records)
+
+
+def test_perfect_recognition_finds_everything():
+    records = run_episode("toy-moved", "nearest-frontier")
+    assert [record.state for record in records] == [EndState.SUCCESS] * 3
+    assert all(0.0 < record.spl <= 1.0 for record in records)
+
+
+def test_stages_are_joined_by_the_agents_own_trajectory():
+    records = run_episode("toy-static", "random-walk")
+    assert records[0].requested_start == records[0].effective_start
+    for before, after in pairwise(records):
+        assert after.requested_start == before.terminal
+
+
+def test_trace_adds_up_to_the_record():
+    for record in run_episode("toy-static", "nearest-frontier"):
+        assert record.num_rounds == len(record.trace) <= 50
+        length_m = sum(math.dist(a, b) for entry in record.trace for a, b in pairwise(entry.path_m))
+        assert record.path_length_m == pytest.approx(length_m)
+        for entry, after in pairwise(record.trace):
+            assert entry.path_m[0] == (entry.pose.x_m, entry.pose.z_m)
+            assert entry.path_m[-1] == (after.pose.x_m, after.pose.z_m)
+            assert sum(math.dist(a, b) for a, b in pairwise(entry.path_m)) <= 1.0 + 1e-6
+            assert all(math.dist(a, b) <= 0.25 + 1e-9 for a, b in pairwise(entry.path_m))
+        assert StageRecord.model_validate_json(record.model_dump_json()) == record
