@@ -208,3 +208,52 @@ class OccupancyMap:
     def cells(self) -> NDArray[np.uint8]: ...
     @property
     def explored(self) -> NDArray[np.bool_]: ...
+
+# simulator
+
+@final
+class EmbeddedSimulator:
+    """One house, instantiated. Points on the ground are `(x, z)`."""
+
+    def __new__(
+        cls,
+        house_json: str,
+        *,
+        name: str,
+        image_px: tuple[int, int],
+        vertical_fov_rad: float,
+        camera_height_m: float,
+        agent_radius_m: float,
+        agent_height_m: float,
+        allow_unknown_assets: bool,
+    ) -> EmbeddedSimulator: ...
+    def apply(self, delta_json: str) -> EmbeddedSimulator: ...
+    def house_json(self) -> str: ...
+    def bodies(self) -> list[tuple[str, str, str, tuple[float, float, float], tuple[float, float, float]]]:
+        """Id, category, kind, centre and size of the box, in instance order."""
+
+    def start(self) -> tuple[tuple[float, float, float], float, float]:
+        """Position, yaw and horizon."""
+
+    def render(
+        self, position_m: tuple[float, float, float], yaw_rad: float, horizon_rad: float, *, rgb: bool, instances: bool
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None, NDArray[np.int32] | None]:
+        """Depth `(H, W)`, colours `(H, W, 3)` and instances `(H, W)`."""
+
+    def is_free(self, point_m: tuple[float, float]) -> bool: ...
+    def is_reachable(self, point_m: tuple[float, float]) -> bool: ...
+    def can_move(self, from_m: tuple[float, float], to_m: tuple[float, float]) -> bool: ...
+    def is_visible(
+        self, from_m: tuple[float, float, float], to_m: tuple[float, float, float], ignored: list[int]
+    ) -> bool: ...
+    def reachable_positions(self, from_m: tuple[float, float], grid_m: float) -> NDArray[np.float64]:
+        """`(N, 2)`."""
+
+    def shortest_path(self, start_m: tuple[float, float], target_m: tuple[float, float]) -> NDArray[np.float64]:
+        """`(M, 2)` corners, `(0, 2)` when there is no way."""
+
+    def distances_m(self, start_m: tuple[float, float], targets_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """`(N,)` lengths to `(N, 2)` targets, `inf` where there is no way."""
+
+    def occupancy(self, cell_m: float) -> tuple[NDArray[np.uint8], tuple[float, float]]:
+        """Cells `(R, C)` and the corner of the grid."""

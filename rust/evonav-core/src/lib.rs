@@ -13,6 +13,7 @@ pub mod house;
 pub mod memory;
 pub mod rng;
 pub mod sensors;
+pub mod simulator;
 pub mod world;
 
 pub use error::Error;

@@ -1,7 +1,10 @@
 //! Borrowing numpy arrays.
 
 use evonav_core::Error;
-use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods,
+    ndarray::IntoDimension,
+};
 use pyo3::prelude::*;
 
 use crate::error;
@@ -39,10 +42,10 @@ pub fn rows_of<T: Element, const M: usize>(
 }
 
 /// Array of a shape, of elements in row-major order; the memory moves, nothing is copied.
-pub fn image_of<T: Element>(
+pub fn image_of<T: Element, D: IntoDimension>(
     py: Python<'_>,
     elements: Vec<T>,
-    shape: [usize; 2],
-) -> PyResult<Bound<'_, PyArray2<T>>> {
+    shape: D,
+) -> PyResult<Bound<'_, PyArray<T, D::Dim>>> {
     PyArray1::from_vec(py, elements).reshape(shape)
 }

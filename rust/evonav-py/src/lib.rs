@@ -5,6 +5,7 @@ mod error;
 mod house;
 mod memory;
 mod sensors;
+mod simulator;
 
 use pyo3::prelude::*;
 
@@ -14,5 +15,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     error::register(module)?;
     house::register(module)?;
     sensors::register(module)?;
-    memory::register(module)
+    memory::register(module)?;
+    simulator::register(module)
 }

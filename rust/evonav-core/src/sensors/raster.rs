@@ -41,6 +41,14 @@ pub struct FrameBuffer {
     scratch: Scratch,
 }
 
+impl FrameBuffer {
+    /// Hands out depth, colours and instances, as vectors of their own.
+    pub fn take(&mut self) -> (Vec<f32>, Vec<u8>, Vec<i32>) {
+        let Self { depth_m, rgb, instances, .. } = self;
+        (std::mem::take(depth_m), std::mem::take(rgb), std::mem::take(instances))
+    }
+}
+
 /// Vertices of the part and corners of the face at hand.
 #[derive(Debug, Clone, Default)]
 struct Scratch {

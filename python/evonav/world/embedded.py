@@ -1,0 +1,255 @@
+"""The embedded simulator: AI2-THOR's agent in a ProcTHOR house, in Rust, without Unity."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav import _core
+from evonav.errors import SimulationError
+from evonav.world.pose import Pose
+from evonav.world.simulator import Action, Frame, Intrinsics, OccupancyGrid, SceneObject, SimulatorConfig
+
+_Position = tuple[float, float, float]
+
+
+class EmbeddedSimulator:
+    """A `Simulator` over the Rust core: one house at a time, deterministic, about 1,000 images a second a core.
+
+    Calls release the GIL. Pickling carries the house and the pose, not what is derived from them, which loading makes
+    again in a few milliseconds.
+
+    Example:
+        >>> simulator = EmbeddedSimulator()  # doctest: +SKIP
+        >>> simulator.reset(house.to_json())  # doctest: +SKIP
+        >>> simulator.render(rgb=False).depth_m.shape  # doctest: +SKIP
+        (300, 300)
+    """
+
+    def __init__(self, config: SimulatorConfig | None = None, *, allow_unknown_assets: bool = False) -> None:
+        """Makes a simulator without a house; call `reset` next.
+
+        Args:
+            config: Camera, body and steps; AI2-THOR's by default.
+            allow_unknown_assets: Draw assets that the catalogue does not hold (Objaverse ones) in the usual size of
+                their category, instead of refusing the house.
+        """
+        self.config = config or SimulatorConfig()
+        self.allow_unknown_assets = allow_unknown_assets
+        self.intrinsics = Intrinsics(
+            self.config.width_px, self.config.height_px, math.radians(self.config.vertical_fov_deg)
+        )
+        self._loaded: _core.EmbeddedSimulator | None = None
+        self._house_name = "house"
+        self._pose = Pose(0.0, self._body_y_m, 0.0, 0.0)
+        self._objects: tuple[SceneObject, ...] | None = None
+
+    def reset(self, house_json: str, pose: Pose | None = None, *, name: str = "house") -> Pose:
+        """Loads a house; the agent stands at `pose`, or at the house's own start.
+
+        A `pose` that the agent does not fit at, or cannot be reached from the house's start, is moved to the nearest
+        reachable grid position.
+
+        Args:
+            house_json: A ProcTHOR house.
+            pose: Where to stand and look.
+            name: Of the house, for errors.
+
+        Returns:
+            The effective pose.
+
+        Raises:
+            HouseError: The house is malformed or holds an unknown asset.
+            SimulationError: The agent fits nowhere.
+        """
+        core = _core.EmbeddedSimulator(
+            house_json,
+            name=name,
+            image_px=(self.config.width_px, self.config.height_px),
+            vertical_fov_rad=self.intrinsics.vertical_fov_rad,
+            camera_height_m=self.config.camera_height_m,
+            agent_radius_m=self.config.agent_radius_m,
+            agent_height_m=self.config.agent_height_m,
+            allow_unknown_assets=self.allow_unknown_assets,
+        )
+        self._house_name = name
+        return self._enter(core, pose)
+
+    def apply(self, delta: str | Mapping[str, Any], pose: Pose | None = None) -> Pose:
+        """Changes the house at hand; only what moved is built again.
+
+        Args:
+            delta: A `HouseDelta`, as JSON or as its dictionary.
+            pose: Where to stand then; by default where the agent is.
+
+        Returns:
+            The effective pose, as `reset`.
+
+        Raises:
+            HouseError: The delta names an object that the house does not hold.
+            InvalidArgumentError: It is no `HouseDelta`.
+        """
+        delta_json = delta if isinstance(delta, str) else json.dumps(delta)
+        return self._enter(self._core.apply(delta_json), pose or self._pose)
+
+    @property
+    def house_json(self) -> str:
+        """The house at hand."""
+        return self._core.house_json()
+
+    @property
+    def pose(self) -> Pose:
+        """The agent's pose."""
+        return self._pose
+
+    @property
+    def objects(self) -> Sequence[SceneObject]:
+        """Bodies in instance order (instance id = index + 1)."""
+        if self._objects is None:
+            self._objects = tuple(SceneObject(*record) for record in self._core.bodies())
+        return self._objects
+
+    def step(self, action: Action) -> bool:
+        """Does one discrete action; `False`, and the pose unchanged, when it collides. `STOP` does nothing."""
+        pose, turn_rad = self._pose, math.radians(self.config.turn_deg)
+        if action is Action.TURN_LEFT:
+            self._pose = _turned(pose, -turn_rad)
+        elif action is Action.TURN_RIGHT:
+            self._pose = _turned(pose, turn_rad)
+        elif action is Action.MOVE_FORWARD:
+            x_m = pose.x_m + self.config.move_m * math.sin(pose.yaw_rad)
+            z_m = pose.z_m + self.config.move_m * math.cos(pose.yaw_rad)
+            if not self._core.can_move((pose.x_m, pose.z_m), (x_m, z_m)):
+                return False
+            self._pose = Pose(x_m, self._body_y_m, z_m, pose.yaw_rad, pose.horizon_rad)
+        return True
+
+    def teleport(self, pose: Pose) -> bool:
+        """Sets the pose; `False`, and the pose unchanged, when the agent does not fit there."""
+        if not _is_finite(pose) or not self._core.is_free((pose.x_m, pose.z_m)):
+            return False
+        self._pose = self._standing(pose, pose.x_m, pose.z_m)
+        return True
+
+    def render(self, pose: Pose | None = None, *, rgb: bool = True, instances: bool = True) -> Frame:
+        """What the camera sees when the agent is at `pose` (default: where it is); collisions are not checked.
+
+        Raises:
+            InvalidArgumentError: The pose is not finite.
+        """
+        at = pose or self._pose
+        depth_m, colours, ids = self._core.render(
+            at.position_m, at.yaw_rad, at.horizon_rad, rgb=rgb, instances=instances
+        )
+        camera = Pose(at.x_m, self.config.camera_height_m, at.z_m, at.yaw_rad, at.horizon_rad)
+        return Frame(camera, self.intrinsics, depth_m, colours, ids)
+
+    def reachable_positions(self) -> NDArray[np.float64]:
+        """`(N, 3)` positions of the square grid through the agent that it can reach along that grid."""
+        points_m = self._core.reachable_positions((self._pose.x_m, self._pose.z_m), self.config.grid_m)
+        return self._raised(points_m)
+
+    def nearest_reachable_position(self, position_m: _Position) -> _Position:
+        """The reachable position nearest on the ground plane."""
+        reachable_m = self.reachable_positions()
+        return _nearest(reachable_m, position_m)
+
+    def is_free(self, position_m: _Position) -> bool:
+        """Whether the agent's body fits at the position, and it can walk there from the house's start."""
+        return self._core.is_reachable((position_m[0], position_m[2]))
+
+    def is_visible(self, from_m: _Position, to_m: _Position, ignored_instances: Sequence[int] = ()) -> bool:
+        """Whether nothing stands between two points but bodies with the given instance ids."""
+        return self._core.is_visible(from_m, to_m, [instance - 1 for instance in ignored_instances])
+
+    def shortest_path(self, start_m: _Position, target_m: _Position) -> NDArray[np.float64]:
+        """`(M, 3)` corners of the geodesic; `(0, 3)` when there is none. Both ends snap to the nearest free point."""
+        return self._raised(self._core.shortest_path((start_m[0], start_m[2]), (target_m[0], target_m[2])))
+
+    def path_lengths_m(self, start_m: _Position, targets_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Geodesic distances from one position to many.
+
+        Args:
+            start_m: `(x, y, z)`.
+            targets_m: `(N, 3)`.
+
+        Returns:
+            `(N,)` metres, `inf` where there is no way.
+        """
+        targets = np.ascontiguousarray(np.asarray(targets_m, dtype=np.float64).reshape(-1, 3)[:, [0, 2]])
+        return self._core.distances_m((start_m[0], start_m[2]), targets)
+
+    def occupancy(self) -> OccupancyGrid:
+        """The oracle occupancy at `config.occupancy_cell_m`; the same grid for all arrangements of a house."""
+        cells, corner_m = self._core.occupancy(self.config.occupancy_cell_m)
+        return OccupancyGrid(cells, self.config.occupancy_cell_m, corner_m)
+
+    def close(self) -> None:
+        """Releases the house; safe to call twice."""
+        self._loaded = None
+        self._objects = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """House and pose; see the class."""
+        house_json = self._loaded and self._loaded.house_json()
+        state = self.__dict__ | {"_loaded": house_json, "_objects": None}
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Loads the house again."""
+        house_json = state["_loaded"]
+        self.__dict__.update(state | {"_loaded": None})
+        if house_json:
+            pose = self._pose
+            self.reset(house_json, name=self._house_name)
+            self._pose = pose
+
+    @property
+    def _core(self) -> _core.EmbeddedSimulator:
+        if self._loaded is None:
+            raise SimulationError("no house: call reset first")
+        return self._loaded
+
+    @property
+    def _body_y_m(self) -> float:
+        return self.config.agent_height_m / 2
+
+    def _enter(self, core: _core.EmbeddedSimulator, pose: Pose | None) -> Pose:
+        self._loaded, self._objects = core, None
+        start_m, yaw_rad, horizon_rad = core.start()
+        start = Pose(*start_m, yaw_rad, horizon_rad)
+        self._pose = start
+        if pose is not None:
+            x_m, z_m = pose.x_m, pose.z_m
+            if not core.is_reachable((x_m, z_m)):
+                x_m, _, z_m = self.nearest_reachable_position(pose.position_m)
+            self._pose = self._standing(pose, x_m, z_m)
+        return self._pose
+
+    def _standing(self, pose: Pose, x_m: float, z_m: float) -> Pose:
+        return Pose(x_m, self._body_y_m, z_m, pose.yaw_rad, pose.horizon_rad)
+
+    def _raised(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        raised = np.full((len(points_m), 3), self._body_y_m)
+        raised[:, [0, 2]] = points_m
+        return raised
+
+
+def _turned(pose: Pose, angle_rad: float) -> Pose:
+    yaw_rad = (pose.yaw_rad + angle_rad) % math.tau
+    return Pose(pose.x_m, pose.y_m, pose.z_m, yaw_rad, pose.horizon_rad)
+
+
+def _nearest(reachable_m: NDArray[np.float64], position_m: _Position) -> _Position:
+    if not len(reachable_m):
+        raise SimulationError("no position is reachable from where the agent stands")
+    squared_m2 = (reachable_m[:, 0] - position_m[0]) ** 2 + (reachable_m[:, 2] - position_m[2]) ** 2
+    x_m, y_m, z_m = reachable_m[int(np.argmin(squared_m2))].tolist()
+    return (x_m, y_m, z_m)
+
+
+def _is_finite(pose: Pose) -> bool:
+    return all(math.isfinite(v) for v in (*pose.position_m, pose.yaw_rad, pose.horizon_rad))

@@ -1,0 +1,177 @@
+//! One house, instantiated: what an agent can see and where it can go.
+
+use std::sync::OnceLock;
+
+use crate::{
+    Error,
+    assets::catalogue::{Catalogue, UnknownAssets},
+    geometry::{Pose, Vec2, Vec3},
+    house::{House, delta::HouseDelta},
+    sensors::{
+        camera::Camera,
+        raster::{FrameBuffer, Want, render},
+        raycast3d::RayCaster,
+    },
+    world::{
+        collision::AgentBody,
+        mesh::SceneMesh,
+        navigation::{Navigation, NavigationConfig},
+        scene::{Body, Scene},
+    },
+};
+
+/// Pitch at which a free place is looked for when the house's own start is blocked.
+const SEARCH_PITCH_M: f64 = 0.25;
+
+/// The agent's camera and body, and what to do about unknown assets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SimulatorConfig {
+    /// Columns and rows of images.
+    pub image_px: [usize; 2],
+    /// Field of view from the upper to the lower border.
+    pub vertical_fov_rad: f64,
+    /// Optical centre over the floor.
+    pub camera_height_m: f64,
+    /// What collides.
+    pub agent: AgentBody,
+    /// Assets that the catalogue does not hold.
+    pub unknown: UnknownAssets,
+}
+
+/// A house with everything derived from it: bodies, surfaces, free space.
+///
+/// Holds no state of an agent, so one simulator may serve many threads.
+#[derive(Debug)]
+pub struct EmbeddedSimulator {
+    house: House,
+    config: SimulatorConfig,
+    scene: Scene,
+    mesh: SceneMesh,
+    navigation: Navigation,
+    start_m: Vec2,
+    rays: OnceLock<RayCaster>,
+}
+
+impl EmbeddedSimulator {
+    /// Instantiates a house.
+    ///
+    /// # Errors
+    /// [`Error::House`] for unknown assets, [`Error::InvalidArgument`] for the camera or the body,
+    /// [`Error::Simulation`] if the agent fits nowhere.
+    pub fn new(house: House, config: SimulatorConfig) -> Result<Self, Error> {
+        let scene = Scene::build(&house, Catalogue::bundled(), config.unknown)?;
+        let navigation = Navigation::build(&scene, config.agent, NavigationConfig::default())?;
+        Self::assemble(house, config, scene, navigation)
+    }
+
+    /// This house after a change, as a new simulator; only what moved is built again.
+    ///
+    /// # Errors
+    /// Those of [`House::apply`] and [`Self::new`].
+    pub fn apply(&self, delta: &HouseDelta) -> Result<Self, Error> {
+        let house = self.house.apply(delta)?;
+        let moved: Vec<usize> =
+            delta.moves.iter().filter_map(|change| house.object_index(&change.id)).collect();
+        let (catalogue, unknown) = (Catalogue::bundled(), self.config.unknown);
+        let scene = self.scene.rebuild(&house, catalogue, unknown, &moved)?;
+        let navigation = self.navigation.with_scene(&scene)?;
+        Self::assemble(house, self.config, scene, navigation)
+    }
+
+    fn assemble(
+        house: House,
+        config: SimulatorConfig,
+        scene: Scene,
+        navigation: Navigation,
+    ) -> Result<Self, Error> {
+        let mesh = SceneMesh::build(&scene);
+        let start_m = start_of(&house, &navigation)?;
+        let simulator =
+            Self { house, config, scene, mesh, navigation, start_m, rays: OnceLock::new() };
+        simulator.camera(&simulator.start()).check()?;
+        Ok(simulator)
+    }
+
+    /// The house file.
+    pub fn house(&self) -> &House {
+        &self.house
+    }
+
+    /// Columns and rows of images.
+    pub fn image_px(&self) -> [usize; 2] {
+        self.config.image_px
+    }
+
+    /// Everything in the house, in instance order.
+    pub fn bodies(&self) -> &[Body] {
+        &self.scene.bodies
+    }
+
+    /// All surfaces.
+    pub fn mesh(&self) -> &SceneMesh {
+        &self.mesh
+    }
+
+    /// Free space.
+    pub fn navigation(&self) -> &Navigation {
+        &self.navigation
+    }
+
+    /// The house's own start pose, moved to the nearest place where the agent fits.
+    pub fn start(&self) -> Pose {
+        let start = &self.house.start;
+        Pose {
+            position_m: self.body_position_m(self.start_m),
+            yaw_rad: start.yaw_deg.to_radians(),
+            horizon_rad: start.horizon_deg.to_radians(),
+        }
+    }
+
+    /// AI2-THOR's agent position over a point of the floor: the middle of the body.
+    pub fn body_position_m(&self, point_m: Vec2) -> Vec3 {
+        [point_m[0], self.config.agent.height_m / 2.0, point_m[1]]
+    }
+
+    /// The camera of an agent at `pose`, whose own height does not matter.
+    pub fn camera(&self, pose: &Pose) -> Camera {
+        let SimulatorConfig { image_px, vertical_fov_rad, camera_height_m, .. } = self.config;
+        Camera::at(pose, image_px, vertical_fov_rad, camera_height_m)
+    }
+
+    /// What the agent sees from `pose`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the pose is not finite.
+    pub fn render(&self, pose: &Pose, want: Want, out: &mut FrameBuffer) -> Result<(), Error> {
+        render(&self.mesh, &self.camera(pose), want, out)
+    }
+
+    /// Whether an agent fits at `[x, z]` and can walk there from the house's start.
+    pub fn is_reachable(&self, point_m: Vec2) -> bool {
+        let length_m = || self.navigation.distances_m(self.start_m, &[point_m])[0];
+        self.navigation.is_free(point_m) && length_m().is_finite()
+    }
+
+    /// Whether nothing is between two points but the bodies in `ignored` (indices).
+    pub fn is_visible(&self, from_m: Vec3, to_m: Vec3, ignored: &[usize]) -> bool {
+        let rays = self.rays.get_or_init(|| RayCaster::build(&self.mesh));
+        rays.is_visible(&self.mesh, from_m, to_m, |body| ignored.contains(&body))
+    }
+}
+
+/// The house's start, or the free place nearest to it.
+fn start_of(house: &House, navigation: &Navigation) -> Result<Vec2, Error> {
+    let [x, _, z] = house.start.position_m;
+    let near = |point_m: Vec2| navigation.snap(point_m);
+    let anywhere = || {
+        let spec = navigation.map_spec(SEARCH_PITCH_M).ok()?;
+        let cells = (0..spec.len()).map(|i| spec.centre_m([i / spec.cols, i % spec.cols]));
+        let squared_m2 = |p: &Vec2| (p[0] - x).powi(2) + (p[1] - z).powi(2);
+        cells
+            .filter(|&point_m| navigation.is_free(point_m))
+            .min_by(|a, b| squared_m2(a).total_cmp(&squared_m2(b)))
+    };
+    near([x, z]).or_else(anywhere).ok_or_else(|| Error::Simulation {
+        message: format!("house {}: the agent fits nowhere", house.name),
+    })
+}

@@ -1,0 +1,204 @@
+//! `EmbeddedSimulator`. Shapes, units and errors: `_core.pyi`.
+
+use std::sync::Mutex;
+
+use evonav_core::{
+    Error,
+    assets::catalogue::UnknownAssets,
+    geometry::{Pose, Vec2, Vec3},
+    house::{House, delta::HouseDelta},
+    sensors::raster::{FrameBuffer, Want},
+    simulator::{EmbeddedSimulator, SimulatorConfig},
+    world::{
+        collision::AgentBody,
+        scene::{Body, BodyKind, OrientedBox},
+    },
+};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::{arrays, error};
+
+/// Depth, colours and instances of one view.
+type Images<'py> = (
+    Bound<'py, PyArray2<f32>>,
+    Option<Bound<'py, PyArray3<u8>>>,
+    Option<Bound<'py, PyArray2<i32>>>,
+);
+
+/// Id, category, kind, centre and size of a body.
+type BodyRecord = (String, String, &'static str, Vec3, Vec3);
+
+#[pyclass(name = "EmbeddedSimulator", module = "evonav._core", frozen)]
+struct PyEmbeddedSimulator {
+    core: EmbeddedSimulator,
+    /// Working memory of the renderer; a second thread that finds it taken makes its own.
+    buffer: Mutex<FrameBuffer>,
+}
+
+impl From<EmbeddedSimulator> for PyEmbeddedSimulator {
+    fn from(core: EmbeddedSimulator) -> Self {
+        Self { core, buffer: Mutex::default() }
+    }
+}
+
+#[pymethods]
+impl PyEmbeddedSimulator {
+    #[new]
+    #[pyo3(signature = (
+        house_json, *, name, image_px, vertical_fov_rad, camera_height_m, agent_radius_m,
+        agent_height_m, allow_unknown_assets
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword-only in Python")]
+    fn new(
+        py: Python<'_>,
+        house_json: &str,
+        name: &str,
+        image_px: [usize; 2],
+        vertical_fov_rad: f64,
+        camera_height_m: f64,
+        agent_radius_m: f64,
+        agent_height_m: f64,
+        allow_unknown_assets: bool,
+    ) -> PyResult<Self> {
+        let unknown = match allow_unknown_assets {
+            true => UnknownAssets::CategoryDefault,
+            false => UnknownAssets::Error,
+        };
+        let agent = AgentBody { radius_m: agent_radius_m, height_m: agent_height_m };
+        let config =
+            SimulatorConfig { image_px, vertical_fov_rad, camera_height_m, agent, unknown };
+        py.detach(|| EmbeddedSimulator::new(House::from_json(name, house_json)?, config))
+            .map(Self::from)
+            .map_err(error::to_py)
+    }
+
+    /// A simulator of this house after a `HouseDelta` (JSON).
+    fn apply(&self, py: Python<'_>, delta_json: &str) -> PyResult<Self> {
+        let delta: HouseDelta = serde_json::from_str(delta_json)
+            .map_err(|e| error::to_py(Error::invalid("delta_json", e, "a HouseDelta")))?;
+        py.detach(|| self.core.apply(&delta)).map(Self::from).map_err(error::to_py)
+    }
+
+    fn house_json(&self) -> String {
+        self.core.house().to_json()
+    }
+
+    fn bodies(&self) -> Vec<BodyRecord> {
+        self.core.bodies().iter().map(body_record).collect()
+    }
+
+    /// Position, yaw and horizon.
+    fn start(&self) -> (Vec3, f64, f64) {
+        let Pose { position_m, yaw_rad, horizon_rad } = self.core.start();
+        (position_m, yaw_rad, horizon_rad)
+    }
+
+    #[pyo3(signature = (position_m, yaw_rad, horizon_rad, *, rgb, instances))]
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        position_m: Vec3,
+        yaw_rad: f64,
+        horizon_rad: f64,
+        rgb: bool,
+        instances: bool,
+    ) -> PyResult<Images<'py>> {
+        let pose = Pose { position_m, yaw_rad, horizon_rad };
+        let [width, height] = self.core.image_px();
+        let (depth, colours, ids) = py
+            .detach(|| {
+                let mut spare = FrameBuffer::default();
+                let mut kept = self.buffer.try_lock().ok();
+                let buffer = kept.as_deref_mut().unwrap_or(&mut spare);
+                self.core.render(&pose, Want { rgb, instances }, buffer)?;
+                Ok(buffer.take())
+            })
+            .map_err(error::to_py)?;
+        let shape = [height, width];
+        let depth = arrays::image_of(py, depth, shape)?;
+        let colours = rgb.then(|| arrays::image_of(py, colours, [height, width, 3])).transpose()?;
+        let ids = instances.then(|| arrays::image_of(py, ids, shape)).transpose()?;
+        Ok((depth, colours, ids))
+    }
+
+    fn is_free(&self, point_m: Vec2) -> bool {
+        self.core.navigation().is_free(point_m)
+    }
+
+    fn is_reachable(&self, py: Python<'_>, point_m: Vec2) -> bool {
+        py.detach(|| self.core.is_reachable(point_m))
+    }
+
+    fn can_move(&self, from_m: Vec2, to_m: Vec2) -> bool {
+        self.core.navigation().try_move(from_m, to_m)
+    }
+
+    fn is_visible(&self, py: Python<'_>, from_m: Vec3, to_m: Vec3, ignored: Vec<usize>) -> bool {
+        py.detach(|| self.core.is_visible(from_m, to_m, &ignored))
+    }
+
+    fn reachable_positions<'py>(
+        &self,
+        py: Python<'py>,
+        from_m: Vec2,
+        grid_m: f64,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let points_m = py
+            .detach(|| self.core.navigation().reachable_positions(from_m, grid_m))
+            .map_err(error::to_py)?;
+        arrays::rows_of(py, points_m)
+    }
+
+    fn shortest_path<'py>(
+        &self,
+        py: Python<'py>,
+        start_m: Vec2,
+        target_m: Vec2,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let path_m = py.detach(|| self.core.navigation().shortest_path(start_m, target_m));
+        arrays::rows_of(py, path_m.unwrap_or_default())
+    }
+
+    fn distances_m<'py>(
+        &self,
+        py: Python<'py>,
+        start_m: Vec2,
+        targets_m: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (targets_m, _) = arrays::row_major("targets_m", &targets_m)?;
+        let targets_m = targets_m.as_chunks().0;
+        let lengths_m = py.detach(|| self.core.navigation().distances_m(start_m, targets_m));
+        Ok(lengths_m.into_pyarray(py))
+    }
+
+    /// Cells and `(x, z)` of the grid's corner.
+    fn occupancy<'py>(
+        &self,
+        py: Python<'py>,
+        cell_m: f64,
+    ) -> PyResult<(Bound<'py, PyArray2<u8>>, Vec2)> {
+        let navigation = self.core.navigation();
+        let spec = navigation.map_spec(cell_m).map_err(error::to_py)?;
+        let cells = py.detach(|| navigation.occupancy(&spec));
+        Ok((arrays::image_of(py, cells, [spec.rows, spec.cols])?, spec.corner_m))
+    }
+}
+
+fn body_record(body: &Body) -> BodyRecord {
+    let kind = match body.kind {
+        BodyKind::Object => "object",
+        BodyKind::Wall => "wall",
+        BodyKind::Floor => "floor",
+        BodyKind::Ceiling => "ceiling",
+        BodyKind::Door => "door",
+        BodyKind::Window => "window",
+    };
+    let aabb = OrientedBox::of_aabb(&body.aabb);
+    (body.id.clone(), body.category.clone(), kind, aabb.centre_m, aabb.half_m.map(|h| 2.0 * h))
+}
+
+/// Adds the class to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PyEmbeddedSimulator>()
+}
