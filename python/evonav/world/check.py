@@ -166,8 +166,8 @@ def _check_frame(simulator: Simulator, frame: Frame, pose: Pose) -> None:
     ):
         _check(image is not None, f"render was asked for {name} and left it out")
         if image is not None:
-            got = (image.dtype, image.shape)
-            _check(got == asked, f"{name} is {got[0]} {got[1]}, not {np.dtype(asked[0])} {asked[1]}")
+            got, promised = f"{image.dtype} {image.shape}", f"{np.dtype(asked[0])} {asked[1]}"
+            _check(got == promised, f"{name} is {got}, not {promised}")
     depth_m, instances = frame.depth_m, frame.instances
     _check(bool((depth_m > 0).all()), "depth holds values that are not positive (nothing there is inf)")
     if instances is not None:

@@ -93,12 +93,12 @@ class EmbeddedSimulator:
             InvalidArgumentError: It is no `HouseDelta`.
         """
         delta_json = delta if isinstance(delta, str) else json.dumps(delta)
-        return self._enter(self._core.apply(delta_json), pose or self._pose)
+        return self._enter(self._world.apply(delta_json), pose or self._pose)
 
     @property
     def house_json(self) -> str:
         """The house at hand."""
-        return self._core.house_json()
+        return self._world.house_json()
 
     @property
     def pose(self) -> Pose:
@@ -109,7 +109,7 @@ class EmbeddedSimulator:
     def objects(self) -> Sequence[SceneObject]:
         """Bodies in instance order (instance id = index + 1)."""
         if self._objects is None:
-            self._objects = tuple(SceneObject(*record) for record in self._core.bodies())
+            self._objects = tuple(SceneObject(*record) for record in self._world.bodies())
         return self._objects
 
     def step(self, action: Action) -> bool:
@@ -122,14 +122,14 @@ class EmbeddedSimulator:
         elif action is Action.MOVE_FORWARD:
             x_m = pose.x_m + self.config.move_m * math.sin(pose.yaw_rad)
             z_m = pose.z_m + self.config.move_m * math.cos(pose.yaw_rad)
-            if not self._core.can_move((pose.x_m, pose.z_m), (x_m, z_m)):
+            if not self._world.can_move((pose.x_m, pose.z_m), (x_m, z_m)):
                 return False
             self._pose = Pose(x_m, self._body_y_m, z_m, pose.yaw_rad, pose.horizon_rad)
         return True
 
     def teleport(self, pose: Pose) -> bool:
         """Sets the pose; `False`, and the pose unchanged, when the agent does not fit there."""
-        if not _is_finite(pose) or not self._core.is_free((pose.x_m, pose.z_m)):
+        if not _is_finite(pose) or not self._world.is_free((pose.x_m, pose.z_m)):
             return False
         self._pose = self._standing(pose, pose.x_m, pose.z_m)
         return True
@@ -141,7 +141,7 @@ class EmbeddedSimulator:
             InvalidArgumentError: The pose is not finite.
         """
         at = pose or self._pose
-        depth_m, colours, ids = self._core.render(
+        depth_m, colours, ids = self._world.render(
             at.position_m, at.yaw_rad, at.horizon_rad, rgb=rgb, instances=instances
         )
         camera = Pose(at.x_m, self.config.camera_height_m, at.z_m, at.yaw_rad, at.horizon_rad)
@@ -149,7 +149,7 @@ class EmbeddedSimulator:
 
     def reachable_positions(self) -> NDArray[np.float64]:
         """`(N, 3)` positions of the square grid through the agent that it can reach along that grid."""
-        points_m = self._core.reachable_positions((self._pose.x_m, self._pose.z_m), self.config.grid_m)
+        points_m = self._world.reachable_positions((self._pose.x_m, self._pose.z_m), self.config.grid_m)
         return self._raised(points_m)
 
     def nearest_reachable_position(self, position_m: _Position) -> _Position:
@@ -159,15 +159,15 @@ class EmbeddedSimulator:
 
     def is_free(self, position_m: _Position) -> bool:
         """Whether the agent's body fits at the position, and it can walk there from the house's start."""
-        return self._core.is_reachable((position_m[0], position_m[2]))
+        return self._world.is_reachable((position_m[0], position_m[2]))
 
     def is_visible(self, from_m: _Position, to_m: _Position, ignored_instances: Sequence[int] = ()) -> bool:
         """Whether nothing stands between two points but bodies with the given instance ids."""
-        return self._core.is_visible(from_m, to_m, [instance - 1 for instance in ignored_instances])
+        return self._world.is_visible(from_m, to_m, [instance - 1 for instance in ignored_instances])
 
     def shortest_path(self, start_m: _Position, target_m: _Position) -> NDArray[np.float64]:
         """`(M, 3)` corners of the geodesic; `(0, 3)` when there is none. Both ends snap to the nearest free point."""
-        return self._raised(self._core.shortest_path((start_m[0], start_m[2]), (target_m[0], target_m[2])))
+        return self._raised(self._world.shortest_path((start_m[0], start_m[2]), (target_m[0], target_m[2])))
 
     def path_lengths_m(self, start_m: _Position, targets_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Geodesic distances from one position to many.
@@ -180,11 +180,11 @@ class EmbeddedSimulator:
             `(N,)` metres, `inf` where there is no way.
         """
         targets = np.ascontiguousarray(np.asarray(targets_m, dtype=np.float64).reshape(-1, 3)[:, [0, 2]])
-        return self._core.distances_m((start_m[0], start_m[2]), targets)
+        return self._world.distances_m((start_m[0], start_m[2]), targets)
 
     def occupancy(self) -> OccupancyGrid:
         """The oracle occupancy at `config.occupancy_cell_m`; the same grid for all arrangements of a house."""
-        cells, corner_m = self._core.occupancy(self.config.occupancy_cell_m)
+        cells, corner_m = self._world.occupancy(self.config.occupancy_cell_m)
         return OccupancyGrid(cells, self.config.occupancy_cell_m, corner_m)
 
     def close(self) -> None:
@@ -195,8 +195,7 @@ class EmbeddedSimulator:
     def __getstate__(self) -> dict[str, Any]:
         """House and pose; see the class."""
         house_json = self._loaded and self._loaded.house_json()
-        state = self.__dict__ | {"_loaded": house_json, "_objects": None}
-        return state
+        return self.__dict__ | {"_loaded": house_json, "_objects": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Loads the house again."""
@@ -208,7 +207,7 @@ class EmbeddedSimulator:
             self._pose = pose
 
     @property
-    def _core(self) -> _core.EmbeddedSimulator:
+    def _world(self) -> _core.EmbeddedSimulator:
         if self._loaded is None:
             raise SimulationError("no house: call reset first")
         return self._loaded
@@ -220,8 +219,7 @@ class EmbeddedSimulator:
     def _enter(self, core: _core.EmbeddedSimulator, pose: Pose | None) -> Pose:
         self._loaded, self._objects = core, None
         start_m, yaw_rad, horizon_rad = core.start()
-        start = Pose(*start_m, yaw_rad, horizon_rad)
-        self._pose = start
+        self._pose = Pose(*start_m, yaw_rad=yaw_rad, horizon_rad=horizon_rad)
         if pose is not None:
             x_m, z_m = pose.x_m, pose.z_m
             if not core.is_reachable((x_m, z_m)):

@@ -6,7 +6,7 @@ use crate::{
     Error,
     assets::catalogue::{Catalogue, UnknownAssets},
     geometry::{Pose, Vec2, Vec3},
-    house::{House, delta::HouseDelta},
+    house::{House, HouseDelta},
     sensors::{
         camera::Camera,
         raster::{FrameBuffer, Want, render},
@@ -22,6 +22,9 @@ use crate::{
 
 /// Pitch at which a free place is looked for when the house's own start is blocked.
 const SEARCH_PITCH_M: f64 = 0.25;
+
+/// Yaw and horizon in houses that name no start: ProcTHOR's usual horizon.
+const DEFAULT_LOOK_DEG: [f64; 2] = [0.0, 30.0];
 
 /// The agent's camera and body, and what to do about unknown assets.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,7 +88,7 @@ impl EmbeddedSimulator {
         navigation: Navigation,
     ) -> Result<Self, Error> {
         let mesh = SceneMesh::build(&scene);
-        let start_m = start_of(&house, &navigation)?;
+        let start_m = start_of(&house, &scene, &navigation)?;
         let simulator =
             Self { house, config, scene, mesh, navigation, start_m, rays: OnceLock::new() };
         simulator.camera(&simulator.start()).check()?;
@@ -117,14 +120,12 @@ impl EmbeddedSimulator {
         &self.navigation
     }
 
-    /// The house's own start pose, moved to the nearest place where the agent fits.
+    /// The house's own start pose, moved to the nearest place where the agent fits; the middle of
+    /// a house that names none.
     pub fn start(&self) -> Pose {
-        let start = &self.house.start;
-        Pose {
-            position_m: self.body_position_m(self.start_m),
-            yaw_rad: start.yaw_deg.to_radians(),
-            horizon_rad: start.horizon_deg.to_radians(),
-        }
+        let given = self.house.start.map(|start| [start.yaw_deg, start.horizon_deg]);
+        let [yaw_rad, horizon_rad] = given.unwrap_or(DEFAULT_LOOK_DEG).map(f64::to_radians);
+        Pose { position_m: self.body_position_m(self.start_m), yaw_rad, horizon_rad }
     }
 
     /// AI2-THOR's agent position over a point of the floor: the middle of the body.
@@ -160,9 +161,8 @@ impl EmbeddedSimulator {
 }
 
 /// The house's start, or the free place nearest to it.
-fn start_of(house: &House, navigation: &Navigation) -> Result<Vec2, Error> {
-    let [x, _, z] = house.start.position_m;
-    let near = |point_m: Vec2| navigation.snap(point_m);
+fn start_of(house: &House, scene: &Scene, navigation: &Navigation) -> Result<Vec2, Error> {
+    let [x, _, z] = house.start.map_or_else(|| scene.bounds.centre_m(), |start| start.position_m);
     let anywhere = || {
         let spec = navigation.map_spec(SEARCH_PITCH_M).ok()?;
         let cells = (0..spec.len()).map(|i| spec.centre_m([i / spec.cols, i % spec.cols]));
@@ -171,7 +171,7 @@ fn start_of(house: &House, navigation: &Navigation) -> Result<Vec2, Error> {
             .filter(|&point_m| navigation.is_free(point_m))
             .min_by(|a, b| squared_m2(a).total_cmp(&squared_m2(b)))
     };
-    near([x, z]).or_else(anywhere).ok_or_else(|| Error::Simulation {
+    navigation.snap([x, z]).or_else(anywhere).ok_or_else(|| Error::Simulation {
         message: format!("house {}: the agent fits nowhere", house.name),
     })
 }

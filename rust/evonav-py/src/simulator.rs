@@ -6,7 +6,7 @@ use evonav_core::{
     Error,
     assets::catalogue::UnknownAssets,
     geometry::{Pose, Vec2, Vec3},
-    house::{House, delta::HouseDelta},
+    house::{House, HouseDelta},
     sensors::raster::{FrameBuffer, Want},
     simulator::{EmbeddedSimulator, SimulatorConfig},
     world::{
