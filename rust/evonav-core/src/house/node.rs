@@ -11,6 +11,9 @@ enum Step<'a> {
     Index(usize),
 }
 
+/// Field of an error about an entry as such.
+const WHOLE: &str = "(whole)";
+
 /// A JSON value that knows where it stands. Costs nothing until an error is made.
 #[derive(Clone, Copy)]
 pub(super) struct Node<'a> {
@@ -71,13 +74,13 @@ impl<'a> Node<'a> {
             text
         };
         if let Some(id) = id {
-            return (id, text(&path));
+            return (id, if path.is_empty() { WHOLE.to_owned() } else { text(&path) });
         }
         // Without an id, an entry of a list at the top is named by its place.
         let is_entry = matches!(path.as_slice(), [Step::Key(_), Step::Index(_), ..]);
         let (object, field) = path.split_at(if is_entry { 2 } else { 0 });
         let object = if object.is_empty() { "house".to_owned() } else { text(object) };
-        (object, text(field))
+        (object, if field.is_empty() { WHOLE.to_owned() } else { text(field) })
     }
 
     fn map(&self) -> Result<&'a Map<String, Value>, Error> {
