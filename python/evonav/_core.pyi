@@ -257,3 +257,9 @@ class EmbeddedSimulator:
 
     def occupancy(self, cell_m: float) -> tuple[NDArray[np.uint8], tuple[float, float]]:
         """Cells `(R, C)` and the corner of the grid."""
+
+# evolution
+
+def generate_task(
+    house: House, *, seed: int, label: str, parameters_json: str, allow_unknown_assets: bool
+) -> tuple[str, list[str], list[bytes]]: ...

@@ -1,1 +1,13 @@
-"""Task generation (paper, Algorithm 1)."""
+"""Tasks made from houses."""
+
+from evonav.generation.pipeline import Rejections, TaskRejectedError, generate_task, generate_tasks
+from evonav.tasks.manifest import GenerationParameters, write_task
+
+__all__ = [
+    "GenerationParameters",
+    "Rejections",
+    "TaskRejectedError",
+    "generate_task",
+    "generate_tasks",
+    "write_task",
+]

@@ -15,6 +15,7 @@ from PIL import Image
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from evonav.errors import HouseError, TaskError
+from evonav.house import House
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.public import StageInput
 from evonav.tasks.records import (
@@ -184,8 +185,6 @@ class Task:
         Raises:
             TaskError: A house or a delta is malformed, or the result is not what the oracle says.
         """
-        from evonav.house import House
-
         try:
             houses = [House(self.first_house_json, name=self.header.house.name)]
             for delta in self.deltas:

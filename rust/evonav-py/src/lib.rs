@@ -2,6 +2,7 @@
 
 mod arrays;
 mod error;
+mod evolution;
 mod house;
 mod memory;
 mod sensors;
@@ -16,5 +17,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     house::register(module)?;
     sensors::register(module)?;
     memory::register(module)?;
-    simulator::register(module)
+    simulator::register(module)?;
+    evolution::register(module)
 }

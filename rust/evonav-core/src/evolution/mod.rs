@@ -1,10 +1,20 @@
 //! Task generation: which room evolves, what moves where, and which object is the goal
 //! (paper, Sec. 3.2 and A.1-A.4).
 
+mod generate;
 mod goals;
+mod layout;
+mod modify;
 mod parameters;
+mod placement;
+pub mod plan;
+pub mod record;
+mod relations;
 mod rooms;
+mod stage;
+mod surfaces;
 
+pub use generate::{Generation, generate_task};
 pub use goals::{Candidate, GoalBias, goal_room_weights, sample_goal, target_scores};
 pub use parameters::Parameters;
 pub use rooms::{Mode, RoomHistory, evolved_room_weight, sample_evolved_room};

@@ -1,0 +1,95 @@
+//! Convex outlines on the floor plan: overlap, distance, containment in a room.
+
+use crate::geometry::{Vec2, polygon_contains};
+
+/// Length by which convex outlines overlap along the axis in which they overlap least; negative
+/// when they are apart along one of their edges' normals.
+///
+/// Two convex polygons are disjoint if and only if an edge normal of one of them separates them
+/// (separating axis theorem), so the sign is exact; the value is the depth of penetration.
+///
+/// # Arguments
+/// * `a`, `b` - convex outlines `[x, z]`, either orientation; empty ones are infinitely far apart.
+pub fn overlap_m(a: &[Vec2], b: &[Vec2]) -> f64 {
+    if a.is_empty() || b.is_empty() {
+        return f64::NEG_INFINITY;
+    }
+    let mut least_m = f64::INFINITY;
+    // Outlines of one or two points have no or one normal: the axes make up for it.
+    for normal in normals(a).chain(normals(b)).chain([[1.0, 0.0], [0.0, 1.0]]) {
+        let ([a_low, a_high], [b_low, b_high]) = (extent(a, normal), extent(b, normal));
+        least_m = least_m.min((a_high - b_low).min(b_high - a_low));
+    }
+    least_m
+}
+
+/// Unit normals of a polygon's edges; edges shorter than a nanometre have none.
+fn normals(outline: &[Vec2]) -> impl Iterator<Item = Vec2> + '_ {
+    let next = outline.iter().cycle().skip(1);
+    outline.iter().zip(next).filter_map(|(p, q)| {
+        let (x, z) = (q[0] - p[0], q[1] - p[1]);
+        let length = x.hypot(z);
+        (length > 1e-9).then(|| [z / length, -x / length])
+    })
+}
+
+/// Smallest and largest coordinate along a direction.
+fn extent(outline: &[Vec2], direction: Vec2) -> [f64; 2] {
+    outline
+        .iter()
+        .map(|p| p[0] * direction[0] + p[1] * direction[1])
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+            [low.min(value), high.max(value)]
+        })
+}
+
+/// Distance between two segments, 0 if they cross.
+fn segment_distance_m(a: [Vec2; 2], b: [Vec2; 2]) -> f64 {
+    let side = |s: [Vec2; 2], p: Vec2| {
+        (s[1][0] - s[0][0]) * (p[1] - s[0][1]) - (s[1][1] - s[0][1]) * (p[0] - s[0][0])
+    };
+    if side(a, b[0]) * side(a, b[1]) < 0.0 && side(b, a[0]) * side(b, a[1]) < 0.0 {
+        return 0.0;
+    }
+    let ends = [(a, b[0]), (a, b[1]), (b, a[0]), (b, a[1])];
+    ends.iter().map(|&(s, p)| point_segment_m(p, s)).fold(f64::INFINITY, f64::min)
+}
+
+/// Distance of a point from a segment.
+pub fn point_segment_m(point: Vec2, segment: [Vec2; 2]) -> f64 {
+    let [a, b] = segment;
+    let along = [b[0] - a[0], b[1] - a[1]];
+    let squared = along[0] * along[0] + along[1] * along[1];
+    let t = if squared > 0.0 {
+        ((point[0] - a[0]) * along[0] + (point[1] - a[1]) * along[1]) / squared
+    } else {
+        0.0
+    };
+    let t = t.clamp(0.0, 1.0);
+    (point[0] - a[0] - t * along[0]).hypot(point[1] - a[1] - t * along[1])
+}
+
+/// Edges of a closed polygon.
+pub fn edges(polygon: &[Vec2]) -> impl Iterator<Item = [Vec2; 2]> + '_ {
+    polygon.iter().zip(polygon.iter().cycle().skip(1)).map(|(&a, &b)| [a, b])
+}
+
+/// Whether a convex outline lies in a simple polygon, at least `margin_m` off its border.
+pub fn is_within(outline: &[Vec2], polygon: &[Vec2], margin_m: f64) -> bool {
+    outline.first().is_some_and(|&p| polygon_contains(polygon, p))
+        && edges(outline)
+            .all(|side| edges(polygon).all(|wall| segment_distance_m(side, wall) >= margin_m))
+}
+
+/// Smallest distance between the outlines' points; 0 if they overlap.
+pub fn gap_m(a: &[Vec2], b: &[Vec2]) -> f64 {
+    if a.is_empty() || b.is_empty() {
+        return f64::INFINITY;
+    }
+    if overlap_m(a, b) >= 0.0 {
+        return 0.0;
+    }
+    edges(a)
+        .flat_map(|p| edges(b).map(move |q| segment_distance_m(p, q)))
+        .fold(f64::INFINITY, f64::min)
+}

@@ -1,0 +1,248 @@
+//! What generation leaves on record; the JSON that Python's `evonav.tasks.oracle` reads.
+
+use serde::Serialize;
+
+use super::Mode;
+use crate::{
+    geometry::{Vec2, Vec3},
+    house::HouseDelta,
+};
+
+/// A generated task.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GeneratedTask {
+    /// Stages, from the first.
+    pub stages: Vec<GeneratedStage>,
+    /// House of each stage, JSON.
+    #[serde(skip)]
+    pub houses: Vec<String>,
+    /// Reference image of each stage, RGB, row by row.
+    #[serde(skip)]
+    pub images: Vec<Vec<u8>>,
+}
+
+/// Why no task was made of a house.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Rejected {
+    /// Which check it failed.
+    pub reason: RejectReason,
+    /// The stage at hand; 0 before the first.
+    pub stage: usize,
+    /// What was found.
+    pub detail: String,
+}
+
+/// Checks that a house must pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RejectReason {
+    /// Fewer than two rooms (paper, Sec. 3.2).
+    TooFewRooms,
+    /// The house file has no start pose.
+    NoStart,
+    /// The house's own start pose, or anything within snapping distance, is not free.
+    StartNotFree,
+    /// The start is in no room.
+    StartOutside,
+    /// Fewer than two rooms can be reached from the start.
+    Disconnected,
+    /// No object of the house has a reference pose from which it is visible.
+    NoValidGoal,
+}
+
+/// One stage.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GeneratedStage {
+    /// ΔH_k, with its history.
+    pub evolution: EvolutionRecord,
+    /// ΔH_k, as it is applied.
+    pub delta: HouseDelta,
+    /// S before the stage.
+    pub state: StateRecord,
+    /// Reference start s_k.
+    pub start_pose: PoseRecord,
+    /// x_k.
+    pub target: TargetRecord,
+    /// Goals drawn and refused before.
+    pub rejections: Vec<RejectionRecord>,
+    /// Where the reference image was taken.
+    pub reference_pose: PoseRecord,
+    /// Pixels of the target in it.
+    pub reference_visible_px: usize,
+    /// Mean colour of those pixels, sRGB.
+    pub reference_colour: [u8; 3],
+    /// Corners of the shortest path to it.
+    pub reference_path_m: Vec<Vec2>,
+    /// Its length.
+    pub reference_path_length_m: f64,
+    /// Ids of all objects that any change so far relocated, sorted.
+    pub ever_relocated_ids: Vec<String>,
+    /// What an instruction may say of the target's surroundings.
+    pub relations: Relations,
+}
+
+/// A pose as AI2-THOR writes it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PoseRecord {
+    /// Middle of the body.
+    pub position_m: Vec3,
+    /// Heading.
+    pub yaw_deg: f64,
+    /// Pitch, positive looking down.
+    pub horizon_deg: f64,
+}
+
+/// How a transition went.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EvolutionOutcome {
+    /// There is no transition before stage 1.
+    FirstStage,
+    /// The draw said no.
+    NotTriggered,
+    /// All rooms have weight 0.
+    NoRoom,
+    /// Nothing in the drawn room could be moved.
+    NoPlacement,
+    /// The room changed.
+    Evolved,
+}
+
+/// ΔH_k, with what it was drawn from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EvolutionRecord {
+    /// How it went.
+    pub outcome: EvolutionOutcome,
+    /// Drawn modification.
+    pub mode: Option<Mode>,
+    /// Drawn room.
+    pub room_id: Option<String>,
+    /// What `SALIENT_OBJECT` moved.
+    pub salient_id: Option<String>,
+    /// Factors of every room's weight; empty when not triggered.
+    pub room_weights: Vec<RoomWeightRecord>,
+    /// Every object whose pose or support differs.
+    pub changes: Vec<ChangeRecord>,
+    /// Objects that were to move and could not.
+    pub unmoved_ids: Vec<String>,
+}
+
+/// One room's weight.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RoomWeightRecord {
+    /// Room.
+    pub room_id: String,
+    /// Objects in it.
+    pub num_assets: usize,
+    /// On the reference trajectory so far.
+    pub is_visited: bool,
+    /// The reference trajectory ends in it.
+    pub is_transition_room: bool,
+    /// Changed within the window.
+    pub was_changed_recently: bool,
+    /// Product, not normalised.
+    pub weight: f64,
+}
+
+/// One object's move.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ChangeRecord {
+    /// Object.
+    pub id: String,
+    /// Its category.
+    pub category: String,
+    /// Centre before.
+    pub from_position_m: Vec3,
+    /// Euler angles before.
+    pub from_rotation_deg: Vec3,
+    /// Support before.
+    pub from_support_id: Option<String>,
+    /// Centre after.
+    pub to_position_m: Vec3,
+    /// Euler angles after.
+    pub to_rotation_deg: Vec3,
+    /// Support after.
+    pub to_support_id: Option<String>,
+    /// Distance of the centres.
+    pub displacement_m: f64,
+    /// Farther than `relocated_min_m`, or on another support.
+    pub is_relocated: bool,
+}
+
+/// S.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StateRecord {
+    /// Rooms on the reference trajectory, in house order.
+    pub visited_room_ids: Vec<String>,
+    /// Room changed at each of the last two transitions.
+    pub changed_room_ids: Vec<Option<String>>,
+    /// Goal rooms of the last two stages.
+    pub goal_room_ids: Vec<String>,
+    /// Room in which the reference trajectory ends.
+    pub transition_room_id: Option<String>,
+}
+
+/// A refused goal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RejectionRecord {
+    /// Object.
+    pub id: String,
+    /// Why.
+    pub reason: GoalRejection,
+}
+
+/// Why an object cannot be a goal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GoalRejection {
+    /// No reachable position of its room lies at the reference distance.
+    NoReferencePose,
+    /// It is not visible from any of them.
+    NotVisible,
+    /// No path leads there.
+    Unreachable,
+}
+
+/// x_k.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TargetRecord {
+    /// Object.
+    pub id: String,
+    /// Its category.
+    pub category: String,
+    /// Its room.
+    pub room_id: String,
+    /// Centre of its box.
+    pub position_m: Vec3,
+    /// Size of its box at zero yaw.
+    pub size_m: Vec3,
+    /// What it stands on.
+    pub support_id: Option<String>,
+    /// Target score.
+    pub score: f64,
+    /// Others of its category.
+    pub same_category_ids: Vec<String>,
+    /// By this stage's change.
+    pub is_relocated_now: bool,
+    /// By any change so far.
+    pub is_relocated_ever: bool,
+}
+
+/// What surrounds a target, in categories (paper, Sec. A.4).
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Relations {
+    /// Type of its room.
+    pub room_type: String,
+    /// Whether no other object of the house has its category.
+    pub is_category_unique: bool,
+    /// Category of what it stands on or in.
+    pub support: Option<String>,
+    /// Categories of at most two things next to it, nearest first.
+    pub neighbours: Vec<String>,
+    /// `doorway` or `window` near it.
+    pub structure: Option<String>,
+    /// Category of something on the wall near it.
+    pub wall_object: Option<String>,
+    /// Whether that hangs above it.
+    pub is_below_wall_object: bool,
+}

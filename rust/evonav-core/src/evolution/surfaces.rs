@@ -1,0 +1,99 @@
+//! Where small things can go: the surfaces of receptacles, as the shapes have them.
+
+use super::{
+    layout::{Layout, Placement, TOUCH_M, bottom_m},
+    placement::{round_to, turned_deg},
+};
+use crate::{
+    assets::catalogue::Catalogue,
+    geometry::{Vec2, add, polygon_contains, rotate, yaw_rotation},
+    rng::Stream,
+    world::footprint::convex_hull,
+};
+
+/// Share of a small thing's outline, about its middle, that must lie over its support.
+const SUPPORTED_SHARE: f64 = 0.8;
+/// Height difference between a recorded surface and the top of the part that bears it.
+const SURFACE_M: f64 = 0.02;
+/// Rounding of places.
+const ROUND_M: f64 = 1e-4;
+
+/// Receptacles among `room_items` on which an object may stand, by what was recorded of
+/// categories (`receptacles.json` of the `procthor` package).
+pub fn receptacles_for(
+    layout: &Layout,
+    catalogue: &Catalogue,
+    index: usize,
+    room_items: &[usize],
+) -> Vec<usize> {
+    let category = &layout.items[index].asset.category;
+    let can_bear = |&other: &usize| {
+        let receptacle = &layout.items[other];
+        receptacle.is_on_floor
+            && !receptacle.asset.surfaces_m.is_empty()
+            && catalogue.can_rest_on(category, &receptacle.asset.category)
+    };
+    room_items.iter().copied().filter(|other| *other != index).filter(can_bear).collect()
+}
+
+/// Draws a place for one small object on one of `receptacles`; `None` when this draw overhangs,
+/// touches something, or is where the object already is (within `min_move_m`).
+pub fn sample_surface_place(
+    layout: &Layout,
+    index: usize,
+    receptacles: &[usize],
+    min_move_m: f64,
+    stream: &mut Stream,
+) -> Option<Placement> {
+    let receptacle_index = *receptacles.get(stream.below(receptacles.len()))?;
+    let (item, receptacle) = (&layout.items[index], &layout.items[receptacle_index]);
+    let surfaces = &receptacle.asset.surfaces_m;
+    let height_m = bottom_m(&receptacle.solids) + surfaces.get(stream.below(surfaces.len()))?;
+    let yaw_deg = receptacle.placement.rotation_deg[1];
+    let [size_x, _, size_z] = receptacle.asset.size_m;
+    let local = [(stream.uniform() - 0.5) * size_x, 0.0, (stream.uniform() - 0.5) * size_z];
+    let centre =
+        add(rotate(&yaw_rotation(yaw_deg.to_radians()), local), receptacle.placement.position_m);
+    let rise_m = item.placement.position_m[1] - bottom_m(&item.solids);
+    let [x_deg, _, z_deg] = item.placement.rotation_deg;
+    let mut place = Placement {
+        position_m: [
+            round_to(centre[0], ROUND_M),
+            round_to(height_m + rise_m, ROUND_M),
+            round_to(centre[2], ROUND_M),
+        ],
+        rotation_deg: [x_deg, turned_deg(yaw_deg + 90.0 * stream.below(4) as f64), z_deg],
+        parent: Some(receptacle_index),
+    };
+    // The part that bears it may end a little above or below the recorded height.
+    let bearing: Vec<_> = receptacle
+        .solids
+        .iter()
+        .filter(|solid| (solid.top_m - height_m).abs() < SURFACE_M)
+        .collect();
+    let top_m = bearing.iter().map(|solid| solid.top_m).fold(f64::NEG_INFINITY, f64::max);
+    if !top_m.is_finite() {
+        return None;
+    }
+    place.position_m[1] = round_to(top_m + rise_m, ROUND_M);
+    let solids = item.solids_at(&place);
+    let outline = convex_hull(solids.iter().flat_map(|s| s.outline_m.iter().copied()).collect());
+    let is_borne = |p: Vec2| bearing.iter().any(|solid| polygon_contains(&solid.outline_m, p));
+    let shrunk = |p: &Vec2| {
+        [0, 1].map(|i| {
+            let middle = place.position_m[2 * i];
+            middle + SUPPORTED_SHARE * (p[i] - middle)
+        })
+    };
+    let moved_m: f64 = (0..3)
+        .map(|i| (place.position_m[i] - item.placement.position_m[i]).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    let is_moved = item.placement.parent != place.parent || moved_m > min_move_m;
+    let is_valid = is_moved
+        && is_borne([place.position_m[0], place.position_m[2]])
+        && outline.iter().map(shrunk).all(is_borne)
+        && bottom_m(&solids) > top_m - TOUCH_M
+        && layout.is_clear(&[(index, place)]);
+    is_valid.then_some(place)
+}

@@ -1,0 +1,45 @@
+//! Task generation.
+
+use evonav_core::{
+    assets::{Catalogue, UnknownAssets},
+    evolution::{self, Generation, Parameters},
+};
+use pyo3::{prelude::*, types::PyBytes};
+
+use crate::{error, house::House};
+
+/// JSON of the record, stage houses, and reference images (RGB, row by row).
+type Generated<'py> = (String, Vec<String>, Vec<Bound<'py, PyBytes>>);
+
+/// Units and errors: `_core.pyi` and `evonav_core::evolution::generate_task`.
+#[pyfunction]
+#[pyo3(signature = (house, *, seed, label, parameters_json, allow_unknown_assets))]
+fn generate_task<'py>(
+    py: Python<'py>,
+    house: &House,
+    seed: u64,
+    label: &str,
+    parameters_json: &str,
+    allow_unknown_assets: bool,
+) -> PyResult<Generated<'py>> {
+    let unknown =
+        if allow_unknown_assets { UnknownAssets::CategoryDefault } else { UnknownAssets::Error };
+    let (json, generated) = py
+        .detach(|| {
+            let parameters = Parameters::from_json(parameters_json)?;
+            let catalogue = Catalogue::bundled();
+            evolution::generate_task(&house.inner, catalogue, unknown, seed, label, &parameters)
+                .map(|generated| (generated.to_json(), generated))
+        })
+        .map_err(error::to_py)?;
+    let (houses, images) = match generated {
+        Generation::Task(task) => (task.houses, task.images),
+        Generation::Rejected(_) => (Vec::new(), Vec::new()),
+    };
+    Ok((json, houses, images.iter().map(|image| PyBytes::new(py, image)).collect()))
+}
+
+/// Adds the function to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(generate_task, module)?)
+}
