@@ -97,7 +97,7 @@ fn there_is_room_under_tables_and_chairs_but_not_in_their_tops() {
         let h = asset.size_m[1];
         let parts = shape_of(&asset);
         assert!(is_filled(&parts, [0.0, 0.5 * h - 0.01, 0.0]), "{id}: top");
-        let quarter = [0.25 * asset.size_m[0], -0.1 * h, 0.25 * asset.size_m[2]];
+        let quarter = [-0.25 * asset.size_m[0], -0.1 * h, 0.25 * asset.size_m[2]];
         assert!(!is_filled(&parts, quarter), "{id}: room underneath");
     }
     let chair = asset("Chair_203_1");
@@ -132,9 +132,9 @@ proptest! {
         let parts = shape_of(&asset);
         prop_assert!(is_sane(&parts), "{asset:?}");
         let bounds = aabb_of(&parts);
-        for axis in 0..3 {
-            prop_assert!((bounds.max_m[axis] - 0.5 * size_m[axis]).abs() < 1e-6, "{asset:?}");
-            prop_assert!((bounds.min_m[axis] + 0.5 * size_m[axis]).abs() < 1e-6, "{asset:?}");
+        for (axis, edge) in size_m.into_iter().enumerate() {
+            prop_assert!((bounds.max_m[axis] - 0.5 * edge).abs() < 1e-6, "{asset:?}");
+            prop_assert!((bounds.min_m[axis] + 0.5 * edge).abs() < 1e-6, "{asset:?}");
         }
     }
 }

@@ -7,4 +7,5 @@ pub mod navigation;
 mod openings;
 pub mod paths;
 pub mod scene;
+mod settle;
 mod structure;

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::{
     openings::{door_parts, window_parts},
+    settle::fall_m,
     structure::{Openings, SLAB_M, room_height_m, slab_parts, wall_parts},
 };
 use crate::{
@@ -11,7 +12,7 @@ use crate::{
         Asset,
         catalogue::{Catalogue, UnknownAssets},
         part::{Part, aabb_of},
-        shapes::shape_of,
+        shapes::{lit, shape_of},
     },
     error::Error,
     geometry::{Aabb, IDENTITY, Mat3, Vec3, euler_rotation_deg},
@@ -76,7 +77,8 @@ pub struct Body {
     pub parts: Vec<Part>,
     /// Box around the parts; [`Aabb::EMPTY`] if there are none.
     pub aabb: Aabb,
-    /// For objects the asset's box as it is placed, for the rest `aabb`.
+    /// For objects the asset's box as it is placed (children at rest on their parent, which may be
+    /// below where the file has them), for the rest `aabb`.
     pub oriented: OrientedBox,
 }
 
@@ -88,19 +90,32 @@ impl Body {
         Self { id, category, kind, parts, aabb, oriented }
     }
 
-    fn object(object: &Object, asset: &Asset) -> Self {
+    /// `parent` is what it stands on, if that is an object.
+    fn object(object: &Object, asset: &Asset, parent: Option<&Self>) -> Self {
         let rotation = euler_rotation_deg(object.rotation_deg);
         let place = |part: &Part| part.placed(object.position_m, &rotation);
-        let parts: Vec<Part> = shape_of(asset).iter().map(place).collect();
-        let centre_m = object.position_m;
-        let half_m = asset.size_m.map(|edge| 0.5 * edge);
+        let mut parts: Vec<Part> = shape_of(asset).iter().map(place).collect();
+        let mut centre_m = object.position_m;
+        let mut aabb = aabb_of(&parts);
+        if let Some(parent) = parent.filter(|_| !object.is_kinematic) {
+            let fall_m = fall_m(&parent.parts, &aabb);
+            for height_m in parts.iter_mut().map(|part| &mut part.centre_m[1]) {
+                *height_m -= fall_m;
+            }
+            centre_m[1] -= fall_m;
+            aabb = aabb_of(&parts);
+        }
         Self {
             id: object.id.clone(),
             category: asset.category.clone(),
             kind: BodyKind::Object,
-            aabb: aabb_of(&parts),
             parts,
-            oriented: OrientedBox { centre_m, half_m, rotation },
+            aabb,
+            oriented: OrientedBox {
+                centre_m,
+                half_m: asset.size_m.map(|edge| 0.5 * edge),
+                rotation,
+            },
         }
     }
 }
@@ -137,7 +152,9 @@ impl Scene {
         let bounds = bodies.iter().fold(Aabb::EMPTY, |bounds, body| bounds.union(body.aabb));
         for object in &house.objects {
             let asset = catalogue.asset_of(house, object, unknown)?;
-            bodies.push(Body::object(object, &asset));
+            let parent = object.parent.and_then(|index| bodies.get(first_object + index));
+            let body = Body::object(object, &asset, parent);
+            bodies.push(body);
         }
         Ok(Self { bodies, first_object, bounds })
     }
@@ -147,8 +164,8 @@ impl Scene {
     /// # Arguments
     /// * `house` - the house after the move; its structure must be this scene's.
     /// * `catalogue`, `unknown` - as the scene was built with.
-    /// * `moved` - indices in `house.objects` of all objects whose pose or asset changed. Objects
-    ///   that this scene does not hold are built in any case.
+    /// * `moved` - indices in `house.objects` of all objects whose pose or parent changed. What stands on
+    ///   them is built anew too, and so are objects that this scene does not hold.
     ///
     /// # Errors
     /// Those of [`Scene::build`].
@@ -169,12 +186,19 @@ impl Scene {
         }
         let mut bodies = Vec::with_capacity(fixed.len() + house.objects.len());
         bodies.extend_from_slice(fixed);
-        for (object, is_moved) in house.objects.iter().zip(is_moved) {
-            let old = known.get(object.id.as_str()).filter(|_| !is_moved);
-            bodies.push(match old {
+        for (index, object) in house.objects.iter().enumerate() {
+            // Parents stand before their children.
+            is_moved[index] |= object.parent.is_some_and(|parent| parent < index && is_moved[parent]);
+            let old = known.get(object.id.as_str()).filter(|_| !is_moved[index]);
+            let body = match old {
                 Some(&body) => body.clone(),
-                None => Body::object(object, &catalogue.asset_of(house, object, unknown)?),
-            });
+                None => {
+                    let parent = object.parent.and_then(|parent| bodies.get(fixed.len() + parent));
+                    let asset = catalogue.asset_of(house, object, unknown)?;
+                    Body::object(object, &asset, parent)
+                }
+            };
+            bodies.push(body);
         }
         Ok(Self { bodies, ..*self })
     }
@@ -183,9 +207,11 @@ impl Scene {
 /// Floors, ceilings, walls, doors and windows.
 fn structure(house: &House, catalogue: &Catalogue) -> Vec<Body> {
     let openings = Openings::of(house);
-    let paint = |material: &str, tint: Option<[f64; 3]>, otherwise: [u8; 3]| match tint {
-        Some(rgb) => rgb.map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8),
-        None => catalogue.material_colour(material).unwrap_or(otherwise),
+    let paint = |material: &str, tint: Option<[f64; 3]>, otherwise: [u8; 3]| {
+        lit(match tint {
+            Some(rgb) => rgb.map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8),
+            None => catalogue.material_colour(material).unwrap_or(otherwise),
+        })
     };
     let floor = |room: &Room| {
         let colour = paint(&room.floor_material, None, FLOOR);

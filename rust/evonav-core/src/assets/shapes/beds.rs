@@ -1,7 +1,7 @@
 //! Beds and what belongs on them.
 
 use super::{
-    colour::{FABRICS, WOODS, shade},
+    colour::{FABRICS, WOODS, liveliest, shade},
     sketch::{Sketch, Span, between, ends, inside},
 };
 
@@ -16,10 +16,10 @@ const LINEN: [[u8; 3]; 6] = [
 
 /// Frame, mattress, blanket, pillows, headboard; above 1.5 m a bunk or canopy bed on four posts.
 pub fn bed(s: &mut Sketch<'_>) {
-    let [w, h, d] = s.size();
+    let [w, h, _] = s.size();
     let [x, _, z] = s.spans();
     let wood = s.tint(0, s.choose(&WOODS, WOODS[2]));
-    let linen = s.tint(1, s.choose(&LINEN, LINEN[0]));
+    let linen = liveliest(s.asset(), s.choose(&LINEN, LINEN[0]));
     let levels = s.levels();
     let is_tall = h > 1.5;
     let lying = levels.iter().copied().find(|&y| y > 0.2 && y < 0.9);
@@ -34,15 +34,13 @@ pub fn bed(s: &mut Sketch<'_>) {
     if is_tall {
         s.legs([0.0, h], 0.06, 0.0, wood);
         let upper = levels.iter().copied().find(|&y| y > 1.0 && y < h);
-        match upper {
-            Some(y) if w < 1.4 => bunk(s, [wood, linen], y, x),
-            _ => {}
+        if let Some(y) = upper.filter(|_| w < 1.4) {
+            bunk(s, [wood, linen], y, x);
         }
         for rail in ends(x, 0.05, 0.0) {
             s.cuboid(rail, [h - 0.06, h], z, wood);
         }
     }
-    let _ = d;
 }
 
 /// Slats, mattress, blanket and pillows at one height.

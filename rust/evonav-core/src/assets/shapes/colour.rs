@@ -35,3 +35,21 @@ pub fn tint(asset: &Asset, index: usize, otherwise: Colour) -> Colour {
 pub fn shade(colour: Colour, factor: f64) -> Colour {
     colour.map(|channel| (f64::from(channel) * factor).round().clamp(0.0, 255.0) as u8)
 }
+
+/// How a material shows indoors: black reflects a little and white not all.
+pub fn lit(colour: Colour) -> Colour {
+    colour.map(|channel| 24 + (f64::from(channel) * 0.9).round() as u8)
+}
+
+/// The lightest of an asset's colours: its shade, screen or cloth; `otherwise` if none is light.
+pub fn lightest(asset: &Asset, otherwise: Colour) -> Colour {
+    let sum = |colour: &&Colour| colour.iter().map(|&c| u32::from(c)).sum::<u32>();
+    asset.colours.iter().max_by_key(sum).filter(|c| sum(c) > 450).copied().unwrap_or(otherwise)
+}
+
+/// The most colourful of an asset's colours after the first; `otherwise` if all are dull.
+pub fn liveliest(asset: &Asset, otherwise: Colour) -> Colour {
+    let spread = |c: &&Colour| c.iter().max().zip(c.iter().min()).map_or(0, |(a, b)| a - b);
+    let rest = asset.colours.iter().skip(1);
+    rest.max_by_key(spread).filter(|c| spread(c) > 60).copied().unwrap_or(otherwise)
+}

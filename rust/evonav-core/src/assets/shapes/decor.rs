@@ -45,8 +45,17 @@ pub fn painting(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
     let frame = s.tint(0, s.choose(&[WOODS[3], DARK, [210, 205, 195], WOODS[1]], WOODS[3]));
-    let skies = [[150, 185, 210], [225, 190, 140], [200, 200, 205], [120, 140, 165]];
-    let grounds = [[95, 120, 80], [150, 95, 70], [70, 90, 110], [180, 160, 120]];
+    let skies = [
+        [150, 185, 210],
+        [225, 190, 140],
+        [200, 200, 205],
+        [120, 140, 165],
+        [235, 215, 200],
+        [95, 110, 140],
+        [175, 200, 180],
+    ];
+    let grounds =
+        [[95, 120, 80], [150, 95, 70], [70, 90, 110], [180, 160, 120], [110, 80, 110]];
     let bar = 0.07 * w.min(h);
     s.cuboid(x, y, between(z, 0.0, 0.7), frame);
     let (inner, canvas) = (inside(x, bar), inside(y, bar));

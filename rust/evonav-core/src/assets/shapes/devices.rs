@@ -1,7 +1,7 @@
 //! Screens, lamps and gadgets.
 
 use super::{
-    colour::{DARK, STEEL, shade},
+    colour::{DARK, STEEL, lightest, shade},
     sketch::{Along, Sketch, between, inside},
 };
 
@@ -64,8 +64,8 @@ pub fn lamp(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
     let metal = s.tint(0, s.choose(&[DARK, STEEL, [150, 115, 70]], DARK));
-    let cloth =
-        s.tint(1, s.choose(&[[240, 228, 200], [225, 225, 220], [215, 180, 130]], [240, 228, 200]));
+    let cloths = [[240, 228, 200], [225, 225, 220], [215, 180, 130]];
+    let cloth = lightest(s.asset(), s.choose(&cloths, cloths[0]));
     let is_floor = s.asset().category == "FloorLamp";
     let (foot, shade_from) = if is_floor { (0.02, 0.82) } else { (0.07, 0.55) };
     let pole = (0.012 + 0.01 * w) / w.max(d);

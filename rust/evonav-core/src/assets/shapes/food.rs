@@ -35,13 +35,9 @@ pub fn food(s: &mut Sketch<'_>) {
             s.ellipsoid(x, y, z, s.choose(&[[235, 215, 190], [245, 240, 232]], [235, 215, 190]))
         }
         "Lettuce" => {
-            s.ellipsoid(x, y, z, [120, 165, 80]);
-            s.cuboid(
-                between(x, 0.3, 0.7),
-                between(y, 0.2, 0.7),
-                between(z, 0.0, 1.0),
-                [185, 205, 150],
-            );
+            s.ellipsoid(x, y, between(z, 0.0, 0.9), [120, 165, 80]);
+            let stump = [between(x, 0.3, 0.7), between(y, 0.3, 0.7), between(z, 0.8, 1.0)];
+            s.round(Along::Z, 0.6, 8, stump, [185, 205, 150]);
         }
         _ => {
             // Bread: a loaf with a rounded top.

@@ -69,23 +69,33 @@ fn cabinets(s: &mut Sketch<'_>, x: Span, z: Span, face: Face) {
     }
 }
 
-/// A fridge: two doors over each other, with handles.
+/// A fridge: a shell with shelves, closed by two doors over each other.
 pub fn fridge(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, _, z] = s.spans();
     let steel = s.tint(0, s.choose(&[[215, 217, 220], [235, 235, 232], [160, 163, 167]], STEEL));
-    let door = shade(steel, 1.06);
-    let (split, grip) = (0.68 * h, shade(steel, 0.55));
-    s.cuboid(x, [0.0, h], [z[0], z[1] - 0.09], shade(steel, 0.9));
-    for y in [[0.05, split - 0.005], [split + 0.005, h - 0.01]] {
+    let (door, grip) = (shade(steel, 1.06), shade(steel, 0.55));
+    let (body, inner) = ([z[0], z[1] - 0.09], shade(steel, 0.9));
+    let wall = 0.05;
+    for side in ends(x, wall, 0.0) {
+        s.cuboid(side, [0.0, h], body, inner);
+    }
+    let width = inside(x, wall);
+    s.cuboid(width, [0.0, h], [z[0], z[0] + wall], inner);
+    let levels = s.levels();
+    let lowest = levels.first().copied().unwrap_or(0.1).min(0.3);
+    s.cuboid(width, [0.0, lowest], body, inner);
+    s.cuboid(width, [h - wall, h], body, inner);
+    for level in levels.into_iter().filter(|&y| y > lowest + 0.05 && y < h - 0.15) {
+        s.cuboid(width, [level - 0.01, level], body, [215, 225, 230]);
+    }
+    let split = 0.68 * h;
+    for (is_upper, y) in [(false, [0.05, split - 0.005]), (true, [split + 0.005, h - 0.01])] {
         s.cuboid(x, y, [z[1] - 0.085, z[1] - 0.04], door);
         let reach = 0.35 * (y[1] - y[0]);
-        let y = if y[0] < 0.5 * h {
-            [y[1] - 0.05 - reach, y[1] - 0.05]
-        } else {
-            [y[0] + 0.05, y[0] + 0.05 + reach]
-        };
-        s.cuboid([x[0] + 0.06 * w, x[0] + 0.06 * w + 0.03], y, [z[1] - 0.04, z[1]], grip);
+        let low = if is_upper { y[0] + 0.05 } else { y[1] - 0.05 - reach };
+        let handle = [x[0] + 0.06 * w, x[0] + 0.06 * w + 0.03];
+        s.cuboid(handle, [low, low + reach], [z[1] - 0.04, z[1]], grip);
     }
 }
 

@@ -19,6 +19,7 @@ mod tables;
 mod vessels;
 
 use crate::assets::{Asset, part::Part};
+pub(crate) use colour::lit;
 use sketch::Sketch;
 
 /// The parts of an asset, in the object frame.

@@ -145,6 +145,7 @@ impl<'a> Sketch<'a> {
         }
         let [x, y, z] = spans.map(|[low, high]| 0.5 * (low + high));
         let centre_m = [x, y - 0.5 * self.size_m[1], z];
+        let colour = colour::lit(colour);
         self.parts.push(Part { primitive, centre_m, rotation, colour });
     }
 

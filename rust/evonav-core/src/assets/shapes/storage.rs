@@ -96,8 +96,8 @@ pub fn cart(s: &mut Sketch<'_>) {
     let wood = s.tint(0, WOODS[1]);
     s.legs([0.0, h], 0.03, 0.0, s.tint(1, STEEL));
     let mut levels = s.levels();
-    if levels.is_empty() {
-        levels = vec![0.15 * h, 0.5 * h, 0.8 * h];
+    if levels.len() < 2 {
+        levels.extend([0.15 * h, 0.5 * h]);
     }
     for level in levels {
         s.cuboid(x, [level - 0.025, level], z, wood);

@@ -28,12 +28,11 @@ const ROUND: [&str; 14] = [
 pub fn table(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let low_levels = s.levels().iter().filter(|&&y| y < 0.8 * h).count();
-    if low_levels >= 2
-        || (s.asset().category == "SideTable" && h < 0.75 && w < 0.7 && low_levels > 0)
-    {
+    let is_nightstand = s.asset().category == "SideTable" && h < 0.75 && w < 0.7;
+    if s.asset().category != "DiningTable" && (low_levels >= 2 || is_nightstand && low_levels > 0) {
         return storage::carcass(s);
     }
-    let [x, y, z] = s.spans();
+    let [x, _, z] = s.spans();
     let wood = s.tint(0, s.choose(&WOODS, WOODS[1]));
     let support = s.tint(1, shade(wood, 0.8));
     let top = (0.06 * h).clamp(0.02, 0.045).min(h);
@@ -59,7 +58,6 @@ pub fn table(s: &mut Sketch<'_>) {
             s.cuboid(inside(x, thick), [level - 0.02, level], inside(z, thick), wood);
         }
     }
-    let _ = y;
 }
 
 /// Desks: a table with a drawer block on one side; tall ones carry a shelf at the back; deep ones
@@ -70,8 +68,12 @@ pub fn desk(s: &mut Sketch<'_>) {
     let wood = s.tint(0, s.choose(&WOODS, WOODS[1]));
     let front = s.tint(1, shade(wood, 0.85));
     let levels = s.levels();
-    let working = levels.iter().copied().filter(|&y| y > 0.5 && y < 0.95).next_back();
-    let desk_top = if h <= 0.95 { h } else { working.unwrap_or(0.75) };
+    let working = levels.iter().copied().rfind(|&y| y > 0.5 && y < 0.95);
+    let desk_top = match working {
+        Some(level) if level < h - 0.06 => level,
+        _ if h <= 0.95 => h,
+        _ => 0.75,
+    };
     let top = 0.035;
     let side = 0.025;
     let leg_y = [0.0, desk_top - top];
@@ -103,7 +105,7 @@ pub fn desk(s: &mut Sketch<'_>) {
             );
         }
     }
-    if h > desk_top + 0.1 {
+    if h > desk_top + 0.05 {
         // Shelf over the back of the desk.
         let back = between(z, 0.0, 0.42);
         s.cuboid(x, [h - 0.025, h], back, wood);
