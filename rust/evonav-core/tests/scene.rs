@@ -335,6 +335,8 @@ fn recorded_children_rest_on_their_parents() {
         eprintln!("skipped: no recorded houses under EVONAV_SHARED or ../shared");
         return;
     }
-    eprintln!("of {num_children} children {num_resting} rest on a surface, {num_buried} are buried");
+    eprintln!(
+        "of {num_children} children {num_resting} rest on a surface, {num_buried} are buried"
+    );
     assert!(num_resting * 100 >= num_children * 97 && num_buried * 100 <= num_children * 2);
 }

@@ -188,7 +188,8 @@ impl Scene {
         bodies.extend_from_slice(fixed);
         for (index, object) in house.objects.iter().enumerate() {
             // Parents stand before their children.
-            is_moved[index] |= object.parent.is_some_and(|parent| parent < index && is_moved[parent]);
+            is_moved[index] |=
+                object.parent.is_some_and(|parent| parent < index && is_moved[parent]);
             let old = known.get(object.id.as_str()).filter(|_| !is_moved[index]);
             let body = match old {
                 Some(&body) => body.clone(),

@@ -54,8 +54,7 @@ pub fn painting(s: &mut Sketch<'_>) {
         [95, 110, 140],
         [175, 200, 180],
     ];
-    let grounds =
-        [[95, 120, 80], [150, 95, 70], [70, 90, 110], [180, 160, 120], [110, 80, 110]];
+    let grounds = [[95, 120, 80], [150, 95, 70], [70, 90, 110], [180, 160, 120], [110, 80, 110]];
     let bar = 0.07 * w.min(h);
     s.cuboid(x, y, between(z, 0.0, 0.7), frame);
     let (inner, canvas) = (inside(x, bar), inside(y, bar));
