@@ -1,13 +1,11 @@
 //! What a body covers of the ground plane, seen by an agent of some height.
 
 use crate::{
-    assets::part::{Part, Primitive},
+    assets::part::Part,
     geometry::{Vec2, Vec3, add, rotate},
+    world::mesh::outline,
 };
 
-/// Rings and segments an ellipsoid is cut into: 2% of a half axis at most.
-const ELLIPSOID_RINGS: usize = 8;
-const ELLIPSOID_SIDES: usize = 16;
 /// Points nearer than this are one.
 const MERGE_M: f64 = 1e-9;
 
@@ -25,12 +23,12 @@ pub struct Footprint {
 
 /// Projects what a part has between the heights `low_m` and `high_m`; `None` if nothing.
 ///
-/// Exact for cuboids and frustums in any rotation; an ellipsoid is taken as the polyhedron of
-/// [`Primitive::Ellipsoid`]'s latitude-longitude net, inside it by at most 2% of a half axis.
+/// Of the polyhedron that is drawn, so that the agent collides with what it sees.
 pub fn footprint(part: &Part, low_m: f64, high_m: f64) -> Option<Footprint> {
-    let (corners, edges) = polyhedron(&part.primitive);
-    let corners: Vec<Vec3> =
-        corners.iter().map(|&c| add(rotate(&part.rotation, c), part.centre_m)).collect();
+    let (mut corners, polygons) = outline(&part.primitive);
+    for corner in &mut corners {
+        *corner = add(rotate(&part.rotation, *corner), part.centre_m);
+    }
     let mut shadow: Vec<Vec2> = Vec::with_capacity(corners.len());
     let (mut bottom_m, mut top_m) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut keep = |point: Vec3| {
@@ -42,12 +40,15 @@ pub fn footprint(part: &Part, low_m: f64, high_m: f64) -> Option<Footprint> {
         keep(corner);
     }
     // The band's faces cut the solid along polygons whose corners lie on its edges.
-    for &(i, j) in &edges {
-        let (a, b) = (corners[i], corners[j]);
-        for height in [low_m, high_m] {
-            if (a[1] < height) != (b[1] < height) {
-                let t = (height - a[1]) / (b[1] - a[1]);
-                keep([a[0] + t * (b[0] - a[0]), height, a[2] + t * (b[2] - a[2])]);
+    for polygon in &polygons {
+        for (k, &i) in polygon.iter().enumerate() {
+            let (a, b) = (corners[i as usize], corners[polygon[(k + 1) % polygon.len()] as usize]);
+            for height in [low_m, high_m] {
+                // Each edge runs upwards in one of its two faces.
+                if a[1] < height && height <= b[1] {
+                    let t = (height - a[1]) / (b[1] - a[1]);
+                    keep([a[0] + t * (b[0] - a[0]), height, a[2] + t * (b[2] - a[2])]);
+                }
             }
         }
     }
@@ -82,50 +83,4 @@ fn is_right_or_straight(hull: &[Vec2], point: Vec2) -> bool {
     let along = [point[0] - a[0], point[1] - a[1]];
     let cross = along[0] * (b[1] - a[1]) - along[1] * (b[0] - a[0]);
     cross >= -MERGE_M * along[0].hypot(along[1])
-}
-
-/// Corners and edges of a primitive, its own frame.
-fn polyhedron(primitive: &Primitive) -> (Vec<Vec3>, Vec<(usize, usize)>) {
-    match *primitive {
-        Primitive::Cuboid { half_m: h } => {
-            let sign = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-            let corners = (0..8).map(|i| [sign(i, 0) * h[0], sign(i, 1) * h[1], sign(i, 2) * h[2]]);
-            let edges = (0..8_usize)
-                .flat_map(|i| [1, 2, 4].map(|bit| (i, i | bit)))
-                .filter(|(i, j)| i != j);
-            (corners.collect(), edges.collect())
-        }
-        Primitive::Frustum { bottom_m, top_m, half_height_m, sides } => {
-            let sides = usize::from(sides.max(3));
-            let rings = [(bottom_m, -half_height_m), (top_m, half_height_m)];
-            net(&rings, sides)
-        }
-        Primitive::Ellipsoid { half_m } => {
-            let rings: Vec<([f64; 2], f64)> = (0..=ELLIPSOID_RINGS)
-                .map(|i| {
-                    let latitude = std::f64::consts::PI * (i as f64 / ELLIPSOID_RINGS as f64 - 0.5);
-                    let (sin, cos) = latitude.sin_cos();
-                    ([half_m[0] * cos, half_m[2] * cos], half_m[1] * sin)
-                })
-                .collect();
-            net(&rings, ELLIPSOID_SIDES)
-        }
-    }
-}
-
-/// Rings of `sides` corners at given heights, joined along the rings and upwards.
-fn net(rings: &[([f64; 2], f64)], sides: usize) -> (Vec<Vec3>, Vec<(usize, usize)>) {
-    let mut corners = Vec::with_capacity(rings.len() * sides);
-    let mut edges = Vec::with_capacity(2 * rings.len() * sides);
-    for (ring, &(half_m, height_m)) in rings.iter().enumerate() {
-        for side in 0..sides {
-            let angle = std::f64::consts::TAU * side as f64 / sides as f64;
-            corners.push([half_m[0] * angle.cos(), height_m, half_m[1] * angle.sin()]);
-            edges.push((ring * sides + side, ring * sides + (side + 1) % sides));
-            if ring > 0 {
-                edges.push((ring * sides + side, (ring - 1) * sides + side));
-            }
-        }
-    }
-    (corners, edges)
 }

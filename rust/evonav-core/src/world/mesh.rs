@@ -183,7 +183,7 @@ pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
 }
 
 /// Vertices of a primitive in its own frame, and its outward polygons as indices of them.
-fn outline(primitive: &Primitive) -> (Vec<Vec3>, Vec<Vec<u32>>) {
+pub(crate) fn outline(primitive: &Primitive) -> (Vec<Vec3>, Vec<Vec<u32>>) {
     match *primitive {
         Primitive::Cuboid { half_m } => {
             let corner = |i: usize, axis: usize| {
