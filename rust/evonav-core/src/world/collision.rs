@@ -39,6 +39,9 @@ impl AgentBody {
     /// AI2-THOR's LoCoBot (agent mode "locobot": radius 0.175, height 0.9).
     pub const LOCOBOT: Self = Self { radius_m: 0.175, height_m: 0.9 };
 
+    /// AI2-THOR's Stretch (agent mode "stretch": radius 0.185, height 1.436).
+    pub const STRETCH: Self = Self { radius_m: 0.185_462_8, height_m: 1.435_714 };
+
     /// Largest radius of the capsule between two heights above the floor, 0 outside it.
     pub fn radius_between_m(&self, bottom_m: f64, top_m: f64) -> f64 {
         // Distance of the interval from the cylinder, into one of the rounded ends.
@@ -55,6 +58,8 @@ pub struct Obstacle {
     pub outline_m: Vec<Vec2>,
     /// Distance to keep.
     pub radius_m: f64,
+    /// Index of its body in the scene.
+    pub body: usize,
     /// Smallest corner of the box around the grown outline.
     min_m: Vec2,
     /// Largest corner.
@@ -81,7 +86,7 @@ impl Obstacles {
     /// [`Error::Simulation`] naming the body if a part's geometry is not finite.
     pub fn build(bodies: &[Body], agent: AgentBody, step_height_m: f64) -> Result<Self, Error> {
         let mut obstacles = Vec::new();
-        for body in bodies {
+        for (index, body) in bodies.iter().enumerate() {
             if matches!(body.kind, BodyKind::Floor | BodyKind::Ceiling) {
                 continue;
             }
@@ -96,7 +101,7 @@ impl Obstacles {
                     });
                 }
                 let radius_m = agent.radius_between_m(shadow.bottom_m, shadow.top_m);
-                obstacles.push(Obstacle::new(shadow, radius_m));
+                obstacles.push(Obstacle::new(shadow, radius_m, index));
             }
             drop_covered(&mut obstacles, from);
         }
@@ -120,15 +125,24 @@ impl Obstacles {
     ///
     /// The answer is the same in both directions.
     pub fn is_clear_between(&self, from_m: Vec2, to_m: Vec2) -> bool {
+        self.first_between(from_m, to_m).is_none()
+    }
+
+    /// Index in the scene of a body that a straight move touches: the way to name the collider.
+    pub fn blocker_between(&self, from_m: Vec2, to_m: Vec2) -> Option<usize> {
+        self.first_between(from_m, to_m).map(|obstacle| obstacle.body)
+    }
+
+    fn first_between(&self, from_m: Vec2, to_m: Vec2) -> Option<&Obstacle> {
         let (a, b) = if from_m <= to_m { (from_m, to_m) } else { (to_m, from_m) };
-        let length_m = (b[0] - a[0]).hypot(b[1] - a[1]);
-        if length_m == 0.0 {
-            return self.is_clear(a);
-        }
-        let sweep = Sweep { a, b, along: [(b[0] - a[0]) / length_m, (b[1] - a[1]) / length_m] };
+        let sweep = Sweep::new(a, b);
+        let mut hit = None;
         self.buckets_along(a, b, |bucket| {
-            bucket.iter().all(|&i| !self.obstacles[i as usize].blocks_sweep(&sweep, length_m))
-        })
+            let mut obstacles = bucket.iter().map(|&i| &self.obstacles[i as usize]);
+            hit = obstacles.find(|obstacle| obstacle.blocks_sweep(&sweep));
+            hit.is_none()
+        });
+        hit
     }
 
     /// Calls `visit` for the buckets under a segment until it returns false; whether it never did.
@@ -265,12 +279,21 @@ fn drop_covered(obstacles: &mut Vec<Obstacle>, from: usize) {
 struct Sweep {
     a: Vec2,
     b: Vec2,
-    /// Unit vector from `a` to `b`.
+    length_m: f64,
+    /// Unit vector from `a` to `b`; any, if they are the same.
     along: Vec2,
 }
 
+impl Sweep {
+    fn new(a: Vec2, b: Vec2) -> Self {
+        let length_m = (b[0] - a[0]).hypot(b[1] - a[1]);
+        let along = [(b[0] - a[0]) / length_m, (b[1] - a[1]) / length_m];
+        Self { a, b, length_m, along: if length_m > 0.0 { along } else { [1.0, 0.0] } }
+    }
+}
+
 impl Obstacle {
-    fn new(footprint: Footprint, radius_m: f64) -> Self {
+    fn new(footprint: Footprint, radius_m: f64, body: usize) -> Self {
         let mut min_m = [f64::INFINITY; 2];
         let mut max_m = [f64::NEG_INFINITY; 2];
         for point in &footprint.outline_m {
@@ -279,7 +302,7 @@ impl Obstacle {
                 max_m[axis] = max_m[axis].max(point[axis] + radius_m);
             }
         }
-        Self { outline_m: footprint.outline_m, radius_m, min_m, max_m }
+        Self { outline_m: footprint.outline_m, radius_m, body, min_m, max_m }
     }
 
     /// Whether whatever the other blocks, this one blocks too (sufficient, not necessary).
@@ -299,9 +322,9 @@ impl Obstacle {
     ///
     /// The least distance between a segment and a convex polygon that do not meet is taken at an
     /// end of the segment or at a corner of the polygon.
-    fn blocks_sweep(&self, sweep: &Sweep, length_m: f64) -> bool {
+    fn blocks_sweep(&self, sweep: &Sweep) -> bool {
         let reach = self.radius_m;
-        let Sweep { a, b, along } = *sweep;
+        let Sweep { a, b, length_m, along } = *sweep;
         let is_near =
             (0..2).all(|i| self.min_m[i] < a[i].max(b[i]) && a[i].min(b[i]) < self.max_m[i]);
         if !is_near {

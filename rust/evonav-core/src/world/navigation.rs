@@ -1,14 +1,11 @@
 //! Where an agent can stand, how it can move, and the shortest way.
 
-use std::{
-    collections::{HashMap, VecDeque},
-    sync::OnceLock,
-};
+use std::sync::OnceLock;
 
 use crate::{
     Error,
     geometry::{Vec2, distance_2d_m},
-    grid::GridSpec,
+    grid::{GridSpec, MAX_CELLS},
     world::{
         collision::{AgentBody, Obstacles, distance_squared},
         footprint::footprint,
@@ -38,6 +35,15 @@ const FLOOR_SLACK_M: f64 = 0.05;
 const MAP_MARGIN_M: f64 = 0.5;
 /// Pitch of the places that [`Navigation::snap`] tries.
 const SNAP_PITCH_M: f64 = 0.025;
+
+/// What a flood fill knows of a grid point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Unknown,
+    Blocked,
+    Free,
+    Reached,
+}
 
 /// Free space of one scene for one agent body: exact collision queries and shortest paths.
 ///
@@ -133,27 +139,38 @@ impl Navigation {
         }
         // Offsets from the start, so that a point has the same coordinates by every way to it.
         let point_of = |cell: [i64; 2]| [0, 1].map(|i| from_m[i] + cell[i] as f64 * grid_m);
-        let mut seen: HashMap<[i64; 2], bool> = HashMap::from([([0, 0], true)]);
-        let mut queue = VecDeque::from([[0_i64, 0]]);
-        let mut reached = Vec::new();
-        while let Some(cell) = queue.pop_front() {
-            reached.push(cell);
+        let cells_to = |bound_m: f64, i: usize| (bound_m - from_m[i]) / grid_m;
+        let low = [0, 1].map(|i| cells_to(self.min_m[i] - FLOOR_SLACK_M, i).floor() - 1.0);
+        let high = [0, 1].map(|i| cells_to(self.max_m[i] + FLOOR_SLACK_M, i).ceil() + 2.0);
+        let size = [0, 1].map(|i| high[i] - low[i]);
+        Error::require("grid points", size[0] * size[1], "at most 2^26", |n| {
+            n <= MAX_CELLS as f64
+        })?;
+        let index = |cell: [i64; 2]| {
+            (cell[1] - low[1] as i64) as usize * size[0] as usize
+                + (cell[0] - low[0] as i64) as usize
+        };
+        // Free points lie in the floors' box grown by the slack, so their neighbours are on the grid.
+        let mut state = vec![State::Unknown; size[0] as usize * size[1] as usize];
+        let mut queue = vec![[0_i64, 0]];
+        state[index([0, 0])] = State::Reached;
+        let mut next_in_queue = 0;
+        while let Some(&cell) = queue.get(next_in_queue) {
+            next_in_queue += 1;
             for step in [[1, 0], [0, 1], [-1, 0], [0, -1]] {
                 let next = [cell[0] + step[0], cell[1] + step[1]];
-                if seen.get(&next) == Some(&true) {
-                    continue;
+                let (to_m, state) = (point_of(next), &mut state[index(next)]);
+                if *state == State::Unknown {
+                    *state = if self.is_free(to_m) { State::Free } else { State::Blocked };
                 }
-                let to = point_of(next);
-                let is_free = *seen.entry(next).or_insert_with(|| !self.is_free(to));
-                // `false` marks a free point that no move has reached yet.
-                if !is_free && self.obstacles.is_clear_between(point_of(cell), to) {
-                    seen.insert(next, true);
-                    queue.push_back(next);
+                if *state == State::Free && self.obstacles.is_clear_between(point_of(cell), to_m) {
+                    *state = State::Reached;
+                    queue.push(next);
                 }
             }
         }
-        reached.sort_unstable_by_key(|&[x, z]| (z, x));
-        Ok(reached.into_iter().map(point_of).collect())
+        queue.sort_unstable_by_key(|&[x, z]| (z, x));
+        Ok(queue.into_iter().map(point_of).collect())
     }
 
     /// The nearest of `reachable_m` to a point, the first of equals; `None` if there is none.

@@ -1,0 +1,145 @@
+//! Navigation in real ProcTHOR houses, against positions recorded from AI2-THOR itself.
+
+mod recorded;
+
+use std::collections::BTreeMap;
+
+use evonav_core::{geometry::Vec2, world::collision::AgentBody};
+use recorded::{house_of, lines, navigation_of, recordings, scene_of};
+use serde_json::Value;
+
+/// `[x, z]` of a JSON position, an object or an array.
+fn xz(position: &Value) -> Vec2 {
+    let at = |key: &str, index: usize| {
+        let value = if position.is_array() { &position[index] } else { &position[key] };
+        value.as_f64().expect("a number")
+    };
+    [at("x", 0), at("z", 2)]
+}
+
+/// Share of `positions` that are free; prints what stands at the others.
+fn share_free(name: &str, line: &str, agent: AgentBody, positions: &[Vec2]) -> [usize; 2] {
+    let house = house_of(name, line);
+    let scene = scene_of(&house);
+    let navigation = navigation_of(&scene, agent);
+    let mut num_free = 0;
+    for &position in positions {
+        if navigation.is_free(position) {
+            num_free += 1;
+            continue;
+        }
+        let blocker = navigation.obstacles().blocker_between(position, position);
+        let what = blocker.map_or("off the floor".to_owned(), |i| {
+            let asset = house.object_index(&scene.bodies[i].id);
+            let asset = asset.map_or("", |i| house.objects[i].asset_id.as_str());
+            format!("{} {asset}", scene.bodies[i].id)
+        });
+        let wider = (1..40).map(|i| f64::from(i) * 0.005).find(|shrink| {
+            let agent = AgentBody { radius_m: agent.radius_m - shrink, ..agent };
+            agent.radius_m > 0.0 && navigation_of(&scene, agent).is_free(position)
+        });
+        eprintln!("blocked: {name} {position:?} by {what}, too close by {wider:?}");
+    }
+    [num_free, positions.len()]
+}
+
+fn assert_share(name: &str, [num_free, num_all]: [usize; 2]) {
+    let share = num_free as f64 / num_all as f64;
+    eprintln!("{name}: {num_free} of {num_all} recorded positions free ({share:.4})");
+    assert!(num_all > 0 && share >= 0.995, "{name}: {num_free} of {num_all}");
+}
+
+/// Positions by line number of their house.
+fn by_house(records: impl IntoIterator<Item = (usize, Vec2)>) -> BTreeMap<usize, Vec<Vec2>> {
+    let mut positions: BTreeMap<usize, Vec<Vec2>> = BTreeMap::new();
+    for (house, position) in records {
+        let known = positions.entry(house).or_default();
+        if !known.contains(&position) {
+            known.push(position);
+        }
+    }
+    positions
+}
+
+fn total(counts: impl Iterator<Item = [usize; 2]>) -> [usize; 2] {
+    counts.fold([0; 2], |sum, count| [sum[0] + count[0], sum[1] + count[1]])
+}
+
+#[test]
+fn locobot_start_positions_are_free() {
+    let Some(data) = recordings() else { return };
+    let folder = data.join("ram81-procthor-1k");
+    let houses = lines(&folder.join("val.jsonl.gz"));
+    let episodes = lines(&folder.join("procthor-attr-onav-locobot-val.jsonl.gz"));
+    let positions = by_house(episodes.iter().map(|line| {
+        let episode: Value = serde_json::from_str(line).expect("JSON");
+        let house = episode["scene"].as_u64().expect("a line number") as usize;
+        (house, xz(&episode["agentPose"]["position"]))
+    }));
+    let shares = positions.iter().map(|(&house, positions)| {
+        share_free(&format!("1k-val-{house}"), &houses[house], AgentBody::LOCOBOT, positions)
+    });
+    assert_share("LoCoBot starts", total(shares));
+}
+
+#[test]
+fn stretch_start_positions_are_free() {
+    let Some(data) = recordings() else { return };
+    let houses = lines(&data.join("roseh-procthor-100k-history/tiny-val.jsonl.gz"));
+    let folder = data.join("kunalmessi10-procthor-100k-eval");
+    let files = ["explorehouse", "fetch2roomtype", "objectnavtype"];
+    let episodes = files.iter().flat_map(|kind| {
+        lines(&folder.join(format!("tinyval_June8_procthor_100k_{kind}_val.jsonl.gz")))
+    });
+    let positions = by_house(episodes.filter_map(|line| {
+        let episode: Value = serde_json::from_str(&line).expect("JSON");
+        let house = episode["house_number"].as_u64().expect("a line number") as usize;
+        (house < houses.len()).then(|| (house, xz(&episode["agent_starting_position"])))
+    }));
+    let shares = positions.iter().map(|(&house, positions)| {
+        share_free(&format!("tiny-val-{house}"), &houses[house], AgentBody::STRETCH, positions)
+    });
+    assert_share("Stretch starts", total(shares));
+}
+
+/// Files of whole houses by the unmodified generator.
+const HOUSE_FILES: [&str; 9] = [
+    "ram81-procthor-100k-history/attr-onav-1k-val-100.jsonl.gz",
+    "ram81-procthor-100k-history/uniform-hard-val-75.jsonl.gz",
+    "ram81-procthor-1k/train.jsonl.gz",
+    "ram81-procthor-1k/val.jsonl.gz",
+    "roseh-procthor-100k-history/tiny-train.jsonl.gz",
+    "roseh-procthor-100k-history/tiny-val.jsonl.gz",
+    "procthor-generated/houses-train.jsonl.gz",
+    "procthor-generated/houses-test.jsonl.gz",
+    "ram81-procthor-100k-history/attr-onav-1k-train-1000.jsonl.gz",
+];
+
+#[test]
+fn every_house_starts_free_and_reaches_every_room() {
+    let Some(data) = recordings() else { return };
+    let (mut starts, mut rooms) = ([0, 0], [0, 0]);
+    for file in HOUSE_FILES {
+        for (i, line) in lines(&data.join(file)).iter().enumerate() {
+            let house = house_of(&format!("{file}:{i}"), line);
+            let Some(start) = house.start else { continue };
+            let start_m = [start.position_m[0], start.position_m[2]];
+            let name = format!("{file}:{i}");
+            let count = share_free(&name, line, AgentBody::DEFAULT, &[start_m]);
+            starts = total([starts, count].into_iter());
+            let navigation = navigation_of(&scene_of(&house), AgentBody::DEFAULT);
+            let reached = navigation.reachable_positions(start_m, 0.25).expect("a grid");
+            let mut is_reached = vec![false; house.rooms.len()];
+            for room in reached.iter().filter_map(|&p| house.room_of(p)) {
+                is_reached[room] = true;
+            }
+            rooms[0] += is_reached.iter().filter(|&&is| is).count();
+            rooms[1] += is_reached.len();
+            for (room, _) in is_reached.iter().enumerate().filter(|&(_, is)| count[0] == 1 && !is) {
+                eprintln!("unreached: {name} {}", house.rooms[room].id);
+            }
+        }
+    }
+    assert_share("house starts", starts);
+    assert_share("rooms reached from the start", rooms);
+}
