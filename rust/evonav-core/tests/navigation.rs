@@ -14,6 +14,9 @@ use evonav_core::{
 use proptest::prelude::*;
 
 const ROOM_M: f64 = 5.0;
+/// No slack, so that the twins need none.
+const EXACT: NavigationConfig =
+    NavigationConfig { step_height_m: 0.03, tolerance_m: 0.0, snap_m: 0.5 };
 
 fn cuboid(centre_m: Vec3, half_m: Vec3, yaw_rad: f64) -> Part {
     Part {
@@ -50,8 +53,7 @@ fn room(boxes: Vec<Part>) -> Scene {
 
 fn navigation(boxes: &[Part]) -> Navigation {
     let scene = room(boxes.to_vec());
-    Navigation::build(&scene, AgentBody::DEFAULT, NavigationConfig::default())
-        .expect("a sound scene")
+    Navigation::build(&scene, AgentBody::DEFAULT, EXACT).expect("a sound scene")
 }
 
 /// Boxes from the floor up past the capsule's lower end, so that its full radius counts.

@@ -67,6 +67,19 @@ pub fn dog_bed(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[2]));
     let rim = 0.15 * w.min(d);
+    if (w - d).abs() < 0.03 {
+        // Round ones: recorded agents stand in the corners of their boxes.
+        s.column(x, [0.0, 0.7 * h], z, 1.0, 16, fabric);
+        s.column(
+            inside(x, 0.5 * rim),
+            [0.7 * h, h],
+            inside(z, 0.5 * rim),
+            1.0,
+            16,
+            shade(fabric, 1.2),
+        );
+        return;
+    }
     s.cuboid(inside(x, 0.5 * rim), [0.0, 0.5 * h], inside(z, 0.5 * rim), shade(fabric, 1.2));
     for x in ends(x, rim, 0.0) {
         s.cuboid(x, y, z, fabric);
