@@ -5,6 +5,7 @@ mod error;
 mod evolution;
 mod house;
 mod memory;
+mod objects;
 mod sensors;
 mod simulator;
 

@@ -1,6 +1,11 @@
 //! What an agent remembers: an occupancy map with frontiers, and object entries.
 
 pub mod bits;
+pub mod cloud;
 pub mod components;
+pub mod dbscan;
+pub mod entry;
 pub mod frontiers;
+pub mod objects;
 pub mod occupancy;
+pub mod voxels;

@@ -7,3 +7,4 @@ mod raster_fill;
 mod raster_shade;
 pub mod raycast;
 pub mod raycast3d;
+pub mod unproject;

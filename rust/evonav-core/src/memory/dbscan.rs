@@ -1,0 +1,218 @@
+//! Density clusters of a point cloud.
+
+use crate::{
+    memory::voxels::{Voxel, VoxelTable, voxel_of},
+    sensors::unproject::Point,
+};
+
+/// Label of a point that belongs to no cluster.
+pub const NOISE: i32 = -1;
+
+/// DBSCAN (Ester, Kriegel, Sander & Xu, KDD 1996): a point with `min_points` points, itself
+/// counted, within `radius_m` is a core point; core points within `radius_m` of each other share a cluster.
+///
+/// # Returns
+/// A cluster a point, numbered by their first core point, or [`NOISE`]. A border point within
+/// reach of several clusters takes the first, as in scikit-learn.
+///
+/// # Complexity
+/// Exact, by a grid whose cells are small enough that all points of a cell are neighbours (Gunawan,
+/// 2013): close to O(points) for the surfaces of objects.
+pub fn dbscan(points: &[Point], radius_m: f32, min_points: usize) -> Vec<i32> {
+    let grid = Grid::new(points, radius_m);
+    let is_core = grid.core_points(min_points);
+    let clusters = grid.join_cells(&is_core);
+    grid.label(&is_core, clusters)
+}
+
+/// The points of the largest cluster (the first of equal ones), in their order; `None` if all is noise.
+pub fn largest_cluster(points: &[Point], radius_m: f32, min_points: usize) -> Option<Vec<Point>> {
+    let labels = dbscan(points, radius_m, min_points);
+    let num = labels.iter().max().map_or(0, |&last| (last + 1) as usize);
+    let mut sizes = vec![0_usize; num];
+    labels.iter().filter(|&&label| label != NOISE).for_each(|&label| sizes[label as usize] += 1);
+    let largest = (0..num).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
+    let is_inside = |&(_, &label): &(&Point, &i32)| label == largest as i32;
+    Some(points.iter().zip(&labels).filter(is_inside).map(|(&point, _)| point).collect())
+}
+
+/// Squared distance.
+pub(crate) fn distance2(a: Point, b: Point) -> f32 {
+    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    x * x + y * y + z * z
+}
+
+struct Grid<'a> {
+    points: &'a [Point],
+    radius2: f32,
+    /// Point indices by cell, ascending in each; cell `c` has `members[starts[c]..starts[c + 1]]`.
+    members: Vec<u32>,
+    starts: Vec<u32>,
+    /// Cells that may hold neighbours, itself left out; each pair once, from the later to the earlier cell.
+    earlier: Vec<Vec<u32>>,
+}
+
+impl<'a> Grid<'a> {
+    fn new(points: &'a [Point], radius_m: f32) -> Self {
+        // A hair less than radius / sqrt(3), so that rounding cannot part the points of a cell.
+        let inverse_edge = 3.0_f64.sqrt() * 1.0001 / f64::from(radius_m);
+        let mut table = VoxelTable::with_capacity(points.len() / 4);
+        let mut voxels: Vec<Voxel> = Vec::new();
+        let cell_of: Vec<u32> = points
+            .iter()
+            .map(|&point| {
+                let voxel = voxel_of(point, inverse_edge);
+                let (&mut cell, is_new) = table.entry(voxel, voxels.len() as u32);
+                if is_new {
+                    voxels.push(voxel);
+                }
+                cell
+            })
+            .collect();
+        let mut starts = vec![0_u32; voxels.len() + 1];
+        cell_of.iter().for_each(|&cell| starts[cell as usize + 1] += 1);
+        (0..voxels.len()).for_each(|cell| starts[cell + 1] += starts[cell]);
+        let mut next = starts.clone();
+        let mut members = vec![0; points.len()];
+        for (point, &cell) in cell_of.iter().enumerate() {
+            members[next[cell as usize] as usize] = point as u32;
+            next[cell as usize] += 1;
+        }
+        let earlier = neighbour_cells(&voxels, &table);
+        Self { points, radius2: radius_m * radius_m, members, starts, earlier }
+    }
+
+    fn num_cells(&self) -> usize {
+        self.earlier.len()
+    }
+
+    fn members(&self, cell: usize) -> &[u32] {
+        &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    fn is_near(&self, a: u32, b: u32) -> bool {
+        distance2(self.points[a as usize], self.points[b as usize]) <= self.radius2
+    }
+
+    fn core_points(&self, min_points: usize) -> Vec<bool> {
+        let mut is_core = vec![false; self.points.len()];
+        let is_dense = |cell: usize| self.members(cell).len() >= min_points;
+        // Neighbours of the points in thin cells; those in dense ones are core points at once.
+        let mut counts = vec![0_u32; self.points.len()];
+        for cell in 0..self.num_cells() {
+            let here = self.members(cell);
+            here.iter().for_each(|&point| counts[point as usize] += here.len() as u32);
+            for &other in &self.earlier[cell] {
+                let other = other as usize;
+                if is_dense(cell) && is_dense(other) {
+                    continue;
+                }
+                for &a in here {
+                    for &b in self.members(other) {
+                        let is_near = u32::from(self.is_near(a, b));
+                        counts[a as usize] += is_near;
+                        counts[b as usize] += is_near;
+                    }
+                }
+            }
+        }
+        for (is_core, count) in is_core.iter_mut().zip(counts) {
+            *is_core = count as usize >= min_points;
+        }
+        is_core
+    }
+
+    /// Cells joined by core points within the radius: a representative a cell.
+    fn join_cells(&self, is_core: &[bool]) -> Vec<u32> {
+        let mut parents: Vec<u32> = (0..self.num_cells() as u32).collect();
+        let core_of = |cell: usize| {
+            self.members(cell).iter().copied().filter(|&point| is_core[point as usize])
+        };
+        for cell in 0..self.num_cells() {
+            for &other in &self.earlier[cell] {
+                let (a, b) = (root(&parents, cell as u32), root(&parents, other));
+                if a == b {
+                    continue;
+                }
+                let touches =
+                    core_of(cell).any(|a| core_of(other as usize).any(|b| self.is_near(a, b)));
+                if touches {
+                    parents[a.max(b) as usize] = a.min(b);
+                }
+            }
+        }
+        (0..self.num_cells() as u32).map(|cell| root(&parents, cell)).collect()
+    }
+
+    fn label(&self, is_core: &[bool], cluster_of_cell: Vec<u32>) -> Vec<i32> {
+        let mut labels = vec![NOISE; self.points.len()];
+        let mut cell_of = vec![0; self.points.len()];
+        for cell in 0..self.num_cells() {
+            self.members(cell).iter().for_each(|&point| cell_of[point as usize] = cell);
+        }
+        let mut number_of = vec![NOISE; self.num_cells()];
+        let mut num = 0;
+        for point in (0..self.points.len()).filter(|&point| is_core[point]) {
+            let number = &mut number_of[cluster_of_cell[cell_of[point]] as usize];
+            if *number == NOISE {
+                *number = num;
+                num += 1;
+            }
+            labels[point] = *number;
+        }
+        self.label_borders(is_core, &mut labels);
+        labels
+    }
+
+    fn label_borders(&self, is_core: &[bool], labels: &mut [i32]) {
+        let mut adopt = |border: u32, core: u32| {
+            if !is_core[border as usize] && is_core[core as usize] && self.is_near(border, core) {
+                let (label, mine) = (labels[core as usize], &mut labels[border as usize]);
+                *mine = if *mine == NOISE { label } else { label.min(*mine) };
+            }
+        };
+        for cell in 0..self.num_cells() {
+            let here = self.members(cell);
+            let has_border = |cell: usize| self.members(cell).iter().any(|&p| !is_core[p as usize]);
+            if has_border(cell) {
+                here.iter().for_each(|&a| here.iter().for_each(|&b| adopt(a, b)));
+            }
+            for &other in &self.earlier[cell] {
+                if has_border(cell) || has_border(other as usize) {
+                    for &a in here {
+                        for &b in self.members(other as usize) {
+                            adopt(a, b);
+                            adopt(b, a);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn root(parents: &[u32], mut cell: u32) -> u32 {
+    while parents[cell as usize] != cell {
+        cell = parents[cell as usize];
+    }
+    cell
+}
+
+/// For each cell the earlier cells at most two steps away an axis.
+fn neighbour_cells(voxels: &[Voxel], table: &VoxelTable) -> Vec<Vec<u32>> {
+    let steps: Vec<Voxel> = (-2..=2)
+        .flat_map(|x| (-2..=2).flat_map(move |y| (-2..=2).map(move |z| [x, y, z])))
+        .filter(|&step| step > [0, 0, 0])
+        .collect();
+    let mut earlier = vec![Vec::new(); voxels.len()];
+    for (cell, voxel) in voxels.iter().enumerate() {
+        for step in &steps {
+            let beside = [0, 1, 2].map(|i| voxel[i].saturating_add(step[i]));
+            if let Some(other) = table.get(beside) {
+                let (late, early) = (other.max(cell as u32), other.min(cell as u32));
+                earlier[late as usize].push(early);
+            }
+        }
+    }
+    earlier
+}

@@ -1,0 +1,122 @@
+//! One object as remembered.
+
+use crate::{
+    geometry::Vec3,
+    memory::{cloud::Cloud, objects::ObjectMapConfig},
+};
+
+/// A detection that passed the filters.
+#[derive(Debug, Clone)]
+pub(crate) struct Sighting {
+    pub(crate) label: String,
+    pub(crate) confidence: f32,
+    pub(crate) feature: Option<Vec<f32>>,
+    pub(crate) cloud: Cloud,
+}
+
+/// An object entry: detections that seem to be of one object.
+#[derive(Debug, Clone)]
+pub struct Entry {
+    /// Counts up from 1.
+    pub id: u64,
+    /// Detections by label, in the order in which the labels came.
+    pub label_counts: Vec<(String, u32)>,
+    /// Number of detections.
+    pub num_detections: u32,
+    /// Largest confidence of a detection.
+    pub confidence: f32,
+    /// Unit mean of the detections' features.
+    pub feature: Option<Vec<f32>>,
+    /// Where its points are.
+    pub cloud: Cloud,
+    /// Stage of the first detection.
+    pub first_seen_stage: u32,
+    /// Stage of the last detection.
+    pub last_seen_stage: u32,
+    /// View of the last detection, counted from 1 since the map began.
+    pub last_seen_view: u64,
+}
+
+impl Entry {
+    pub(crate) fn new(id: u64, sighting: Sighting, stage: u32, view: u64) -> Self {
+        Self {
+            id,
+            label_counts: vec![(sighting.label, 1)],
+            num_detections: 1,
+            confidence: sighting.confidence,
+            feature: sighting.feature,
+            cloud: sighting.cloud,
+            first_seen_stage: stage,
+            last_seen_stage: stage,
+            last_seen_view: view,
+        }
+    }
+
+    /// The label of most detections, of equal ones the first.
+    pub fn label(&self) -> &str {
+        let best = self.label_counts.iter().rev().max_by_key(|(_, count)| *count);
+        best.map_or("", |(label, _)| label)
+    }
+
+    /// Middle of the box around the points.
+    pub fn centre_m(&self) -> Vec3 {
+        self.cloud.bounds_m().centre_m()
+    }
+
+    /// Edges of the box around the points.
+    pub fn size_m(&self) -> Vec3 {
+        self.cloud.bounds_m().size_m()
+    }
+
+    /// Cosine of the features, or, where one has none, 1 for the same label and 0 for another.
+    pub(crate) fn similarity(&self, label: &str, feature: Option<&[f32]>) -> f64 {
+        match (&self.feature, feature) {
+            (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum(),
+            _ => f64::from(u8::from(self.label() == label)),
+        }
+    }
+
+    /// Whether the boxes touch when grown by the radius of overlap: if not, nothing overlaps.
+    pub(crate) fn is_beside(&self, other: &Cloud, config: &ObjectMapConfig) -> bool {
+        let mut bounds_m = *self.cloud.bounds_m();
+        bounds_m.min_m = bounds_m.min_m.map(|v| v - config.overlap_radius_m);
+        bounds_m.max_m = bounds_m.max_m.map(|v| v + config.overlap_radius_m);
+        bounds_m.intersects(other.bounds_m())
+    }
+
+    /// Joins a detection.
+    pub(crate) fn see(&mut self, sighting: Sighting, stage: u32, view: u64) {
+        self.absorb(Self::new(0, sighting, stage, view));
+    }
+
+    /// Joins another entry; the id stays.
+    pub(crate) fn absorb(&mut self, other: Self) {
+        for (label, count) in other.label_counts {
+            match self.label_counts.iter_mut().find(|(known, _)| *known == label) {
+                Some((_, known)) => *known += count,
+                None => self.label_counts.push((label, count)),
+            }
+        }
+        self.feature = match (self.feature.take(), other.feature) {
+            (Some(a), Some(b)) => {
+                Some(weighted_mean(&a, self.num_detections, &b, other.num_detections))
+            }
+            (a, b) => a.or(b),
+        };
+        self.num_detections += other.num_detections;
+        self.confidence = self.confidence.max(other.confidence);
+        self.cloud.merge(other.cloud.points());
+        self.first_seen_stage = self.first_seen_stage.min(other.first_seen_stage);
+        self.last_seen_stage = self.last_seen_stage.max(other.last_seen_stage);
+        self.last_seen_view = self.last_seen_view.max(other.last_seen_view);
+    }
+}
+
+/// Mean of two vectors by number of detections, of length 1 again (or as it is, if it has no length).
+fn weighted_mean(a: &[f32], num_a: u32, b: &[f32], num_b: u32) -> Vec<f32> {
+    let mix = |(a, b): (&f32, &f32)| a * num_a as f32 + b * num_b as f32;
+    let sum: Vec<f32> = a.iter().zip(b).map(mix).collect();
+    let length = sum.iter().map(|v| v * v).sum::<f32>().sqrt();
+    let scale = if length > 0.0 { 1.0 / length } else { 1.0 };
+    sum.into_iter().map(|v| v * scale).collect()
+}

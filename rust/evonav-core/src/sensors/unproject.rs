@@ -1,0 +1,92 @@
+//! Depth images back to points.
+
+use crate::{Error, sensors::camera::Camera};
+
+/// A point in the world frame. Single precision: 8 micrometres at 100 m.
+pub type Point = [f32; 3];
+
+/// A depth image and what was detected in it.
+#[derive(Debug, Clone, Copy)]
+pub struct MaskedDepth<'a> {
+    /// Where and how the image was taken.
+    pub camera: &'a Camera,
+    /// Planar depth, row-major, metres; infinite or not positive where there is none.
+    pub depth_m: &'a [f32],
+    /// Detection of each pixel, negative where none.
+    pub masks: &'a [i32],
+}
+
+/// The points behind the pixels of each detection.
+///
+/// # Arguments
+/// * `num_detections` - masks count from 0 to one less.
+/// * `max_points` - a mask with more pixels with a depth is thinned to every n-th of them, evenly
+///   in row-major order, so that at most this many remain (3D-Mem: about 5,000).
+///
+/// # Returns
+/// A list a detection, in row-major order of the pixels.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] if an image's size is not the camera's, a depth is NaN, a mask's
+/// number is too large, `max_points` 0, or the camera impossible.
+///
+/// # Complexity
+/// O(pixels), two passes.
+pub fn unproject_masks(
+    image: MaskedDepth<'_>,
+    num_detections: usize,
+    max_points: usize,
+) -> Result<Vec<Vec<Point>>, Error> {
+    let MaskedDepth { camera, depth_m, masks } = image;
+    camera.check()?;
+    Error::require("max_points", max_points, "at least 1", |n| n > 0)?;
+    let num_px = camera.width_px * camera.height_px;
+    for (name, len) in [("depth_m", depth_m.len()), ("masks", masks.len())] {
+        Error::require(name, len, "one value a pixel of the camera", |n| n == num_px)?;
+    }
+    let mut num_px = vec![0; num_detections];
+    for (&mask, &depth) in masks.iter().zip(depth_m) {
+        Error::require("depth_m", depth, "not NaN", |d| !d.is_nan())?;
+        let Ok(detection) = usize::try_from(mask) else { continue };
+        let count = num_px.get_mut(detection).ok_or_else(|| {
+            Error::invalid("masks", mask, "negative or the index of a detection")
+        })?;
+        *count += usize::from(has_depth(depth));
+    }
+    let strides: Vec<usize> = num_px.iter().map(|n: &usize| n.div_ceil(max_points).max(1)).collect();
+    let mut clouds: Vec<Vec<Point>> = num_px
+        .iter()
+        .zip(&strides)
+        .map(|(num, stride)| Vec::with_capacity(num.div_ceil(*stride)))
+        .collect();
+    let mut skips = vec![0_usize; num_detections];
+    // A pixel's ray is affine in its coordinates.
+    let first = camera.ray([0.5, 0.5]);
+    let [along_u, along_v] = [camera.ray([1.5, 0.5]), camera.ray([0.5, 1.5])]
+        .map(|ray| [0, 1, 2].map(|i| ray[i] - first[i]));
+    let rows = masks.chunks_exact(camera.width_px).zip(depth_m.chunks_exact(camera.width_px));
+    for (row, (masks, depth_m)) in rows.enumerate() {
+        let start = [0, 1, 2].map(|i| first[i] + along_v[i] * row as f64);
+        for (col, (&mask, &depth)) in masks.iter().zip(depth_m).enumerate() {
+            if mask < 0 || !has_depth(depth) {
+                continue;
+            }
+            let detection = mask as usize;
+            if skips[detection] > 0 {
+                skips[detection] -= 1;
+                continue;
+            }
+            skips[detection] = strides[detection] - 1;
+            let depth = f64::from(depth);
+            clouds[detection].push([0, 1, 2].map(|i| {
+                let ray = start[i] + along_u[i] * col as f64;
+                (camera.position_m[i] + ray * depth) as f32
+            }));
+        }
+    }
+    Ok(clouds)
+}
+
+fn has_depth(depth_m: f32) -> bool {
+    depth_m > 0.0 && depth_m < f32::INFINITY
+}

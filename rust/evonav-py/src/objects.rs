@@ -1,0 +1,270 @@
+//! `evonav_core::memory::objects`. Shapes, units and errors: `_core.pyi`.
+
+use evonav_core::{
+    geometry::Pose,
+    memory::{
+        entry::Entry,
+        objects::{self, DetectedView, ObjectMapConfig},
+    },
+    sensors::{camera::Camera, unproject::MaskedDepth},
+};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::{arrays, error};
+
+/// An object entry as it was when asked for.
+#[pyclass(frozen, module = "evonav._core")]
+pub struct ObjectEntry(Entry);
+
+#[pymethods]
+impl ObjectEntry {
+    #[getter]
+    fn id(&self) -> u64 {
+        self.0.id
+    }
+
+    #[getter]
+    fn label(&self) -> &str {
+        self.0.label()
+    }
+
+    #[getter]
+    fn label_counts(&self) -> Vec<(String, u32)> {
+        self.0.label_counts.clone()
+    }
+
+    #[getter]
+    fn num_detections(&self) -> u32 {
+        self.0.num_detections
+    }
+
+    #[getter]
+    fn confidence(&self) -> f32 {
+        self.0.confidence
+    }
+
+    #[getter]
+    fn centre_m(&self) -> (f64, f64, f64) {
+        self.0.centre_m().into()
+    }
+
+    #[getter]
+    fn size_m(&self) -> (f64, f64, f64) {
+        self.0.size_m().into()
+    }
+
+    #[getter]
+    fn num_points(&self) -> usize {
+        self.0.cloud.points().len()
+    }
+
+    #[getter]
+    fn points_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        arrays::rows_of(py, self.0.cloud.points().to_vec())
+    }
+
+    #[getter]
+    fn feature<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f32>>> {
+        self.0.feature.as_ref().map(|feature| PyArray1::from_slice(py, feature))
+    }
+
+    #[getter]
+    fn first_seen_stage(&self) -> u32 {
+        self.0.first_seen_stage
+    }
+
+    #[getter]
+    fn last_seen_stage(&self) -> u32 {
+        self.0.last_seen_stage
+    }
+
+    #[getter]
+    fn last_seen_view(&self) -> u64 {
+        self.0.last_seen_view
+    }
+}
+
+/// What was detected, gathered into lasting entries.
+#[pyclass(module = "evonav._core")]
+pub struct ObjectMap(objects::ObjectMap);
+
+type Update = (Vec<Option<u64>>, Vec<u64>, Vec<(u64, u64)>);
+
+#[pymethods]
+impl ObjectMap {
+    #[new]
+    #[pyo3(signature = (
+        *, min_points, max_points, min_box_m3, voxel_m, cluster_radius_m, cluster_min_points,
+        max_distance_m, overlap_radius_m, match_threshold, views_per_cleanup, min_detections,
+        merge_overlap, merge_similarity,
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python class")]
+    fn new(
+        min_points: usize,
+        max_points: usize,
+        min_box_m3: f64,
+        voxel_m: f64,
+        cluster_radius_m: f64,
+        cluster_min_points: usize,
+        max_distance_m: f64,
+        overlap_radius_m: f64,
+        match_threshold: f64,
+        views_per_cleanup: u32,
+        min_detections: u32,
+        merge_overlap: f64,
+        merge_similarity: f64,
+    ) -> PyResult<Self> {
+        let config = ObjectMapConfig {
+            min_points,
+            max_points,
+            min_box_m3,
+            voxel_m,
+            cluster_radius_m,
+            cluster_min_points,
+            max_distance_m,
+            overlap_radius_m,
+            match_threshold,
+            views_per_cleanup,
+            min_detections,
+            merge_overlap,
+            merge_similarity,
+        };
+        objects::ObjectMap::new(config).map(Self).map_err(error::to_py)
+    }
+
+    #[pyo3(signature = (
+        depth_m, masks, labels, confidences, features,
+        *, position_m, yaw_rad, horizon_rad, vertical_fov_rad,
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python method")]
+    fn update(
+        &mut self,
+        py: Python<'_>,
+        depth_m: PyReadonlyArray2<'_, f32>,
+        masks: PyReadonlyArray2<'_, i32>,
+        labels: Vec<String>,
+        confidences: PyReadonlyArray1<'_, f32>,
+        features: Option<PyReadonlyArray2<'_, f32>>,
+        position_m: [f64; 3],
+        yaw_rad: f64,
+        horizon_rad: f64,
+        vertical_fov_rad: f64,
+    ) -> PyResult<Update> {
+        let pose = Pose { position_m, yaw_rad, horizon_rad };
+        let arrays = ViewArrays { depth_m, masks, labels, confidences, features };
+        let (view, map) = (arrays.view(pose, vertical_fov_rad)?, &mut self.0);
+        let update = py.detach(|| map.update(&view.borrow())).map_err(error::to_py)?;
+        let merged = update.merged.into_iter().map(Into::into).collect();
+        Ok((update.entry_ids, update.removed, merged))
+    }
+
+    #[pyo3(signature = (
+        entry_id, depth_m, masks, labels, confidences, features,
+        *, position_m, yaw_rad, horizon_rad, vertical_fov_rad,
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python method")]
+    fn compare<'py>(
+        &self,
+        py: Python<'py>,
+        entry_id: u64,
+        depth_m: PyReadonlyArray2<'py, f32>,
+        masks: PyReadonlyArray2<'py, i32>,
+        labels: Vec<String>,
+        confidences: PyReadonlyArray1<'py, f32>,
+        features: Option<PyReadonlyArray2<'py, f32>>,
+        position_m: [f64; 3],
+        yaw_rad: f64,
+        horizon_rad: f64,
+        vertical_fov_rad: f64,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let pose = Pose { position_m, yaw_rad, horizon_rad };
+        let arrays = ViewArrays { depth_m, masks, labels, confidences, features };
+        let view = arrays.view(pose, vertical_fov_rad)?;
+        let found =
+            py.detach(|| self.0.compare(entry_id, &view.borrow())).map_err(error::to_py)?;
+        arrays::rows_of(py, found.into_iter().map(|c| [c.overlap, c.distance_m]).collect())
+    }
+
+    fn begin_stage(&mut self, stage: u32) {
+        self.0.begin_stage(stage);
+    }
+
+    fn remove(&mut self, entry_id: u64) -> bool {
+        self.0.remove(entry_id)
+    }
+
+    fn clear(&mut self) {
+        self.0.clear();
+    }
+
+    #[getter]
+    fn num_views(&self) -> u64 {
+        self.0.num_views()
+    }
+
+    #[getter]
+    fn entries(&self) -> Vec<ObjectEntry> {
+        self.0.entries().iter().cloned().map(ObjectEntry).collect()
+    }
+
+    fn entry(&self, entry_id: u64) -> Option<ObjectEntry> {
+        self.0.entry(entry_id).cloned().map(ObjectEntry)
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.entries().len()
+    }
+}
+
+/// The arrays of one view, as Python lends them.
+struct ViewArrays<'py> {
+    depth_m: PyReadonlyArray2<'py, f32>,
+    masks: PyReadonlyArray2<'py, i32>,
+    labels: Vec<String>,
+    confidences: PyReadonlyArray1<'py, f32>,
+    features: Option<PyReadonlyArray2<'py, f32>>,
+}
+
+/// The same as slices, which may leave the interpreter.
+struct ViewSlices<'a> {
+    camera: Camera,
+    depth_m: &'a [f32],
+    masks: &'a [i32],
+    labels: &'a [String],
+    confidences: &'a [f32],
+    features: &'a [f32],
+}
+
+impl ViewArrays<'_> {
+    /// The image is as large as `masks`.
+    fn view(&self, pose: Pose, vertical_fov_rad: f64) -> PyResult<ViewSlices<'_>> {
+        let (masks, [height_px, width_px]) = arrays::row_major("masks", &self.masks)?;
+        let features = match &self.features {
+            Some(features) => arrays::row_major("features", features)?.0,
+            None => &[],
+        };
+        let height_m = pose.position_m[1];
+        Ok(ViewSlices {
+            camera: Camera::at(&pose, [width_px, height_px], vertical_fov_rad, height_m),
+            depth_m: arrays::row_major("depth_m", &self.depth_m)?.0,
+            masks,
+            labels: &self.labels,
+            confidences: self.confidences.as_slice()?,
+            features,
+        })
+    }
+}
+
+impl ViewSlices<'_> {
+    fn borrow(&self) -> DetectedView<'_> {
+        let image =
+            MaskedDepth { camera: &self.camera, depth_m: self.depth_m, masks: self.masks };
+        DetectedView {
+            image,
+            labels: self.labels,
+            confidences: self.confidences,
+            features: self.features,
+        }
+    }
+}
