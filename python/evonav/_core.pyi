@@ -209,6 +209,114 @@ class OccupancyMap:
     @property
     def explored(self) -> NDArray[np.bool_]: ...
 
+@final
+class ObjectEntry:
+    """An object entry as it was when asked for."""
+
+    @property
+    def id(self) -> int:
+        """Counts up from 1."""
+
+    @property
+    def label(self) -> str:
+        """The label of most detections."""
+
+    @property
+    def label_counts(self) -> list[tuple[str, int]]:
+        """Detections by label, in the order in which the labels came."""
+
+    @property
+    def num_detections(self) -> int:
+        """Detections that joined the entry."""
+
+    @property
+    def confidence(self) -> float:
+        """Largest confidence of a detection."""
+
+    @property
+    def centre_m(self) -> tuple[float, float, float]:
+        """Middle of the box around the points."""
+
+    @property
+    def size_m(self) -> tuple[float, float, float]:
+        """Edges of the box around the points."""
+
+    @property
+    def num_points(self) -> int:
+        """Points of the cloud."""
+
+    @property
+    def feature(self) -> NDArray[np.float32] | None:
+        """`(D,)` unit mean of the detections' features."""
+
+    @property
+    def first_seen_stage(self) -> int:
+        """Stage of the first detection."""
+
+    @property
+    def last_seen_stage(self) -> int:
+        """Stage of the last detection."""
+
+    @property
+    def last_seen_view(self) -> int:
+        """View of the last detection, counted from 1 since the map began."""
+
+@final
+class ObjectMap:
+    def __new__(
+        cls,
+        *,
+        min_points: int,
+        max_points: int,
+        min_box_m3: float,
+        voxel_m: float,
+        cluster_radius_m: float,
+        cluster_min_points: int,
+        max_distance_m: float,
+        overlap_radius_m: float,
+        match_threshold: float,
+        views_per_cleanup: int,
+        min_detections: int,
+        merge_overlap: float,
+        merge_similarity: float,
+    ) -> ObjectMap: ...
+    def update(
+        self,
+        depth_m: NDArray[np.float32],
+        masks: NDArray[np.int32],
+        labels: list[str],
+        confidences: NDArray[np.float32],
+        features: NDArray[np.float32] | None,
+        *,
+        position_m: tuple[float, float, float],
+        yaw_rad: float,
+        horizon_rad: float,
+        vertical_fov_rad: float,
+    ) -> tuple[list[int | None], list[int], list[tuple[int, int]]]: ...
+    def compare(
+        self,
+        entry_id: int,
+        depth_m: NDArray[np.float32],
+        masks: NDArray[np.int32],
+        labels: list[str],
+        confidences: NDArray[np.float32],
+        features: NDArray[np.float32] | None,
+        *,
+        position_m: tuple[float, float, float],
+        yaw_rad: float,
+        horizon_rad: float,
+        vertical_fov_rad: float,
+    ) -> NDArray[np.float64]: ...
+    def begin_stage(self, stage: int) -> None: ...
+    def remove(self, entry_id: int) -> bool: ...
+    def clear(self) -> None: ...
+    def entry(self, entry_id: int) -> ObjectEntry | None: ...
+    def points_m(self, entry_id: int) -> NDArray[np.float32] | None: ...
+    def __len__(self) -> int: ...
+    @property
+    def num_views(self) -> int: ...
+    @property
+    def entries(self) -> list[ObjectEntry]: ...
 # simulator
 
 @final

@@ -46,6 +46,8 @@ class View:
     occupancy: VisibleOccupancy
     rgb: NDArray[np.uint8] | None = None
     """`(H, W, 3)`; `None` when the agent declared that it needs none."""
+    camera_height_m: float = 1.575
+    """Of the optical centre over the floor (y = 0); the pose's own height is the body's."""
 
 
 @dataclass(frozen=True, slots=True)

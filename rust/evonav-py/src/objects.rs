@@ -1,6 +1,7 @@
 //! `evonav_core::memory::objects`. Shapes, units and errors: `_core.pyi`.
 
 use evonav_core::{
+    Error,
     geometry::Pose,
     memory::{
         entry::Entry,
@@ -14,74 +15,38 @@ use pyo3::prelude::*;
 use crate::{arrays, error};
 
 /// An object entry as it was when asked for.
-#[pyclass(frozen, module = "evonav._core")]
-pub struct ObjectEntry(Entry);
+#[pyclass(frozen, get_all, module = "evonav._core")]
+pub struct ObjectEntry {
+    id: u64,
+    label: String,
+    label_counts: Vec<(String, u32)>,
+    num_detections: u32,
+    confidence: f32,
+    centre_m: (f64, f64, f64),
+    size_m: (f64, f64, f64),
+    num_points: usize,
+    feature: Option<Py<PyArray1<f32>>>,
+    first_seen_stage: u32,
+    last_seen_stage: u32,
+    last_seen_view: u64,
+}
 
-#[pymethods]
 impl ObjectEntry {
-    #[getter]
-    fn id(&self) -> u64 {
-        self.0.id
-    }
-
-    #[getter]
-    fn label(&self) -> &str {
-        self.0.label()
-    }
-
-    #[getter]
-    fn label_counts(&self) -> Vec<(String, u32)> {
-        self.0.label_counts.clone()
-    }
-
-    #[getter]
-    fn num_detections(&self) -> u32 {
-        self.0.num_detections
-    }
-
-    #[getter]
-    fn confidence(&self) -> f32 {
-        self.0.confidence
-    }
-
-    #[getter]
-    fn centre_m(&self) -> (f64, f64, f64) {
-        self.0.centre_m().into()
-    }
-
-    #[getter]
-    fn size_m(&self) -> (f64, f64, f64) {
-        self.0.size_m().into()
-    }
-
-    #[getter]
-    fn num_points(&self) -> usize {
-        self.0.cloud.points().len()
-    }
-
-    #[getter]
-    fn points_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        arrays::rows_of(py, self.0.cloud.points().to_vec())
-    }
-
-    #[getter]
-    fn feature<'py>(&self, py: Python<'py>) -> Option<Bound<'py, PyArray1<f32>>> {
-        self.0.feature.as_ref().map(|feature| PyArray1::from_slice(py, feature))
-    }
-
-    #[getter]
-    fn first_seen_stage(&self) -> u32 {
-        self.0.first_seen_stage
-    }
-
-    #[getter]
-    fn last_seen_stage(&self) -> u32 {
-        self.0.last_seen_stage
-    }
-
-    #[getter]
-    fn last_seen_view(&self) -> u64 {
-        self.0.last_seen_view
+    fn new(py: Python<'_>, entry: &Entry) -> Self {
+        Self {
+            id: entry.id,
+            label: entry.label().to_owned(),
+            label_counts: entry.label_counts.clone(),
+            num_detections: entry.num_detections,
+            confidence: entry.confidence,
+            centre_m: entry.centre_m().into(),
+            size_m: entry.size_m().into(),
+            num_points: entry.cloud.points().len(),
+            feature: entry.feature.as_ref().map(|f| PyArray1::from_slice(py, f).unbind()),
+            first_seen_stage: entry.first_seen_stage,
+            last_seen_stage: entry.last_seen_stage,
+            last_seen_view: entry.last_seen_view,
+        }
     }
 }
 
@@ -181,8 +146,7 @@ impl ObjectMap {
         let pose = Pose { position_m, yaw_rad, horizon_rad };
         let arrays = ViewArrays { depth_m, masks, labels, confidences, features };
         let view = arrays.view(pose, vertical_fov_rad)?;
-        let found =
-            py.detach(|| self.0.compare(entry_id, &view.borrow())).map_err(error::to_py)?;
+        let found = py.detach(|| self.0.compare(entry_id, &view.borrow())).map_err(error::to_py)?;
         arrays::rows_of(py, found.into_iter().map(|c| [c.overlap, c.distance_m]).collect())
     }
 
@@ -204,12 +168,21 @@ impl ObjectMap {
     }
 
     #[getter]
-    fn entries(&self) -> Vec<ObjectEntry> {
-        self.0.entries().iter().cloned().map(ObjectEntry).collect()
+    fn entries(&self, py: Python<'_>) -> Vec<ObjectEntry> {
+        self.0.entries().iter().map(|entry| ObjectEntry::new(py, entry)).collect()
     }
 
-    fn entry(&self, entry_id: u64) -> Option<ObjectEntry> {
-        self.0.entry(entry_id).cloned().map(ObjectEntry)
+    fn entry(&self, py: Python<'_>, entry_id: u64) -> Option<ObjectEntry> {
+        self.0.entry(entry_id).map(|entry| ObjectEntry::new(py, entry))
+    }
+
+    fn points_m<'py>(
+        &self,
+        py: Python<'py>,
+        entry_id: u64,
+    ) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
+        let entry = self.0.entry(entry_id);
+        entry.map(|entry| arrays::rows_of(py, entry.cloud.points().to_vec())).transpose()
     }
 
     fn __len__(&self) -> usize {
@@ -240,14 +213,22 @@ impl ViewArrays<'_> {
     /// The image is as large as `masks`.
     fn view(&self, pose: Pose, vertical_fov_rad: f64) -> PyResult<ViewSlices<'_>> {
         let (masks, [height_px, width_px]) = arrays::row_major("masks", &self.masks)?;
-        let features = match &self.features {
-            Some(features) => arrays::row_major("features", features)?.0,
-            None => &[],
+        let (depth_m, depth_shape) = arrays::row_major("depth_m", &self.depth_m)?;
+        let expected = "as many rows as `masks`";
+        Error::require("depth_m", depth_shape[0], expected, |n| n == height_px)
+            .map_err(error::to_py)?;
+        let (features, num_features) = match &self.features {
+            Some(features) => {
+                arrays::row_major("features", features).map(|(values, shape)| (values, shape[0]))?
+            }
+            None => (&[][..], self.labels.len()),
         };
+        Error::require("features", num_features, "a row a label", |n| n == self.labels.len())
+            .map_err(error::to_py)?;
         let height_m = pose.position_m[1];
         Ok(ViewSlices {
             camera: Camera::at(&pose, [width_px, height_px], vertical_fov_rad, height_m),
-            depth_m: arrays::row_major("depth_m", &self.depth_m)?.0,
+            depth_m,
             masks,
             labels: &self.labels,
             confidences: self.confidences.as_slice()?,
@@ -258,8 +239,7 @@ impl ViewArrays<'_> {
 
 impl ViewSlices<'_> {
     fn borrow(&self) -> DetectedView<'_> {
-        let image =
-            MaskedDepth { camera: &self.camera, depth_m: self.depth_m, masks: self.masks };
+        let image = MaskedDepth { camera: &self.camera, depth_m: self.depth_m, masks: self.masks };
         DetectedView {
             image,
             labels: self.labels,

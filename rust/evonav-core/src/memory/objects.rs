@@ -346,7 +346,8 @@ impl ObjectMap {
         let mut pairs = Vec::new();
         for (i, a) in self.entries.iter().enumerate() {
             for (j, b) in self.entries.iter().enumerate() {
-                let is_alike = || a.similarity(&b.label(), b.feature.as_deref()) > config.merge_similarity;
+                let is_alike =
+                    || a.similarity(b.label(), b.feature.as_deref()) > config.merge_similarity;
                 if i != j && a.is_beside(&b.cloud, &config) && is_alike() {
                     let overlap = b.cloud.overlap(a.cloud.points());
                     if overlap > config.merge_overlap {
@@ -390,7 +391,8 @@ fn clean_cloud(points: &[Point], config: &ObjectMapConfig) -> Option<Cloud> {
         .unwrap_or(filtered);
     let cloud = Cloud::new(&cluster, config.voxel_m, config.overlap_radius_m as f32);
     // A picture seen from the front is a plane; as a set of voxels it has a volume all the same.
-    let volume_m3: f64 = cloud.bounds_m().size_m().iter().map(|edge| edge.max(config.voxel_m)).product();
+    let volume_m3: f64 =
+        cloud.bounds_m().size_m().iter().map(|edge| edge.max(config.voxel_m)).product();
     (volume_m3 >= config.min_box_m3).then_some(cloud)
 }
 

@@ -48,12 +48,13 @@ pub fn unproject_masks(
     for (&mask, &depth) in masks.iter().zip(depth_m) {
         Error::require("depth_m", depth, "not NaN", |d| !d.is_nan())?;
         let Ok(detection) = usize::try_from(mask) else { continue };
-        let count = num_px.get_mut(detection).ok_or_else(|| {
-            Error::invalid("masks", mask, "negative or the index of a detection")
-        })?;
+        let count = num_px
+            .get_mut(detection)
+            .ok_or_else(|| Error::invalid("masks", mask, "negative or the index of a detection"))?;
         *count += usize::from(has_depth(depth));
     }
-    let strides: Vec<usize> = num_px.iter().map(|n: &usize| n.div_ceil(max_points).max(1)).collect();
+    let strides: Vec<usize> =
+        num_px.iter().map(|n: &usize| n.div_ceil(max_points).max(1)).collect();
     let mut clouds: Vec<Vec<Point>> = num_px
         .iter()
         .zip(&strides)

@@ -1,0 +1,434 @@
+//! The object memory, piece by piece and as a whole, against plain quadratic twins.
+
+use std::collections::BTreeMap;
+
+use evonav_core::{
+    memory::{
+        cloud::Cloud,
+        dbscan::dbscan,
+        objects::{DetectedView, ObjectMap, ObjectMapConfig, Update},
+        voxels::voxel_filter,
+    },
+    sensors::{
+        camera::Camera,
+        unproject::{MaskedDepth, Point, unproject_masks},
+    },
+};
+use proptest::{collection::vec, prelude::*};
+
+fn distance2(a: Point, b: Point) -> f32 {
+    let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    x * x + y * y + z * z
+}
+
+fn unproject_naive(image: MaskedDepth<'_>, num: usize, max_points: usize) -> Vec<Vec<Point>> {
+    let of_mask = |mask: usize| {
+        let pixels: Vec<usize> = (0..image.masks.len())
+            .filter(|&i| image.masks[i] == mask as i32)
+            .filter(|&i| image.depth_m[i].is_finite() && image.depth_m[i] > 0.0)
+            .collect();
+        let stride = pixels.len().div_ceil(max_points).max(1);
+        let point = |&i: &usize| {
+            let (row, col) = (i / image.camera.width_px, i % image.camera.width_px);
+            let uv = [col as f64 + 0.5, row as f64 + 0.5];
+            image.camera.unproject(uv, f64::from(image.depth_m[i])).map(|v| v as f32)
+        };
+        pixels.iter().step_by(stride).map(point).collect()
+    };
+    (0..num).map(of_mask).collect()
+}
+
+fn voxel_filter_naive(points: &[Point], edge_m: f64) -> Vec<Point> {
+    let voxel = |p: &Point| p.map(|v| (f64::from(v) / edge_m).floor() as i64);
+    let mut groups: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
+    points.iter().enumerate().for_each(|(i, p)| groups.entry(voxel(p)).or_default().push(i));
+    let mut groups: Vec<Vec<usize>> = groups.into_values().collect();
+    groups.sort();
+    let mean = |group: &Vec<usize>| {
+        let sum = |axis: usize| group.iter().map(|&i| f64::from(points[i][axis])).sum::<f64>();
+        [0, 1, 2].map(|axis| (sum(axis) / group.len() as f64) as f32)
+    };
+    groups.iter().map(mean).collect()
+}
+
+/// The textbook: grow clusters from core points in the order of the points.
+fn dbscan_naive(points: &[Point], radius: f32, min_points: usize) -> Vec<i32> {
+    let near = |i: usize| -> Vec<usize> {
+        (0..points.len()).filter(|&j| distance2(points[i], points[j]) <= radius * radius).collect()
+    };
+    let mut labels = vec![-1; points.len()];
+    let mut num = 0;
+    for start in 0..points.len() {
+        if labels[start] != -1 || near(start).len() < min_points {
+            continue;
+        }
+        labels[start] = num;
+        let mut queue = vec![start];
+        while let Some(i) = queue.pop() {
+            let around = near(i);
+            if around.len() >= min_points {
+                for j in around {
+                    if labels[j] == -1 {
+                        labels[j] = num;
+                        queue.push(j);
+                    }
+                }
+            }
+        }
+        num += 1;
+    }
+    labels
+}
+
+fn overlap_naive(points: &[Point], others: &[Point], radius: f32) -> f64 {
+    let has_near = |p: &&Point| others.iter().any(|q| distance2(**p, *q) < radius * radius);
+    points.iter().filter(has_near).count() as f64 / points.len().max(1) as f64
+}
+
+fn point() -> impl Strategy<Value = Point> {
+    [-0.4_f32..0.4, -0.4_f32..0.4, -0.4_f32..0.4]
+}
+
+/// Points in clumps, so that there are clusters, borders and noise.
+fn points() -> impl Strategy<Value = Vec<Point>> {
+    let clump = (point(), vec([-0.12_f32..0.12, -0.12_f32..0.12, -0.12_f32..0.12], 1..25));
+    vec(clump, 0..6).prop_map(|clumps| {
+        let around = |(centre, offsets): (Point, Vec<Point>)| {
+            offsets.into_iter().map(move |o| [0, 1, 2].map(|i| centre[i] + o[i]))
+        };
+        clumps.into_iter().flat_map(around).collect()
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..Default::default() })]
+
+    #[test]
+    fn clusters_are_those_of_the_textbook(
+        points in points(),
+        radius in 0.03_f32..0.2,
+        min_points in 1_usize..12,
+    ) {
+        prop_assert_eq!(dbscan(&points, radius, min_points), dbscan_naive(&points, radius, min_points));
+    }
+
+    #[test]
+    fn the_voxel_filter_averages_what_shares_a_voxel(points in points(), edge_m in 0.01..0.3) {
+        prop_assert_eq!(voxel_filter(&points, edge_m), voxel_filter_naive(&points, edge_m));
+    }
+
+    #[test]
+    fn overlap_counts_the_points_with_a_near_one(
+        points in points(), others in points(), more in points(), radius in 0.01_f32..0.2,
+    ) {
+        let mut cloud = Cloud::new(&others, 1e-4, radius);
+        cloud.merge(&more);
+        let kept = cloud.points().to_vec();
+        prop_assert!(kept.len() <= others.len() + more.len());
+        prop_assert_eq!(cloud.overlap(&points), overlap_naive(&points, &kept, radius));
+    }
+}
+
+/// Boxes `(centre, size, label)` seen by a camera: depth and masks, box by box and pixel by pixel.
+type SolidBox = ([f64; 3], [f64; 3], &'static str);
+
+const SIDE_PX: usize = 48;
+
+fn look(boxes: &[SolidBox], camera: &Camera) -> (Vec<f32>, Vec<i32>) {
+    let cast = |i: usize| {
+        let ray = camera.ray([(i % SIDE_PX) as f64 + 0.5, (i / SIDE_PX) as f64 + 0.5]);
+        let hit = |(centre, size, _): &SolidBox| {
+            let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+            for axis in 0..3 {
+                let middle = centre[axis] - camera.position_m[axis];
+                let (a, b) = (
+                    (middle - size[axis] / 2.0) / ray[axis],
+                    (middle + size[axis] / 2.0) / ray[axis],
+                );
+                (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+            }
+            (enter < leave && enter > 0.0).then_some(enter)
+        };
+        let hits = boxes.iter().enumerate().filter_map(|(k, b)| Some((hit(b)?, k)));
+        let nearest = hits.min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.map_or((f32::INFINITY, -1), |(depth, k)| (depth as f32, k as i32))
+    };
+    (0..SIDE_PX * SIDE_PX).map(cast).unzip()
+}
+
+fn camera(x: f64, z: f64, yaw_rad: f64) -> Camera {
+    Camera {
+        width_px: SIDE_PX,
+        height_px: SIDE_PX,
+        vertical_fov_rad: 1.5,
+        position_m: [x, 1.5, z],
+        yaw_rad,
+        horizon_rad: 0.4,
+    }
+}
+
+/// The same pipeline with nothing clever in it; entries are `(id, label counts, points)`.
+struct NaiveMap {
+    config: ObjectMapConfig,
+    entries: Vec<(u64, BTreeMap<String, u32>, Vec<Point>)>,
+    next_id: u64,
+}
+
+impl NaiveMap {
+    fn clean(&self, points: &[Point]) -> Option<Vec<Point>> {
+        if points.len() < self.config.min_points {
+            return None;
+        }
+        let points = voxel_filter_naive(points, self.config.voxel_m);
+        let labels = dbscan_naive(
+            &points,
+            self.config.cluster_radius_m as f32,
+            self.config.cluster_min_points,
+        );
+        let size = |k: i32| labels.iter().filter(|&&label| label == k).count();
+        let num = labels.iter().max().map_or(0, |k| k + 1);
+        let best = (0..num).rev().max_by_key(|&k| size(k));
+        let cluster: Vec<Point> = points
+            .iter()
+            .zip(&labels)
+            .filter(|(_, k)| Some(**k) == best)
+            .map(|(p, _)| *p)
+            .collect();
+        Some(first_of_voxels(
+            if cluster.len() >= 5 { &cluster } else { &points },
+            self.config.voxel_m,
+        ))
+    }
+
+    fn update(&mut self, view: &DetectedView<'_>) -> Vec<Option<u64>> {
+        let radius = self.config.overlap_radius_m as f32;
+        let camera_m = view.image.camera.position_m;
+        let before = self.entries.clone();
+        let clouds = unproject_naive(view.image, view.labels.len(), self.config.max_points);
+        let mut ids = Vec::new();
+        for (label, cloud) in view.labels.iter().zip(clouds) {
+            let Some(cloud) = self.clean(&cloud) else {
+                ids.push(None);
+                continue;
+            };
+            let middle = |axis: usize| {
+                let values = || cloud.iter().map(|p| f64::from(p[axis]));
+                (values().fold(f64::INFINITY, f64::min)
+                    + values().fold(f64::NEG_INFINITY, f64::max))
+                    / 2.0
+            };
+            if (middle(0) - camera_m[0]).hypot(middle(2) - camera_m[2]) > self.config.max_distance_m
+            {
+                ids.push(None);
+                continue;
+            }
+            let score = |(_, counts, points): &(u64, BTreeMap<String, u32>, Vec<Point>)| {
+                let most = counts.values().max();
+                // Scenes here never give an entry two labels of equal count.
+                let same = counts.get(label) == most;
+                overlap_naive(&cloud, points, radius) + f64::from(u8::from(same))
+            };
+            let mut best = (self.config.match_threshold, None);
+            for (i, entry) in before.iter().enumerate() {
+                if score(entry) > best.0 {
+                    best = (score(entry), Some(i));
+                }
+            }
+            let index = best.1.unwrap_or_else(|| {
+                self.entries.push((self.next_id, BTreeMap::new(), Vec::new()));
+                self.next_id += 1;
+                self.entries.len() - 1
+            });
+            let (id, counts, points) = &mut self.entries[index];
+            *counts.entry(label.clone()).or_default() += 1;
+            points.extend(cloud);
+            *points = first_of_voxels(points, self.config.voxel_m);
+            ids.push(Some(*id));
+        }
+        ids
+    }
+}
+
+fn first_of_voxels(points: &[Point], edge_m: f64) -> Vec<Point> {
+    let mut seen = std::collections::BTreeSet::new();
+    let voxel = |p: &Point| p.map(|v| (f64::from(v) / edge_m).floor() as i64);
+    points.iter().filter(|p| seen.insert(voxel(p))).copied().collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..Default::default() })]
+
+    #[test]
+    fn views_of_random_rooms_give_the_entries_of_the_plain_pipeline(
+        boxes in vec(([-1.5..1.5, 0.2..1.2, 1.0..3.5], [0.05..0.6, 0.05..0.6, 0.05..0.6], 0..3_usize), 1..7),
+        cameras in vec((-0.6..0.6, -0.6..0.4, -0.5..0.5), 1..5),
+        voxel_m in 0.008..0.03,
+    ) {
+        let boxes: Vec<SolidBox> =
+            boxes.into_iter().map(|(c, s, k)| (c, s, ["Chair", "Mug", "Bed"][k])).collect();
+        let labels: Vec<String> = boxes.iter().map(|b| b.2.to_owned()).collect();
+        let config = ObjectMapConfig { voxel_m, views_per_cleanup: 0, ..Default::default() };
+        let mut map = ObjectMap::new(config).unwrap();
+        let mut naive = NaiveMap { config, entries: Vec::new(), next_id: 1 };
+        for (x, z, yaw_rad) in cameras {
+            let camera = camera(x, z, yaw_rad);
+            let (depth_m, masks) = look(&boxes, &camera);
+            let image = MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks };
+            let view = DetectedView {
+                image, labels: &labels, confidences: &vec![1.0; labels.len()], features: &[],
+            };
+            prop_assert_eq!(map.update(&view).unwrap().entry_ids, naive.update(&view));
+            for (entry, (id, _, points)) in map.entries().iter().zip(&naive.entries) {
+                prop_assert_eq!(entry.id, *id);
+                prop_assert_eq!(entry.cloud.points(), points);
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_unproject_to_where_the_camera_says(
+        max_points in 1_usize..3000, x in -1.0..1.0, yaw_rad in -9.0..9.0,
+    ) {
+        let boxes = [([x, 1.0, 2.0], [1.0; 3], "Bed"), ([-0.5, 0.5, 1.2], [0.3; 3], "Mug")];
+        let camera = camera(x, 0.0, yaw_rad);
+        let (depth_m, masks) = look(&boxes, &camera);
+        let image = MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks };
+        let clouds = unproject_masks(image, 2, max_points).unwrap();
+        let naive = unproject_naive(image, 2, max_points);
+        prop_assert_eq!(clouds.iter().map(Vec::len).collect::<Vec<_>>(), naive.iter().map(Vec::len).collect::<Vec<_>>());
+        for (a, b) in clouds.iter().flatten().zip(naive.iter().flatten()) {
+            prop_assert!(distance2(*a, *b) < 1e-10, "{a:?} {b:?}");
+        }
+    }
+}
+
+fn see(map: &mut ObjectMap, boxes: &[SolidBox], camera: &Camera) -> Update {
+    let labels: Vec<String> = boxes.iter().map(|b| b.2.to_owned()).collect();
+    let (depth_m, masks) = look(boxes, camera);
+    let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
+    let confidences = vec![1.0; labels.len()];
+    map.update(&DetectedView { image, labels: &labels, confidences: &confidences, features: &[] })
+        .unwrap()
+}
+
+const SOFA: SolidBox = ([0.0, 0.5, 2.0], [1.0, 0.6, 0.5], "Sofa");
+
+#[test]
+fn a_moved_object_becomes_a_new_entry_and_the_old_one_goes_stale_until_removed() {
+    let mut map = ObjectMap::new(ObjectMapConfig::default()).unwrap();
+    let camera = camera(0.0, 0.0, 0.0);
+    assert_eq!(see(&mut map, &[SOFA], &camera).entry_ids, [Some(1)]);
+    assert_eq!(see(&mut map, &[SOFA], &camera).entry_ids, [Some(1)]);
+    map.begin_stage(2);
+    let moved = ([-1.2, 0.5, 2.5], SOFA.1, SOFA.2);
+    assert_eq!(see(&mut map, &[moved], &camera).entry_ids, [Some(2)]);
+    let old = map.entry(1).unwrap();
+    assert_eq!((old.num_detections, old.first_seen_stage, old.last_seen_stage), (2, 1, 1));
+    assert!((old.centre_m()[0] - 0.0).abs() < 0.05 && old.label() == "Sofa");
+    assert!(map.remove(1) && !map.remove(1) && map.entry(1).is_none());
+    assert_eq!(see(&mut map, &[SOFA], &camera).entry_ids, [Some(3)]);
+    map.clear();
+    assert_eq!(see(&mut map, &[SOFA], &camera).entry_ids, [Some(1)]);
+}
+
+#[test]
+fn compare_tells_an_object_still_there_from_one_gone() {
+    let mut map = ObjectMap::new(ObjectMapConfig::default()).unwrap();
+    let camera = camera(0.0, 0.0, 0.0);
+    see(&mut map, &[SOFA], &camera);
+    let compare = |boxes: &[SolidBox]| {
+        let labels: Vec<String> = boxes.iter().map(|b| b.2.to_owned()).collect();
+        let (depth_m, masks) = look(boxes, &camera);
+        let image = MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks };
+        let confidences = vec![1.0; labels.len()];
+        let view =
+            DetectedView { image, labels: &labels, confidences: &confidences, features: &[] };
+        map.compare(1, &view).unwrap()[0]
+    };
+    let here = compare(&[SOFA]);
+    assert!(here.overlap > 0.99 && here.distance_m < 0.5, "{here:?}");
+    let gone = compare(&[([-1.2, 0.5, 2.9], SOFA.1, SOFA.2)]);
+    assert!(gone.overlap < 0.01 && gone.distance_m > 0.9, "{gone:?}");
+}
+
+#[test]
+fn a_clean_up_merges_the_pieces_of_an_object_and_drops_far_single_sightings() {
+    let config = ObjectMapConfig { views_per_cleanup: 5, ..Default::default() };
+    let mut map = ObjectMap::new(config).unwrap();
+    // Two ends of a bed are seen first, too far apart to be taken for one, and a dresser once.
+    let end = |x: f64| ([x, 0.5, 2.0], [0.3, 0.3, 0.3], "Bed");
+    let first = see(
+        &mut map,
+        &[end(-0.4), end(0.4), ([0.9, 1.0, 3.0], [0.8; 3], "Dresser")],
+        &camera(0.0, 0.0, 0.0),
+    );
+    assert_eq!(first.entry_ids, [Some(1), Some(2), Some(3)]);
+    let whole = ([0.0, 0.5, 2.0], [1.1, 0.3, 0.3], "Bed");
+    for _ in 0..3 {
+        see(&mut map, &[whole], &camera(0.0, 0.0, 0.0));
+    }
+    let last = see(&mut map, &[whole], &camera(0.0, -0.9, 0.0));
+    assert_eq!(last.removed, [3], "{last:?}");
+    assert_eq!(map.entries().len(), 1);
+    assert_eq!(last.merged.len(), 1);
+    assert_eq!(last.entry_ids, [Some(map.entries()[0].id)]);
+    assert_eq!(map.entries()[0].num_detections, 6);
+}
+
+#[test]
+fn features_decide_where_there_are_any() {
+    let mut map = ObjectMap::new(ObjectMapConfig::default()).unwrap();
+    let camera = camera(0.0, 0.0, 0.0);
+    let (depth_m, masks) = look(&[SOFA], &camera);
+    let image = MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks };
+    let mut see = |label: &str, feature: [f32; 2]| {
+        let view = DetectedView {
+            image,
+            labels: &[label.to_owned()],
+            confidences: &[0.5],
+            features: &feature,
+        };
+        map.update(&view).unwrap().entry_ids[0]
+    };
+    assert_eq!(see("Sofa", [1.0, 0.0]), Some(1));
+    assert_eq!(see("ArmChair", [0.8, 0.6]), Some(1)); // overlap 1 + cosine 0.8
+    assert_eq!(see("Sofa", [-0.6, 0.8]), Some(2)); // the same place, another look
+    let feature = map.entry(1).unwrap().feature.clone().unwrap();
+    assert!((feature[0].hypot(feature[1]) - 1.0).abs() < 1e-6 && feature[1] > 0.3);
+}
+
+#[test]
+fn arguments_that_do_not_fit_are_named_and_change_nothing() {
+    let mut map = ObjectMap::new(ObjectMapConfig::default()).unwrap();
+    let camera = camera(0.0, 0.0, 0.0);
+    let (depth_m, masks) = look(&[SOFA], &camera);
+    let labels = ["Sofa".to_owned()];
+    let good = DetectedView {
+        image: MaskedDepth { camera: &camera, depth_m: &depth_m, masks: &masks },
+        labels: &labels,
+        confidences: &[1.0],
+        features: &[],
+    };
+    let mut fails = |view: &DetectedView<'_>, name: &str| {
+        let message = map.update(view).unwrap_err().to_string();
+        assert!(message.contains(&format!("`{name}`")), "{message}");
+        assert_eq!(map.num_views(), 0);
+    };
+    let nan = vec![f32::NAN; depth_m.len()];
+    let with = |depth_m, masks| DetectedView {
+        image: MaskedDepth { camera: &camera, depth_m, masks },
+        ..good
+    };
+    fails(&with(&nan, &masks), "depth_m");
+    fails(&with(&depth_m[1..], &masks), "depth_m");
+    fails(&with(&depth_m, &vec![1; masks.len()]), "masks");
+    fails(&DetectedView { confidences: &[], ..good }, "confidences");
+    fails(&DetectedView { confidences: &[f32::NAN], ..good }, "confidences");
+    fails(&DetectedView { features: &[f32::INFINITY], ..good }, "features");
+    let view_of = |name: &str, config| {
+        let message = ObjectMap::new(config).unwrap_err().to_string();
+        assert!(message.contains(name), "{message}");
+    };
+    view_of("voxel_m", ObjectMapConfig { voxel_m: 0.0, ..Default::default() });
+    view_of("match_threshold", ObjectMapConfig { match_threshold: f64::NAN, ..Default::default() });
+}
