@@ -86,6 +86,7 @@ class PairedDifference:
     a: str
     b: str
     n: int
+    num_tasks: int
     sr: float
     sr_ci95: Interval
     spl: float
@@ -200,6 +201,7 @@ def paired_differences(records_by_agent: dict[str, list[StageRecord]]) -> list[P
                     a=a,
                     b=b,
                     n=len(keys),
+                    num_tasks=len({task_id for task_id, _ in keys}),
                     sr=sr,
                     sr_ci95=_interval(ends[0]),
                     spl=spl,

@@ -1,0 +1,77 @@
+"""What the marks of a map mean, drawn by the code that draws the maps."""
+
+from markupsafe import Markup
+
+from evonav.report.svg import arrow_head, star
+
+_DASH = "stroke-dasharray:3 2"
+
+_ENTRIES = (
+    (
+        "path, from first round to last",
+        '<g class="path" stroke-width="5">'
+        + "".join(f'<path class="t{i}" d="M{4 + 5 * i} 12h5"/>' for i in range(10))
+        + f'<g class="t6"><path class="head" d="{arrow_head((38, 12), (1, 0), 12)}"/></g></g>',
+        58,
+    ),
+    ("start", '<circle class="start" cx="12" cy="12" r="6" stroke-width="3"/>', 24),
+    (
+        "end, success",
+        '<g class="end ok" stroke-width="2.4"><circle cx="12" cy="12" r="8"/><path d="M8 12.4L11 15.2L16 9.2"/></g>',
+        24,
+    ),
+    (
+        "end, no success",
+        '<g class="end bad" stroke-width="2.4"><circle cx="12" cy="12" r="8"/><path d="M9 9l6 6m0-6l-6 6"/></g>',
+        24,
+    ),
+    ("target", f'<path class="star" stroke-width="1.4" d="{star((12, 12), 10)}"/>', 24),
+    ("where it stood in stage 1", f'<path class="star old" stroke-width="1.4" d="{star((12, 12), 10)}"/>', 24),
+    (
+        "success radius",
+        '<circle class="ring" style="stroke-dasharray:4 3" cx="12" cy="12" r="9" stroke-width="1.6"/>',
+        24,
+    ),
+    (
+        "object moved before this stage",
+        f'<g class="ghost"><rect class="item" style="{_DASH}" x="2" y="6" width="12" height="12" stroke-width="1.4"/>'
+        "</g>"
+        '<g class="moved"><rect class="item" x="40" y="6" width="12" height="12" stroke-width="1.4"/></g>'
+        '<g class="arrow" stroke-width="2"><path d="M10 12h22"/>'
+        f'<path class="head" d="{arrow_head((40, 12), (1, 0), 9)}"/></g>',
+        56,
+    ),
+    (
+        "stale entry of the goal's category",
+        '<g class="stale" stroke-width="1.8"><g class="goal">'
+        f'<rect style="{_DASH}" x="4" y="4" width="16" height="16"/>'
+        '<path d="M9 9l6 6m0-6l-6 6"/></g></g>',
+        24,
+    ),
+    (
+        "stale entry the agent went to",
+        '<g class="stale" stroke-width="1.8"><g class="visited"><rect x="4" y="4" width="16" height="16"/>'
+        '<path d="M9 9l6 6m0-6l-6 6"/></g></g>',
+        24,
+    ),
+    (
+        "other stale entry",
+        '<g class="stale" stroke-width="1.8"><g class="weak">'
+        f'<rect style="{_DASH}" x="7" y="7" width="10" height="10"/>'
+        "</g></g>",
+        24,
+    ),
+)
+
+
+def legend() -> Markup:
+    """The legend as HTML."""
+    items = [
+        Markup(
+            '<span class="key"><svg class="map" width="{}" height="24" viewBox="0 0 {} 24" aria-hidden="true">'
+        ).format(width, width)
+        + Markup(drawing)  # noqa: S704 - our own SVG
+        + Markup("</svg>{}</span>").format(words)
+        for words, drawing, width in _ENTRIES
+    ]
+    return Markup("").join(items)

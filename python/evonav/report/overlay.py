@@ -1,0 +1,278 @@
+"""What happened in a stage, drawn over its house: change, path in time, beliefs, start, end and target."""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+
+from evonav.evaluation.records import (
+    EndState,
+    EntryRecord,
+    ObjectFootprint,
+    Relocation,
+    RoundRecord,
+    StageMap,
+    StageRecord,
+)
+from evonav.report.plan import Frame, distance_m, furniture
+from evonav.report.svg import Point, arrow_head, cm, join, polyline, simplified, star, title
+from evonav.tasks.language import noun_of
+
+NUM_TIMES = 10
+"""Colours of the path, from the first round to the last: classes `t0` to `t9`."""
+ARROW_EVERY = 16.0
+"""Units of a frame between direction arrows."""
+CARRIED_GAP_M = 0.05
+"""How far outside of a moved object's footprint something that it carries may lie."""
+
+
+def stage_overlay(
+    record: StageRecord,
+    frame: Frame,
+    *,
+    stage_map: StageMap | None,
+    previous_map: StageMap | None,
+    success_radius_m: float,
+) -> str:
+    """All that one agent's stage adds to the map of its house."""
+    return (
+        change(record, frame, stage_map=stage_map, previous_map=previous_map)
+        + _ring(record, frame, success_radius_m)
+        + _path(record, frame)
+        + _stale_entries(record, frame)
+        + _target(record, frame)
+        + _ends(record, frame)
+    )
+
+
+def change(record: StageRecord, frame: Frame, *, stage_map: StageMap | None, previous_map: StageMap | None) -> str:
+    """Relocated objects: where they stood (dashed), where they stand (stressed), and an arrow between.
+
+    What was carried along on a moved piece of furniture is stressed too, but gets no arrow of its own.
+    """
+    relocations = record.transition.relocations
+    if not relocations:
+        return ""
+    names = {relocation.object_id for relocation in relocations}
+    now = _by_id(stage_map)
+    before = _by_id(previous_map)
+    ghosts = furniture([before[name] for name in sorted(names) if name in before], frame, "items ghost")
+    stressed = furniture([now[name] for name in sorted(names) if name in now], frame, "items moved")
+    arrows = join(
+        _relocation_arrow(relocation, frame)
+        for relocation in relocations
+        if not _is_carried(relocation, relocations, before, now)
+    )
+    return f'<g class="change">{ghosts}{stressed}<g stroke-width="{0.55 * frame.unit:.1f}">{arrows}</g></g>'
+
+
+def rounds(trace: Sequence[RoundRecord]) -> list[str]:
+    """Decision rounds in words, runs of the same choice together: `frontier 3 x4`."""
+    runs: list[tuple[str, int]] = []
+    for entry in trace:
+        choice = _choice(entry)
+        if runs and runs[-1][0] == choice:
+            runs[-1] = (choice, runs[-1][1] + 1)
+        else:
+            runs.append((choice, 1))
+    return [choice if count == 1 else f"{choice} ×{count}" for choice, count in runs]
+
+
+def _by_id(stage_map: StageMap | None) -> Mapping[str, ObjectFootprint]:
+    return {} if stage_map is None else {item.object_id: item for item in stage_map.objects}
+
+
+def _is_carried(
+    relocation: Relocation,
+    relocations: Sequence[Relocation],
+    before: Mapping[str, ObjectFootprint],
+    now: Mapping[str, ObjectFootprint],
+) -> bool:
+    """Whether it lay on (or in) a larger moved object and still does."""
+    own = now.get(relocation.object_id)
+    if own is None:
+        return False
+    area_m2 = own.size_m[0] * own.size_m[2]
+    for other in relocations:
+        old, new = before.get(other.object_id), now.get(other.object_id)
+        if other.object_id == relocation.object_id or old is None or new is None:
+            continue
+        is_larger = new.size_m[0] * new.size_m[2] > area_m2
+        if is_larger and _is_over(relocation.from_m, old) and _is_over(relocation.to_m, new):
+            return True
+    return False
+
+
+def _is_over(point_m: Sequence[float], item: ObjectFootprint) -> bool:
+    return (
+        abs(point_m[0] - item.centre_m[0]) <= item.size_m[0] / 2 + CARRIED_GAP_M
+        and abs(point_m[2] - item.centre_m[2]) <= item.size_m[2] / 2 + CARRIED_GAP_M
+    )
+
+
+def _relocation_arrow(relocation: Relocation, frame: Frame) -> str:
+    start, end = cm(_ground(relocation.from_m)), cm(_ground(relocation.to_m))
+    u = frame.unit
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length = math.hypot(dx, dy)
+    words = f"{noun_of(relocation.category)}: moved {distance_m(relocation.from_m, relocation.to_m):.1f} m"
+    hint = title(words)
+    if length < 3 * u:
+        return f'<circle class="arrow" cx="{end[0]}" cy="{end[1]}" r="{1.4 * u:.0f}">{hint}</circle>'
+    # A curve, so that arrows to and fro do not hide each other.
+    bend = 0.14
+    middle = (start[0] + dx / 2 - dy * bend, start[1] + dy / 2 + dx * bend)
+    direction = (end[0] - middle[0], end[1] - middle[1])
+    scale = 1.8 * u / math.hypot(*direction)
+    neck = (end[0] - direction[0] * scale, end[1] - direction[1] * scale)
+    curve = f"M{start[0]} {start[1]}Q{middle[0]:.0f} {middle[1]:.0f} {neck[0]:.0f} {neck[1]:.0f}"
+    return (
+        f'<g class="arrow">{hint}<path d="{curve}"/><circle cx="{start[0]}" cy="{start[1]}" r="{0.7 * u:.0f}"/>'
+        f'<path class="head" d="{arrow_head(end, direction, 2.4 * u)}"/></g>'
+    )
+
+
+def _ring(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
+    x, y = cm(_ground(record.target.position_m))
+    radius_cm = round(100 * success_radius_m)
+    hint = title(f"success within {success_radius_m:g} m of the target")
+    width = f"{0.4 * frame.unit:.1f}"
+    return f'<circle class="ring" cx="{x}" cy="{y}" r="{radius_cm}" stroke-width="{width}">{hint}</circle>'
+
+
+def _target(record: StageRecord, frame: Frame) -> str:
+    u = frame.unit
+    target = record.target
+    centre = cm(_ground(target.position_m))
+    first = ""
+    if target.first_position_m is not None and distance_m(target.first_position_m, target.position_m) > 0.1:
+        old = cm(_ground(target.first_position_m))
+        hint = title(f"the target, {noun_of(target.category)}, stood here in stage 1")
+        first = f'<path class="star old" stroke-width="{0.35 * u:.1f}" d="{star(old, 2.4 * u)}">{hint}</path>'
+    hint = title(f"target: {noun_of(target.category)}")
+    return f'{first}<path class="star" stroke-width="{0.4 * u:.1f}" d="{star(centre, 2.9 * u)}">{hint}</path>'
+
+
+def _path(record: StageRecord, frame: Frame) -> str:
+    if not record.trace:
+        return ""
+    u = frame.unit
+    pieces = [simplified([cm(point) for point in entry.path_m]) for entry in record.trace]
+    whole = [point for piece in pieces for point in piece]
+    last = max(1, len(record.trace) - 1)
+    gone = 0.0
+    drawn = []
+    for entry, piece in zip(record.trace, pieces, strict=True):
+        arrow, gone = _direction_arrow(piece, gone, frame)
+        time = min(NUM_TIMES - 1, NUM_TIMES * entry.round // (last + 1))
+        yaw_deg = round(math.degrees(entry.pose.yaw_rad)) % 360
+        x, y = cm((entry.pose.x_m, entry.pose.z_m))
+        hint = title(f"round {entry.round + 1}: {_choice(entry)}")
+        head = f'<path class="head" d="{arrow}"/>' if arrow else ""
+        drawn.append(f'<g class="r t{time}" data-p="{x},{y},{yaw_deg}">{hint}<path d="{polyline(piece)}"/>{head}</g>')
+    return (
+        f'<path class="casing" stroke-width="{1.9 * u:.1f}" d="{polyline(whole)}"/>'
+        f'<g class="path" stroke-width="{0.95 * u:.1f}">{join(drawn)}</g>'
+    )
+
+
+def _direction_arrow(piece: Sequence[tuple[int, int]], gone: float, frame: Frame) -> tuple[str, float]:
+    """An arrow if this piece of the path reaches the next arrow's place, and the way gone since the last one."""
+    every = ARROW_EVERY * frame.unit
+    for a, b in itertools.pairwise(piece):
+        length = math.dist(a, b)
+        if gone + length >= every and length > 0.0:
+            t = max(0.0, every - gone) / length
+            size = 2.3 * frame.unit
+            direction = ((b[0] - a[0]) / length, (b[1] - a[1]) / length)
+            tip = (
+                a[0] + t * (b[0] - a[0]) + direction[0] * size / 2,
+                a[1] + t * (b[1] - a[1]) + direction[1] * size / 2,
+            )
+            rest = math.dist(b, piece[-1])
+            return arrow_head(tip, direction, size), (1 - t) * length + rest
+        gone += length
+    return "", gone
+
+
+def _ends(record: StageRecord, frame: Frame) -> str:
+    u = frame.unit
+    marks = []
+    if (start := record.effective_start) is not None:
+        x, y = cm((start.x_m, start.z_m))
+        hint = title(
+            "start" if not record.is_snapped else "start, moved here since the carried pose was no longer free"
+        )
+        size = f'r="{1.5 * u:.0f}" stroke-width="{0.7 * u:.1f}"'
+        marks.append(f'<circle class="start" cx="{x}" cy="{y}" {size}>{hint}</circle>')
+    if (end := record.terminal) is not None:
+        marks.append(_end_mark(cm((end.x_m, end.z_m)), record.state is EndState.SUCCESS, u))
+    elif record.state is EndState.ERRORED and record.trace:
+        last = record.trace[-1].path_m or ((record.trace[-1].pose.x_m, record.trace[-1].pose.z_m),)
+        marks.append(_end_mark(cm(last[-1]), is_success=False, unit=u))
+    return join(marks)
+
+
+def _end_mark(at: tuple[int, int], is_success: bool, unit: float) -> str:
+    x, y = at
+    r = 1.9 * unit
+    d = 0.8 * unit
+    if is_success:
+        sign = f"M{x - d:.0f} {y + 0.1 * d:.0f}L{x - 0.2 * d:.0f} {y + 0.8 * d:.0f}L{x + d:.0f} {y - 0.7 * d:.0f}"
+    else:
+        sign = _cross(x, y, 0.75 * d)
+    css = "end ok" if is_success else "end bad"
+    hint = title("ended here: success" if is_success else "ended here: no success")
+    return (
+        f'<g class="{css}" stroke-width="{0.55 * unit:.1f}">{hint}<circle cx="{x}" cy="{y}" r="{r:.0f}"/>'
+        f'<path d="{sign}"/></g>'
+    )
+
+
+def _stale_entries(record: StageRecord, frame: Frame) -> str:
+    """Stale entries of the memory at the end, those of the goal's category and those gone to stressed."""
+    visited: dict[int, EntryRecord] = {}
+    for decision in record.trace:
+        if decision.chosen_entry is not None and decision.chosen_entry.is_stale:
+            visited[decision.chosen_entry.entry_id] = decision.chosen_entry
+    believed = {entry.entry_id: entry for entry in record.entries if entry.is_stale}
+    marks = []
+    for name, entry in sorted({**believed, **visited}.items()):
+        is_stressed = name in visited or entry.label == record.target.category
+        marks.append(_stale_mark(entry, frame, is_stressed=is_stressed, is_visited=name in visited))
+    return f'<g class="stale" stroke-width="{0.5 * frame.unit:.1f}">{join(marks)}</g>' if marks else ""
+
+
+def _stale_mark(entry: EntryRecord, frame: Frame, *, is_stressed: bool, is_visited: bool) -> str:
+    x, y = cm(_ground(entry.centre_m))
+    u = frame.unit
+    least = (3.2 if is_stressed else 1.5) * u
+    width, height = (min(300.0, max(least, 100 * size)) for size in (entry.size_m[0], entry.size_m[2]))
+    words = f"stale entry: {noun_of(entry.label)} (no longer here), seen {entry.num_detections} times"
+    if is_visited:
+        words += ", gone to by the agent"
+    css = "visited" if is_visited else "goal" if is_stressed else "weak"
+    box = f'x="{x - width / 2:.0f}" y="{y - height / 2:.0f}" width="{width:.0f}" height="{height:.0f}"'
+    cross = ""
+    if is_stressed:
+        cross = f'<path d="{_cross(x, y, 0.9 * u)}"/>'
+    return f'<g class="{css}">{title(words)}<rect {box}/>{cross}</g>'
+
+
+def _cross(x: int, y: int, arm: float) -> str:
+    return f"M{x - arm:.0f} {y - arm:.0f}l{2 * arm:.0f} {2 * arm:.0f}m0 {-2 * arm:.0f}l{-2 * arm:.0f} {2 * arm:.0f}"
+
+
+def _choice(entry: RoundRecord) -> str:
+    """What a round chose, in words."""
+    words = entry.choice or entry.action.kind.replace("_", " ")
+    if entry.chosen_entry is not None:
+        words += f" ({noun_of(entry.chosen_entry.label)}{', stale' if entry.chosen_entry.is_stale else ''})"
+    if entry.action.kind == "stop":
+        words += ", stop"
+    if not entry.is_action_success:
+        words += ", action failed"
+    return words
+
+
+def _ground(point_m: Sequence[float]) -> Point:
+    return (point_m[0], point_m[2])

@@ -1,0 +1,149 @@
+"""A run as a report needs it: measures of all agents held at once, stages with their traces a task at a time."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from evonav.evaluation.metrics import AgentSummary, PairedDifference, paired_differences, summarise
+from evonav.evaluation.records import StageMap, StageRecord
+from evonav.evaluation.store import RunStore
+from evonav.report.causes import Cause, cause_of
+from evonav.report.maps import success_radius_of
+
+
+@dataclass(frozen=True, slots=True)
+class StageOutcome:
+    """A stage in a line: what an overview needs of it."""
+
+    record: StageRecord
+    """Without trace and entries."""
+    cause: Cause | None
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A task with all that its agents did in it."""
+
+    task_id: str
+    num_stages: int
+    records: Mapping[tuple[str, int], StageRecord]
+    """By (agent, stage); a stage that is not there was not run yet."""
+    maps: Mapping[int, StageMap]
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run's header and measures."""
+
+    run_dir: Path
+    agents: tuple[str, ...]
+    num_stages: Mapping[str, int]
+    """By task id, in order."""
+    config: Mapping[str, Any]
+    outcomes: Mapping[tuple[str, str, int], StageOutcome]
+    """By (agent, task, stage)."""
+    rows_sha256: Mapping[str, str]
+    """By agent, of its records as stored: equal runs have equal ones."""
+    mean_wall_s: float | None
+    """A stage; not part of the records."""
+    summaries: tuple[AgentSummary, ...]
+    pairs: tuple[PairedDifference, ...]
+
+    @property
+    def success_radius_m(self) -> float:
+        """As the run was held to."""
+        return success_radius_of(self.config)
+
+    @property
+    def num_recorded(self) -> int:
+        """Stages with a record, over all agents."""
+        return len(self.outcomes)
+
+    @property
+    def num_expected(self) -> int:
+        """Stages that the run consists of, over all agents."""
+        return sum(self.num_stages.values()) * len(self.agents)
+
+    def records_by_agent(self) -> dict[str, list[StageRecord]]:
+        """Slim records, without traces."""
+        found: dict[str, list[StageRecord]] = {agent: [] for agent in self.agents}
+        for (agent, _, _), outcome in self.outcomes.items():
+            found[agent].append(outcome.record)
+        return found
+
+    def cause_counts(self) -> dict[str, Counter[Cause | None]]:
+        """Stages by cause, for each agent."""
+        counts: dict[str, Counter[Cause | None]] = {agent: Counter() for agent in self.agents}
+        for (agent, _, _), outcome in self.outcomes.items():
+            counts[agent][outcome.cause] += 1
+        return counts
+
+    def tasks(self) -> Iterator[Task]:
+        """Every task with whole records and maps, one at a time: a run's traces may not fit in memory.
+
+        Raises:
+            StoreError: The run cannot be read.
+        """
+        with RunStore(self.run_dir) as store:
+            for task_id, num_stages in self.num_stages.items():
+                records = {
+                    (agent, record.stage): record for agent in self.agents for record in store.records(agent, task_id)
+                }
+                maps = {stage_map.stage: stage_map for stage_map in store.maps(task_id)}
+                yield Task(task_id, num_stages, records, maps)
+
+
+def load_run(run_dir: Path) -> Run:
+    """Reads a run, finished or not.
+
+    Raises:
+        StoreError: There is no run, or it cannot be read.
+    """
+    with RunStore(run_dir) as store:
+        outcomes: dict[tuple[str, str, int], StageOutcome] = {}
+        states = store.states()
+        agents = _agents(store.meta("agents"), [agent for agent, _, _ in states])
+        digests = {}
+        for agent in agents:
+            digest = hashlib.sha256()
+            for text in store.record_texts(agent):
+                digest.update(text.encode())
+                digest.update(b"\n")
+                record = StageRecord.model_validate_json(text)
+                slim = record.model_copy(update={"trace": (), "entries": ()})
+                outcomes[agent, record.task_id, record.stage] = StageOutcome(slim, cause_of(record))
+            digests[agent] = digest.hexdigest()
+        num_stages = _num_stages(store.meta("num_stages"), outcomes)
+        config = store.meta("config") or {}
+        walls_s = [wall_s for wall_s, _ in store.timings().values() if wall_s > 0]
+    records: dict[str, list[StageRecord]] = {agent: [] for agent in agents}
+    for (agent, _, _), outcome in outcomes.items():
+        records[agent].append(outcome.record)
+    total = sum(num_stages.values())
+    return Run(
+        run_dir=run_dir,
+        agents=agents,
+        num_stages=num_stages,
+        config=config,
+        outcomes=outcomes,
+        rows_sha256=digests,
+        mean_wall_s=sum(walls_s) / len(walls_s) if walls_s else None,
+        summaries=tuple(summarise(agent, records[agent], total) for agent in agents),
+        pairs=tuple(paired_differences(records)),
+    )
+
+
+def _agents(asked: Sequence[str] | None, recorded: Sequence[str]) -> tuple[str, ...]:
+    """The agents of a run, in the order they are listed; one that was only recorded comes last."""
+    return tuple(dict.fromkeys([*(asked or ()), *sorted(recorded)]))
+
+
+def _num_stages(
+    asked: Mapping[str, int] | None, outcomes: Mapping[tuple[str, str, int], StageOutcome]
+) -> dict[str, int]:
+    """Stages of each task, from the run's header; of tasks not named there, from their records."""
+    found = {outcome.record.task_id: outcome.record.num_stages for outcome in outcomes.values()}
+    return dict(sorted({**found, **(asked or {})}.items()))

@@ -1,0 +1,139 @@
+"""Small pieces of SVG: escaping, numbers, paths, markers.
+
+Drawings are in centimetres seen from above, x to the right and z up the page, so that coordinates are short integers.
+Colours are CSS classes (`templates/map.css`); only geometry is written here.
+"""
+
+import hashlib
+import html
+import math
+import re
+from collections.abc import Iterable, Sequence
+
+Point = tuple[float, float]
+"""`(x, z)` in metres, as in records."""
+
+MAX_SLUG_LENGTH = 80
+
+_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_NOT_SLUG = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+def clean(text: str) -> str:
+    """`text` with the characters that no XML or HTML page may hold replaced."""
+    return _NOT_XML.sub("\ufffd", text)
+
+
+def escape(text: str) -> str:
+    """`text` as the content of an element or a quoted attribute."""
+    return html.escape(clean(text))
+
+
+def slug(name: str) -> str:
+    """A file name or anchor for `name`: ASCII, no separator, different for different names."""
+    plain = _NOT_SLUG.sub("_", name).lstrip(".-")[:MAX_SLUG_LENGTH]
+    if plain == name and plain:
+        return plain
+    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    return f"{plain or 'task'}-{digest}"
+
+
+def cm(point_m: Point) -> tuple[int, int]:
+    """Page coordinates of a point; the origin where a coordinate is not finite."""
+    x_m, z_m = point_m
+    if not (math.isfinite(x_m) and math.isfinite(z_m)):
+        return (0, 0)
+    return (round(100 * x_m), round(-100 * z_m))
+
+
+def polyline(points_cm: Sequence[tuple[int, int]], *, closed: bool = False) -> str:
+    """Path data through points, relative and without separators it does not need. A single point is a dot."""
+    if not points_cm:
+        return ""
+    x, y = points_cm[0]
+    parts = [f"M{x} {y}"]
+    for next_x, next_y in points_cm[1:]:
+        dx, dy = next_x - x, next_y - y
+        if dx == 0 and dy == 0:
+            continue
+        parts.append(f"h{dx}" if dy == 0 else f"v{dy}" if dx == 0 else f"l{dx} {dy}")
+        x, y = next_x, next_y
+    if len(parts) == 1:
+        return f"{parts[0]}h0"
+    return "".join(parts) + ("z" if closed else "")
+
+
+def simplified(points_cm: Sequence[tuple[int, int]], tolerance_cm: float = 2.0) -> list[tuple[int, int]]:
+    """A polyline without the points that lie within `tolerance_cm` of the line they are on (Douglas-Peucker)."""
+    if len(points_cm) < 3:
+        return list(points_cm)
+    kept = {0, len(points_cm) - 1}
+    todo = [(0, len(points_cm) - 1)]
+    while todo:
+        first, last = todo.pop()
+        farthest, distance_cm = first, tolerance_cm
+        for i in range(first + 1, last):
+            d = _distance_to_segment(points_cm[i], points_cm[first], points_cm[last])
+            if d > distance_cm:
+                farthest, distance_cm = i, d
+        if farthest != first:
+            kept.add(farthest)
+            todo += [(first, farthest), (farthest, last)]
+    return [points_cm[i] for i in sorted(kept)]
+
+
+def arrow_head(tip: Point, direction: Point, size: float) -> str:
+    """Path data of a filled triangle whose tip is at `tip` (page coordinates), pointing along `direction`."""
+    length = math.hypot(*direction)
+    if length == 0.0:
+        return ""
+    ux, uy = direction[0] / length, direction[1] / length
+    back = (tip[0] - ux * size, tip[1] - uy * size)
+    corners = [
+        tip,
+        (back[0] - uy * size * 0.55, back[1] + ux * size * 0.55),
+        (back[0] + uy * size * 0.55, back[1] - ux * size * 0.55),
+    ]
+    return polyline([(round(x), round(y)) for x, y in corners], closed=True)
+
+
+def star(centre: Point, radius: float) -> str:
+    """Path data of a five-pointed star, page coordinates."""
+    corners = []
+    for i in range(10):
+        r = radius if i % 2 == 0 else radius * 0.42
+        angle = math.pi * i / 5
+        corners.append((round(centre[0] + r * math.sin(angle)), round(centre[1] - r * math.cos(angle))))
+    return polyline(corners, closed=True)
+
+
+def title(text: str) -> str:
+    """A tooltip, also what a screen reader says."""
+    return f"<title>{escape(text)}</title>"
+
+
+def text_lines(text: str, width: int, max_lines: int) -> list[str]:
+    """`text` broken into lines of at most `width` characters, with an ellipsis where it does not fit."""
+    lines: list[str] = []
+    for word in clean(text).split():
+        if lines and len(lines[-1]) + 1 + len(word) <= width:
+            lines[-1] += f" {word}"
+        else:
+            lines.append(word if len(word) <= width else f"{word[: width - 1]}…")
+    if len(lines) > max_lines:
+        lines = lines[:max_lines]
+        lines[-1] = f"{lines[-1][: width - 1]}…"
+    return lines
+
+
+def join(parts: Iterable[str]) -> str:
+    """Concatenates, for readability of callers."""
+    return "".join(parts)
+
+
+def _distance_to_segment(point: tuple[int, int], a: tuple[int, int], b: tuple[int, int]) -> float:
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    length2 = dx * dx + dy * dy
+    t = 0.0 if length2 == 0 else ((point[0] - a[0]) * dx + (point[1] - a[1]) * dy) / length2
+    t = min(1.0, max(0.0, t))
+    return math.hypot(point[0] - a[0] - t * dx, point[1] - a[1] - t * dy)

@@ -1,0 +1,313 @@
+"""Tables of a run, as Markdown, CSV, LaTeX (booktabs), HTML cells and for a terminal.
+
+Rates are in percent with their 95% bootstrap interval over tasks; a row with errored or not-run stages says
+*incomplete* in words, since its rates are not final.
+"""
+
+import csv
+import io
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rich.table import Table as RichTable
+from rich.text import Text
+
+from evonav.evaluation.metrics import AgentSummary, Interval, PairedDifference, Rates, rates
+from evonav.evaluation.records import StageRecord
+from evonav.report.causes import Cause, cause_of
+
+NONE = "–"
+"""What a cell without a value says."""
+MIN_TASKS_FOR_VERDICT = 5
+"""Tasks from which on a bootstrap interval is taken at its word."""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows of text under headers; the first column is left-aligned, the others right-aligned."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+    best: frozenset[tuple[int, int]] = frozenset()
+    """(row, column) of cells to stress."""
+
+    def markdown(self) -> str:
+        """GitHub's table syntax, the notes below."""
+        lines = [
+            _markdown_row(self.columns),
+            _markdown_row(["---"] + ["---:"] * (len(self.columns) - 1)),
+            *(
+                _markdown_row(
+                    [
+                        f"**{_markdown_text(cell)}**" if (i, j) in self.best else _markdown_text(cell)
+                        for j, cell in enumerate(row)
+                    ]
+                )
+                for i, row in enumerate(self.rows)
+            ),
+        ]
+        return "\n".join(lines + [f"\n{_markdown_text(note)}" for note in self.notes]) + "\n"
+
+    def latex(self) -> str:
+        """A `tabular` for `booktabs`, best values in bold, notes as comments."""
+        lines = [f"% {_one_line(self.title)}", rf"\begin{{tabular}}{{l{'r' * (len(self.columns) - 1)}}}", r"\toprule"]
+        lines += [" & ".join(map(_latex_text, self.columns)) + r" \\", r"\midrule"]
+        for i, row in enumerate(self.rows):
+            cells = [
+                rf"\textbf{{{_latex_text(cell)}}}" if (i, j) in self.best else _latex_text(cell)
+                for j, cell in enumerate(row)
+            ]
+            lines.append(" & ".join(cells) + r" \\")
+        lines += [r"\bottomrule", r"\end{tabular}", *(f"% {_one_line(note)}" for note in self.notes)]
+        return "\n".join(lines) + "\n"
+
+    def rich(self) -> RichTable:
+        """For `rich.print`."""
+        table = RichTable(title=self.title, title_justify="left", caption="\n".join(self.notes), caption_justify="left")
+        for j, column in enumerate(self.columns):
+            table.add_column(Text(column), justify="left" if j == 0 else "right")
+        for i, row in enumerate(self.rows):
+            table.add_row(*(Text(cell, style="bold" if (i, j) in self.best else "") for j, cell in enumerate(row)))
+        return table
+
+
+def headline(summaries: Sequence[AgentSummary]) -> Table:
+    """One row an agent: SR, SPL, n, and the stages by end state."""
+    columns = ("Agent", "SR % [95% CI]", "SPL % [95% CI]", "n", "success", "failure", "errored", "not run", "stages")
+    rows = tuple(
+        (
+            summary.agent,
+            percent(summary.sr, summary.sr_ci95),
+            percent(summary.spl, summary.spl_ci95),
+            str(summary.n),
+            *(str(summary.counts.get(state, 0)) for state in ("success", "failure", "errored", "not_run")),
+            f"{summary.n} of {summary.num_stages}, incomplete"
+            if summary.is_incomplete
+            else f"all {summary.num_stages}",
+        )
+        for summary in summaries
+    )
+    notes = [
+        "Intervals: bootstrap over tasks (stages of a task share a memory), 10,000 resamples. "
+        "Rates are over stages that ended in success or failure."
+    ]
+    incomplete = [summary.agent for summary in summaries if summary.is_incomplete]
+    if incomplete:
+        notes.append(f"Incomplete: {', '.join(incomplete)}. Some stages errored or were not run; rates are not final.")
+    best = frozenset(_best([s.sr for s in summaries], 1) + _best([s.spl for s in summaries], 2))
+    return Table("Success rate and SPL", columns, rows, tuple(notes), best)
+
+
+SPLIT_TITLES = {
+    "stage_1": "stage 1",
+    "relocated": "target relocated",
+    "not_relocated": "target not relocated",
+    "static": "static",
+    "salient_object": "SALIENT_OBJECT",
+    "retain_group": "RETAIN_GROUP",
+    "full_shuffle": "FULL_SHUFFLE",
+}
+"""The splits of `AgentSummary`, in reading order."""
+
+
+def relocation_table(summaries: Sequence[AgentSummary]) -> Table:
+    """SR on stage 1 and on the paper's two strata of the later stages."""
+    names = ("stage_1", "relocated", "not_relocated")
+    note = "Relocated: the target had ever moved since stage 1. Stages 2 and on; stage 1 is in neither."
+    return _split_table("By relocation of the target", summaries, names, (note,))
+
+
+def mode_table(summaries: Sequence[AgentSummary]) -> Table:
+    """SR by what happened in the transition before the stage."""
+    names = ("static", "salient_object", "retain_group", "full_shuffle")
+    return _split_table("By evolution before the stage", summaries, names, ("Stages 2 and on.",))
+
+
+def stage_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:
+    """SR by stage index."""
+    stages = sorted({record.stage for part in records.values() for record in part})
+    cells = {
+        agent: [rates([record for record in part if record.stage == stage]) for stage in stages]
+        for agent, part in records.items()
+    }
+    return _rates_table("By stage", [f"stage {k}" for k in stages], cells, ())
+
+
+def cause_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:
+    """Stages without success by cause."""
+    counts = {agent: Counter(cause_of(record) for record in part) for agent, part in records.items()}
+    return cause_count_table(counts)
+
+
+def cause_count_table(counts: Mapping[str, Mapping[Cause | None, int]]) -> Table:
+    """`cause_table` from counts."""
+    causes = [cause for cause in Cause if any(part.get(cause) for part in counts.values())]
+    rows = tuple((cause.value, *(str(part.get(cause, 0)) for part in counts.values())) for cause in causes)
+    note = "One cause a stage, the first that fits."
+    return Table("Why stages failed", ("Cause", *counts), rows, (note,))
+
+
+def paired_table(pairs: Sequence[PairedDifference]) -> Table:
+    """Differences between agents on the stages that both scored, with a verdict in words."""
+    columns = (
+        "Agents",
+        "SR difference [95% CI]",
+        "SPL difference [95% CI]",
+        "n",
+        "only first",
+        "only second",
+        "SR says",
+    )
+    rows = tuple(
+        (
+            f"{pair.b} less {pair.a}",
+            points(pair.sr, pair.sr_ci95),
+            points(pair.spl, pair.spl_ci95),
+            str(pair.n),
+            str(pair.num_only_b),
+            str(pair.num_only_a),
+            verdict(pair),
+        )
+        for pair in pairs
+    )
+    note = (
+        "Percentage points, on the same stages; intervals resample tasks. `only first` counts the stages where only "
+        "the first-named agent succeeded."
+    )
+    return Table("Paired differences", columns, rows, (note,))
+
+
+def verdict(pair: PairedDifference) -> str:
+    """What an interval allows to say about SR."""
+    low, high = pair.sr_ci95
+    if pair.num_only_a == 0 and pair.num_only_b == 0:
+        return "equal on every stage"
+    if pair.num_tasks < MIN_TASKS_FOR_VERDICT:
+        return f"too few tasks to tell ({pair.num_tasks})"
+    if low > 0:
+        return f"{pair.b} is ahead beyond the interval"
+    if high < 0:
+        return f"{pair.a} is ahead beyond the interval"
+    return "a tie within the interval"
+
+
+_CSV_COLUMNS = (
+    "agent",
+    "split",
+    "n",
+    "sr",
+    "sr_low",
+    "sr_high",
+    "sr_wilson_low",
+    "sr_wilson_high",
+    "spl",
+    "spl_low",
+    "spl_high",
+    "soft_spl",
+    "success",
+    "failure",
+    "errored",
+    "not_run",
+    "num_stages",
+    "num_tasks",
+    "is_incomplete",
+)
+
+
+def summary_csv(summaries: Sequence[AgentSummary]) -> str:
+    """Every measure of every agent and split, unrounded: one row an agent and split."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(_CSV_COLUMNS)
+    for s in summaries:
+        overall = Rates(s.n, s.sr, s.spl, s.sr_ci95, s.spl_ci95, s.sr_wilson95)
+        counts = [s.counts.get(state, 0) for state in ("success", "failure", "errored", "not_run")]
+        totals = [_csv_number(s.soft_spl), *counts, s.num_stages, s.num_tasks]
+        is_incomplete = str(s.is_incomplete).lower()
+        writer.writerow([s.agent, "all", *_csv_rates(overall), *totals, is_incomplete])
+        for name, part in s.splits.items():
+            writer.writerow([s.agent, name, *_csv_rates(part), *[""] * len(totals), is_incomplete])
+    return out.getvalue()
+
+
+def percent(value: float | None, interval: Interval | None) -> str:
+    """`61.1 [54.0, 68.2]`, from rates of 0 to 1.
+
+    No interval where resampling cannot tell one: a single task, or tasks that all agree.
+    """
+    if value is None:
+        return NONE
+    ends = (
+        "" if interval is None or interval[0] == interval[1] else f" [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
+    )
+    return f"{100 * value:.1f}{ends}"
+
+
+def points(value: float, interval: Interval) -> str:
+    """`+6.3 [-1.2, +13.9]`, from differences of -1 to 1."""
+    return f"{100 * value:+.1f} [{100 * interval[0]:+.1f}, {100 * interval[1]:+.1f}]"
+
+
+def _split_table(title: str, summaries: Sequence[AgentSummary], names: Sequence[str], notes: tuple[str, ...]) -> Table:
+    names = [name for name in names if any(name in summary.splits for summary in summaries)]
+    empty = Rates(n=0, sr=None, spl=None)
+    cells = {s.agent: [s.splits.get(name, empty) for name in names] for s in summaries}
+    return _rates_table(title, [SPLIT_TITLES[name] for name in names], cells, notes)
+
+
+def _rates_table(
+    title: str, titles: Sequence[str], cells: Mapping[str, Sequence[Rates]], notes: tuple[str, ...]
+) -> Table:
+    rows = tuple((agent, *map(_rate_cell, row)) for agent, row in cells.items())
+    return Table(title, ("Agent", *titles), rows, ("SR % [95% CI], n stages.", *notes))
+
+
+def _rate_cell(part: Rates) -> str:
+    return NONE if part.n == 0 else f"{percent(part.sr, part.sr_ci95)}, n = {part.n}"
+
+
+def _best(values: Sequence[float | None], column: int) -> list[tuple[int, int]]:
+    """Where the largest value is, if there are two to compare and not all are equal."""
+    known = [value for value in values if value is not None]
+    if len(known) < 2 or min(known) == max(known):
+        return []
+    return [(i, column) for i, value in enumerate(values) if value == max(known)]
+
+
+def _markdown_row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _markdown_text(text: str) -> str:
+    return re.sub(r"([\\|*_<\[\]])", r"\\\1", _one_line(text)).replace(r"\[", "[").replace(r"\]", "]")
+
+
+_LATEX = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "–": "--",
+    **{character: f"\\{character}" for character in "&%$#_{}"},
+}
+
+
+def _latex_text(text: str) -> str:
+    return "".join(_LATEX.get(character, character) for character in _one_line(text))
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _csv_rates(part: Rates) -> list[str | int]:
+    ends = [*(part.sr_ci95 or (None, None)), *(part.sr_wilson95 or (None, None))]
+    spl_ends = part.spl_ci95 or (None, None)
+    return [part.n, *map(_csv_number, (part.sr, *ends, part.spl, *spl_ends))]
+
+
+def _csv_number(value: float | None) -> str:
+    return "" if value is None else repr(value)

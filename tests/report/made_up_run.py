@@ -1,0 +1,177 @@
+"""A run made up by hand: two rooms, a table that moves with its plate. Never results, only input of tests."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from evonav.evaluation.records import (
+    ActionRecord,
+    EndState,
+    EntryRecord,
+    ErrorKind,
+    GoalRecord,
+    ObjectFootprint,
+    Opening,
+    PoseRecord,
+    Relocation,
+    RoomFootprint,
+    RoundRecord,
+    StageError,
+    StageMap,
+    StageRecord,
+    TargetRecord,
+    TransitionRecord,
+)
+from evonav.evaluation.store import RunStore
+
+WriteRun = Callable[..., Path]
+
+OLD_TABLE_M = (2.0, 0.4, 2.0)
+NEW_TABLE_M = (7.0, 0.4, 3.0)
+
+
+def pose(x_m: float, z_m: float) -> PoseRecord:
+    return PoseRecord(x_m=x_m, y_m=0.9, z_m=z_m, yaw_rad=0.5, horizon_rad=0.0)
+
+
+def box(object_id: str, category: str, centre_m: tuple[float, float, float], x_m: float, z_m: float) -> ObjectFootprint:
+    x, _, z = centre_m
+    corners = ((-x_m, -z_m), (x_m, -z_m), (x_m, z_m), (-x_m, z_m))
+    polygon_m = tuple((x + dx / 2, z + dz / 2) for dx, dz in corners)
+    return ObjectFootprint(
+        object_id=object_id, category=category, centre_m=centre_m, size_m=(x_m, 0.4, z_m), polygon_m=polygon_m
+    )
+
+
+def stage_map(task_id: str, stage: int) -> StageMap:
+    x, y, z = OLD_TABLE_M if stage == 1 else NEW_TABLE_M
+    return StageMap(
+        task_id=task_id,
+        house="house-1",
+        stage=stage,
+        rooms=(
+            RoomFootprint(room_id="room|1", room_type="Kitchen", polygon_m=((0, 0), (0, 4), (5, 4), (5, 0))),
+            RoomFootprint(room_id="room|2", room_type="LivingRoom", polygon_m=((5, 0), (5, 4), (9, 4), (9, 0))),
+        ),
+        # The inner wall comes once a side, as in ProcTHOR.
+        walls=(
+            ((0, 0), (0, 4)),
+            ((0, 4), (9, 4)),
+            ((9, 4), (9, 0)),
+            ((9, 0), (0, 0)),
+            ((5, 0), (5, 4)),
+            ((5, 4), (5, 0)),
+        ),
+        openings=(
+            Opening(kind="door", from_m=(5, 1), to_m=(5, 2)),
+            Opening(kind="window", from_m=(0, 1), to_m=(0, 2)),
+        ),
+        objects=(
+            box("fridge", "Fridge", (0.5, 0.9, 3.5), 0.8, 0.8),
+            box("table", "DiningTable", (x, y, z), 1.6, 1.0),
+            box("plate", "Plate", (x + 0.3, 0.8, z), 0.2, 0.2),
+        ),
+    )
+
+
+def entry(label: str, centre_m: tuple[float, float, float], *, is_stale: bool) -> EntryRecord:
+    return EntryRecord(
+        entry_id=7, label=label, centre_m=centre_m, size_m=(0.2, 0.1, 0.2), num_detections=3, is_stale=is_stale
+    )
+
+
+def rounds(num: int, chosen: EntryRecord | None, *, has_stopped: bool) -> tuple[RoundRecord, ...]:
+    return tuple(
+        RoundRecord(
+            round=i,
+            pose=pose(1.0 + i, 1.0),
+            action=ActionRecord(kind="stop", reason="arrived")
+            if has_stopped and i == num - 1
+            else ActionRecord(kind="navigate_to", position_m=(2.0 + i, 1.0)),
+            path_m=((1.0 + i, 1.0),) if has_stopped and i == num - 1 else ((1.0 + i, 1.0), (2.0 + i, 1.0)),
+            is_action_success=True,
+            is_target_visible=False,
+            choice="object 7" if chosen is not None else "frontier 1",
+            chosen_entry=chosen,
+            num_entries=1,
+            num_frontiers=2,
+            counters={},
+            details={},
+        )
+        for i in range(num)
+    )
+
+
+def stage_record(
+    agent: str,
+    task_id: str,
+    stage: int,
+    state: EndState,
+    *,
+    num_stages: int = 2,
+    chosen: EntryRecord | None = None,
+    entries: Sequence[EntryRecord] = (),
+    has_stopped: bool = True,
+    num_visible: int = 0,
+    instruction: str = "Please navigate to the plate on the dining table.",
+    category: str = "Plate",
+) -> StageRecord:
+    is_scored = state in (EndState.SUCCESS, EndState.FAILURE)
+    is_later = stage > 1
+    x, _, z = NEW_TABLE_M if is_later else OLD_TABLE_M
+    shift = tuple(b - a for a, b in zip(OLD_TABLE_M, NEW_TABLE_M, strict=True))
+    old_plate_m = (OLD_TABLE_M[0] + 0.3, 0.8, OLD_TABLE_M[2])
+    new_plate_m = (old_plate_m[0] + shift[0], 0.8, old_plate_m[2] + shift[2])
+    relocations = (
+        Relocation(object_id="table", category="DiningTable", from_m=OLD_TABLE_M, to_m=NEW_TABLE_M),
+        Relocation(object_id="plate", category="Plate", from_m=old_plate_m, to_m=new_plate_m),
+    )
+    trace = () if state is EndState.NOT_RUN else rounds(4, chosen, has_stopped=has_stopped and is_scored)
+    return StageRecord(
+        agent=agent,
+        task_id=task_id,
+        house="house-1",
+        stage=stage,
+        num_stages=num_stages,
+        state=state,
+        error=None if is_scored else StageError(kind=ErrorKind.SIMULATION, message="the floor <gave> way"),
+        goal=GoalRecord(category=category, instruction=instruction, basic_instruction=instruction),
+        target=TargetRecord(
+            object_id="plate",
+            category="Plate",
+            position_m=(x + 0.3, 0.8, z),
+            room_id="room|1",
+            is_relocated=is_later,
+            is_relocated_now=stage == 2,
+            first_position_m=old_plate_m if is_later else None,
+        ),
+        transition=TransitionRecord(mode="RETAIN_GROUP", room_id="room|1", relocations=relocations)
+        if stage == 2
+        else TransitionRecord(),
+        requested_start=pose(1.0, 1.0),
+        effective_start=pose(1.0, 1.0),
+        terminal=pose(4.0, 1.0) if is_scored else None,
+        num_rounds=len(trace),
+        has_stopped=has_stopped and is_scored,
+        start_distance_m=3.0,
+        terminal_distance_m=1.0 if state is EndState.SUCCESS else 3.5,
+        path_length_m=3.0 if is_scored else None,
+        reference_length_m=2.4 if is_scored else None,
+        spl=None if not is_scored else 0.8 if state is EndState.SUCCESS else 0.0,
+        soft_spl=0.5 if is_scored else None,
+        num_target_visible_rounds=num_visible,
+        trace=trace,
+        entries=tuple(entries),
+    )
+
+
+def record_run(
+    run_dir: Path, records: Sequence[StageRecord], num_stages: dict[str, int], agents: Sequence[str]
+) -> Path:
+    with RunStore(run_dir, create=True) as store:
+        store.set_meta("agents", list(agents))
+        store.set_meta("num_stages", num_stages)
+        store.set_meta("config", {"evonav": "0.1.0", "seed": 3, "protocol": {"success_radius_m": 1.5}})
+        for record in records:
+            store.add_stage(record, wall_s=1.0, cpu_s=0.5)
+            store.add_map(stage_map(record.task_id, record.stage))
+    return run_dir

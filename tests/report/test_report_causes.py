@@ -1,0 +1,47 @@
+import pytest
+from made_up_run import entry, stage_record
+
+from evonav.evaluation.records import EndState, EntryRecord
+from evonav.report.causes import Cause, cause_of, sentence
+
+AT_TARGET_M = (2.3, 0.8, 2.0)
+ELSEWHERE_M = (8.0, 0.8, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "expected"),
+    [
+        (None, Cause.NO_OBJECT),
+        (entry("Plate", AT_TARGET_M, is_stale=True), Cause.STALE_ENTRY),
+        (entry("Mug", AT_TARGET_M, is_stale=False), Cause.WRONG_CATEGORY),
+        (entry("Plate", ELSEWHERE_M, is_stale=False), Cause.WRONG_INSTANCE),
+        (entry("Plate", AT_TARGET_M, is_stale=False), Cause.STOPPED_SHORT),
+    ],
+)
+def test_a_stop_is_judged_by_what_it_stopped_at(chosen: EntryRecord | None, expected: Cause) -> None:
+    record = stage_record("fu", "t", 1, EndState.FAILURE, chosen=chosen)
+    assert cause_of(record) is expected
+    assert sentence(record).endswith("3.5 m from the target.")
+
+
+@pytest.mark.parametrize(
+    ("num_visible", "entries", "expected"),
+    [
+        (0, [], Cause.NEVER_IN_VIEW),
+        (2, [], Cause.NOT_REMEMBERED),
+        (2, [entry("Plate", ELSEWHERE_M, is_stale=False)], Cause.NOT_REMEMBERED),
+        (2, [entry("Plate", AT_TARGET_M, is_stale=False)], Cause.NOT_REACHED),
+    ],
+)
+def test_a_spent_budget_is_judged_by_what_was_seen(
+    num_visible: int, entries: list[EntryRecord], expected: Cause
+) -> None:
+    record = stage_record("fu", "t", 1, EndState.FAILURE, has_stopped=False, num_visible=num_visible, entries=entries)
+    assert cause_of(record) is expected
+
+
+def test_success_has_no_cause_and_errors_speak_for_themselves() -> None:
+    assert cause_of(stage_record("fu", "t", 1, EndState.SUCCESS)) is None
+    assert cause_of(stage_record("fu", "t", 1, EndState.ERRORED)) is Cause.ERRORED
+    assert sentence(stage_record("fu", "t", 1, EndState.ERRORED)) == "Errored (simulation): the floor <gave> way"
+    assert cause_of(stage_record("fu", "t", 1, EndState.NOT_RUN)) is Cause.NOT_RUN

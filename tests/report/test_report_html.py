@@ -1,0 +1,162 @@
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from made_up_run import WriteRun, record_run, stage_record
+
+from evonav.errors import StoreError
+from evonav.evaluation.records import EndState
+from evonav.evaluation.store import RunStore
+from evonav.report import html, tables, write_report
+from evonav.report.run import load_run
+
+VOID = {"meta", "input", "br", "link", "img"}
+
+
+class Page(HTMLParser):
+    """Checks that elements nest, and collects classes, ids, links and what is fetched."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(path.read_text(encoding="utf-8"))
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        names = [name for name, _ in attrs]
+        assert len(names) == len(set(names)), (tag, attrs)
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def count(self, tag: str, css: str) -> int:
+        return len(self.all(tag, css))
+
+    def all(self, tag: str, css: str) -> list[dict[str, str | None]]:
+        return [a for name, a in self.elements if name == tag and css in (a.get("class") or "").split()]
+
+    def ids(self) -> list[str]:
+        return [a["id"] for _, a in self.elements if a.get("id")]  # type: ignore[misc]
+
+    def references(self) -> list[str]:
+        return [a["href"] for _, a in self.elements if a.get("href")]  # type: ignore[misc]
+
+
+def test_the_page_holds_every_stage_and_fetches_nothing(write_run: WriteRun) -> None:
+    run_dir = write_run()
+    path = write_report(run_dir)
+    assert path == run_dir / "report.html"
+    page = Page(path)
+    assert page.count("section", "task") == 6
+    assert page.count("figure", "cell") == 24
+    assert page.count("figure", "success") == 6 + 11
+    assert len([a for tag, a in page.elements if tag == "i" and (a.get("title") or "").startswith("stage")]) == 24
+    assert len(list((run_dir / "maps").glob("*.svg"))) == 24
+    ids = page.ids()
+    assert len(ids) == len(set(ids))
+    for reference in page.references():
+        assert reference.startswith("#")
+        assert unquote(reference[1:]) in ids
+    assert not [a for tag, a in page.elements if tag in ("script", "img", "link") and (a.get("src") or a.get("href"))]
+    text = path.read_text(encoding="utf-8")
+    assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
+    assert "@import" not in text
+    assert "url(" not in text
+
+
+def test_the_page_shows_the_numbers_of_the_tables(write_run: WriteRun) -> None:
+    run_dir = write_run()
+    text = write_report(run_dir).read_text(encoding="utf-8")
+    run = load_run(run_dir)
+    for table in html.run_tables(run):
+        for row in table.rows:
+            for cell in row:
+                assert f">{cell}<" in text, cell
+    assert tables.headline(run.summaries).markdown() in (run_dir / "table.md").read_text(encoding="utf-8")
+    assert (run_dir / "table.csv").read_text(encoding="utf-8") == tables.summary_csv(run.summaries)
+    assert "Incomplete" not in text
+    assert all(digest in text for digest in run.rows_sha256.values())
+    assert "ftu has the highest success rate" in text
+
+
+def test_an_incomplete_run_says_so(write_run: WriteRun) -> None:
+    text = write_report(write_run(is_complete=False)).read_text(encoding="utf-8")
+    assert "<b>Incomplete.</b> ftu: 1 errored, 1 not run of 12." in text
+    assert "Errored (simulation): the floor &lt;gave&gt; way" in text
+    assert "This stage has no record yet." in text
+
+
+def test_a_run_without_a_stage_says_so(tmp_path: Path) -> None:
+    run_dir = record_run(tmp_path / "run", [], {"task-1": 3}, ["fu"])
+    text = write_report(run_dir).read_text(encoding="utf-8")
+    assert "<b>Empty.</b>" in text
+    Page(run_dir / "report.html")
+    (tmp_path / "bare").mkdir()
+    with RunStore(tmp_path / "bare", create=True):
+        pass
+    Page(write_report(tmp_path / "bare"))
+
+
+def test_names_cannot_break_out_of_the_page(tmp_path: Path) -> None:
+    wild = '../<script>alert("1")</script>&\x1b\x00'
+    agent = "my_package:<Agent>"
+    records = [
+        stage_record(
+            agent, wild, 1, EndState.FAILURE, instruction=f"Go to {wild} {{{{ 7 * 7 }}}}", category="<b>Plate"
+        ),
+        stage_record(agent, wild.replace("&", "+"), 1, EndState.SUCCESS),
+    ]
+    run_dir = record_run(tmp_path / "run", records, {}, [agent])
+    path = write_report(run_dir)
+    text = path.read_text(encoding="utf-8")
+    page = Page(path)
+    assert "<script>alert" not in text
+    assert "<b>Plate" not in text
+    assert "\x1b" not in text
+    assert "\x00" not in text
+    assert "{{ 7 * 7 }}" in text
+    assert page.count("section", "task") == 2
+    written = {item.relative_to(tmp_path).parts[0] for item in tmp_path.rglob("*")}
+    assert written == {"run"}
+    assert len(list((run_dir / "maps").glob("*.svg"))) == 2
+
+
+def test_many_stages_get_a_page_a_task(write_run: WriteRun, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(html, "MAX_INLINE_STAGES", 23)
+    run_dir = write_run()
+    index = Page(write_report(run_dir))
+    assert index.count("section", "task") == 0
+    links = [reference for reference in index.references() if not reference.startswith("#")]
+    assert len(links) == 6
+    for link in links:
+        page = Page(run_dir / link)
+        assert page.count("figure", "cell") == 4
+        (back,) = [reference for reference in page.references() if reference.startswith("../report.html#")]
+        assert back.partition("#")[2] in index.ids()
+    assert not (run_dir / "maps").exists()
+    assert "too many maps for one page" in (run_dir / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_same_records_give_the_same_page(write_run: WriteRun) -> None:
+    run_dir = write_run()
+    first = write_report(run_dir).read_bytes()
+    assert write_report(run_dir).read_bytes() == first
+
+
+def test_houses_are_drawn_once_a_task(write_run: WriteRun) -> None:
+    text = write_report(write_run()).read_text(encoding="utf-8")
+    assert len(re.findall(r'class="floor kitchen"', text)) == 6
+
+
+def test_no_run_is_an_error_that_names_the_folder(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=re.escape(str(tmp_path))):
+        write_report(tmp_path)

@@ -1,0 +1,135 @@
+import math
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from made_up_run import NEW_TABLE_M, WriteRun, entry, stage_map, stage_record
+
+from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.records import EndState
+from evonav.report.maps import stage_svg, write_strip
+from evonav.report.overlay import rounds as choices
+from evonav.report.plan import label_point
+from evonav.report.svg import polyline, simplified, slug
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def with_class(root: ElementTree.Element, name: str) -> list[ElementTree.Element]:
+    return [element for element in root.iter() if name in element.get("class", "").split()]
+
+
+def drawn(stage: int = 2, state: EndState = EndState.FAILURE) -> ElementTree.Element:
+    stale = entry("Plate", (2.3, 0.8, 2.0), is_stale=True)
+    record = stage_record("fu", "t", stage, state, chosen=stale, entries=[stale])
+    maps = {k: stage_map("t", k) for k in (1, 2)}
+    return ElementTree.fromstring(stage_svg(record, maps, success_radius_m=1.5))
+
+
+def test_the_house_is_drawn_to_scale() -> None:
+    root = drawn()
+    assert len(with_class(root, "floor")) == 2
+    assert len(with_class(root, "kitchen")) == 1
+    # Both sides of the inner wall are one line.
+    (walls,) = with_class(root, "walls")
+    assert len(list(walls)) == 5
+    assert len(list(with_class(root, "doors")[0])) == 1
+    assert len(list(with_class(root, "windows")[0])) == 1
+    # 9 m x 4 m with 0.4 m around, z up the page.
+    assert root.get("viewBox") == "-40 -440 980 480"
+    (kitchen,) = with_class(root, "kitchen")
+    assert kitchen.get("d") == "M0 0v-400h500v400z"
+
+
+def test_target_ring_and_ends_are_where_the_record_says() -> None:
+    root = drawn()
+    (ring,) = with_class(root, "ring")
+    at = (round(100 * (NEW_TABLE_M[0] + 0.3)), round(-100 * NEW_TABLE_M[2]))
+    assert (ring.get("cx"), ring.get("cy"), ring.get("r")) == (str(at[0]), str(at[1]), "150")
+    (start,) = with_class(root, "start")
+    assert (start.get("cx"), start.get("cy")) == ("100", "-100")
+    (end,) = with_class(root, "end")
+    circle = end.find(f"{SVG}circle")
+    assert circle is not None
+    assert (circle.get("cx"), circle.get("cy")) == ("400", "-100")
+    assert "bad" in end.get("class", "")
+    assert "ok" in with_class(drawn(state=EndState.SUCCESS), "end")[0].get("class", "")
+    # The target moved, so its first place is marked as well; in stage 1 it is not.
+    assert len(with_class(root, "star")) == 2
+    assert len(with_class(drawn(stage=1), "star")) == 1
+
+
+def test_change_is_ghosts_and_one_arrow_for_table_and_plate() -> None:
+    root = drawn()
+    assert len(with_class(with_class(root, "ghost")[0], "item")) == 2
+    assert len(with_class(with_class(root, "moved")[0], "item")) == 2
+    arrows = with_class(root, "arrow")
+    assert [arrow.find(f"{SVG}title").text for arrow in arrows] == ["dining table: moved 5.1 m"]  # type: ignore[union-attr]
+    assert with_class(drawn(stage=1), "change") == []
+
+
+def test_the_path_has_a_piece_a_round_and_stale_entries_are_marked() -> None:
+    root = drawn()
+    pieces = with_class(root, "r")
+    assert len(pieces) == 4
+    assert [piece.get("class", "").split()[1] for piece in pieces] == ["t0", "t2", "t5", "t7"]
+    assert pieces[0].get("data-p") == f"100,-100,{round(math.degrees(0.5))}"
+    (visited,) = with_class(root, "visited")
+    assert "plate" in (visited.findtext(f"{SVG}title") or "")
+    fresh = stage_record("fu", "t", 2, EndState.SUCCESS, entries=[entry("Plate", (7.3, 0.8, 3.0), is_stale=False)])
+    assert with_class(ElementTree.fromstring(stage_svg(fresh, {})), "stale") == []
+
+
+def test_a_stage_without_house_or_trace_is_still_drawn() -> None:
+    record = stage_record("fu", "t", 1, EndState.NOT_RUN)
+    root = ElementTree.fromstring(stage_svg(record, {}))
+    assert with_class(root, "star")
+    assert with_class(root, "floor") == []
+
+
+def test_strip_shows_the_stages_side_by_side(write_run: WriteRun, tmp_path: Path) -> None:
+    path = write_strip(write_run(), "task-1", "fu", tmp_path / "images" / "strip.svg")
+    root = ElementTree.parse(path).getroot()
+    words = [element.text for element in with_class(root, "stage")]
+    assert words == ["Stage 1", "Stage 2"]
+    assert len(root.findall(f".//{SVG}svg")) == 2
+    assert {ring.get("r") for ring in with_class(root, "ring")} == {"150"}
+    assert "RETAIN_GROUP in the kitchen: 2 objects moved" in "".join(root.itertext())
+
+
+def test_strip_of_what_is_not_there_names_it(write_run: WriteRun, tmp_path: Path) -> None:
+    run_dir = write_run()
+    with pytest.raises(InvalidArgumentError, match="'task-99' by agent 'fu'"):
+        write_strip(run_dir, "task-99", "fu", tmp_path / "strip.svg")
+    with pytest.raises(StoreError, match="no run here"):
+        write_strip(tmp_path, "task-1", "fu", tmp_path / "strip.svg")
+
+
+def test_rounds_are_told_in_runs() -> None:
+    stale = entry("DiningTable", (0, 0, 0), is_stale=True)
+    record = stage_record("fu", "t", 1, EndState.FAILURE, chosen=stale)
+    assert choices(record.trace) == ["object 7 (dining table, stale) ×3", "object 7 (dining table, stale), stop"]
+
+
+def test_slugs_are_safe_and_differ() -> None:
+    names = ["a", "a/b", "a_b", "../a", "a b", "", ".", "é", "x" * 300, "x" * 301, "con\x00trol", "a\\b"]
+    slugs = [slug(name) for name in names]
+    assert len(set(slugs)) == len(names)
+    assert slugs[0] == "a"
+    for found in slugs:
+        assert re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]*", found)
+        assert len(found) <= 100
+
+
+def test_simplified_keeps_ends_and_corners() -> None:
+    assert simplified([(0, 0), (25, 0), (50, 1), (100, 0), (100, 80)]) == [(0, 0), (100, 0), (100, 80)]
+    assert simplified([(0, 0), (50, 30), (0, 0)]) == [(0, 0), (50, 30), (0, 0)]
+    assert polyline([(0, 0), (100, 0), (100, 80), (90, 70)]) == "M0 0h100v80l-10 -10"
+    assert polyline([(3, 4)]) == "M3 4h0"
+
+
+def test_labels_lie_inside_rooms_that_are_no_rectangles() -> None:
+    ell = [(0.0, 0.0), (0.0, 8.0), (2.0, 8.0), (2.0, 2.0), (8.0, 2.0), (8.0, 0.0)]
+    x, z = label_point(ell)
+    assert (0 < x < 2 and 0 < z < 8) or (0 < x < 8 and 0 < z < 2)

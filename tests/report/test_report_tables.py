@@ -1,0 +1,88 @@
+import csv
+import io
+from dataclasses import replace
+
+from made_up_run import WriteRun
+from rich.console import Console
+
+from evonav.evaluation.metrics import PairedDifference, paired_differences, summarise
+from evonav.report import tables
+from evonav.report.run import load_run
+
+
+def test_rates_are_those_of_the_metrics(write_run: WriteRun) -> None:
+    run = load_run(write_run())
+    records = run.records_by_agent()
+    expected = summarise("ftu", records["ftu"], 12)
+    assert expected.sr_ci95 is not None
+    assert expected.sr_ci95[0] < expected.sr_ci95[1]
+    row = dict(zip(tables.headline(run.summaries).columns, tables.headline(run.summaries).rows[1], strict=True))
+    low, high = (100 * end for end in expected.sr_ci95)
+    assert row["SR % [95% CI]"] == f"91.7 [{low:.1f}, {high:.1f}]"
+    assert (row["n"], row["success"], row["failure"]) == ("12", "11", "1")
+    assert row["stages"] == "all 12"
+    pairs = paired_differences(records)
+    assert run.pairs == tuple(pairs)
+
+
+def test_csv_holds_unrounded_measures(write_run: WriteRun) -> None:
+    run = load_run(write_run())
+    rows = {(row["agent"], row["split"]): row for row in csv.DictReader(io.StringIO(tables.summary_csv(run.summaries)))}
+    summary = run.summaries[1]
+    row = rows["ftu", "all"]
+    assert float(row["sr"]) == summary.sr
+    assert summary.spl_ci95 is not None
+    assert (float(row["spl_low"]), float(row["spl_high"])) == summary.spl_ci95
+    assert summary.sr_wilson95 is not None
+    assert (float(row["sr_wilson_low"]), float(row["sr_wilson_high"])) == summary.sr_wilson95
+    assert rows["fu", "relocated"]["sr"] == "0.0"
+    assert rows["fu", "stage_1"]["n"] == "6"
+
+
+def test_incomplete_runs_say_so_in_words(write_run: WriteRun) -> None:
+    table = tables.headline(load_run(write_run(is_complete=False)).summaries)
+    assert table.rows[1][-1] == "10 of 12, incomplete"
+    assert table.rows[1][6:8] == ("1", "1")  # errored, not run: the stage that has no record
+    assert "Incomplete: ftu." in table.notes[1]
+    for text in (table.markdown(), table.latex()):
+        assert "ncomplete" in text
+    assert "Incomplete" not in "".join(tables.headline(load_run(write_run("whole")).summaries).notes)
+
+
+def test_a_verdict_claims_no_more_than_the_interval() -> None:
+    pair = PairedDifference("fu", "ftu", 20, 10, 0.1, (-0.1, 0.3), 0.1, (0.0, 0.2), 2, 4)
+    assert tables.verdict(pair) == "a tie within the interval"
+    assert tables.verdict(replace(pair, sr_ci95=(0.01, 0.3))) == "ftu is ahead beyond the interval"
+    assert tables.verdict(replace(pair, sr_ci95=(-0.3, -0.01))) == "fu is ahead beyond the interval"
+    assert tables.verdict(replace(pair, sr_ci95=(0.2, 0.2), num_tasks=1)) == "too few tasks to tell (1)"
+    assert tables.verdict(replace(pair, num_only_a=0, num_only_b=0)) == "equal on every stage"
+
+
+def test_causes_add_up_to_the_stages_without_success(write_run: WriteRun) -> None:
+    table = tables.cause_count_table(load_run(write_run()).cause_counts())
+    assert table.columns == ("Cause", "fu", "ftu")
+    assert table.rows == (("stopped at a stale entry", "6", "0"), ("stopped without an object", "0", "1"))
+
+
+def test_markup_of_every_format_is_escaped() -> None:
+    table = tables.Table("t", ("Agent", "x"), (("a|b_c*&%$#{}\\~^<", "1"),), best=frozenset({(0, 1)}))
+    assert r"| a\|b\_c\*&%$#{}\\~^\< | **1** |" in table.markdown()
+    assert r"a|b\_c*\&\%\$\#\{\}\textbackslash{}\textasciitilde{}\textasciicircum{}<" in table.latex()
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(tables.Table("t", ("[red]Agent", "x"), (("[bold]a", "1"),)).rich())
+    assert "[red]Agent" in console.export_text()
+
+
+def test_latex_is_a_booktabs_tabular(write_run: WriteRun) -> None:
+    lines = tables.headline(load_run(write_run()).summaries).latex().splitlines()
+    assert lines[1] == r"\begin{tabular}{lrrrrrrrr}"
+    assert [lines[2], lines[4], lines[7], lines[8]] == [r"\toprule", r"\midrule", r"\bottomrule", r"\end{tabular}"]
+    assert lines[6].startswith(r"ftu & \textbf{91.7 [")
+    assert r"\textbf" not in lines[5]
+    assert all(line.count("&") == 8 for line in (lines[3], lines[5], lines[6]))
+
+
+def test_rates_without_spread_claim_no_interval() -> None:
+    assert tables.percent(1.0, (1.0, 1.0)) == "100.0"
+    assert tables.percent(0.5, (0.25, 0.75)) == "50.0 [25.0, 75.0]"
+    assert tables.percent(None, None) == "–"
