@@ -6,6 +6,11 @@ use evonav_core::{
     Error,
     assets::{Catalogue, UnknownAssets},
     house::{House, HouseDelta},
+    world::{
+        collision::AgentBody,
+        navigation::{Navigation, NavigationConfig},
+        scene::Scene,
+    },
 };
 use proptest::{collection::vec, prelude::*, sample::Index};
 use serde_json::{Value, json};
@@ -98,6 +103,22 @@ fn damage(text: &str, place: Index, way: usize) -> String {
     }
 }
 
+/// What is read can be built, stood in and mapped without a panic.
+fn check_world(house: &House) -> Result<(), TestCaseError> {
+    let scene = Scene::build(house, Catalogue::bundled(), UnknownAssets::CategoryDefault);
+    let scene = scene.map_err(|error| TestCaseError::fail(error.to_string()))?;
+    let agent = AgentBody { radius_m: 0.2, height_m: 1.8 };
+    if let Ok(navigation) = Navigation::build(&scene, agent, NavigationConfig::default()) {
+        let corner_m = house.rooms[0].polygon_m[0];
+        if let Some(free_m) = navigation.snap(corner_m) {
+            prop_assert!(navigation.is_free(free_m));
+        }
+        let spec = navigation.map_spec(0.25);
+        prop_assert!(spec.is_ok_and(|spec| navigation.occupancy(&spec).len() < 4_000_000));
+    }
+    Ok(())
+}
+
 /// What must hold of any text.
 fn check(json: &str) -> Result<bool, TestCaseError> {
     let start = Instant::now();
@@ -109,6 +130,7 @@ fn check(json: &str) -> Result<bool, TestCaseError> {
             prop_assert_eq!(again.as_ref(), Ok(house));
             let unchanged = house.apply(&HouseDelta::default());
             prop_assert_eq!(unchanged.as_ref(), Ok(house));
+            check_world(house)?;
             for object in &house.objects {
                 let unknown = UnknownAssets::CategoryDefault;
                 let asset =

@@ -1,7 +1,5 @@
 //! Reading, refusing and writing houses.
 
-use std::{fs, path::PathBuf};
-
 use evonav_core::{Error, house::House};
 use serde_json::{Value, json};
 
@@ -89,36 +87,4 @@ fn refusals_name_object_field_and_value() {
     let twice = SMALL.replacen("\"roomType\"", "\"id\": \"a\", \"roomType\"", 1);
     assert!(refusal(&twice).2.contains("\"id\" is given twice"));
     assert_eq!(refusal(&"[".repeat(100_000)).0, "document");
-}
-
-/// Plain files under the directory in `EVONAV_FLAT_HOUSES` (the recorded houses, unpacked).
-#[test]
-fn recorded_houses_survive() {
-    let Some(folder) = std::env::var_os("EVONAV_FLAT_HOUSES").map(PathBuf::from) else {
-        eprintln!("skipped: EVONAV_FLAT_HOUSES is not set");
-        return;
-    };
-    let mut num_houses = 0;
-    for entry in fs::read_dir(folder).expect("a directory") {
-        let path = entry.expect("an entry").path();
-        let text = fs::read_to_string(&path).expect("text");
-        let is_lines = path.extension().is_some_and(|extension| extension == "jsonl");
-        let documents: Vec<Value> = if is_lines {
-            text.lines().map(|line| serde_json::from_str(line).expect("valid JSON")).collect()
-        } else {
-            match serde_json::from_str(&text).expect("valid JSON") {
-                Value::Array(list) => list,
-                document => vec![document],
-            }
-        };
-        for (index, document) in documents.iter().enumerate() {
-            let name = format!("{}:{}", path.file_name().expect("a name").display(), index + 1);
-            match House::from_json(&name, &document.to_string()) {
-                Ok(house) => assert_eq!(house.to_json(), document.to_string()),
-                Err(error) => eprintln!("{error}"),
-            }
-            num_houses += 1;
-        }
-    }
-    eprintln!("{num_houses} houses");
 }

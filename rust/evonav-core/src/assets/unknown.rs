@@ -55,6 +55,8 @@ const BLOCK: Vec3 = [0.8, 1.0, 0.8];
 const MAX_EDGE_M: f64 = 1.2;
 const MIN_EDGE_M: f64 = 0.02;
 const MAX_HEIGHT_M: f64 = 2.4;
+/// Tallest that a child is guessed to be: above that, it stands on a shelf nobody was seen on.
+const MAX_CHILD_HEIGHT_M: f64 = 0.4;
 /// Wall objects of the recorded houses hang within 0.2 m of their wall.
 const MAX_WALL_DISTANCE_M: f64 = 0.25;
 
@@ -66,11 +68,16 @@ pub(super) fn category_default(catalogue: &Catalogue, house: &House, object: &Ob
     let alike = like(catalogue, category);
     let model = alike.and_then(|name| catalogue.median_size_m(name)).unwrap_or(BLOCK);
     let is_on_wall = object.id.contains("|wall|") || alike == Some("Painting");
-    let size_m =
-        match wall_distance_m(house, object).filter(|&d| is_on_wall && d < MAX_WALL_DISTANCE_M) {
-            Some(distance_m) => [model[0], model[1], (2.0 * distance_m).max(MIN_EDGE_M)],
-            None => scaled(model, 2.0 * height_above_support_m(catalogue, house, object)),
-        };
+    let size_m = match wall_distance_m(house, object)
+        .filter(|&d| is_on_wall && d < MAX_WALL_DISTANCE_M)
+    {
+        Some(distance_m) => [model[0], model[1], (2.0 * distance_m).max(MIN_EDGE_M)],
+        None => {
+            let limit_m = if object.parent.is_some() { MAX_CHILD_HEIGHT_M } else { MAX_HEIGHT_M };
+            let height_m = 2.0 * height_above_support_m(catalogue, house, object);
+            scaled(model, height_m.clamp(MIN_EDGE_M, limit_m))
+        }
+    };
     Asset {
         id: object.asset_id.clone(),
         category: category.to_owned(),
@@ -91,9 +98,8 @@ fn like<'a>(catalogue: &Catalogue, category: &'a str) -> Option<&'a str> {
     matches.max_by_key(|(word, _)| word.len()).map(|&(_, name)| name)
 }
 
-/// `model` scaled to `height_m`, within sane bounds.
+/// `model` scaled to `height_m`, its footprint within sane bounds.
 fn scaled(model: Vec3, height_m: f64) -> Vec3 {
-    let height_m = height_m.clamp(MIN_EDGE_M, MAX_HEIGHT_M);
     let scale = height_m / model[1].max(MIN_EDGE_M);
     let edge = |length_m: f64| (length_m * scale).clamp(MIN_EDGE_M, MAX_EDGE_M);
     [edge(model[0]), height_m, edge(model[2])]
