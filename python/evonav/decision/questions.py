@@ -67,13 +67,24 @@ class Choice:
 
 
 @dataclass(frozen=True, slots=True)
+class Sighting:
+    """An object in a present view, compared with a remembered one."""
+
+    label: str
+    overlap: float
+    """Share of its points that lie by the remembered object's."""
+    distance_m: float
+    """From its centroid to the middle of the remembered object's box; `inf` if it cannot be told."""
+
+
+@dataclass(frozen=True, slots=True)
 class VerifyQuestion:
     """Does the present view support that the remembered object is still here?"""
 
     goal: StageInput
     entry: ObjectCandidate
-    seen: Sequence[ObjectCandidate]
-    """What the present views show; ids and counts mean nothing."""
+    seen: Sequence[Sighting]
+    """What the present views show."""
 
 
 @dataclass(frozen=True, slots=True)

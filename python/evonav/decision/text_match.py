@@ -71,7 +71,7 @@ class TextMatchConfig:
     same_place_m: float = 0.5
     """Verification: centres this near are the same place."""
     min_overlap: float = 0.2
-    """Verification: or this share of the smaller box is common."""
+    """Verification: or this share of what is seen lies by what is remembered."""
 
 
 class TextMatch:
@@ -124,11 +124,9 @@ class TextMatch:
         """Present if something of the entry's label is seen at the entry's place."""
         entry, config = question.entry, self.config
         for seen in question.seen:
-            if canonical(seen.label) != canonical(entry.label):
-                continue
-            distance_m = math.dist(seen.centre_m, entry.centre_m)
-            if distance_m <= config.same_place_m or _overlap(seen, entry) > config.min_overlap:
-                return Verdict(True, f"{seen.label} seen {distance_m:.2f} m from the remembered centre")
+            is_here = seen.overlap > config.min_overlap or seen.distance_m < config.same_place_m
+            if is_here and canonical(seen.label) == canonical(entry.label):
+                return Verdict(True, f"{seen.label} seen {seen.distance_m:.2f} m from the remembered middle")
         return Verdict(False, f"no {entry.label} seen at the remembered place")
 
     def _parsed(self, goal: StageInput) -> Goal:
@@ -215,16 +213,3 @@ def _gap_m(a: ObjectCandidate, b: ObjectCandidate) -> float:
         max(0.0, abs(a.centre_m[axis] - b.centre_m[axis]) - (a.size_m[axis] + b.size_m[axis]) / 2) for axis in (0, 2)
     )
     return math.hypot(*gaps_m)
-
-
-def _overlap(a: ObjectCandidate, b: ObjectCandidate) -> float:
-    """Common volume of two boxes as a share of the smaller one; thin boxes are given 1 cm."""
-    common = volume_a = volume_b = 1.0
-    for axis in range(3):
-        size_a, size_b = max(a.size_m[axis], 0.01), max(b.size_m[axis], 0.01)
-        low = max(a.centre_m[axis] - size_a / 2, b.centre_m[axis] - size_b / 2)
-        high = min(a.centre_m[axis] + size_a / 2, b.centre_m[axis] + size_b / 2)
-        common *= max(0.0, high - low)
-        volume_a *= size_a
-        volume_b *= size_b
-    return common / min(volume_a, volume_b)

@@ -1,0 +1,88 @@
+"""Where to stand to look at a remembered object (3D-Mem's observation point)."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.sensors.observation import MapFrame
+
+Point2 = tuple[float, float]
+_NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1))
+
+
+def observation_point(
+    is_free: NDArray[np.bool_], frame: MapFrame, object_m: Point2, distance_m: float = 1.5
+) -> Point2 | None:
+    """A free place `distance_m` from an object, on the side where most free floor is.
+
+    Of the free cells within `distance_m` of the object the largest 4-connected group is taken; the point lies in the
+    direction of its mean, at `distance_m` exactly, moved to the nearest free cell.
+
+    Args:
+        is_free: `(R, C)`, cells known to be free.
+        frame: Of the map.
+        object_m: `(x, z)` of the object's middle.
+        distance_m: How far to stand.
+
+    Returns:
+        `(x, z)` of a cell's middle, or `None` when no cell within `distance_m` is known to be free.
+    """
+    window, offset = _window(is_free, frame, object_m, distance_m + 2 * frame.cell_m)
+    rows, cols = np.nonzero(window)
+    if len(rows) == 0:
+        return None
+    x_m = (cols + offset[1] + 0.5) * frame.cell_m + frame.corner_m[0]
+    z_m = (rows + offset[0] + 0.5) * frame.cell_m + frame.corner_m[1]
+    is_near = np.hypot(x_m - object_m[0], z_m - object_m[1]) <= distance_m
+    near = np.zeros_like(window)
+    near[rows[is_near], cols[is_near]] = True
+    group = _largest_group(near)
+    if group is None:
+        return None
+    mean_row, mean_col = group.mean(axis=0)
+    dx_m = (mean_col + offset[1] + 0.5) * frame.cell_m + frame.corner_m[0] - object_m[0]
+    dz_m = (mean_row + offset[0] + 0.5) * frame.cell_m + frame.corner_m[1] - object_m[1]
+    length_m = math.hypot(dx_m, dz_m)
+    if length_m > 1e-9:
+        wanted = (object_m[0] + dx_m / length_m * distance_m, object_m[1] + dz_m / length_m * distance_m)
+    else:
+        wanted = object_m
+    best = int(np.hypot(x_m - wanted[0], z_m - wanted[1]).argmin())
+    return (float(x_m[best]), float(z_m[best]))
+
+
+def _window(
+    is_free: NDArray[np.bool_], frame: MapFrame, centre_m: Point2, reach_m: float
+) -> tuple[NDArray[np.bool_], tuple[int, int]]:
+    """The part of the map around a point, and the row and column where it begins."""
+    ends = []
+    for centre, corner, size in (
+        (centre_m[1], frame.corner_m[1], frame.rows),
+        (centre_m[0], frame.corner_m[0], frame.cols),
+    ):
+        low = math.floor((centre - reach_m - corner) / frame.cell_m)
+        high = math.ceil((centre + reach_m - corner) / frame.cell_m)
+        ends.append((min(max(low, 0), size), min(max(high, 0), size)))
+    (row_low, row_high), (col_low, col_high) = ends
+    return is_free[row_low:row_high, col_low:col_high], (row_low, col_low)
+
+
+def _largest_group(cells: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+    """`(N, 2)` cells of the largest 4-connected group, the first one of those as large; `None` without cells."""
+    unseen = {(int(row), int(col)) for row, col in zip(*np.nonzero(cells), strict=True)}
+    largest: list[tuple[int, int]] = []
+    for start in sorted(unseen):
+        if start not in unseen:
+            continue
+        unseen.discard(start)
+        group = [start]
+        for row, col in group:
+            for d_row, d_col in _NEIGHBOURS:
+                after = (row + d_row, col + d_col)
+                if after in unseen:
+                    unseen.discard(after)
+                    group.append(after)
+        if len(group) > len(largest):
+            largest = group
+    return np.array(largest) if largest else None

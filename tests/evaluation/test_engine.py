@@ -1,0 +1,233 @@
+"""Runs on disk: determinism, resumption, containment, refusal."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from toy_house import write_tasks
+
+from evonav.errors import InvalidArgumentError, StoreError, TaskError
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records import EndState, ErrorKind
+from evonav.evaluation.store import RunStore
+
+TOY = Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator")
+CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
+
+
+@pytest.fixture
+def tasks(tmp_path):
+    write_tasks(tmp_path / "tasks")
+    return task_files(tmp_path / "tasks")
+
+
+def texts(run_dir):
+    with RunStore(run_dir) as store:
+        return [*store.record_texts(), *(plan.model_dump_json() for plan in store.maps())]
+
+
+def records(run_dir, agent):
+    with RunStore(run_dir) as store:
+        return list(store.records(agent))
+
+
+def test_records_are_the_same_for_any_number_of_workers(tasks, tmp_path):
+    agents = ["random-walk", "nearest-frontier", "toy_agents:Idle"]
+    for workers in (0, 1, 2):
+        evaluate(agents, tasks, tmp_path / str(workers), config=CONFIG, num_workers=workers)
+    shuffled = [*reversed(agents)]
+    evaluate(shuffled, tasks, tmp_path / "shuffled", config=CONFIG, num_workers=2)
+    assert len(texts(tmp_path / "0")) == 3 * 6 + 6
+    for other in ("1", "2", "shuffled"):
+        assert texts(tmp_path / other) == texts(tmp_path / "0")
+        assert (tmp_path / other / "summary.json").read_bytes() == (tmp_path / "0" / "summary.json").read_bytes()
+
+
+def test_seeds_make_a_difference(tasks, tmp_path):
+    evaluate(["random-walk"], tasks, tmp_path / "a", config=CONFIG, num_workers=0)
+    other = RunConfig(backend=TOY, protocol=CONFIG.protocol, seed=1)
+    evaluate(["random-walk"], tasks, tmp_path / "b", config=other, num_workers=0)
+    assert texts(tmp_path / "a") != texts(tmp_path / "b")
+
+
+def test_summary_counts_every_stage_once(tasks, tmp_path):
+    (summary,) = evaluate(["toy_agents:Raising"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+    assert sum(summary.counts.values()) == summary.num_stages == 6
+    assert summary.counts["errored"] == 2
+    assert summary.counts["not_run"] == 2
+    assert summary.is_incomplete
+    content = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert content["is_incomplete"] is True
+    assert content["agents"]["toy_agents:Raising"]["n"] == 2
+
+
+@pytest.mark.parametrize(
+    ("agent", "kind", "message"),
+    [
+        ("toy_agents:Raising", ErrorKind.AGENT, "RuntimeError: no idea"),
+        ("toy_agents:Speechless", ErrorKind.AGENT, "is no action"),
+        ("toy_agents:Lost", ErrorKind.AGENT, "must be finite"),
+        ("toy_agents:FarSighted", ErrorKind.AGENT, "occupancy_range_m"),
+        ("toy_agents:Dying", ErrorKind.CRASH, "exit code 3"),
+        ("toy_agents:Hanging", ErrorKind.TIMEOUT, "within 3 s"),
+    ],
+)
+def test_an_agents_fault_costs_its_episode_alone(tasks, tmp_path, agent, kind, message):
+    config = RunConfig(backend=TOY, protocol=CONFIG.protocol, stage_timeout_s=3.0)
+    evaluate([agent, "toy_agents:Idle"], tasks, tmp_path / "run", config=config, num_workers=1)
+    assert all(record.is_scored for record in records(tmp_path / "run", "toy_agents:Idle"))
+    by_task = {}
+    for record in records(tmp_path / "run", agent):
+        by_task.setdefault(record.task_id, []).append(record)
+    for stages in by_task.values():
+        states = [record.state for record in stages]
+        failed = states.index(EndState.ERRORED)
+        assert failed in (0, 1)
+        assert states[failed + 1 :] == [EndState.NOT_RUN] * (2 - failed)
+        assert stages[failed].error.kind is kind
+        assert message in stages[failed].error.message
+        assert stages[failed].spl is None
+
+
+def test_resumption_does_what_is_left(tasks, tmp_path):
+    run = tmp_path / "run"
+    evaluate(["random-walk"], tasks, tmp_path / "whole", config=CONFIG, num_workers=0)
+    evaluate(["random-walk"], tasks, run, config=CONFIG, num_workers=0)
+    with RunStore(run) as store:
+        store.forget_episode("random-walk", "toy-moved", 2)
+    seen = []
+    evaluate(["random-walk"], tasks, run, config=CONFIG, num_workers=0, on_progress=seen.append)
+    assert [(news.latest.task_id, news.latest.stage) for news in seen if news.latest] == [
+        ("toy-moved", 2),
+        ("toy-moved", 3),
+    ]
+    assert (seen[0].num_done, seen[-1].num_done, seen[-1].num_stages) == (4, 6, 6)
+    assert texts(run) == texts(tmp_path / "whole")
+
+
+def test_a_finished_run_runs_nothing(tasks, tmp_path):
+    evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+    before = texts(tmp_path / "run")
+    seen = []
+    evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=CONFIG, num_workers=0, on_progress=seen.append)
+    assert [news.latest for news in seen] == [None]
+    assert texts(tmp_path / "run") == before
+
+
+def test_agents_can_join_a_run(tasks, tmp_path):
+    evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+    (summary,) = evaluate(["random-walk"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+    assert summary.agent == "random-walk"
+    content = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert sorted(content["agents"]) == ["random-walk", "toy_agents:Idle"]
+    assert len(content["paired_differences"]) == 1
+
+
+def test_errored_stages_run_again_when_asked(tasks, tmp_path, monkeypatch):
+    alive = tmp_path / "alive"
+    monkeypatch.setenv("TOY_ALIVE", str(alive))
+    arguments = (["toy_agents:DyingOnce"], tasks, tmp_path / "run")
+    (summary,) = evaluate(*arguments, config=CONFIG, num_workers=1)
+    assert summary.counts["errored"] == 2
+    alive.touch()
+    (summary,) = evaluate(*arguments, config=CONFIG, num_workers=1)
+    assert summary.counts["errored"] == 2
+    (summary,) = evaluate(*arguments, config=CONFIG, num_workers=1, retry_errored=True)
+    assert not summary.is_incomplete
+    assert summary.n == 6
+
+
+def test_a_resumed_episode_is_never_a_mix_of_two_rollouts(tasks, tmp_path):
+    run = tmp_path / "run"
+    agent = "toy_agents:Undecided"
+    evaluate([agent], tasks, run, config=CONFIG, num_workers=0)
+    with RunStore(run) as store:
+        store.forget_episode(agent, "toy-moved", 2)
+    evaluate([agent], tasks, run, config=CONFIG, num_workers=0)
+    stages = [record for record in records(run, agent) if record.task_id == "toy-moved"]
+    for before, after in pairwise(stages):
+        assert after.requested_start == before.terminal
+
+
+@pytest.mark.parametrize("change", [{"seed": 1}, {"protocol": ProtocolConfig(max_rounds=13)}])
+def test_another_configuration_is_refused(tasks, tmp_path, change):
+    evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+    other = RunConfig(**{"backend": TOY, "protocol": CONFIG.protocol, **change})
+    with pytest.raises(StoreError, match=next(iter(change))):
+        evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=other, num_workers=0)
+    with pytest.raises(StoreError, match="tasks"):
+        evaluate(["toy_agents:Idle"], tasks[:1], tmp_path / "run", config=CONFIG, num_workers=0)
+
+
+def test_requests_that_make_no_sense_are_refused(tasks, tmp_path):
+    for agents in ([], ["random-walk", "random-walk"], ["no-such-agent"], ["toy_agents:Nobody"], ["json:decoder"]):
+        with pytest.raises(InvalidArgumentError):
+            evaluate(agents, tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+    with pytest.raises(InvalidArgumentError):
+        evaluate(["random-walk"], [], tmp_path / "run", config=CONFIG)
+    assert not (tmp_path / "run").exists()
+    with pytest.raises(TaskError):
+        task_files(tmp_path)
+    (tmp_path / "bad" / "task").mkdir(parents=True)
+    (tmp_path / "bad" / "task" / "task.json").write_text('{"num_stages": "many"}')
+    with pytest.raises(TaskError, match=r"task\.json"):
+        task_files(tmp_path / "bad")
+
+
+def test_a_file_that_is_no_run_is_refused(tmp_path):
+    with pytest.raises(StoreError, match="no run"):
+        RunStore(tmp_path)
+    (tmp_path / "records.sqlite").write_bytes(b"not a database" * 100)
+    with pytest.raises(StoreError):
+        RunStore(tmp_path)
+
+
+INTERRUPTED = """
+import sys
+from pathlib import Path
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.protocol import ProtocolConfig
+
+if __name__ == "__main__":
+    root = Path(sys.argv[1])
+    config = RunConfig(
+        backend=Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator"),
+        protocol=ProtocolConfig(max_rounds=12),
+    )
+    show = lambda news: print(news.num_done, flush=True)
+    evaluate(["random-walk", "nearest-frontier"], task_files(root / "tasks"), root / "run", config=config,
+             num_workers=2, on_progress=show)
+"""
+
+
+@pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
+def test_a_run_that_was_ended_can_be_resumed(tasks, tmp_path, kill):
+    agents = ["random-walk", "nearest-frontier"]
+    evaluate(agents, tasks, tmp_path / "whole", config=CONFIG, num_workers=0)
+    script = tmp_path / "script.py"
+    script.write_text(INTERRUPTED)
+    child = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={"PYTHONPATH": str(Path(__file__).parent), "PATH": ""},
+        text=True,
+    )
+    while child.stdout.readline().strip() in ("", "0", "1"):
+        assert child.poll() is None
+    child.send_signal(kill)
+    assert child.wait(timeout=30) != 0
+    child.stdout.close()
+    time.sleep(0.2)
+    with RunStore(tmp_path / "run") as store:
+        assert 2 <= len(store.states()) < 12
+    evaluate(agents, tasks, tmp_path / "run", config=CONFIG, num_workers=2)
+    assert texts(tmp_path / "run") == texts(tmp_path / "whole")

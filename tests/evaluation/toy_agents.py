@@ -1,0 +1,89 @@
+"""Agents that misbehave, for tests of containment. All walk as the nearest-frontier explorer does until they do not."""
+
+import os
+import time
+
+import numpy as np
+
+from evonav.agents.agent import NavigateTo, Sensing, Stop
+from evonav.agents.nearest_frontier import NearestFrontier
+
+
+class Explorer(NearestFrontier):
+    """Well-behaved."""
+
+    stage = 0
+
+    def begin_stage(self, stage):
+        self.stage = stage.stage
+        super().begin_stage(stage)
+
+
+class Dying(Explorer):
+    def act(self, observation):
+        if self.stage == 2 and observation.num_rounds_left < 50:
+            os._exit(3)
+        return super().act(observation)
+
+
+class DyingOnce(Explorer):
+    """Dies in stage 2 unless the file named by TOY_ALIVE exists."""
+
+    def act(self, observation):
+        if self.stage == 2 and not os.path.exists(os.environ["TOY_ALIVE"]):  # noqa: PTH110
+            os._exit(3)
+        return super().act(observation)
+
+
+class Raising(Explorer):
+    def act(self, observation):
+        if self.stage == 2:
+            raise RuntimeError("no idea")
+        return super().act(observation)
+
+
+class Hanging(Explorer):
+    def act(self, observation):
+        if self.stage == 2:
+            time.sleep(60.0)
+        return super().act(observation)
+
+
+class Speechless(Explorer):
+    def act(self, observation):
+        return "forward" if self.stage == 2 else super().act(observation)
+
+
+class Lost(Explorer):
+    def act(self, observation):
+        return NavigateTo((float("nan"), 0.0))
+
+
+class FarSighted(Explorer):
+    def __init__(self):
+        super().__init__()
+        self.sensing = Sensing(occupancy_range_m=100.0)
+
+
+class Idle:
+    """Stops at once: what comes for free."""
+
+    sensing = Sensing()
+
+    def begin_task(self, task):
+        pass
+
+    def begin_stage(self, stage):
+        pass
+
+    def act(self, observation):
+        return Stop("idle")
+
+
+class Undecided(Explorer):
+    """Not deterministic: goes where the clock says."""
+
+    def act(self, observation):
+        pose = observation.pose
+        angle_rad = time.monotonic_ns() % 1000
+        return NavigateTo((pose.x_m + np.sin(angle_rad), pose.z_m + np.cos(angle_rad)))
