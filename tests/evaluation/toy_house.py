@@ -50,7 +50,7 @@ def house_json(moves=None):
         objects.append(
             {
                 "id": object_id,
-                "category": category,
+                "assetId": f"Toy_{category}",
                 "position": {"x": x, "y": y, "z": z},
                 "rotation": {"x": 0, "y": 0, "z": 0},
                 "size": size,
@@ -61,6 +61,7 @@ def house_json(moves=None):
         {
             "id": room_id,
             "roomType": kind,
+            "floorMaterial": {"name": "Plain"},
             "floorPolygon": [{"x": x, "y": 0, "z": z} for x, z in ((a, 0), (a, DEPTH_M), (b, DEPTH_M), (b, 0))],
         }
         for room_id, (kind, a, b) in ROOMS.items()
@@ -68,11 +69,15 @@ def house_json(moves=None):
     walls = [
         {
             "id": f"wall|{name}",
+            "roomId": "room|1",
+            "material": {"name": "Plain"},
             "polygon": [{"x": x, "y": y, "z": z} for y, ends in ((0, (a, b)), (2.5, (b, a))) for x, z in ends],
         }
         for name, (a, b) in WALLS.items()
     ]
-    return json.dumps({"objects": objects, "rooms": rooms, "walls": walls, "doors": [], "windows": []})
+    metadata = {"agent": {"position": {"x": 1, "y": 0.9, "z": 3}, "rotation": {"x": 0, "y": 0, "z": 0}, "horizon": 30}}
+    house = {"objects": objects, "rooms": rooms, "walls": walls, "doors": [], "windows": [], "metadata": metadata}
+    return json.dumps(house)
 
 
 class ToySimulator:
@@ -93,7 +98,7 @@ class ToySimulator:
             bodies.append((f"wall|{name}", "Wall", "wall", ((x0 + x1) / 2, 1.25, (z0 + z1) / 2), size))
         for entry in house["objects"]:
             centre = tuple(entry["position"][axis] for axis in "xyz")
-            bodies.append((entry["id"], entry["category"], "object", centre, tuple(entry["size"])))
+            bodies.append((entry["id"], entry["assetId"].removeprefix("Toy_"), "object", centre, tuple(entry["size"])))
         self._objects = [SceneObject(*body) for body in bodies]
         centres = np.array([body.centre_m for body in self._objects])
         sizes = np.array([body.size_m for body in self._objects])

@@ -1,11 +1,8 @@
 """From a task on disk to what the evaluator runs and records."""
 
-import json
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
 
-from evonav.errors import TaskError
 from evonav.evaluation.protocol import EpisodeCase, StageCase
 from evonav.evaluation.records import (
     ObjectFootprint,
@@ -18,11 +15,11 @@ from evonav.evaluation.records import (
     TargetRecord,
     TransitionRecord,
 )
+from evonav.house import House, Wall
+from evonav.house import Opening as HouseOpening
 from evonav.tasks import Task
 from evonav.tasks.oracle import OracleStage
 from evonav.world.simulator import SceneObject
-
-_OPENINGS: tuple[tuple[OpeningKind, str], ...] = (("door", "doors"), ("window", "windows"))
 
 
 def episode_case(task: Task) -> EpisodeCase:
@@ -99,34 +96,28 @@ def stage_map(case: EpisodeCase, stage: int, objects: Sequence[SceneObject]) -> 
         objects: The simulator's bodies, for sizes.
 
     Raises:
-        TaskError: The house has no floor plan to draw.
+        HouseError: The house is malformed.
     """
-    try:
-        house = json.loads(case.stages[stage - 1].house_json)
-        walls = {wall["id"]: _wall_segment(wall) for wall in house["walls"]}
-        drawn = {walls[wall["id"]] for wall in house["walls"] if not wall.get("empty", False)}
-        return StageMap(
-            task_id=case.task_id,
-            house=case.house,
-            stage=stage,
-            rooms=tuple(
-                RoomFootprint(
-                    room_id=room["id"],
-                    room_type=room["roomType"],
-                    polygon_m=tuple((corner["x"], corner["z"]) for corner in room["floorPolygon"]),
-                )
-                for room in house["rooms"]
-            ),
-            walls=tuple(sorted(drawn)),
-            openings=tuple(
-                Opening(kind=kind, from_m=ends[0], to_m=ends[1])
-                for kind, key in _OPENINGS
-                for ends in (_hole_segment(hole, walls) for hole in house.get(key, ()))
-            ),
-            objects=_footprints(house, objects),
-        )
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-        raise TaskError(f"task {case.task_id}: stage {stage}: house has no floor plan to draw ({error!r})") from error
+    house = House(case.stages[stage - 1].house_json, name=case.house)
+    walls = {wall.id: wall for wall in house.walls}
+    return StageMap(
+        task_id=case.task_id,
+        house=case.house,
+        stage=stage,
+        rooms=tuple(
+            RoomFootprint(room_id=room.id, room_type=room.room_type, polygon_m=tuple(room.polygon_m))
+            for room in house.rooms
+        ),
+        # Every wall has two sides at the same place: one is enough for a picture.
+        walls=tuple(sorted({(min(w.from_m, w.to_m), max(w.from_m, w.to_m)) for w in walls.values() if not w.is_empty})),
+        openings=tuple(
+            _opening(kind, hole, walls[hole.wall_ids[0]])
+            for kind, holes in _openings(house)
+            for hole in holes
+            if hole.wall_ids[0] in walls
+        ),
+        objects=_footprints({entry.id: math.radians(entry.rotation_deg[1]) for entry in house.objects}, objects),
+    )
 
 
 def room_at(plan: StageMap, point_m: Point2) -> str | None:
@@ -143,46 +134,36 @@ def _is_inside(polygon_m: Sequence[Point2], point_m: Point2) -> bool:
     return is_inside
 
 
-def _wall_segment(wall: dict[str, Any]) -> tuple[Point2, Point2]:
-    """The two ends of a wall on the floor plan, in the wall's own direction."""
-    corners = [(corner["x"], corner["z"]) for corner in wall["polygon"]]
-    return corners[0], next(corner for corner in (*corners[1:], corners[0]) if corner != corners[0])
+def _openings(house: House) -> Iterator[tuple[OpeningKind, list[HouseOpening]]]:
+    yield "door", house.doors
+    yield "window", house.windows
 
 
-def _hole_segment(hole: dict[str, Any], walls: dict[str, tuple[Point2, Point2]]) -> tuple[Point2, Point2]:
-    """The two sides of a door or window; its polygon is in the wall's frame."""
-    (x0, z0), (x1, z1) = walls[hole["wall0"]]
-    length_m = math.hypot(x1 - x0, z1 - z0)
-    offsets_m = sorted(corner["x"] for corner in hole["holePolygon"])
+def _opening(kind: OpeningKind, hole: HouseOpening, wall: Wall) -> Opening:
+    """The two sides of a door or window; its hole is in the wall's frame."""
+    (x0, z0), (x1, z1) = wall.from_m, wall.to_m
+    length_m = math.hypot(x1 - x0, z1 - z0) or 1.0
     near, far = (
-        (x0 + (x1 - x0) * offset_m / length_m, z0 + (z1 - z0) * offset_m / length_m)
-        for offset_m in (offsets_m[0], offsets_m[-1])
+        (x0 + (x1 - x0) * along_m / length_m, z0 + (z1 - z0) * along_m / length_m)
+        for along_m in (hole.hole_min_m[0], hole.hole_max_m[0])
     )
-    return near, far
+    return Opening(kind=kind, from_m=near, to_m=far)
 
 
-def _footprints(house: dict[str, Any], objects: Sequence[SceneObject]) -> tuple[ObjectFootprint, ...]:
-    yaws_deg: dict[str, float] = {}
-    pending = list(house["objects"])
-    while pending:
-        entry = pending.pop()
-        yaws_deg[entry["id"]] = float(entry.get("rotation", {}).get("y", 0.0))
-        pending.extend(entry.get("children", ()))
+def _footprints(yaws_rad: Mapping[str, float], objects: Sequence[SceneObject]) -> tuple[ObjectFootprint, ...]:
     footprints = []
     for body in objects:
         if body.kind != "object":
             continue
         x, _, z = body.centre_m
-        yaw_rad = math.radians(yaws_deg.get(body.id, 0.0))
+        corners = _turned_corners(body.size_m[0], body.size_m[2], yaws_rad.get(body.id, 0.0))
         footprints.append(
             ObjectFootprint(
                 object_id=body.id,
                 category=body.category,
                 centre_m=body.centre_m,
                 size_m=body.size_m,
-                polygon_m=tuple(
-                    (x + dx, z + dz) for dx, dz in _turned_corners(body.size_m[0], body.size_m[2], yaw_rad)
-                ),
+                polygon_m=tuple((x + dx, z + dz) for dx, dz in corners),
             )
         )
     return tuple(footprints)

@@ -5,6 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+import numpy as np
+from numpy.typing import NDArray
+
 from evonav.agents.agent import Move, NavigateTo
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Simulator
@@ -66,16 +69,43 @@ def waypoints(corners_m: Sequence[Point2], spacing_m: float, max_travel_m: float
     return points, True
 
 
-def navigate(simulator: Simulator, action: NavigateTo, *, spacing_m: float, max_travel_m: float) -> Motion:
+class Planner:
+    """The simulator's shortest paths, to the nearest reachable place where a point itself is cut off.
+
+    The free point nearest to an object may lie in a pocket behind furniture; the paper's reading is the nearest
+    *reachable* one (docs/paper-readings.md).
+    """
+
+    def __init__(self, simulator: Simulator) -> None:
+        """Of the house and pose that the simulator is in."""
+        self._simulator = simulator
+        self._reachable_m: NDArray[np.float64] | None = None
+
+    def path_m(self, target_m: Point2) -> list[Point2]:
+        """Corners from the agent to a target; empty if there is no way to anywhere near it."""
+        pose = self._simulator.pose
+        corners = self._simulator.shortest_path(pose.position_m, (target_m[0], pose.y_m, target_m[1]))
+        if len(corners) == 0:
+            if self._reachable_m is None:
+                self._reachable_m = self._simulator.reachable_positions()[:, [0, 2]]
+            if len(self._reachable_m) == 0:
+                return []
+            nearest = int(np.hypot(*(self._reachable_m - target_m).T).argmin())
+            x_m, z_m = self._reachable_m[nearest].tolist()
+            corners = self._simulator.shortest_path(pose.position_m, (x_m, pose.y_m, z_m))
+        return [(float(x), float(z)) for x, _, z in corners]
+
+
+def navigate(
+    simulator: Simulator, planner: Planner, action: NavigateTo, *, spacing_m: float, max_travel_m: float
+) -> Motion:
     """Follows the planner towards a point; the heading is that of travel, on arrival towards `face_m`."""
     start = simulator.pose
     here = (start.x_m, start.z_m)
-    target_x_m, target_z_m = action.position_m
-    corners = simulator.shortest_path(start.position_m, (target_x_m, start.y_m, target_z_m))
-    if len(corners) == 0:
+    corners = planner.path_m(action.position_m)
+    if not corners:
         return Motion((here,), is_success=False)
-    path = [here, *((float(x), float(z)) for x, _, z in corners)]
-    points, is_end = waypoints(path, spacing_m, max_travel_m)
+    points, is_end = waypoints([here, *corners], spacing_m, max_travel_m)
     passed = [here]
     for point in points:
         x0, z0 = passed[-1]

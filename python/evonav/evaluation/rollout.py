@@ -123,6 +123,7 @@ class _StageRun:
         self._stage = self._case.stages[record.stage - 1]
         self._record = record
         self._requested = requested
+        self._planner = motion.Planner(self._simulator)
         self._trace: list[RoundRecord] = []
         self._length_m = 0.0
         self.plan: StageMap | None = None
@@ -178,10 +179,9 @@ class _StageRun:
 
     def _reference_length_m(self) -> float | None:
         """L*: the planner's path from the effective start to the target, or `None` when there is none."""
-        path = self._simulator.shortest_path(self._simulator.pose.position_m, self._stage.target.position_m)
-        if len(path) == 0:
-            return None
-        return motion.polyline_length_m([(float(x), float(z)) for x, _, z in path])
+        x_m, _, z_m = self._stage.target.position_m
+        path_m = self._planner.path_m((x_m, z_m))
+        return motion.polyline_length_m(path_m) if path_m else None
 
     def _rounds(self) -> str | None:
         """Decision rounds until the agent stops (returns why) or the budget ends (returns `None`)."""
@@ -215,6 +215,7 @@ class _StageRun:
         if isinstance(action, NavigateTo):
             return motion.navigate(
                 self._simulator,
+                self._planner,
                 action,
                 spacing_m=self._protocol.waypoint_m,
                 max_travel_m=self._agent.sensing.max_travel_m,

@@ -1,0 +1,145 @@
+"""A hostile agent searches everything that it is handed; the target and the simulator's ids must not be there."""
+
+import gc
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_case
+
+from evonav.agents.agent import NavigateTo, Sensing
+from evonav.evaluation.privileged import PrivilegedAgent
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records import EndState
+from evonav.evaluation.rollout import Episode
+from evonav.sensors.ground_truth import GroundTruthPerception
+
+CODE = (type, types.ModuleType, types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.FrameType)
+
+
+def reachable(roots):
+    """Every object that the garbage collector, attributes and array bases lead to, code left out."""
+    seen, pending = {}, list(roots)
+    while pending:
+        thing = pending.pop()
+        if id(thing) in seen or isinstance(thing, CODE):
+            continue
+        seen[id(thing)] = thing
+        pending.extend(gc.get_referents(thing))
+        if isinstance(thing, np.ndarray) and thing.base is not None:
+            pending.append(thing.base)
+        for slot in getattr(type(thing), "__slots__", ()):
+            pending.append(getattr(thing, slot, None))
+    return list(seen.values())
+
+
+class Hostile:
+    """Walks the object graph of all its arguments."""
+
+    sensing = Sensing(needs_rgb=True)
+
+    def __init__(self):
+        self.handed = []
+
+    def begin_task(self, task):
+        self.handed.append(task)
+
+    def begin_stage(self, stage):
+        self.handed.append(stage)
+
+    def act(self, observation):
+        self.handed.append(observation)
+        return NavigateTo((observation.pose.x_m + 1.0, observation.pose.z_m))
+
+
+@pytest.fixture(scope="module")
+def loot():
+    agent = Hostile()
+    episode = Episode(
+        episode_case("toy-moved"), "h", agent, ToySimulator(), GroundTruthPerception(), ProtocolConfig(max_rounds=4), 0
+    )
+    records = [outcome.record for outcome in episode.run()]
+    assert all(record.is_scored for record in records)
+    return reachable(agent.handed)
+
+
+def test_no_simulator_id_reaches_the_agent(loot):
+    ids = {*OBJECTS, "room|1", "room|2", "wall|south", "floor"}
+    strings = {thing for thing in loot if isinstance(thing, str)}
+    assert "Chair" in strings
+    assert not strings & ids
+    assert not any(object_id in text for text in strings for object_id in OBJECTS)
+
+
+def test_no_position_of_an_object_reaches_the_agent(loot):
+    places = {*(centre for _, centre, _ in OBJECTS.values()), *CHAIR_AWAY.values()}
+    for thing in loot:
+        if isinstance(thing, tuple) and len(thing) in (2, 3) and all(isinstance(value, float) for value in thing):
+            assert not any(thing in (place, (place[0], place[2])) for place in places)
+        if isinstance(thing, np.ndarray) and thing.dtype.kind == "f" and thing.shape[-1:] == (3,):
+            flat = thing.reshape(-1, 3)
+            assert not any((np.abs(flat - place) < 1e-6).all(axis=1).any() for place in places)
+
+
+def test_masks_number_detections_and_not_instances(loot):
+    for thing in loot:
+        if isinstance(thing, np.ndarray) and thing.dtype == np.int32 and thing.ndim == 2 and thing.shape == (48, 48):
+            present = np.unique(thing)
+            # -1 and then 0, 1, 2 ... without a gap: an instance image of the toy house has gaps and starts at 1.
+            assert present.tolist() == list(range(-1 if present[0] == -1 else 0, int(present[-1]) + 1))
+
+
+def test_nothing_handed_over_can_reach_the_evaluator(loot):
+    modules = {type(thing).__module__ for thing in loot}
+    assert not {name for name in modules if name.startswith("evonav.evaluation")}
+    assert not {"toy_house", "evonav.world.embedded", "evonav.tasks.oracle", "evonav.tasks.manifest"} & modules
+
+
+def test_the_whole_occupancy_is_not_there(loot):
+    simulator = ToySimulator()
+    simulator.reset(episode_case("toy-moved").stages[0].house_json)
+    shape = simulator.occupancy().cells.shape
+    assert not any(isinstance(thing, np.ndarray) and thing.shape == shape for thing in loot)
+
+
+class Impostor(PrivilegedAgent):
+    """Inherits from the yardsticks and hopes to be told."""
+
+    told = False
+
+    def reveal_target(self, position_m):
+        Impostor.told = True
+
+    def reveal_sighting(self, sighting):
+        Impostor.told = True
+
+    def act(self, observation):
+        return self._approach(observation)
+
+
+def test_inheriting_from_a_yardstick_gives_no_privilege():
+    episode = Episode(
+        episode_case("toy-moved"), "i", Impostor(), ToySimulator(), GroundTruthPerception(), ProtocolConfig(), 0
+    )
+    first = next(iter(episode.run())).record
+    assert not Impostor.told
+    assert first.state is EndState.ERRORED  # its target is unknown: NaN is no place to go
+
+
+FORBIDDEN = (
+    "evonav.tasks.oracle",
+    "evonav.tasks.manifest",
+    "evonav.house",
+    "evonav.world.embedded",
+    "evonav.evaluation",
+)
+
+
+def test_agents_import_no_oracle():
+    root = Path(sys.modules["evonav"].__file__).parent
+    for package in ("agents", "decision", "memory"):
+        for path in (root / package).glob("*.py"):
+            text = path.read_text()
+            assert not any(f"from {name}" in text or f"import {name}" in text for name in FORBIDDEN), path
