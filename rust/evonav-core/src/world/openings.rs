@@ -2,7 +2,7 @@
 
 use super::structure::WallFrame;
 use crate::{
-    assets::{Asset, part::Part},
+    assets::{Asset, part::Part, shapes::lit},
     geometry::{Vec2, Vec3, add, compose, rotate, yaw_rotation},
     house::{House, Opening},
 };
@@ -23,8 +23,8 @@ const SKY: [u8; 3] = [190, 215, 235];
 pub(super) fn door_parts(house: &House, door: &Opening, asset: Option<&Asset>) -> Vec<Part> {
     let Some((frame, along, up)) = hole(house, door) else { return Vec::new() };
     let colours = asset.map_or(&[][..], |asset| &asset.colours);
-    let wood = colours.first().copied().unwrap_or([150, 105, 70]);
-    let trim = colours.get(1).copied().unwrap_or([225, 220, 210]);
+    let wood = lit(colours.first().copied().unwrap_or([150, 105, 70]));
+    let trim = lit(colours.get(1).copied().unwrap_or([225, 220, 210]));
     let bar = BAR_M.min(0.1 * (along[1] - along[0]));
     let depth = [-FRAME_HALF_M, FRAME_HALF_M];
     let inner = [along[0] + bar, along[1] - bar];
@@ -48,7 +48,7 @@ pub(super) fn door_parts(house: &House, door: &Opening, asset: Option<&Asset>) -
     parts
 }
 
-/// A leaf with a handle, hinged at `hinge` and reaching along `direction` (1 or -1) when closed.
+/// A leaf with two raised panels and a handle, hinged at `hinge` and reaching along `direction` (1 or -1) when closed.
 fn leaf(
     frame: &WallFrame,
     hinge: f64,
@@ -57,7 +57,7 @@ fn leaf(
     up: Vec2,
     angle_rad: f64,
     colour: [u8; 3],
-) -> [Part; 2] {
+) -> [Part; 4] {
     let span = |from: f64, to: f64| {
         let ends = [hinge + direction * from, hinge + direction * to];
         [ends[0].min(ends[1]), ends[0].max(ends[1])]
@@ -70,10 +70,17 @@ fn leaf(
         [FRAME_HALF_M - LEAF_M - 0.05, FRAME_HALF_M + 0.05],
         [190, 185, 170],
     );
+    let raised = colour.map(|channel| (f64::from(channel) * 0.88).round() as u8);
+    let panel = |from: f64, to: f64| {
+        let height = up[1] - up[0];
+        let level = [up[0] + from * height, up[0] + to * height];
+        let depth = [FRAME_HALF_M - LEAF_M - 0.004, FRAME_HALF_M + 0.004];
+        frame.cuboid(span(0.2 * width, 0.8 * width), level, depth, raised)
+    };
     let [x, z] = frame.point_m(hinge, FRAME_HALF_M);
     // Seen from above (x right, z up) a turn to the left is against the clock: negative yaw.
     let turn = yaw_rotation(-direction * angle_rad);
-    [board, handle].map(|part| turned_about(part, [x, 0.0, z], &turn))
+    [board, handle, panel(0.08, 0.42), panel(0.52, 0.93)].map(|part| turned_about(part, [x, 0.0, z], &turn))
 }
 
 fn turned_about(part: Part, pivot_m: Vec3, turn: &[[f64; 3]; 3]) -> Part {
@@ -89,6 +96,7 @@ fn turned_about(part: Part, pivot_m: Vec3, turn: &[[f64; 3]; 3]) -> Part {
 pub(super) fn window_parts(house: &House, window: &Opening, asset: Option<&Asset>) -> Vec<Part> {
     let Some((frame, along, up)) = hole(house, window) else { return Vec::new() };
     let trim = asset.and_then(|asset| asset.colours.first().copied()).unwrap_or([235, 235, 230]);
+    let trim = lit(trim);
     let [width, height] = [along[1] - along[0], up[1] - up[0]];
     let bar = BAR_M.min(0.1 * width.min(height));
     let depth = [-WINDOW_HALF_M, WINDOW_HALF_M];

@@ -88,10 +88,10 @@ pub fn dog_bed(s: &mut Sketch<'_>) {
     s.cuboid(inside(x, rim), [0.0, 0.7 * h], ends(z, rim, 0.0)[1], fabric);
 }
 
-/// A pillow.
+/// A pillow: thick in the middle.
 pub fn pillow(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[5]));
-    s.ellipsoid(x, y, z, fabric);
-    s.cuboid(between(x, 0.06, 0.94), between(y, 0.3, 0.7), between(z, 0.06, 0.94), fabric);
+    s.cuboid(x, between(y, 0.3, 0.7), z, fabric);
+    s.cuboid(between(x, 0.07, 0.93), y, between(z, 0.07, 0.93), shade(fabric, 1.04));
 }

@@ -27,9 +27,8 @@ pub fn plant(s: &mut Sketch<'_>) {
     s.pole([0.0, 0.0], 0.05 * w.min(d), [pot_top, 0.6 * h], 6, [95, 80, 50]);
     let crown = 0.75 * h;
     s.ellipsoid(between(x, 0.12, 0.88), [crown - 0.25 * h, h], between(z, 0.12, 0.88), leaf);
-    s.ellipsoid(between(x, 0.0, 0.6), [pot_top, crown], between(z, 0.3, 1.0), shade(leaf, 0.85));
-    s.ellipsoid(
-        between(x, 0.4, 1.0),
+    s.blob(between(x, 0.0, 0.6), [pot_top, crown], between(z, 0.3, 1.0), shade(leaf, 0.85));
+    s.blob(between(x, 0.4, 1.0),
         [1.1 * pot_top, crown + 0.1 * h],
         between(z, 0.0, 0.6),
         shade(leaf, 1.15),
@@ -112,7 +111,7 @@ pub fn statue(s: &mut Sketch<'_>) {
     if w > h {
         // An animal: body, head, legs.
         s.cuboid(between(x, 0.1, 0.8), between(y, 0.35, 0.75), between(z, 0.15, 0.85), stone);
-        s.ellipsoid(between(x, 0.65, 1.0), between(y, 0.5, 1.0), between(z, 0.1, 0.9), stone);
+        s.blob(between(x, 0.65, 1.0), between(y, 0.5, 1.0), between(z, 0.1, 0.9), stone);
         for end in ends(between(x, 0.0, 0.8), 0.15 * w, 0.0) {
             s.cuboid(end, between(y, 0.0, 0.4), z, shade(stone, 0.9));
         }
@@ -127,14 +126,14 @@ pub fn statue(s: &mut Sketch<'_>) {
         8,
         stone,
     );
-    s.ellipsoid(between(x, 0.28, 0.72), between(y, 0.72, 1.0), between(z, 0.28, 0.72), stone);
+    s.blob(between(x, 0.28, 0.72), between(y, 0.72, 1.0), between(z, 0.28, 0.72), stone);
 }
 
 /// Body, head, ears, arms and legs.
 pub fn teddy_bear(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let fur = s.tint(0, [150, 105, 65]);
-    s.ellipsoid(between(x, 0.22, 0.78), between(y, 0.05, 0.62), between(z, 0.05, 0.7), fur);
+    s.blob(between(x, 0.22, 0.78), between(y, 0.05, 0.62), between(z, 0.05, 0.7), fur);
     s.ellipsoid(
         between(x, 0.27, 0.73),
         between(y, 0.52, 0.95),

@@ -11,7 +11,7 @@ pub fn food(s: &mut Sketch<'_>) {
     match s.asset().category.as_str() {
         "Apple" => {
             let skin = s.choose(&[[185, 40, 40], [120, 165, 60], [205, 70, 50]], [185, 40, 40]);
-            s.ellipsoid(x, between(y, 0.0, 0.88), z, skin);
+            s.blob(x, between(y, 0.0, 0.88), z, skin);
             s.cuboid(
                 between(x, 0.46, 0.54),
                 between(y, 0.8, 1.0),
@@ -20,7 +20,7 @@ pub fn food(s: &mut Sketch<'_>) {
             );
         }
         "Tomato" => {
-            s.ellipsoid(x, between(y, 0.0, 0.92), z, [200, 45, 35]);
+            s.blob(x, between(y, 0.0, 0.92), z, [200, 45, 35]);
             s.column(
                 between(x, 0.3, 0.7),
                 between(y, 0.9, 1.0),
@@ -30,12 +30,12 @@ pub fn food(s: &mut Sketch<'_>) {
                 [70, 120, 50],
             );
         }
-        "Potato" => s.ellipsoid(x, y, z, [170, 130, 85]),
+        "Potato" => s.blob(x, y, z, [170, 130, 85]),
         "Egg" => {
-            s.ellipsoid(x, y, z, s.choose(&[[235, 215, 190], [245, 240, 232]], [235, 215, 190]))
+            s.blob(x, y, z, s.choose(&[[235, 215, 190], [245, 240, 232]], [235, 215, 190]))
         }
         "Lettuce" => {
-            s.ellipsoid(x, y, between(z, 0.0, 0.9), [120, 165, 80]);
+            s.blob(x, y, between(z, 0.0, 0.9), [120, 165, 80]);
             let stump = [between(x, 0.3, 0.7), between(y, 0.3, 0.7), between(z, 0.8, 1.0)];
             s.round(Along::Z, 0.6, 8, stump, [185, 205, 150]);
         }

@@ -33,10 +33,59 @@ pub fn shape_of(asset: &Asset) -> Vec<Part> {
     sketch.finish()
 }
 
-/// Draws by category; categories without a shape of their own are drawn as a cuboid.
+/// Words in the categories of Objaverse assets, and the category whose shape fits; first match.
+const ALIKE: [(&str, &str); 34] = [
+    ("Bookshel", "ShelvingUnit"),
+    ("Bookcase", "ShelvingUnit"),
+    ("Shelf", "ShelvingUnit"),
+    ("Chair", "Chair"),
+    ("Stool", "Stool"),
+    ("Sofa", "Sofa"),
+    ("Couch", "Sofa"),
+    ("Desk", "Desk"),
+    ("Table", "CoffeeTable"),
+    ("Bench", "CoffeeTable"),
+    ("Commode", "Dresser"),
+    ("Wardrobe", "Dresser"),
+    ("Cabinet", "Dresser"),
+    ("Refrigerator", "Fridge"),
+    ("Lamp", "DeskLamp"),
+    ("Painting", "Painting"),
+    ("Poster", "Painting"),
+    ("Picture", "Painting"),
+    ("Frame", "Painting"),
+    ("Mirror", "Painting"),
+    ("Calendar", "Painting"),
+    ("TrashCan", "GarbageCan"),
+    ("Bucket", "GarbageCan"),
+    ("Plant", "HousePlant"),
+    ("Sunflower", "HousePlant"),
+    ("Flower", "HousePlant"),
+    ("Book", "Book"),
+    ("Pillow", "Pillow"),
+    ("Cushion", "Pillow"),
+    ("Ball", "BasketBall"),
+    ("ball", "BasketBall"),
+    ("Lotion", "SoapBottle"),
+    ("Perfume", "Bottle"),
+    ("Phone", "CellPhone"),
+];
+
+/// Draws by category; categories of Objaverse assets by words in their names, others as a cuboid.
 fn draw(s: &mut Sketch<'_>) {
-    let asset = s.asset();
-    match asset.category.as_str() {
+    let category = s.asset().category.as_str();
+    if draw_category(s, category) {
+        return;
+    }
+    let alike = ALIKE.iter().find(|(word, _)| category.contains(word));
+    if !alike.is_some_and(|&(_, category)| draw_category(s, category)) {
+        s.block(s.tint(0, [165, 150, 135]));
+    }
+}
+
+/// Whether the category has a shape, which is then drawn.
+fn draw_category(s: &mut Sketch<'_>, category: &str) -> bool {
+    match category {
         "DiningTable" | "CoffeeTable" | "SideTable" => tables::table(s),
         "Desk" => tables::desk(s),
         "TVStand" | "Dresser" | "Cabinet" | "Drawer" => storage::carcass(s),
@@ -105,6 +154,7 @@ fn draw(s: &mut Sketch<'_>) {
             food::utensil(s);
         }
         "KeyChain" | "TableTopDecor" => decor::slab(s),
-        _ => s.block(s.tint(0, [165, 150, 135])),
+        _ => return false,
     }
+    true
 }

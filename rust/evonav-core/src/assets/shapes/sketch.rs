@@ -90,6 +90,13 @@ impl<'a> Sketch<'a> {
         self.push(Primitive::Ellipsoid { half_m }, spans, IDENTITY, colour);
     }
 
+    /// A round thing at half the triangles of an ellipsoid: two frusta base to base.
+    pub fn blob(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
+        let middle = 0.45 * y[1] + 0.55 * y[0];
+        self.column(x, [y[0], middle], z, 1.8, 8, colour);
+        self.column(x, [middle, y[1]], z, 0.5, 8, colour);
+    }
+
     /// Upright cylinder (`taper` 1) or cone; see [`Sketch::round`].
     pub fn column(&mut self, x: Span, y: Span, z: Span, taper: f64, sides: u8, colour: Colour) {
         self.round(Along::Y, taper, sides, [x, y, z], colour);
