@@ -80,7 +80,8 @@ fn leaf(
     let [x, z] = frame.point_m(hinge, FRAME_HALF_M);
     // Seen from above (x right, z up) a turn to the left is against the clock: negative yaw.
     let turn = yaw_rotation(-direction * angle_rad);
-    [board, handle, panel(0.08, 0.42), panel(0.52, 0.93)].map(|part| turned_about(part, [x, 0.0, z], &turn))
+    [board, handle, panel(0.08, 0.42), panel(0.52, 0.93)]
+        .map(|part| turned_about(part, [x, 0.0, z], &turn))
 }
 
 fn turned_about(part: Part, pivot_m: Vec3, turn: &[[f64; 3]; 3]) -> Part {

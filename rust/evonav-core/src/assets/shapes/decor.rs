@@ -28,7 +28,8 @@ pub fn plant(s: &mut Sketch<'_>) {
     let crown = 0.75 * h;
     s.ellipsoid(between(x, 0.12, 0.88), [crown - 0.25 * h, h], between(z, 0.12, 0.88), leaf);
     s.blob(between(x, 0.0, 0.6), [pot_top, crown], between(z, 0.3, 1.0), shade(leaf, 0.85));
-    s.blob(between(x, 0.4, 1.0),
+    s.blob(
+        between(x, 0.4, 1.0),
         [1.1 * pot_top, crown + 0.1 * h],
         between(z, 0.0, 0.6),
         shade(leaf, 1.15),

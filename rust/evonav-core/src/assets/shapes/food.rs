@@ -31,9 +31,7 @@ pub fn food(s: &mut Sketch<'_>) {
             );
         }
         "Potato" => s.blob(x, y, z, [170, 130, 85]),
-        "Egg" => {
-            s.blob(x, y, z, s.choose(&[[235, 215, 190], [245, 240, 232]], [235, 215, 190]))
-        }
+        "Egg" => s.blob(x, y, z, s.choose(&[[235, 215, 190], [245, 240, 232]], [235, 215, 190])),
         "Lettuce" => {
             s.blob(x, y, between(z, 0.0, 0.9), [120, 165, 80]);
             let stump = [between(x, 0.3, 0.7), between(y, 0.3, 0.7), between(z, 0.8, 1.0)];
