@@ -365,6 +365,8 @@ class EmbeddedSimulator:
 
     def occupancy(self, cell_m: float) -> tuple[NDArray[np.uint8], tuple[float, float]]:
         """Cells `(R, C)` and the corner of the grid."""
+    def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+        """Corners `(N, 3, 3)`, body indices `(N,)` and colours `(N, 3)` of all surfaces."""
 
 # evolution
 

@@ -187,6 +187,15 @@ class EmbeddedSimulator:
         cells, corner_m = self._world.occupancy(self.config.occupancy_cell_m)
         return OccupancyGrid(cells, self.config.occupancy_cell_m, corner_m)
 
+    def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
+        """All surfaces, for other renderers and for export.
+
+        Returns:
+            `(N, 3, 3)` corners in metres, clockwise seen from outside; `(N,)` body indices (instance id - 1); and
+            `(N, 3)` colours, sRGB.
+        """
+        return self._world.triangles()
+
     def close(self) -> None:
         """Releases the house; safe to call twice."""
         self._loaded = None

@@ -26,6 +26,10 @@ type Images<'py> = (
     Option<Bound<'py, PyArray2<i32>>>,
 );
 
+/// Corners, bodies and colours of triangles.
+type Triangles<'py> =
+    (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray2<u8>>);
+
 /// Id, category, kind, centre and size of a body.
 type BodyRecord = (String, String, &'static str, Vec3, Vec3);
 
@@ -182,6 +186,15 @@ impl PyEmbeddedSimulator {
         let spec = navigation.map_spec(cell_m).map_err(error::to_py)?;
         let cells = py.detach(|| navigation.occupancy(&spec));
         Ok((arrays::image_of(py, cells, [spec.rows, spec.cols])?, spec.corner_m))
+    }
+
+    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Triangles<'py>> {
+        let triangles: Vec<_> = py.detach(|| self.core.mesh().triangles().collect());
+        let corners_m = triangles.iter().flat_map(|t| t.vertices_m).collect::<Vec<_>>();
+        let bodies = triangles.iter().map(|t| t.body as i32).collect::<Vec<_>>();
+        let colours = triangles.iter().map(|t| t.colour).collect();
+        let corners_m = arrays::image_of(py, corners_m.into_flattened(), [bodies.len(), 3, 3])?;
+        Ok((corners_m, bodies.into_pyarray(py), arrays::rows_of(py, colours)?))
     }
 }
 

@@ -1,0 +1,20 @@
+"""Runs the sections named on the command line, or all, and writes `benches/README.md`."""
+
+import importlib
+import sys
+
+from benches.table import write_section
+
+SECTIONS = {"rendering": "Rendering"}
+"""Module by title. A module has `NOTES` (Markdown) and `run() -> list[Row]`."""
+
+
+def main() -> None:
+    """See the module."""
+    for name in sys.argv[1:] or SECTIONS:
+        module = importlib.import_module(f"benches.{name}")
+        sys.stdout.write(write_section(SECTIONS[name], module.NOTES, module.run()) + "\n")
+
+
+if __name__ == "__main__":
+    main()
