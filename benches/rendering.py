@@ -15,7 +15,7 @@ from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig
 
 NOTES = """Bundled houses, 20 poses in each drawn from the reachable positions, field of view 90 degrees, horizon 30.
-All draw the same triangles and are checked to see the same (depth within 1 mm and instance equal on 99.9% of the pixels).
+All draw the same triangles, checked to see the same (depth within 1 mm and instance equal on 99.9% of the pixels).
 Embree's time is its ray query alone, rays prepared beforehand; OpenGL's has the matrices, one draw call of one vertex
 buffer with back faces culled, and the read-back. `LP_NUM_THREADS=0`: llvmpipe draws in the calling thread.
 """

@@ -317,6 +317,7 @@ class ObjectMap:
     def num_views(self) -> int: ...
     @property
     def entries(self) -> list[ObjectEntry]: ...
+
 # simulator
 
 @final
