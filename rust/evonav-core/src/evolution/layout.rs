@@ -10,8 +10,8 @@ use crate::{
         placement::Place,
         shapes::shape_of,
     },
-    geometry::{Aabb, Vec3, euler_rotation_deg},
-    house::{House, HouseDelta, ObjectMove},
+    geometry::{Aabb, Vec2, Vec3, distance_2d_m, euler_rotation_deg},
+    house::{House, HouseDelta, ObjectMove, Opening},
     world::{
         footprint::{Footprint, footprint},
         scene::{BodyKind, Scene},
@@ -22,6 +22,8 @@ use crate::{
 pub const TOUCH_M: f64 = 0.002;
 /// Gap that furniture keeps to furniture.
 const FURNITURE_GAP_M: f64 = 0.02;
+/// Depth of the floor on either side of a door that furniture is not put on.
+const DOORWAY_M: f64 = 0.5;
 /// A root whose bottom is lower stands on the floor.
 const FLOOR_M: f64 = 0.05;
 
@@ -67,6 +69,8 @@ pub struct Layout {
     pub scene: Scene,
     /// Walls, doors and windows.
     structure: Vec<(Aabb, Footprint)>,
+    /// Plan outlines of the floor in front of doors.
+    doorways: Vec<[Vec2; 4]>,
 }
 
 impl Layout {
@@ -107,7 +111,8 @@ impl Layout {
             .filter_map(|part| footprint(part, f64::NEG_INFINITY, f64::INFINITY))
             .map(|solid| (box_of(std::slice::from_ref(&solid)), solid))
             .collect();
-        Ok(Self { items, scene, structure })
+        let doorways = house.doors.iter().filter_map(|door| doorway(house, door)).collect();
+        Ok(Self { items, scene, structure, doorways })
     }
 
     /// `root` and everything that stands on it, directly or not; parents first.
@@ -138,7 +143,12 @@ impl Layout {
                 bounds.intersects(other_box)
                     && solids.iter().any(|solid| collide(solid, other, 0.0))
             });
+            let blocks_door = item.is_on_floor
+                && self.doorways.iter().any(|doorway| {
+                    solids.iter().any(|solid| overlap_m(&solid.outline_m, doorway) > TOUCH_M)
+                });
             !hits_structure
+                && !blocks_door
                 && self
                     .items
                     .iter()
@@ -212,6 +222,26 @@ impl Layout {
         });
         HouseDelta { moves: moves.collect() }
     }
+}
+
+/// The floor on both sides of a door; `None` if its wall is not there.
+fn doorway(house: &House, door: &Opening) -> Option<[Vec2; 4]> {
+    let wall = house.walls.iter().find(|wall| wall.id == door.wall0)?;
+    let length_m = distance_2d_m(wall.from_m, wall.to_m);
+    let along = [0, 1].map(|i| (wall.to_m[i] - wall.from_m[i]) / length_m.max(1e-9));
+    let corner = |along_m: f64, across_m: f64| {
+        [
+            wall.from_m[0] + along_m * along[0] - across_m * along[1],
+            wall.from_m[1] + along_m * along[1] + across_m * along[0],
+        ]
+    };
+    let (low, high) = (door.hole_min_m[0], door.hole_max_m[0]);
+    Some([
+        corner(low, -DOORWAY_M),
+        corner(high, -DOORWAY_M),
+        corner(high, DOORWAY_M),
+        corner(low, DOORWAY_M),
+    ])
 }
 
 /// Whether two solids share more than a touch, `gap_m` apart or nearer in plan.

@@ -1,0 +1,69 @@
+"""Makes the tasks that come with evonav: `python scripts/build_tasks.py [--check]`.
+
+The first houses with test assets of each number of rooms, seed 0, the paper's parameters. The output is a function of
+this list, of `python/evonav/data/houses.jsonl.gz` and of the code; `--check` says whether it is what is there.
+"""
+
+import argparse
+import shutil
+import sys
+from collections import Counter
+from pathlib import Path
+
+from evonav.generation import Rejections, generate_tasks
+from evonav.house import House, bundled_houses
+from evonav.tasks import Task, load_tasks, write_task
+
+ROOT = Path(__file__).resolve().parents[1] / "python" / "evonav" / "data" / "tasks"
+SEED = 0
+FIRST_TEST_HOUSE = 89
+"""Line of the first house with test assets."""
+NUM_TASKS = {2: 6, 3: 4, 4: 6, 5: 4, 6: 3, 7: 2, 8: 3, 10: 2}
+"""Tasks by number of rooms."""
+
+
+def chosen_houses() -> list[House]:
+    """The houses of the tasks, in file order."""
+    houses = [house for number, house in enumerate(bundled_houses(), start=1) if number >= FIRST_TEST_HOUSE]
+    taken: Counter[int] = Counter()
+    chosen = []
+    for house in houses:
+        num_rooms = len(house.rooms)
+        if taken[num_rooms] < NUM_TASKS.get(num_rooms, 0):
+            taken[num_rooms] += 1
+            chosen.append(house)
+    return chosen
+
+
+def build_tasks() -> list[Task]:
+    """The tasks, in order of task id."""
+    rejections = Rejections()
+    tasks = list(generate_tasks(chosen_houses(), seed=SEED, rejections=rejections, dataset="evonav-mini", split="test"))
+    for message in rejections.messages:
+        sys.stderr.write(f"left out: {message}\n")
+    return sorted(tasks, key=lambda task: task.task_id)
+
+
+def main() -> int:
+    """Writes the tasks, or compares them with those there."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="compare only; 1 if they differ")
+    tasks = build_tasks()
+    if parser.parse_args().check:
+        there = {task.task_id: task.header for task in load_tasks(ROOT)}
+        differing = {task.task_id for task in tasks if there.pop(task.task_id, None) != task.header} | there.keys()
+        for task_id in sorted(differing):
+            sys.stderr.write(f"differs: {task_id}\n")
+        return int(bool(differing))
+    if ROOT.exists():
+        shutil.rmtree(ROOT)
+    for task in tasks:
+        write_task(task, ROOT)
+    num_bytes = sum(path.stat().st_size for path in ROOT.rglob("*") if path.is_file())
+    num_stages = sum(task.num_stages for task in tasks)
+    sys.stdout.write(f"{len(tasks)} tasks, {num_stages} stages, {num_bytes / 1e6:.2f} MB in {ROOT}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
