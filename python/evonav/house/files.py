@@ -82,35 +82,41 @@ def _lines(path: Path, text: IO[str]) -> Iterator[House]:
 
 
 def _document(path: Path, text: str) -> Iterator[House]:
-    """One house, or a list. List entries are cut out of the text, so that numbers stay as they were written."""
+    """One house, or a list of houses."""
     start = _after_space(text, 0)
     if not text.startswith("[", start):
         yield House(text, name=f"{path}:1")
         return
+    line, counted = 1, 0
+    for index, (begin, end) in enumerate(_entries(path, text, start)):
+        line, counted = line + text.count("\n", counted, begin), begin
+        yield House(text[begin:end], name=f"{path}:{line}[{index}]")
+
+
+def _entries(path: Path, text: str, start: int) -> Iterator[tuple[int, int]]:
+    """Where the entries of the list at `start` begin and end: cut out, their numbers stay as they were written."""
     decoder = json.JSONDecoder()
-    line, counted, position = 1, 0, _after_space(text, start + 1)
-    for index in range(len(text)):
-        if index == 0 and text.startswith("]", position):
-            break
-        line, counted = line + text.count("\n", counted, position), position
-        name = f"{path}:{line}[{index}]"
+    position = _after_space(text, start + 1)
+    is_closed = text.startswith("]", position)
+    while not is_closed:
         try:
             _, end = decoder.raw_decode(text, position)
         except (ValueError, RecursionError) as error:
-            message = f"house {name}: document: field `JSON`: {error}"
-            raise HouseError(message) from error
-        yield House(text[position:end], name=name)
-        after = _after_space(text, end)
-        if text.startswith("]", after):
-            position = after
-            break
-        if not text.startswith(",", after):
-            message = f"house {name}: document: field `JSON`: expected `,` or `]` after the entry"
-            raise HouseError(message)
-        position = _after_space(text, after + 1)
-    if text[position + 1 :].strip():
-        message = f"house {path}: document: field `JSON`: text follows the list"
-        raise HouseError(message)
+            raise _list_error(path, text, position, str(error)) from error
+        yield position, end
+        position = _after_space(text, end)
+        is_closed = text.startswith("]", position)
+        if not is_closed:
+            if not text.startswith(",", position):
+                raise _list_error(path, text, position, "expected `,` or `]` after a house")
+            position = _after_space(text, position + 1)
+    if _after_space(text, position + 1) != len(text):
+        raise _list_error(path, text, position, "text follows the list")
+
+
+def _list_error(path: Path, text: str, position: int, message: str) -> HouseError:
+    line = text.count("\n", 0, position) + 1
+    return HouseError(f"house {path}:{line}: document: field `JSON`: {message}")
 
 
 def _after_space(text: str, position: int) -> int:

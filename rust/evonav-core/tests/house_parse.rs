@@ -58,6 +58,11 @@ fn document_survives_byte_for_byte() {
     }
 }
 
+/// `{x, y, z}` of `[x, z]` points on the floor.
+fn corners(points: &[[i32; 2]]) -> Value {
+    points.iter().map(|[x, z]| json!({"x": x, "y": 0, "z": z})).collect()
+}
+
 #[test]
 fn refusals_name_object_field_and_value() {
     let cases = [
@@ -66,6 +71,14 @@ fn refusals_name_object_field_and_value() {
         ("/objects/0/rotation", json!([0, 90, 0]), ".rotation", "[0,90,0]"),
         ("/objects/0/assetId", json!(7), ".assetId", "7"),
         ("/rooms/0/floorPolygon", json!([]), ".floorPolygon", "0 corners"),
+        ("/rooms/0/floorPolygon", corners(&[[0, 0], [4, 0], [8, 0]]), ".floorPolygon", "area of 0"),
+        (
+            "/rooms/0/floorPolygon",
+            corners(&[[0, 0], [4, 4], [4, 0], [0, 5]]),
+            ".floorPolygon",
+            "cross",
+        ),
+        ("/walls/0/polygon", corners(&[[0, 0], [4, 0], [4, 0], [0, 0]]), ".polygon", "0 m high"),
         ("/walls/0/roomId", json!("room|99"), ".roomId", "room|99"),
         ("/doors/0/wall0", json!("wall|x"), ".wall0", "wall|x"),
         ("/doors/0/boundingBox/max/x", json!(50.0), ".holePolygon", "50"),
