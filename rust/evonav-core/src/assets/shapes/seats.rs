@@ -17,7 +17,7 @@ pub fn chair(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
     let id = s.asset().id.to_ascii_lowercase();
-    let seat = seat_height(s, (0.5 * h).clamp(0.25 * h, 0.5));
+    let seat = seat_height(s, (0.5 * h).min(0.5).max(0.25 * h));
     let wood = s.tint(0, s.choose(&WOODS, WOODS[2]));
     let cushion = s.tint(1, wood);
     let back = [z[0], z[0] + 0.09 * d];
