@@ -318,6 +318,29 @@ class ObjectMap:
     @property
     def entries(self) -> list[ObjectEntry]: ...
 
+# camera
+
+def unproject_image(
+    depth_m: NDArray[np.float32],
+    *,
+    vertical_fov_rad: float,
+    position_m: tuple[float, float, float],
+    yaw_rad: float,
+    horizon_rad: float,
+) -> NDArray[np.float64]:
+    """`(H, W, 3)` world points of an `(H, W)` depth image."""
+
+def project_points(
+    points_m: NDArray[np.float64],
+    *,
+    image_px: tuple[int, int],
+    vertical_fov_rad: float,
+    position_m: tuple[float, float, float],
+    yaw_rad: float,
+    horizon_rad: float,
+) -> NDArray[np.float64]:
+    """`(N, 3)` column, row and planar depth of `(N, 3)` world points; NaN behind the camera."""
+
 # simulator
 
 @final

@@ -24,12 +24,21 @@ pub fn row_major<'a, T: Element>(
 
 /// The `(N, 2)` `[row, col]` rows of an array.
 pub fn cells(name: &str, array: &PyReadonlyArray2<'_, i32>) -> PyResult<Vec<[i32; 2]>> {
+    Ok(rows(name, array)?.to_vec())
+}
+
+/// The `N` rows of an `(N, M)` array.
+pub fn rows<'a, T: Element, const M: usize>(
+    name: &str,
+    array: &'a PyReadonlyArray2<'_, T>,
+) -> PyResult<&'a [[T; M]]> {
     let (values, shape) = row_major(name, array)?;
-    if shape[1] != 2 {
+    if shape[1] != M {
         let found = format!("of shape ({}, {})", shape[0], shape[1]);
-        return Err(error::to_py(Error::invalid(name, found, "an array of shape (N, 2)")));
+        let expected = format!("an array of shape (N, {M})");
+        return Err(error::to_py(Error::invalid(name, found, &expected)));
     }
-    Ok(values.as_chunks::<2>().0.to_vec())
+    Ok(values.as_chunks().0)
 }
 
 /// `(N, M)` array of `N` rows; the memory moves, nothing is copied.

@@ -1,6 +1,7 @@
 //! Python bindings of `evonav-core`: they convert, release the GIL and map errors, nothing else.
 
 mod arrays;
+mod camera;
 mod error;
 mod evolution;
 mod house;
@@ -18,6 +19,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     house::register(module)?;
     sensors::register(module)?;
     memory::register(module)?;
+    camera::register(module)?;
     simulator::register(module)?;
     evolution::register(module)
 }

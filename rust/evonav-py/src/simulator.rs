@@ -170,8 +170,7 @@ impl PyEmbeddedSimulator {
         start_m: Vec2,
         targets_m: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let (targets_m, _) = arrays::row_major("targets_m", &targets_m)?;
-        let targets_m = targets_m.as_chunks().0;
+        let targets_m = arrays::rows("targets_m", &targets_m)?;
         let lengths_m = py.detach(|| self.core.navigation().distances_m(start_m, targets_m));
         Ok(lengths_m.into_pyarray(py))
     }

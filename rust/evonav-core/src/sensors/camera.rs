@@ -116,6 +116,29 @@ impl Camera {
         add(self.position_m, self.ray(image_px).map(|d| d * depth_m))
     }
 
+    /// World points behind a whole depth image, row-major; not finite where its depth is not.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the image's size is not the camera's, and as [`Self::check`].
+    pub fn unproject_image(&self, depth_m: &[f32]) -> Result<Vec<Vec3>, Error> {
+        self.check()?;
+        Error::require("depth_m", depth_m.len(), "one value a pixel of the camera", |n| {
+            n == self.width_px * self.height_px
+        })?;
+        let centre = |i: usize| [i % self.width_px, i / self.width_px].map(|k| k as f64 + 0.5);
+        let points = depth_m.iter().enumerate();
+        Ok(points.map(|(i, &depth)| self.unproject(centre(i), f64::from(depth))).collect())
+    }
+
+    /// [`Self::project`] of many points; NaN for those that are not in front of the camera.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub fn project_all(&self, points_m: &[Vec3]) -> Result<Vec<Vec3>, Error> {
+        self.check()?;
+        Ok(points_m.iter().map(|&p| self.project(p).unwrap_or([f64::NAN; 3])).collect())
+    }
+
     /// World direction through image coordinates `[u, v]`, of length 1 along the optical axis.
     pub fn ray(&self, image_px: Vec2) -> Vec3 {
         let ([centre_u, centre_v], focal_px) = (self.centre_px(), self.focal_px());
