@@ -21,5 +21,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     memory::register(module)?;
     camera::register(module)?;
     simulator::register(module)?;
-    evolution::register(module)
+    evolution::register(module)?;
+    // PyO3 lists every name in `__all__`, which the stub would have to repeat.
+    module.delattr("__all__")
 }
