@@ -5,7 +5,7 @@ and box, so it judges "on" and "next to" by geometry and a room by what stands i
 """
 
 import math
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -46,6 +46,7 @@ ROOM_SIGNS: dict[str, tuple[str, ...]] = {
     "living room": ("sofa", "television", "tv stand", "coffee table", "arm chair", "remote control"),
 }
 """Things that mostly stand in one type of room."""
+_ROOM_OF_SIGN = {sign: room for room, signs in ROOM_SIGNS.items() for sign in signs}
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,16 +180,14 @@ class TextMatch:
         return low_m - margin_m <= bottom_m <= low_m + support.size_m[1] + margin_m
 
     def _room_around(self, place_m: Point2, around: Sequence[ObjectCandidate]) -> str | None:
-        """The type of room that most things around a place speak for; `None` without a majority."""
-        votes: Counter[str] = Counter()
+        """The type of room that things around a place speak for, the nearer the louder; `None` if none does."""
+        votes: dict[str, list[float]] = defaultdict(list)
         for other in around:
-            if math.dist(_ground(other), place_m) <= self.config.room_radius_m:
-                label = canonical(other.label)
-                votes.update(room for room, signs in ROOM_SIGNS.items() if label in signs)
-        ranked = votes.most_common(2)
-        if not ranked or (len(ranked) == 2 and ranked[0][1] == ranked[1][1]):
-            return None
-        return ranked[0][0]
+            room = _ROOM_OF_SIGN.get(canonical(other.label))
+            weight = 1.0 - math.dist(_ground(other), place_m) / self.config.room_radius_m
+            if room is not None and weight > 0.0:
+                votes[room].append(weight)
+        return max(sorted(votes), key=lambda room: math.fsum(votes[room]), default=None)
 
     def _frontier_cost_m(self, goal: Goal, question: ChooseQuestion, frontier: FrontierCandidate) -> float:
         """Travel, less what a hint is worth: something the instruction mentions, or the right kind of room."""

@@ -1,0 +1,104 @@
+"""The text matcher's choices, and that they do not depend on the order of what it is shown."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evonav.decision.questions import (
+    ChooseQuestion,
+    FrontierCandidate,
+    ObjectCandidate,
+    Sighting,
+    VerifyQuestion,
+)
+from evonav.decision.text_match import TextMatch
+from evonav.tasks.public import StageInput
+
+
+def goal(text, category):
+    return StageInput(1, category, text, text, text, np.zeros((1, 1, 3), np.uint8))
+
+
+def thing(entry_id, label, x, z, *, y=0.4, size=(0.5, 0.8, 0.5), seen=3):
+    return ObjectCandidate(entry_id, label, (x, y, z), size, seen)
+
+
+TABLE = thing(1, "DiningTable", 2.0, 2.0, size=(1.5, 0.8, 1.0))
+COUNTER = thing(2, "CounterTop", 6.0, 2.0, y=0.45, size=(2.0, 0.9, 0.6))
+SINK = thing(3, "Sink", 6.3, 2.0, y=0.8, size=(0.5, 0.2, 0.4))
+MUG_ON_TABLE = thing(4, "Mug", 2.0, 2.0, y=0.85, size=(0.1, 0.1, 0.1), seen=9)
+MUG_ON_COUNTER = thing(5, "Mug", 5.9, 2.0, y=0.95, size=(0.1, 0.1, 0.1))
+FRIDGE = thing(6, "Fridge", 7.5, 2.0, y=0.9, size=(0.7, 1.8, 0.7))
+BED = thing(7, "Bed", 12.0, 2.0, size=(2.0, 0.6, 1.5))
+ALL = [TABLE, COUNTER, SINK, MUG_ON_TABLE, MUG_ON_COUNTER, FRIDGE, BED]
+MUG_GOAL = goal("Please navigate to the mug in the kitchen on the countertop next to the sink.", "Mug")
+NEAR, FAR = FrontierCandidate(1, (0.0, 1.0), 1.0), FrontierCandidate(2, (6.0, 4.0), 3.5)
+
+
+def question(entries, frontiers=(), stage=MUG_GOAL, rounds=40):
+    model = TextMatch()
+    ranked = [entries[i] for i in model.rank(stage, entries, (0.0, 0.0))[:5]]
+    return model, ChooseQuestion(stage, (0.0, 0.0), ranked, frontiers, entries, rounds)
+
+
+def chosen(model, asked):
+    choice = model.choose(asked)
+    assert choice.is_valid(asked)
+    candidates = {"object": asked.objects, "frontier": asked.frontiers, "none": [None]}
+    return candidates[choice.kind][choice.index]
+
+
+def test_the_instance_that_the_instruction_describes_is_ranked_first():
+    order = [ALL[i].entry_id for i in TextMatch().rank(MUG_GOAL, ALL, (0.0, 0.0))]
+    assert order[:3] == [5, 4, 2]
+    assert BED.entry_id not in order
+
+
+@given(st.permutations(ALL))
+def test_order_makes_no_difference(entries):
+    model, asked = question(list(entries), [NEAR, FAR])
+    assert chosen(model, asked) == MUG_ON_COUNTER
+
+
+def test_the_wrong_instance_does_not_end_the_search():
+    entries = [TABLE, MUG_ON_TABLE, COUNTER, SINK]
+    model, asked = question(entries, [NEAR])
+    assert chosen(model, asked) == NEAR
+    model, asked = question(entries)
+    assert chosen(model, asked) == MUG_ON_TABLE
+    model, asked = question(entries, [NEAR], rounds=5)
+    assert chosen(model, asked) == MUG_ON_TABLE
+
+
+def test_without_the_object_it_explores_where_it_should_be():
+    model, asked = question([TABLE, COUNTER, SINK], [NEAR, FAR])
+    assert chosen(model, asked) == FAR
+    model, asked = question([TABLE], [NEAR, FAR])
+    assert chosen(model, asked) == NEAR
+
+
+def test_with_nothing_left_to_explore_it_goes_where_the_object_should_be():
+    model, asked = question([TABLE, COUNTER, BED])
+    assert chosen(model, asked) == COUNTER
+    model, asked = question([BED])
+    assert model.choose(asked).kind == "none"
+
+
+def test_the_room_is_told_by_what_stands_in_it():
+    stage = goal("Please navigate to the chair in the bedroom.", "Chair")
+    by_bed, by_fridge = thing(8, "Chair", 11.0, 3.0), thing(9, "Chair", 8.5, 2.0, seen=20)
+    model, asked = question([FRIDGE, BED, by_fridge, by_bed], [NEAR], stage)
+    assert chosen(model, asked) == by_bed
+
+
+def test_verification_needs_the_label_at_the_place():
+    model = TextMatch()
+    for sighting, is_present in (
+        (Sighting("Mug", 0.9, 0.6), True),
+        (Sighting("Mug", 0.0, 0.3), True),
+        (Sighting("Mug", 0.1, 0.8), False),
+        (Sighting("Mug", 0.0, float("inf")), False),
+        (Sighting("Bowl", 0.9, 0.0), False),
+    ):
+        assert model.verify(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [sighting])).is_present is is_present
+    assert not model.verify(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [])).is_present
