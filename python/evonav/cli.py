@@ -201,22 +201,27 @@ def _print_table(summaries: "list[AgentSummary]") -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title="Success rate and SPL (%), 95% intervals over tasks")
-    for heading in ("agent", "n", "SR", "", "SPL", "", "states"):
-        table.add_column(heading, justify="left" if heading in ("agent", "states") else "right")
+    table = Table(title="SR and SPL in %, 95% intervals over tasks; SR by target, stages 2 and on")
+    table.add_column("agent", no_wrap=True)
+    for heading in ("n", "SR", "", "SPL", "", "relocated", "not relocated"):
+        table.add_column(heading, justify="right")
     for summary in summaries:
-        states = ", ".join(f"{count} {state}" for state, count in summary.counts.items() if count)
-        name = f"{summary.agent} incomplete ({summary.n})" if summary.is_incomplete else summary.agent
+        splits = (summary.splits.get(name) for name in ("relocated", "not_relocated"))
         table.add_row(
-            name,
+            summary.agent,
             str(summary.n),
             _percent(summary.sr),
             _percent_interval(summary.sr_ci95),
             _percent(summary.spl),
             _percent_interval(summary.spl_ci95),
-            states,
+            *("-" if rates is None else f"{_percent(rates.sr)} ({rates.n})" for rates in splits),
         )
-    Console().print(table)
+    console = Console()
+    console.print(table)
+    for summary in summaries:
+        if summary.is_incomplete:
+            states = ", ".join(f"{count} {state}" for state, count in summary.counts.items() if count)
+            console.print(f"incomplete: {summary.agent} has {summary.n} of {summary.num_stages} stages ({states})")
 
 
 def _percent(value: float | None) -> str:
