@@ -1,7 +1,13 @@
 """From a task on disk to what the evaluator runs and records."""
 
 import math
+from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
+from io import BytesIO
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
 
 from evonav.evaluation.protocol import EpisodeCase, StageCase
 from evonav.evaluation.records import (
@@ -20,6 +26,8 @@ from evonav.house import Opening as HouseOpening
 from evonav.tasks import Task
 from evonav.tasks.oracle import OracleStage
 from evonav.world.simulator import SceneObject
+
+THUMBNAIL_PX = 160
 
 
 def episode_case(task: Task) -> EpisodeCase:
@@ -117,12 +125,20 @@ def stage_map(case: EpisodeCase, stage: int, objects: Sequence[SceneObject]) -> 
             if hole.wall_ids[0] in walls
         ),
         objects=_footprints({entry.id: math.radians(entry.rotation_deg[1]) for entry in house.objects}, objects),
+        reference_image=_thumbnail(case.stages[stage - 1].public.reference_image),
     )
 
 
 def room_at(plan: StageMap, point_m: Point2) -> str | None:
     """The id of the room over a point (even-odd rule), or `None` outside all of them."""
     return next((room.room_id for room in plan.rooms if _is_inside(room.polygon_m, point_m)), None)
+
+
+def _thumbnail(image: NDArray[np.uint8]) -> str:
+    """An RGB image as a small `data:` URI."""
+    buffer = BytesIO()
+    Image.fromarray(image).resize((THUMBNAIL_PX, THUMBNAIL_PX)).save(buffer, "WEBP", quality=70)
+    return f"data:image/webp;base64,{b64encode(buffer.getvalue()).decode()}"
 
 
 def _is_inside(polygon_m: Sequence[Point2], point_m: Point2) -> bool:

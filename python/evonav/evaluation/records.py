@@ -253,3 +253,5 @@ class StageMap(_Record):
     """Wall segments on the floor plan; open-plan ones left out."""
     openings: tuple[Opening, ...]
     objects: tuple[ObjectFootprint, ...]
+    reference_image: str | None = None
+    """What the agent was shown, made small, as a `data:` URI."""

@@ -17,8 +17,8 @@ from evonav.report import tables
 from evonav.report.causes import Cause, cause_of, sentence
 from evonav.report.legend import legend
 from evonav.report.maps import change_words, map_css, map_name, outcome_words, stage_svg, task_frame
-from evonav.report.overlay import rounds, stage_overlay
-from evonav.report.plan import furniture, ground, item_labels, labels, moving_ids
+from evonav.report.overlay import change, course, rounds
+from evonav.report.plan import Frame, furniture, ground, item_labels, labels, moving_ids
 from evonav.report.run import Run, Task, load_run
 from evonav.report.svg import clean, join, slug
 
@@ -51,8 +51,8 @@ class TaskView:
     house: str
     num_rooms: int
     defs: Markup
-    goals: list[tuple[int, StageRecord | None, str]]
-    """Stage, a record that tells the goal, and what changed before."""
+    goals: list[tuple[int, StageRecord | None, str, str | None]]
+    """Stage, a record that tells the goal, what changed before, and the reference image as a data URI."""
     rows: list[tuple[str, list[Cell]]]
     data: dict[str, str]
 
@@ -137,33 +137,28 @@ def task_view(run: Run, task: Task, prefix: str) -> TaskView:
     frame = task_frame(task.maps, records)
     shared = list(task.maps.values())
     moving = moving_ids(shared)
-    # Rules reach into what `use` shows only from its own root, hence the class on every shared group.
     defs = []
     if shared:
         fixed = [item for item in shared[0].objects if item.object_id not in moving]
-        still = ground(shared[0], frame, moving) + item_labels(fixed, frame)
-        defs.append(f'<g class="map" id="{prefix}">{still}</g>')
-        defs.append(f'<g class="map" id="{prefix}n">{labels(shared[0], frame)}</g>')
+        defs.append(_shared(prefix, ground(shared[0], frame, moving)))
+        defs.append(_shared(f"{prefix}n", labels(shared[0], frame)))
+        defs.append(_shared(f"{prefix}f", item_labels(fixed, frame)))
     for stage, stage_map in task.maps.items():
         items = [item for item in stage_map.objects if item.object_id in moving]
-        defs.append(f'<g class="map" id="{prefix}s{stage}">{furniture(items, frame)}{item_labels(items, frame)}</g>')
+        told = next((record for record in records if record.stage == stage), None)
+        changed = "" if told is None else _changed(told, task, frame)
+        defs.append(_shared(f"{prefix}s{stage}", furniture(items, frame) + changed))
+        defs.append(_shared(f"{prefix}f{stage}", item_labels(items, frame)))
     stages = range(1, task.num_stages + 1)
 
     def cell(agent: str, stage: int) -> Cell:
         record = task.records.get((agent, stage))
         if record is None:
             return Cell("not_run", "no record yet", "This stage has no record yet.", "", [], Markup(""), "")
-        below = f'<use href="#{prefix}"/><use href="#{prefix}s{stage}"/><use href="#{prefix}n"/>'
-        over = stage_overlay(
-            record,
-            frame,
-            stage_map=task.maps.get(stage),
-            previous_map=task.maps.get(stage - 1),
-            success_radius_m=run.success_radius_m,
-        )
+        below = _uses(prefix, stage) if stage in task.maps else _changed(record, task, frame)
         name = clean(f"Map of stage {stage} for {agent}")
-        picture = Markup('<svg class="map" viewBox="{}" role="img" aria-label="{}">').format(frame.view_box, name)
-        drawn = picture + Markup((below if stage in task.maps else "") + over + "</svg>")  # noqa: S704 - our own SVG
+        opening = Markup('<svg class="map" viewBox="{}" role="img" aria-label="{}">').format(frame.view_box, name)
+        drawn = opening + Markup(below + course(record, frame, run.success_radius_m) + "</svg>")  # noqa: S704
         return Cell(
             record.state.value,
             outcome_words(record),
@@ -177,7 +172,8 @@ def task_view(run: Run, task: Task, prefix: str) -> TaskView:
     goals = []
     for stage in stages:
         told = next((task.records[agent, stage] for agent in run.agents if (agent, stage) in task.records), None)
-        goals.append((stage, told, "" if told is None else change_words(told, task.maps)))
+        image = task.maps[stage].reference_image if stage in task.maps else None
+        goals.append((stage, told, "" if told is None else change_words(told, task.maps), image))
     return TaskView(
         anchor=slug(task.task_id),
         task_id=task.task_id,
@@ -188,6 +184,23 @@ def task_view(run: Run, task: Task, prefix: str) -> TaskView:
         rows=[(agent, [cell(agent, stage) for stage in stages]) for agent in run.agents],
         data=_filter_data(run, task.task_id),
     )
+
+
+def _shared(name: str, drawing: str) -> str:
+    """A group that many pictures show; style rules reach into it from its own root only, hence the class."""
+    return f'<g class="map" id="{name}">{drawing}</g>'
+
+
+def _uses(prefix: str, stage: int) -> str:
+    """A stage's house from its shared groups; names of furniture (`fine`) are for large pictures."""
+    ids = (prefix, f"{prefix}s{stage}", f"{prefix}n")
+    fine = (f"{prefix}f", f"{prefix}f{stage}")
+    return join([f'<use href="#{name}"/>' for name in ids] + [f'<use class="fine" href="#{name}"/>' for name in fine])
+
+
+def _changed(record: StageRecord, task: Task, frame: Frame) -> str:
+    maps = task.maps
+    return change(record.transition, frame, stage_map=maps.get(record.stage), previous_map=maps.get(record.stage - 1))
 
 
 def _facts(record: StageRecord) -> str:
@@ -271,13 +284,15 @@ def statements(run: Run) -> list[str]:
     lines = [
         f"{best.agent} has the highest success rate, {tables.percent(best.sr, best.sr_ci95)} % of {best.n} stages."
     ]
-    for other in scored[1:]:
-        pair = next((p for p in run.pairs if {p.a, p.b} == {best.agent, other.agent}), None)
-        if pair is not None:
-            lines.append(
-                f"{pair.b} less {pair.a}: {tables.points(pair.sr, pair.sr_ci95)} points on the {pair.n} stages that "
-                f"both scored ({pair.num_tasks} tasks): {tables.verdict(pair)}."
-            )
+    pairs = [pair for pair in run.pairs if best.agent in (pair.a, pair.b)]
+    if pairs and all(pair.num_tasks < tables.MIN_TASKS_FOR_VERDICT for pair in pairs):
+        lines.append(f"{pairs[0].num_tasks} tasks are too few to tell agents apart.")
+        return lines
+    for pair in pairs:
+        lines.append(
+            f"{pair.b} less {pair.a}: {tables.points(pair.sr, pair.sr_ci95)} points on the {pair.n} stages that both "
+            f"scored: {tables.verdict(pair)}."
+        )
     return lines
 
 

@@ -1,5 +1,6 @@
 """Maps as SVG files: one of a stage, and a strip of a task's stages side by side."""
 
+import re
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
@@ -9,7 +10,7 @@ from evonav.evaluation.metrics import SUCCESS_RADIUS_M
 from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.report.causes import sentence
-from evonav.report.overlay import stage_overlay
+from evonav.report.overlay import change, course
 from evonav.report.plan import Frame, frame_of, ground, item_labels, labels
 from evonav.report.svg import escape, join, slug, text_lines
 from evonav.tasks.language import noun_of
@@ -22,8 +23,20 @@ STRIP_FOOT_PX = 66
 
 
 def map_css() -> str:
-    """Colours and fonts of maps, light and dark."""
+    """Colours and fonts of maps on a page: custom properties, light and dark."""
     return str((files("evonav.report") / "templates" / "map.css").read_text(encoding="utf-8"))
+
+
+def file_css() -> str:
+    """The same for a file of its own: colours written out, since few programs but browsers know custom properties."""
+    light, dark, rules = map_css().split("/* --- */")
+    return f"{_inlined(rules, light)}@media (prefers-color-scheme:dark){{{_inlined(rules, dark)}}}"
+
+
+def _inlined(rules: str, properties: str) -> str:
+    """Rules with every `var(--name)` replaced by its value."""
+    values = dict(re.findall(r"--(\w+):(#\w+)", properties))
+    return re.sub(r"var\(--(\w+)\)", lambda match: values[match[1]], rules)
 
 
 def stage_svg(
@@ -45,7 +58,7 @@ def stage_svg(
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="{frame.view_box}" '
         f'width="{STAGE_WIDTH_PX}" height="{height_px}" role="img"><title>{escape(name)}</title>'
-        f"<desc>{escape(record.goal.instruction)} {escape(sentence(record))}</desc><style>{map_css()}</style>"
+        f"<desc>{escape(record.goal.instruction)} {escape(sentence(record))}</desc><style>{file_css()}</style>"
         f"{_stage(record, maps, frame, success_radius_m)}</svg>\n"
     )
 
@@ -96,7 +109,7 @@ def strip_svg(records: Sequence[StageRecord], maps: Mapping[int, StageMap], *, s
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" class="map strip" viewBox="0 0 {total_px[0]} {total_px[1]:.0f}" '
         f'width="{total_px[0]}" height="{total_px[1]:.0f}" role="img"><title>{escape(name)}</title>'
-        f'<style>{map_css()}</style><rect class="page" width="100%" height="100%" rx="10"/>{panels}</svg>\n'
+        f'<style>{file_css()}</style><rect class="page" width="100%" height="100%" rx="10"/>{panels}</svg>\n'
     )
 
 
@@ -138,15 +151,12 @@ def success_radius_of(config: Mapping[str, object]) -> float:
 
 def _stage(record: StageRecord, maps: Mapping[int, StageMap], frame: Frame, success_radius_m: float) -> str:
     stage_map = maps.get(record.stage)
-    below = above = ""
+    changed = change(record.transition, frame, stage_map=stage_map, previous_map=maps.get(record.stage - 1))
+    below, names = changed, ""
     if stage_map is not None:
-        below = ground(stage_map, frame) + item_labels(stage_map.objects, frame)
-        above = labels(stage_map, frame)
-    previous_map = maps.get(record.stage - 1)
-    over = stage_overlay(
-        record, frame, stage_map=stage_map, previous_map=previous_map, success_radius_m=success_radius_m
-    )
-    return below + above + over
+        below = ground(stage_map, frame) + changed
+        names = item_labels(stage_map.objects, frame) + labels(stage_map, frame)
+    return below + names + course(record, frame, success_radius_m)
 
 
 def _panel(

@@ -12,6 +12,7 @@ from evonav.evaluation.records import (
     RoundRecord,
     StageMap,
     StageRecord,
+    TransitionRecord,
 )
 from evonav.report.plan import Frame, distance_m, furniture
 from evonav.report.svg import Point, arrow_head, cm, join, polyline, simplified, star, title
@@ -21,22 +22,16 @@ NUM_TIMES = 10
 """Colours of the path, from the first round to the last: classes `t0` to `t9`."""
 ARROW_EVERY = 16.0
 """Units of a frame between direction arrows."""
+LARGE_M2 = 0.3
+"""Footprint from which on a relocated object has a thick arrow."""
 CARRIED_GAP_M = 0.05
 """How far outside of a moved object's footprint something that it carries may lie."""
 
 
-def stage_overlay(
-    record: StageRecord,
-    frame: Frame,
-    *,
-    stage_map: StageMap | None,
-    previous_map: StageMap | None,
-    success_radius_m: float,
-) -> str:
-    """All that one agent's stage adds to the map of its house."""
+def course(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
+    """What one agent did in a stage: path, beliefs, start and end, and where the target was."""
     return (
-        change(record, frame, stage_map=stage_map, previous_map=previous_map)
-        + _ring(record, frame, success_radius_m)
+        _ring(record, frame, success_radius_m)
         + _path(record, frame)
         + _stale_entries(record, frame)
         + _target(record, frame)
@@ -44,12 +39,14 @@ def stage_overlay(
     )
 
 
-def change(record: StageRecord, frame: Frame, *, stage_map: StageMap | None, previous_map: StageMap | None) -> str:
+def change(
+    transition: TransitionRecord, frame: Frame, *, stage_map: StageMap | None, previous_map: StageMap | None
+) -> str:
     """Relocated objects: where they stood (dashed), where they stand (stressed), and an arrow between.
 
-    What was carried along on a moved piece of furniture is stressed too, but gets no arrow of its own.
+    The same for all agents. What was carried along on a moved piece of furniture is stressed, but has no arrow.
     """
-    relocations = record.transition.relocations
+    relocations = transition.relocations
     if not relocations:
         return ""
     names = {relocation.object_id for relocation in relocations}
@@ -58,11 +55,11 @@ def change(record: StageRecord, frame: Frame, *, stage_map: StageMap | None, pre
     ghosts = furniture([before[name] for name in sorted(names) if name in before], frame, "items ghost")
     stressed = furniture([now[name] for name in sorted(names) if name in now], frame, "items moved")
     arrows = join(
-        _relocation_arrow(relocation, frame)
+        _relocation_arrow(relocation, frame, is_large=_area_m2(now.get(relocation.object_id)) >= LARGE_M2)
         for relocation in relocations
         if not _is_carried(relocation, relocations, before, now)
     )
-    return f'<g class="change">{ghosts}{stressed}<g stroke-width="{0.55 * frame.unit:.1f}">{arrows}</g></g>'
+    return f'<g class="change">{ghosts}{stressed}{arrows}</g>'
 
 
 def rounds(trace: Sequence[RoundRecord]) -> list[str]:
@@ -88,16 +85,12 @@ def _is_carried(
     now: Mapping[str, ObjectFootprint],
 ) -> bool:
     """Whether it lay on (or in) a larger moved object and still does."""
-    own = now.get(relocation.object_id)
-    if own is None:
-        return False
-    area_m2 = own.size_m[0] * own.size_m[2]
+    area_m2 = _area_m2(now.get(relocation.object_id))
     for other in relocations:
         old, new = before.get(other.object_id), now.get(other.object_id)
         if other.object_id == relocation.object_id or old is None or new is None:
             continue
-        is_larger = new.size_m[0] * new.size_m[2] > area_m2
-        if is_larger and _is_over(relocation.from_m, old) and _is_over(relocation.to_m, new):
+        if _area_m2(new) > area_m2 and _is_over(relocation.from_m, old) and _is_over(relocation.to_m, new):
             return True
     return False
 
@@ -109,15 +102,20 @@ def _is_over(point_m: Sequence[float], item: ObjectFootprint) -> bool:
     )
 
 
-def _relocation_arrow(relocation: Relocation, frame: Frame) -> str:
+def _area_m2(item: ObjectFootprint | None) -> float:
+    return 0.0 if item is None else item.size_m[0] * item.size_m[2]
+
+
+def _relocation_arrow(relocation: Relocation, frame: Frame, *, is_large: bool) -> str:
     start, end = cm(_ground(relocation.from_m)), cm(_ground(relocation.to_m))
-    u = frame.unit
+    u = frame.unit * (1.0 if is_large else 0.65)
+    width = f'stroke-width="{0.55 * u:.1f}"'
     dx, dy = end[0] - start[0], end[1] - start[1]
     length = math.hypot(dx, dy)
     words = f"{noun_of(relocation.category)}: moved {distance_m(relocation.from_m, relocation.to_m):.1f} m"
     hint = title(words)
     if length < 3 * u:
-        return f'<circle class="arrow" cx="{end[0]}" cy="{end[1]}" r="{1.4 * u:.0f}">{hint}</circle>'
+        return f'<circle class="arrow" {width} cx="{end[0]}" cy="{end[1]}" r="{1.4 * u:.0f}">{hint}</circle>'
     # A curve, so that arrows to and fro do not hide each other.
     bend = 0.14
     middle = (start[0] + dx / 2 - dy * bend, start[1] + dy / 2 + dx * bend)
@@ -126,7 +124,7 @@ def _relocation_arrow(relocation: Relocation, frame: Frame) -> str:
     neck = (end[0] - direction[0] * scale, end[1] - direction[1] * scale)
     curve = f"M{start[0]} {start[1]}Q{middle[0]:.0f} {middle[1]:.0f} {neck[0]:.0f} {neck[1]:.0f}"
     return (
-        f'<g class="arrow">{hint}<path d="{curve}"/><circle cx="{start[0]}" cy="{start[1]}" r="{0.7 * u:.0f}"/>'
+        f'<g class="arrow" {width}>{hint}<path d="{curve}"/><circle cx="{start[0]}" cy="{start[1]}" r="{0.7 * u:.0f}"/>'
         f'<path class="head" d="{arrow_head(end, direction, 2.4 * u)}"/></g>'
     )
 

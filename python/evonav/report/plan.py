@@ -39,8 +39,9 @@ FLAT_CATEGORIES = frozenset(["Painting", "Window", "Doorway"])
 FLOORS = {"Kitchen": "kitchen", "LivingRoom": "living", "Bedroom": "bedroom", "Bathroom": "bathroom"}
 LABEL_MIN_M2 = 0.25
 """Footprint from which on furniture is named on the map."""
-MOVED_M = 0.01
-TURNED_CM = 2
+ROOM_LETTERS = 3.0
+"""Height of letters, in units of a frame."""
+ITEM_LETTERS = 1.75
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,15 +117,15 @@ def furniture(items: Iterable[ObjectFootprint], frame: Frame, css: str = "items"
 
 
 def labels(stage_map: StageMap, frame: Frame) -> str:
-    """Names of rooms, and of furniture large enough to hold its name."""
+    """Names of rooms."""
     u = frame.unit
     rooms = join(_room_label(room, u) for room in stage_map.rooms)
-    return f'<g class="rooms" font-size="{2.7 * u:.0f}" stroke-width="{0.9 * u:.1f}">{rooms}</g>'
+    return f'<g class="rooms" font-size="{ROOM_LETTERS * u:.0f}" stroke-width="{0.9 * u:.1f}">{rooms}</g>'
 
 
 def item_labels(items: Iterable[ObjectFootprint], frame: Frame) -> str:
     """Names of the furniture large enough to hold them."""
-    size = 1.75 * frame.unit
+    size = ITEM_LETTERS * frame.unit
     named = join(_item_label(item, size) for item in items)
     return f'<g class="names" font-size="{size:.0f}">{named}</g>'
 

@@ -175,8 +175,8 @@ def paired_table(pairs: Sequence[PairedDifference]) -> Table:
         for pair in pairs
     )
     note = (
-        "Percentage points, on the same stages; intervals resample tasks. `only first` counts the stages where only "
-        "the first-named agent succeeded."
+        "Percentage points, on the same stages; intervals resample tasks. Only first: stages where only the "
+        "first-named agent succeeded."
     )
     return Table("Paired differences", columns, rows, (note,))
 

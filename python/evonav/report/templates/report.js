@@ -74,6 +74,8 @@
     const { stage, agent } = cell.dataset;
     dialog.querySelector("h3").textContent = `${task.querySelector("h3").firstChild.textContent} · ${agent} · stage ${stage}`;
     dialog.querySelector(".say").textContent = task.querySelectorAll(".goal")[stage - 1].querySelector(".say")?.textContent ?? "";
+    // Lines that are right for a small picture are too thick for a large one.
+    for (const part of all("[stroke-width]", copy)) part.setAttribute("stroke-width", part.getAttribute("stroke-width") * 0.6);
     rounds = all(".r", copy);
     casing = copy.querySelector(".casing");
     view = document.createElementNS("http://www.w3.org/2000/svg", "path");
