@@ -2,7 +2,6 @@
 
 import os
 import sys
-from collections.abc import Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +11,7 @@ import typer
 if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
     from collections.abc import Callable, Iterator
 
-    from evonav.evaluation.engine import Progress, TaskFile
+    from evonav.evaluation.engine import Progress, RunConfig, TaskFile
     from evonav.evaluation.metrics import AgentSummary
 
 EXIT_ERROR = 1
@@ -34,6 +33,10 @@ Tasks = Annotated[Path | None, typer.Option(help="Folder of tasks; default: the 
 Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-room) houses or tasks.")]
 Seed = Annotated[int, typer.Option(min=0, help="Decides everything random.")]
 Workers = Annotated[int | None, typer.Option(min=0, help="Processes; default: one a core. 0: in this process.")]
+AnyAsset = Annotated[
+    bool,
+    typer.Option("--allow-unknown-assets", help="Objaverse houses: unknown assets get their category's usual size."),
+]
 Out = Annotated[Path, typer.Option(help="Folder of the run; an unfinished one is resumed.")]
 
 
@@ -46,14 +49,16 @@ def evaluate(
     limit: Limit = None,
     seed: Seed = 0,
     workers: Workers = None,
-    retry_errored: Annotated[bool, typer.Option(help="Run errored stages again.")] = False,
+    retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
+    allow_unknown_assets: AnyAsset = False,
 ) -> None:
     """Evaluates agents on tasks; run again to resume. Leaves records.sqlite and summary.json in OUT."""
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
     num_workers = _num_workers(workers)
-    with _tasks(out, houses, tasks, limit, seed) as task_files:
-        summaries = _evaluate(out, agents.split(","), task_files, seed, num_workers, retry_errored)
+    config = _config(seed, allow_unknown_assets)
+    with _tasks(out, houses, tasks, limit, seed, allow_unknown_assets) as task_files:
+        summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored)
     _finish(summaries)
 
 
@@ -67,8 +72,8 @@ def demo(
 ) -> None:
     """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report."""
     num_workers = _num_workers(workers)
-    with _tasks(out, None, None, limit, seed) as task_files:
-        summaries = _evaluate(out, agents.split(","), task_files, seed, num_workers, retry_errored=False)
+    with _tasks(out, None, None, limit, seed, False) as task_files:
+        summaries = _evaluate(out, agents, task_files, _config(seed, False), num_workers, retry_errored=False)
     _report(out)
     _finish(summaries)
 
@@ -88,13 +93,14 @@ def generate(
     out: Annotated[Path, typer.Option(help="Folder for the tasks.")],
     limit: Limit = None,
     seed: Seed = 0,
+    allow_unknown_assets: AnyAsset = False,
 ) -> None:
     """Generates tasks from multi-room houses."""
-    from evonav.evaluation.datasets import generate_tasks
+    from evonav.evaluation.datasets import make_tasks
 
     with _status("Generating tasks") as tell:
-        num_tasks = len(generate_tasks(houses, out, limit=limit, seed=seed, on_task=tell))
-    typer.echo(f"{num_tasks} tasks in {out}")
+        tasks = make_tasks(houses, out, limit=limit, seed=seed, allow_unknown_assets=allow_unknown_assets, on_task=tell)
+    typer.echo(f"{len(tasks)} tasks in {out}")
 
 
 @app.command(name="houses")
@@ -102,7 +108,7 @@ def list_houses(
     path: Annotated[Path | None, typer.Argument(help="ProcTHOR JSON, JSONL or JSONL.gz; default: bundled.")] = None,
     limit: Limit = None,
 ) -> None:
-    """Lists houses: rooms and objects of each."""
+    """Lists houses with their rooms and objects."""
     from evonav.evaluation.datasets import house_facts
 
     for name, num_rooms, num_objects in house_facts(path, limit):
@@ -142,16 +148,23 @@ def main() -> None:
 
 @contextmanager
 def _tasks(
-    out: Path, houses: Path | None, tasks: Path | None, limit: int | None, seed: int
+    out: Path, houses: Path | None, tasks: Path | None, limit: int | None, seed: int, allow_unknown_assets: bool
 ) -> "Iterator[list[TaskFile]]":
     """The tasks of a run: given, generated into the run's folder, or bundled."""
-    from evonav.evaluation.datasets import bundled_tasks, generate_tasks
+    from evonav.evaluation.datasets import bundled_tasks, make_tasks
     from evonav.evaluation.engine import task_file, task_files
 
     with ExitStack() as stack:
         if houses is not None:
             with _status("Generating tasks") as tell:
-                generated = generate_tasks(houses, out / "tasks", limit=limit, seed=seed, on_task=tell)
+                generated = make_tasks(
+                    houses,
+                    out / "tasks",
+                    limit=limit,
+                    seed=seed,
+                    allow_unknown_assets=allow_unknown_assets,
+                    on_task=tell,
+                )
             yield [task_file(root) for root in generated]
         else:
             directory = tasks if tasks is not None else stack.enter_context(bundled_tasks())
@@ -159,17 +172,22 @@ def _tasks(
 
 
 def _evaluate(
-    out: Path, agents: Sequence[str], task_files: "list[TaskFile]", seed: int, num_workers: int, retry_errored: bool
+    out: Path,
+    agents: str,
+    task_files: "list[TaskFile]",
+    config: "RunConfig",
+    num_workers: int,
+    retry_errored: bool,
 ) -> "list[AgentSummary]":
-    from evonav.evaluation.engine import RunConfig, evaluate
+    from evonav.evaluation.engine import evaluate
 
     try:
         with _progress() as show:
             return evaluate(
-                agents,
+                [name.strip() for name in agents.split(",") if name.strip()],
                 task_files,
                 out,
-                config=RunConfig(seed=seed),
+                config=config,
                 num_workers=num_workers,
                 retry_errored=retry_errored,
                 on_progress=show,
@@ -177,6 +195,14 @@ def _evaluate(
     except KeyboardInterrupt:
         typer.echo(f"interrupted; finished stages are in {out}, the same command goes on from there", err=True)
         raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def _config(seed: int, allow_unknown_assets: bool) -> "RunConfig":
+    from evonav.evaluation.backend import Backend
+    from evonav.evaluation.engine import RunConfig
+
+    lenient = "evonav.evaluation.backend:lenient_simulator"
+    return RunConfig(seed=seed, backend=Backend(simulator=lenient) if allow_unknown_assets else Backend())
 
 
 def _finish(summaries: "list[AgentSummary]") -> None:

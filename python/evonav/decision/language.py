@@ -151,6 +151,7 @@ def _singular(noun: str) -> str:
     return noun[:-1] if noun.endswith("s") and not noun.endswith("ss") else noun
 
 
+@lru_cache(maxsize=65536)
 def similarity(noun: str, label: str) -> float:
     """How well a label names a canonical noun: 1 the same, 0 no word in common.
 

@@ -32,15 +32,16 @@ def house_facts(path: Path | None, limit: int | None) -> Iterator[tuple[str, int
         yield house.name, len(house.rooms), len(house.objects)
 
 
-def generate_tasks(
+def make_tasks(
     houses: Path,
     out: Path,
     *,
     limit: int | None = None,
     seed: int = 0,
+    allow_unknown_assets: bool = False,
     on_task: Callable[[str], None] = lambda _: None,
 ) -> list[Path]:
-    """Tasks of the first `limit` multi-room houses, one each; those already there are kept.
+    """Tasks of the first `limit` houses that allow one; a finished earlier call is not done again.
 
     Returns:
         The folders of the tasks, in the order of the houses.
@@ -48,28 +49,39 @@ def generate_tasks(
     Raises:
         HouseError: A house is malformed.
         StoreError: `out` holds tasks of another source.
-        TaskError: No house gives a task.
+        TaskError: No house gives a task; it says why.
     """
-    from evonav.generation import generate_task
+    from evonav.generation import Rejections, generate_tasks
     from evonav.house import load_houses
     from evonav.tasks import write_task
 
-    source = {"houses_sha256": _digest(houses), "seed": seed, "limit": limit}
+    source = {
+        "houses_sha256": _digest(houses),
+        "seed": seed,
+        "limit": limit,
+        "allow_unknown_assets": allow_unknown_assets,
+    }
     done = _done(out, source)
     if done is not None:
         return done
+    rejections = Rejections()
+    tasks = generate_tasks(
+        load_houses(houses), seed=seed, rejections=rejections, allow_unknown_assets=allow_unknown_assets
+    )
     roots: list[Path] = []
-    for house in load_houses(houses):
-        if limit is not None and len(roots) >= limit:
-            break
-        if len(house.rooms) < 2:
-            continue
-        on_task(house.name)
-        roots.append(write_task(generate_task(house, seed=seed), out))
+    for task in islice(tasks, limit):
+        on_task(task.task_id)
+        roots.append(write_task(task, out))
     if not roots:
-        raise TaskError(f"{houses}: no house with two or more rooms")
+        reasons = ", ".join(f"{count} {reason}" for reason, count in rejections.reasons.most_common())
+        raise TaskError(f"{houses}: no house gives a task ({reasons or 'no house'})")
     source["tasks"] = [root.name for root in roots]
-    (out / SOURCE_NAME).write_text(json.dumps(source, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+    source["rejected"] = dict(sorted(rejections.reasons.items()))
+    path = out / SOURCE_NAME
+    try:
+        path.write_text(json.dumps(source, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{path}: {error}") from error
     return roots
 
 
@@ -81,6 +93,7 @@ def _done(out: Path, source: dict[str, object]) -> list[Path] | None:
     try:
         there = json.loads(path.read_text(encoding="utf-8"))
         names = [str(name) for name in there.pop("tasks")]
+        there.pop("rejected", None)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise StoreError(f"{path}: {error!r}") from error
     check_same_run(there, source, out)

@@ -1,0 +1,75 @@
+"""The command: what it prints, what it refuses, and with which exit code."""
+
+import json
+import subprocess
+import sys
+import time
+
+import pytest
+from typer.testing import CliRunner
+
+from evonav.cli import app, main
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_evaluates_bundled_tasks_and_resumes(tmp_path):
+    arguments = ("evaluate", "--agents", "shortest-path, random-walk", "--limit", 1, "--workers", 0, "--out", tmp_path)
+    first = run(*arguments)
+    assert first.exit_code == 0, first.output
+    assert "shortest-path" in first.stdout
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["agents"]["shortest-path"]["sr"] == 1.0
+    assert summary["agents"]["shortest-path"]["spl"] == 1.0
+    assert set(summary["agents"]["shortest-path"]["counts"]) == {"success", "failure", "errored", "not_run"}
+    began_s = time.monotonic()
+    again = run(*arguments)
+    assert again.exit_code == 0
+    assert time.monotonic() - began_s < 5.0
+    assert json.loads((tmp_path / "summary.json").read_text()) == summary
+
+
+def test_lists():
+    agents = run("agents").stdout
+    assert all(name in agents for name in ("fu", "stage-reset", "ftu", "shortest-path"))
+    assert "rooms" in run("houses", "--limit", 1).stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("evaluate", "--agents", "nobody", "--out", "OUT"), "no agent `nobody`"),
+        (("evaluate", "--tasks", "OUT", "--out", "OUT"), "no tasks here"),
+        (("evaluate", "--houses", "OUT/none.json", "--out", "OUT"), "none.json"),
+        (("report", "OUT"), "no run here"),
+        (("houses", "OUT/none.json"), "none.json"),
+    ],
+)
+def test_errors_are_one_line(monkeypatch, capsys, tmp_path, arguments, words):
+    monkeypatch.setattr(sys, "argv", ["evonav", *(word.replace("OUT", str(tmp_path)) for word in arguments)])
+    with pytest.raises(SystemExit) as exit_:
+        main()
+    assert exit_.value.code == 1
+    error = capsys.readouterr().err
+    assert words in error
+    assert "Traceback" not in error
+
+
+def test_contradicting_options_are_wrong_usage(tmp_path):
+    assert run("evaluate", "--tasks", tmp_path, "--houses", tmp_path, "--out", tmp_path).exit_code == 2
+    assert run("evaluate").exit_code == 2
+
+
+def test_an_incomplete_run_says_so(tmp_path):
+    result = run("evaluate", "--agents", "toy_agents:Raising", "--limit", 1, "--workers", 0, "--out", tmp_path)
+    assert result.exit_code == 3
+    assert "incomplete" in result.stdout
+
+
+def test_importing_is_quick():
+    """The package and the command load nothing heavy: no pydantic, no rich, no evaluation."""
+    code = "import evonav, evonav.cli, sys; print([m for m in sys.modules if m.startswith(('pydantic', 'evonav.ev'))])"
+    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert printed.strip() == "[]"
