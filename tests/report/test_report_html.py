@@ -160,3 +160,9 @@ def test_houses_are_drawn_once_a_task(write_run: WriteRun) -> None:
 def test_no_run_is_an_error_that_names_the_folder(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match=re.escape(str(tmp_path))):
         write_report(tmp_path)
+
+
+def test_agents_come_in_the_order_of_the_paper(tmp_path: Path) -> None:
+    agents = ["ftu", "a-walk", "stage-reset", "fu"]
+    records = [stage_record(agent, "t", 1, EndState.SUCCESS) for agent in agents]
+    assert load_run(record_run(tmp_path, records, {"t": 1}, agents)).agents == ("fu", "stage-reset", "ftu", "a-walk")

@@ -113,7 +113,7 @@ def evaluate(
     _check_request(agents, tasks, num_workers)
     with RunStore(run_dir, create=True) as store:
         _claim(store, run_dir, tasks, config)
-        store.set_meta("agents", list(dict.fromkeys([*(store.meta("agents") or []), *agents])))
+        store.set_meta("agents", sorted({*(store.meta("agents") or []), *agents}))
         run = _Run(store, agents, tasks, config)
         if retry_errored:
             run.forget_errored()

@@ -13,6 +13,9 @@ from evonav.evaluation.store import RunStore
 from evonav.report.causes import Cause, cause_of
 from evonav.report.maps import success_radius_of
 
+PAPER_ORDER = ("unigoal", "3d-mem", "msgnav", "fu", "stage-reset", "ftu")
+"""Agents in the order of the paper's tables."""
+
 
 @dataclass(frozen=True, slots=True)
 class StageOutcome:
@@ -137,8 +140,9 @@ def load_run(run_dir: Path) -> Run:
 
 
 def _agents(asked: Sequence[str] | None, recorded: Sequence[str]) -> tuple[str, ...]:
-    """The agents of a run, in the order they are listed; one that was only recorded comes last."""
-    return tuple(dict.fromkeys([*(asked or ()), *sorted(recorded)]))
+    """The agents of a run: the paper's in the order of its tables, then the others by name."""
+    rank = {agent: i for i, agent in enumerate(PAPER_ORDER)}
+    return tuple(sorted({*(asked or ()), *recorded}, key=lambda agent: (rank.get(agent, len(rank)), agent)))
 
 
 def _num_stages(
