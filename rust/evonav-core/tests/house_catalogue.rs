@@ -61,6 +61,16 @@ fn catalogue_is_whole() {
         assert!(catalogue.assets_in(&asset.category).contains(&asset.id));
     }
     assert!(catalogue.get("no such asset").is_none());
+    for category in catalogue.categories() {
+        let median_m = catalogue.median_size_m(category).expect("listed");
+        let sizes = catalogue.assets_in(category).iter().filter_map(|id| catalogue.get(id));
+        for (axis, middle) in median_m.iter().enumerate() {
+            let smaller = sizes.clone().filter(|asset| asset.size_m[axis] < *middle).count();
+            let larger = sizes.clone().filter(|asset| asset.size_m[axis] > *middle).count();
+            let half = catalogue.assets_in(category).len() / 2;
+            assert!(smaller <= half && larger <= half, "{category} {median_m:?}");
+        }
+    }
 }
 
 #[test]
