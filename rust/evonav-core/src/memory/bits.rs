@@ -99,22 +99,19 @@ impl BitGrid {
         })
     }
 
+    /// The 64 bits of a row from column `first` (which may be negative) on, 0 outside.
+    pub(crate) fn window(&self, row: usize, first: i64) -> u64 {
+        let words = self.row(row);
+        let word = first.div_euclid(64);
+        let at = |word: i64| usize::try_from(word).ok().and_then(|w| words.get(w)).copied();
+        let pair = u128::from(at(word).unwrap_or(0)) | u128::from(at(word + 1).unwrap_or(0)) << 64;
+        (pair >> first.rem_euclid(64)) as u64
+    }
+
     /// Number of 1 bits among the 5 x 5 cells around a cell.
     pub(crate) fn count_5x5(&self, row: usize, col: usize) -> u32 {
-        (row.saturating_sub(2)..=row + 2)
-            .map(|r| {
-                let words = self.row(r);
-                let at = |word: usize| words.get(word).copied().unwrap_or(0);
-                // The five bits from col - 2, across a word's border if need be.
-                let first = (col + 62) / 64;
-                let pair = if first == 0 {
-                    u128::from(at(0)) << 64
-                } else {
-                    u128::from(at(first - 1)) | u128::from(at(first)) << 64
-                };
-                ((pair >> ((col + 62) % 64)) & 0b11111).count_ones()
-            })
-            .sum()
+        let rows = row.saturating_sub(2)..=row + 2;
+        rows.map(|r| (self.window(r, col as i64 - 2) & 0b11111).count_ones()).sum()
     }
 }
 

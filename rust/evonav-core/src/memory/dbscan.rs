@@ -95,7 +95,6 @@ impl<'a> Grid<'a> {
     }
 
     fn core_points(&self, min_points: usize) -> Vec<bool> {
-        let mut is_core = vec![false; self.points.len()];
         let is_dense = |cell: usize| self.members(cell).len() >= min_points;
         // Neighbours of the points in thin cells; those in dense ones are core points at once.
         let mut counts = vec![0_u32; self.points.len()];
@@ -116,10 +115,7 @@ impl<'a> Grid<'a> {
                 }
             }
         }
-        for (is_core, count) in is_core.iter_mut().zip(counts) {
-            *is_core = count as usize >= min_points;
-        }
-        is_core
+        counts.into_iter().map(|count| count as usize >= min_points).collect()
     }
 
     /// Cells joined by core points within the radius: a representative a cell.
@@ -165,27 +161,26 @@ impl<'a> Grid<'a> {
     }
 
     fn label_borders(&self, is_core: &[bool], labels: &mut [i32]) {
-        let mut adopt = |border: u32, core: u32| {
-            if !is_core[border as usize] && is_core[core as usize] && self.is_near(border, core) {
-                let (label, mine) = (labels[core as usize], &mut labels[border as usize]);
-                *mine = if *mine == NOISE { label } else { label.min(*mine) };
-            }
-        };
-        for cell in 0..self.num_cells() {
-            let here = self.members(cell);
-            let has_border = |cell: usize| self.members(cell).iter().any(|&p| !is_core[p as usize]);
-            if has_border(cell) {
-                here.iter().for_each(|&a| here.iter().for_each(|&b| adopt(a, b)));
-            }
-            for &other in &self.earlier[cell] {
-                if has_border(cell) || has_border(other as usize) {
-                    for &a in here {
-                        for &b in self.members(other as usize) {
-                            adopt(a, b);
-                            adopt(b, a);
-                        }
+        let is_border = |point: &&u32| !is_core[**point as usize];
+        let borders: Vec<Vec<u32>> = (0..self.num_cells())
+            .map(|cell| self.members(cell).iter().filter(is_border).copied().collect())
+            .collect();
+        // The borders in one cell take the first cluster among the core points of another.
+        let mut adopt = |borders: &[u32], cell: usize| {
+            for &border in borders {
+                for &core in self.members(cell) {
+                    if is_core[core as usize] && self.is_near(border, core) {
+                        let (label, mine) = (labels[core as usize], &mut labels[border as usize]);
+                        *mine = if *mine == NOISE { label } else { label.min(*mine) };
                     }
                 }
+            }
+        };
+        for (cell, earlier) in self.earlier.iter().enumerate() {
+            adopt(&borders[cell], cell);
+            for &other in earlier {
+                adopt(&borders[cell], other as usize);
+                adopt(&borders[other as usize], cell);
             }
         }
     }

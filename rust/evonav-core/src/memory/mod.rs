@@ -8,4 +8,6 @@ pub mod entry;
 pub mod frontiers;
 pub mod objects;
 pub mod occupancy;
+mod regions;
+mod viewpoints;
 pub mod voxels;

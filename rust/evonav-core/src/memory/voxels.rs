@@ -7,7 +7,12 @@ pub type Voxel = [i32; 3];
 
 /// The voxel that holds a point; far outside any house the index saturates.
 pub fn voxel_of(point: Point, inverse_edge: f64) -> Voxel {
-    point.map(|value| (f64::from(value) * inverse_edge).floor() as i32)
+    point.map(|value| {
+        let scaled = f64::from(value) * inverse_edge;
+        // `floor` is a library call on baseline x86-64.
+        let truncated = scaled as i32;
+        truncated.saturating_sub(i32::from(f64::from(truncated) > scaled))
+    })
 }
 
 /// A hash table from voxels to small numbers: linear probing, keys of 21 bits an axis in one word.
@@ -80,11 +85,21 @@ pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
     let inverse_edge = 1.0 / edge_m;
     let mut table = VoxelTable::with_capacity(points.len() / 2);
     let mut sums: Vec<([f64; 3], f64)> = Vec::new();
+    // Neighbouring pixels often share a voxel.
+    let mut last = (Voxel::default(), None);
     for &point in points {
-        let (&mut index, is_new) = table.entry(voxel_of(point, inverse_edge), sums.len() as u32);
-        if is_new {
-            sums.push(([0.0; 3], 0.0));
-        }
+        let voxel = voxel_of(point, inverse_edge);
+        let index = match last {
+            (before, Some(index)) if before == voxel => index,
+            _ => {
+                let (&mut index, is_new) = table.entry(voxel, sums.len() as u32);
+                if is_new {
+                    sums.push(([0.0; 3], 0.0));
+                }
+                index
+            }
+        };
+        last = (voxel, Some(index));
         let (sum, count) = &mut sums[index as usize];
         for (sum, value) in sum.iter_mut().zip(point) {
             *sum += f64::from(value);

@@ -126,17 +126,22 @@ impl Quadrant {
         (index as f64 - self.inside[axis]).max(0.0)
     }
 
-    /// Distance in cells at which the rays of `beam` first enter cell `[i, j]` of (u, v).
-    fn entry(&self, cell: [usize; 2], beam: Beam) -> f64 {
+    /// Whether a ray of `beam` enters cell `[i, j]` of (u, v) within `range` cells.
+    fn is_within(&self, cell: [usize; 2], beam: Beam, range: f64) -> bool {
         let [u, v] = [self.near(0, cell[0]), self.near(1, cell[1])];
-        if u + v == 0.0 {
-            return 0.0;
+        let range2 = range * range;
+        if u * u + v * v > range2 {
+            return false;
         }
-        // Nearest is the near corner, or the beam's edge closest to it.
-        let side = (v / (u + v)).clamp(beam[0], beam[1]);
+        if (u + 1.0) * (u + 1.0) + (v + 1.0) * (v + 1.0) <= range2 {
+            return true;
+        }
+        // The nearest point of entry is the near corner, or at the beam's edge closest to it.
+        let side = if u + v > 0.0 { (v / (u + v)).clamp(beam[0], beam[1]) } else { beam[0] };
         let along_u = if u > 0.0 { u / (1.0 - side) } else { 0.0 };
         let along_v = if v > 0.0 { v / side } else { 0.0 };
-        along_u.max(along_v) * side.hypot(1.0 - side)
+        let entry = along_u.max(along_v);
+        entry * entry * (side * side + (1.0 - side) * (1.0 - side)) <= range2
     }
 }
 
@@ -203,10 +208,11 @@ impl<'a> View<'a> {
             }
             // Side of cell j that it shares with cell j - 1 of the ring.
             let total = (ring + 1) as f64 - quadrant.inside[0] - quadrant.inside[1];
+            let per_cell = 1.0 / total;
             let side = |j: usize| match j {
                 0 => 0.0,
                 j if j > ring => 1.0,
-                j => (j as f64 - quadrant.inside[1]) / total,
+                j => (j as f64 - quadrant.inside[1]) * per_cell,
             };
             for &[from, to] in &beams {
                 let first = (from * total + quadrant.inside[1]).max(0.0) as usize;
@@ -239,7 +245,7 @@ impl<'a> View<'a> {
                 + quadrant.steps[0][axis] * at[0] as i64
                 + quadrant.steps[1][axis] * at[1] as i64
         });
-        if quadrant.entry(at, beam) <= self.range_cells {
+        if quadrant.is_within(at, beam, self.range_cells) {
             self.see(cell);
         }
         self.is_opaque(cell)

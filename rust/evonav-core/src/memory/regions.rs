@@ -1,0 +1,243 @@
+//! Regions of a map that are frontiers.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::{
+    Error,
+    geometry::{Vec2, distance_2d_m},
+    memory::{
+        bits::BitGrid,
+        components::{Components, Run},
+        frontiers::FrontierConfig,
+        occupancy::OccupancyMap,
+    },
+};
+
+/// Regions and the cells that may serve as view positions.
+pub(crate) struct Found {
+    pub(crate) regions: Vec<Vec<[i32; 2]>>,
+    pub(crate) edges: BitGrid,
+}
+
+pub(crate) fn find_regions(
+    map: &OccupancyMap,
+    agent_m: Vec2,
+    seeds: &[[i32; 2]],
+    config: &FrontierConfig,
+) -> Result<Found, Error> {
+    config.check()?;
+    for value in agent_m {
+        Error::require("agent_m", value, "finite", f64::is_finite)?;
+    }
+    let island = island(map, agent_m, seeds);
+    let (inner, edges) = split_by_unexplored_neighbours(&island, map.explored());
+    let mut regions = Vec::new();
+    if edges.count() > 0 {
+        for runs in Components::new(&inner).by_component() {
+            let num_cells: usize = runs.iter().map(Run::len).sum();
+            if num_cells >= config.min_cells.max(2) {
+                let mut cells = Vec::with_capacity(num_cells);
+                for run in &runs {
+                    cells.extend((run.start..run.end).map(|col| [run.row as i32, col as i32]));
+                }
+                split_wide(map, agent_m, cells, config.max_span_rad, &mut regions);
+            }
+        }
+    }
+    Ok(Found { regions, edges })
+}
+
+/// The free cells connected (4 neighbours) to the agent, or to the free cell nearest to it, or to a seed.
+fn island(map: &OccupancyMap, agent_m: Vec2, seeds: &[[i32; 2]]) -> BitGrid {
+    let mut island = BitGrid::new(map.spec().rows, map.spec().cols);
+    let components = Components::new(map.free());
+    let mut is_wanted = vec![false; components.num()];
+    let own = map.spec().cell_of(agent_m);
+    let under_agent = own.and_then(|[row, col]| components.of_cell(row, col));
+    let nearest = || {
+        let distance_m = |run: &Run| {
+            let centre_m = |col: u32| map.spec().centre_m([run.row as usize, col as usize]);
+            let (first, last) = (centre_m(run.start), centre_m(run.end - 1));
+            distance_2d_m([agent_m[0].clamp(first[0], last[0]), first[1]], agent_m)
+        };
+        let by_distance =
+            |a: &(Run, usize), b: &(Run, usize)| distance_m(&a.0).total_cmp(&distance_m(&b.0));
+        components.runs().min_by(by_distance).map(|(_, component)| component)
+    };
+    if let Some(component) = under_agent.or_else(nearest) {
+        is_wanted[component] = true;
+    }
+    for seed in seeds {
+        if let Some(component) = components.of_cell(seed[0] as usize, seed[1] as usize) {
+            is_wanted[component] = true;
+        }
+    }
+    for (run, component) in components.runs() {
+        if is_wanted[component] {
+            island.insert_run(run.row as usize, run.start as usize, run.end as usize);
+        }
+    }
+    island
+}
+
+/// Island cells whose 8 neighbours are all unexplored, and those with 4 to 6 unexplored ones.
+/// What lies off the map counts as explored.
+fn split_by_unexplored_neighbours(island: &BitGrid, explored: &BitGrid) -> (BitGrid, BitGrid) {
+    let (rows, cols) = (island.rows(), island.cols());
+    let (mut inner, mut edges) = (BitGrid::new(rows, cols), BitGrid::new(rows, cols));
+    let num_words = cols.div_ceil(64);
+    let unexplored = |row: usize, word: usize| match explored.row(row).get(word) {
+        Some(&bits) => !bits & explored.word_mask(word),
+        None => 0,
+    };
+    // The word, and the same shifted so that each bit holds its left and its right neighbour.
+    let neighbours = |row: usize, word: usize| {
+        let here = unexplored(row, word);
+        let before = if word > 0 { unexplored(row, word - 1) } else { 0 };
+        [here << 1 | before >> 63, here, here >> 1 | unexplored(row, word + 1) << 63]
+    };
+    for row in 0..rows {
+        for word in 0..num_words {
+            let candidates = island.row(row)[word];
+            if candidates == 0 {
+                continue;
+            }
+            let above = if row > 0 { neighbours(row - 1, word) } else { [0; 3] };
+            let [left, _, right] = neighbours(row, word);
+            let (ones_a, twos_a) = add3(above);
+            let (ones_b, twos_b) = add3(neighbours(row + 1, word));
+            let (ones_c, twos_c) = (left ^ right, left & right);
+            // The number of neighbours in binary: eights, fours, twos (and ones), 64 cells at once.
+            let (ones, carry) = add3([ones_a, ones_b, ones_c]);
+            let (twos, fours_a) = add3([twos_a, twos_b, twos_c]);
+            let (twos, fours_b) = (twos ^ carry, twos & carry);
+            let (fours, eights) = (fours_a ^ fours_b, fours_a & fours_b);
+            inner.row_mut(row)[word] = candidates & eights;
+            edges.row_mut(row)[word] = candidates & fours & !(twos & ones);
+        }
+    }
+    (inner, edges)
+}
+
+/// Sum and carry of three bits, 64 at once.
+fn add3([a, b, c]: [u64; 3]) -> (u64, u64) {
+    (a ^ b ^ c, (a & b) | (c & (a ^ b)))
+}
+
+/// Splits a region that spans a wide angle around the agent, by k-means on the angle.
+fn split_wide(
+    map: &OccupancyMap,
+    agent_m: Vec2,
+    cells: Vec<[i32; 2]>,
+    max_span_rad: f64,
+    regions: &mut Vec<Vec<[i32; 2]>>,
+) {
+    if is_narrow(map, agent_m, &cells, max_span_rad) {
+        regions.push(cells);
+        return;
+    }
+    let angles = unwrapped_angles(map, agent_m, &cells);
+    let (low, high) = angles
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &a| (low.min(a), high.max(a)));
+    if high - low <= max_span_rad {
+        regions.push(cells);
+        return;
+    }
+    let num_parts = ((high - low) / max_span_rad) as usize + 1;
+    let limits = k_means_limits(&angles, low, high, num_parts);
+    let mut parts = vec![Vec::new(); num_parts];
+    for (cell, angle) in cells.into_iter().zip(angles) {
+        parts[limits.partition_point(|&limit| limit <= angle)].push(cell);
+    }
+    regions.extend(parts.into_iter().filter(|part| !part.is_empty()));
+}
+
+/// `[x, z]` from the agent to the middle of a cell.
+fn offset_m(map: &OccupancyMap, agent_m: Vec2, cell: &[i32; 2]) -> Vec2 {
+    let centre_m = map.spec().centre_m(cell.map(|i| i as usize));
+    [centre_m[0] - agent_m[0], centre_m[1] - agent_m[1]]
+}
+
+/// Mean direction of cells seen from the agent, as a vector.
+pub(crate) fn mean_direction(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Vec2 {
+    cells.iter().fold([0.0; 2], |sum, cell| {
+        let [x, z] = offset_m(map, agent_m, cell);
+        let length = (x * x + z * z).sqrt().max(1e-9);
+        [sum[0] + x / length, sum[1] + z / length]
+    })
+}
+
+/// Whether cells surely span no more than an angle: without an arc tangent a cell.
+fn is_narrow(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]], max_span_rad: f64) -> bool {
+    let ahead = mean_direction(map, agent_m, cells);
+    let (mut low, mut high) = (0.0_f64, 0.0_f64);
+    for cell in cells {
+        let [x, z] = offset_m(map, agent_m, cell);
+        let along = x * ahead[0] + z * ahead[1];
+        if along <= 0.0 {
+            return false;
+        }
+        let tangent = (x * ahead[1] - z * ahead[0]) / along;
+        (low, high) = (low.min(tangent), high.max(tangent));
+    }
+    high.atan() - low.atan() <= max_span_rad
+}
+
+/// Angles of cells seen from the agent (0 along +z, growing towards +x), cut at the widest gap
+/// so that neighbours do not lie a turn apart.
+fn unwrapped_angles(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Vec<f64> {
+    let mut angles: Vec<f64> = cells
+        .iter()
+        .map(|cell| {
+            let [x, z] = offset_m(map, agent_m, cell);
+            x.atan2(z)
+        })
+        .collect();
+    // Only a region on both sides of the cut behind the agent needs another cut.
+    let is_near_cut = |angle: &f64| angle.abs() > 0.5 * PI;
+    if angles.iter().any(|a| is_near_cut(a) && *a < 0.0)
+        && angles.iter().any(|a| is_near_cut(a) && *a > 0.0)
+    {
+        let mut sorted = angles.clone();
+        sorted.sort_by(f64::total_cmp);
+        let across = sorted[0] + TAU - sorted[sorted.len() - 1];
+        let mut widest = (across, -PI);
+        for pair in sorted.windows(2) {
+            if pair[1] - pair[0] > widest.0 {
+                widest = (pair[1] - pair[0], pair[1]);
+            }
+        }
+        for angle in &mut angles {
+            if *angle < widest.1 {
+                *angle += TAU;
+            }
+        }
+    }
+    angles
+}
+
+/// Borders between the `num_parts` clusters of one-dimensional k-means, started evenly spread.
+fn k_means_limits(values: &[f64], low: f64, high: f64, num_parts: usize) -> Vec<f64> {
+    let mut means: Vec<f64> =
+        (0..num_parts).map(|i| low + (high - low) * (i as f64 + 0.5) / num_parts as f64).collect();
+    let mut limits = Vec::new();
+    for _ in 0..100 {
+        let middle: Vec<f64> = means.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        if middle == limits {
+            break;
+        }
+        limits = middle;
+        let mut sums = vec![(0.0, 0.0); num_parts];
+        for &value in values {
+            let sum = &mut sums[limits.partition_point(|&limit| limit <= value)];
+            *sum = (sum.0 + value, sum.1 + 1.0);
+        }
+        for (mean, (sum, count)) in means.iter_mut().zip(sums) {
+            if count > 0.0 {
+                *mean = sum / count;
+            }
+        }
+    }
+    limits
+}

@@ -1,0 +1,111 @@
+//! Where to stand and look at a frontier's region.
+
+use crate::{
+    geometry::{Vec2, distance_2d_m},
+    memory::{
+        bits::{BitGrid, ones},
+        frontiers::{Frontier, FrontierConfig},
+        occupancy::OccupancyMap,
+        regions::mean_direction,
+    },
+};
+
+/// Gives a region its direction and view position.
+pub(crate) fn place(
+    map: &OccupancyMap,
+    edges: &BitGrid,
+    agent_m: Vec2,
+    cells: Vec<[i32; 2]>,
+    id: u64,
+    config: &FrontierConfig,
+) -> Frontier {
+    let [x, z] = mean_direction(map, agent_m, &cells);
+    let direction_rad = x.atan2(z);
+    let ahead = [direction_rad.sin(), direction_rad.cos()];
+    let mut candidates = edges_beside(edges, &cells);
+    if candidates.is_empty() {
+        candidates = edges.cells().collect();
+    }
+    // The five cells that lie best in that direction, then the one nearest to the agent.
+    let mut ranked: Vec<(f64, f64, [usize; 2])> = candidates
+        .into_iter()
+        .map(|cell| {
+            let centre_m = map.spec().centre_m(cell);
+            let distance_m = distance_2d_m(centre_m, agent_m);
+            let along_m =
+                (centre_m[0] - agent_m[0]) * ahead[0] + (centre_m[1] - agent_m[1]) * ahead[1];
+            (along_m / distance_m.max(1e-9), distance_m, cell)
+        })
+        .collect();
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.2.cmp(&b.2)));
+    ranked.truncate(5);
+    let nearest = ranked.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+    let position_m =
+        nearest.map_or(agent_m, |&(_, _, cell)| push_away(map, map.spec().centre_m(cell), config));
+    Frontier { id, position_m, direction_rad, cells }
+}
+
+/// Edge cells with 2 to 12 cells of the region in the 5 x 5 cells around them, row-major.
+fn edges_beside(edges: &BitGrid, cells: &[[i32; 2]]) -> Vec<[usize; 2]> {
+    let mut region = BitGrid::new(edges.rows(), edges.cols());
+    let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+    for cell in cells {
+        let cell = cell.map(|i| i as usize);
+        region.insert(cell[0], cell[1]);
+        low = [low[0].min(cell[0]), low[1].min(cell[1])];
+        high = [high[0].max(cell[0]), high[1].max(cell[1])];
+    }
+    let low = low.map(|i| i.saturating_sub(2));
+    let rows = low[0]..(high[0] + 3).min(edges.rows());
+    rows.flat_map(|row| {
+        let words = edges.row(row).iter().enumerate().skip(low[1] / 64);
+        words
+            .take((high[1] + 2) / 64 - low[1] / 64 + 1)
+            .flat_map(move |(index, &word)| ones(word).map(move |bit| [row, index * 64 + bit]))
+    })
+    .filter(|&[row, col]| (2..=12).contains(&region.count_5x5(row, col)))
+    .collect()
+}
+
+/// Moves a point away from the nearest obstacle while that gains clearance and stays on free floor.
+fn push_away(map: &OccupancyMap, mut point_m: Vec2, config: &FrontierConfig) -> Vec2 {
+    let mut moved_m = 0.0;
+    while let Some((obstacle_m, clearance_m)) = nearest_blocked(map, point_m, config.clearance_m)
+        && moved_m + config.push_step_m <= config.max_push_m + 1e-9
+        && clearance_m > 0.0
+    {
+        let step = config.push_step_m / clearance_m;
+        let next_m = [0, 1].map(|i| point_m[i] + (point_m[i] - obstacle_m[i]) * step);
+        let is_free = map.spec().cell_of(next_m).is_some_and(|[r, c]| map.free().get(r, c));
+        let next_clearance_m =
+            nearest_blocked(map, next_m, config.clearance_m).map_or(f64::INFINITY, |n| n.1);
+        if !is_free || next_clearance_m <= clearance_m {
+            break;
+        }
+        point_m = next_m;
+        moved_m += config.push_step_m;
+    }
+    point_m
+}
+
+/// Centre of the nearest blocked cell closer than `within_m`, and its distance.
+fn nearest_blocked(map: &OccupancyMap, point_m: Vec2, within_m: f64) -> Option<(Vec2, f64)> {
+    let spec = map.spec();
+    let [row, col] = spec.cell_of(point_m)?;
+    let reach = (within_m / spec.cell_m).ceil().min((spec.rows + spec.cols) as f64) as usize;
+    let rows = row.saturating_sub(reach)..(row + reach + 1).min(spec.rows);
+    let first = col as i64 - reach as i64;
+    let windows = rows.flat_map(|r| (0..=2 * reach as i64).step_by(64).map(move |w| (r, w)));
+    windows
+        .flat_map(|(r, w)| {
+            let width = (2 * reach as i64 + 1 - w).min(64) as u32;
+            let bits = map.blocked().window(r, first + w) & (u64::MAX >> (64 - width));
+            ones(bits).map(move |bit| [r, (first + w + bit as i64) as usize])
+        })
+        .map(|cell| {
+            let centre_m = spec.centre_m(cell);
+            (centre_m, distance_2d_m(centre_m, point_m))
+        })
+        .filter(|&(_, distance_m)| distance_m < within_m)
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+}
