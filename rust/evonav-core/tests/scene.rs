@@ -11,6 +11,7 @@ use evonav_core::{
     house::{House, HouseDelta, ObjectMove},
     world::scene::{BodyKind, Scene},
 };
+use proptest::{collection::vec, prelude::*};
 
 const UNKNOWN: UnknownAssets = UnknownAssets::CategoryDefault;
 
@@ -221,6 +222,85 @@ fn floors_of_slanted_rooms_are_covered() {
         }
     }
     assert_eq!(scene.bodies[1].kind, BodyKind::Ceiling);
+}
+
+/// A house of one room with the given floor and, along its first edge, holes `[from, to, low, high]`.
+fn one_room(floor_m: &[Vec2], holes_m: &[[f64; 4]]) -> House {
+    let corners: Vec<String> =
+        floor_m.iter().map(|[x, z]| format!(r#"{{"x":{x},"y":0,"z":{z}}}"#)).collect();
+    let [a, b] = [floor_m[0], floor_m[1]];
+    let foot = |y: f64| {
+        format!(r#"{{"x":{},"y":{y},"z":{}}},{{"x":{},"y":{y},"z":{}}}"#, a[0], a[1], b[0], b[1])
+    };
+    let windows: Vec<String> = holes_m
+        .iter()
+        .enumerate()
+        .map(|(i, [from, to, low, high])| {
+            format!(
+                r#"{{"id":"window|{i}","room0":"room|1","room1":"room|1","wall0":"wall|1",
+                "wall1":"wall|1","assetId":"Window_Fixed_36x48","assetPosition":{{"x":1,"y":1,"z":0}},
+                "holePolygon":[{{"x":{from},"y":{low},"z":0}},{{"x":{to},"y":{high},"z":0}}]}}"#
+            )
+        })
+        .collect();
+    let json = format!(
+        r#"{{"rooms":[{{"id":"room|1","roomType":"Bedroom","floorMaterial":"Wood","floorPolygon":[{}]}}],
+        "walls":[{{"id":"wall|1","roomId":"room|1","material":"Wood","polygon":[{},{}]}}],"doors":[],
+        "windows":[{}],"objects":[],"proceduralParameters":{{}},"metadata":{{}}}}"#,
+        corners.join(","),
+        foot(0.0),
+        foot(2.5),
+        windows.join(",")
+    );
+    House::from_json("one room", &json).expect("a valid house")
+}
+
+proptest! {
+    /// A point of the wall's plane is solid exactly where no hole holds it; holes may overlap.
+    #[test]
+    fn walls_are_solid_outside_their_holes(
+        holes in vec([0.0..3.0, 0.05..1.0, 0.0..1.5, 0.05..1.0], 0..5),
+        points in vec([0.001..3.999, 0.001..2.499], 40),
+    ) {
+        let holes: Vec<[f64; 4]> = holes.iter().map(|&[a, w, y, h]| [a, a + w, y, y + h]).collect();
+        let floor = [[1.0, 1.0], [1.0, 5.0], [4.0, 5.0], [4.0, 1.0]];
+        let house = one_room(&floor, &holes);
+        let scene = Scene::build(&house, Catalogue::bundled(), UNKNOWN).expect("no objects");
+        let wall = scene.bodies.iter().find(|body| body.kind == BodyKind::Wall).expect("a wall");
+        for [along, up] in points {
+            let is_hole = holes
+                .iter()
+                .any(|&[from, to, low, high]| from < along && along < to && low < up && up < high);
+            let is_edge = holes.iter().any(|hole| {
+                let [from, to, low, high] = hole;
+                [along - from, along - to, up - low, up - high].iter().any(|gap| gap.abs() < 1e-5)
+            });
+            let is_solid = wall.parts.iter().any(|part| holds(part, [1.002, up, 1.0 + along]));
+            prop_assert!(is_edge || is_solid != is_hole, "{along} {up} {holes:?}");
+        }
+    }
+
+    /// Floors cover their polygon and nothing else: a random comb of rectangular teeth.
+    #[test]
+    fn floors_cover_their_polygon_exactly(
+        teeth in vec([0.3..2.0, 0.5..4.0], 1..6),
+        points in vec([-0.5..11.0, -0.5..4.5], 60),
+    ) {
+        let mut polygon: Vec<Vec2> = vec![[0.0, 0.0]];
+        let mut x = 0.0;
+        for &[width, height] in &teeth {
+            polygon.extend([[x, height], [x + width, height]]);
+            x += width;
+        }
+        polygon.push([x, 0.0]);
+        let scene = Scene::build(&one_room(&polygon, &[]), Catalogue::bundled(), UNKNOWN)
+            .expect("no objects");
+        for point in points {
+            let is_floor = scene.bodies[0].parts.iter().any(|p| holds(p, [point[0], -0.01, point[1]]));
+            let is_edge = teeth.iter().any(|[_, height]| (point[1] - height).abs() < 1e-6);
+            prop_assert!(is_edge || is_floor == polygon_contains(&polygon, point), "{point:?}");
+        }
+    }
 }
 
 /// Every house of the recorded data, if it is there.

@@ -9,23 +9,34 @@ use crate::{
     geometry::{Aabb, Vec2, Vec3},
 };
 
-/// Farthest fall: no recorded child hangs higher over its support.
-const MAX_FALL_M: f64 = 0.6;
 /// A support this little above the bottom is still one: recorded boxes dip into what holds them.
 const DIP_M: f64 = 0.03;
 /// Where under a box supports are looked for: its middle, and this far towards its corners.
 const CORNER: f64 = 0.7;
 
-/// How far a box falls until it rests on one of `parts`; 0 if nothing holds it within reach.
+/// How far a box falls until it rests on one of `parts`.
+///
+/// Beside them all (houses made without physics hang things over the free inside of corner
+/// counters) it falls to the floor, y = 0; under or between them, where something that the parts do
+/// not show must hold it, it stays.
 pub(super) fn fall_m(parts: &[Part], aabb: &Aabb) -> f64 {
     let bottom_m = aabb.min_m[1];
     let [x, _, z] = aabb.centre_m();
     let [w, _, d] = aabb.size_m().map(|edge| 0.5 * CORNER * edge);
     let spots = [[x, z], [x - w, z - d], [x + w, z - d], [x - w, z + d], [x + w, z + d]];
     let tops = parts.iter().flat_map(|part| spots.iter().filter_map(|&spot| top_m(part, spot)));
-    let support_m = tops.filter(|&top| top <= bottom_m + DIP_M).fold(f64::NEG_INFINITY, f64::max);
-    let fall_m = bottom_m - support_m;
-    if fall_m <= MAX_FALL_M { fall_m.max(0.0) } else { 0.0 }
+    let (mut support_m, mut is_beside) = (f64::NEG_INFINITY, true);
+    for top_m in tops {
+        is_beside = false;
+        if top_m <= bottom_m + DIP_M {
+            support_m = support_m.max(top_m);
+        }
+    }
+    match (support_m.is_finite(), is_beside) {
+        (true, _) => (bottom_m - support_m).max(0.0),
+        (false, true) => bottom_m.max(0.0),
+        (false, false) => 0.0,
+    }
 }
 
 /// Height of a part's level top over a ground point; `None` beside it, or where it is not level.

@@ -92,6 +92,6 @@ pub fn dog_bed(s: &mut Sketch<'_>) {
 pub fn pillow(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[5]));
-    s.cuboid(x, between(y, 0.3, 0.7), z, fabric);
-    s.cuboid(between(x, 0.07, 0.93), y, between(z, 0.07, 0.93), shade(fabric, 1.04));
+    s.cuboid(x, between(y, 0.2, 0.75), z, fabric);
+    s.cuboid(between(x, 0.05, 0.95), y, between(z, 0.05, 0.95), shade(fabric, 1.04));
 }

@@ -14,7 +14,7 @@ pub fn carcass(s: &mut Sketch<'_>) {
     let wood = s.tint(0, s.choose(&WOODS, WOODS[1]));
     let front = s.tint(1, shade(wood, 1.12));
     let board = (0.03_f64).min(0.08 * h);
-    let inner: Vec<f64> = s.levels().into_iter().filter(|&y| y < h - 0.1).collect();
+    let inner: Vec<f64> = s.levels().into_iter().filter(|&y| y < h - 0.06).collect();
     let shell = [z[0], z[1] - 0.012];
     if inner.is_empty() {
         let foot = if h > 0.4 { 0.06 } else { 0.02 };

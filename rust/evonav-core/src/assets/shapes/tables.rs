@@ -1,8 +1,8 @@
 //! Tables and desks: a top, legs or a pedestal, and lower boards where things were seen on them.
 
 use super::{
-    colour::{WOODS, shade},
-    sketch::{Sketch, between, ends, inside},
+    colour::{Colour, WOODS, shade},
+    sketch::{Sketch, Span, between, ends, inside},
     storage,
 };
 
@@ -27,9 +27,11 @@ const ROUND: [&str; 14] = [
 /// Dining, coffee and side tables.
 pub fn table(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
-    let low_levels = s.levels().iter().filter(|&&y| y < 0.8 * h).count();
-    let is_nightstand = s.asset().category == "SideTable" && h < 0.75 && w < 0.7;
-    if s.asset().category != "DiningTable" && (low_levels >= 2 || is_nightstand && low_levels > 0) {
+    let low: Vec<f64> = s.levels().into_iter().filter(|&y| y < h - 0.06).collect();
+    // Something inside: a nightstand, unless it is one low board between legs.
+    let is_small = s.asset().category == "SideTable" && h < 0.75 && w < 0.7;
+    let is_carcass = low.len() >= 2 || is_small && low.first().is_some_and(|&y| y > 0.3 * h);
+    if is_carcass && s.asset().category != "DiningTable" {
         return storage::carcass(s);
     }
     let [x, _, z] = s.spans();
@@ -54,17 +56,25 @@ pub fn table(s: &mut Sketch<'_>) {
         }
     }
     for level in s.levels() {
-        if level > 0.04 && level < 0.8 * h {
+        if level > 0.04 && level < h - 0.06 {
             s.cuboid(inside(x, thick), [level - 0.02, level], inside(z, thick), wood);
         }
     }
 }
 
-/// Desks: a table with a drawer block on one side; tall ones carry a shelf at the back; deep ones
-/// are L shaped like corner counters (measured: things stand along the back and along +x).
+/// Desks whose drawers and boards are on the right (+x); on all others they are on the left.
+const RIGHT_HANDED: [&str; 2] = ["Desk_305_1", "Desk_328_1"];
+
+/// Desks: a top, and on one side a block of drawers, or of open boards where things were seen
+/// inside; tall ones carry a shelf at the back; deep ones are L shaped like corner counters. Which
+/// side, and the L, are measured on recorded children.
 pub fn desk(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
+    let id = s.asset().id.as_str();
+    if id == "Desk_329_1" {
+        return storage::carcass(s);
+    }
     let wood = s.tint(0, s.choose(&WOODS, WOODS[1]));
     let front = s.tint(1, shade(wood, 0.85));
     let levels = s.levels();
@@ -74,8 +84,7 @@ pub fn desk(s: &mut Sketch<'_>) {
         _ if h <= 0.95 => h,
         _ => 0.75,
     };
-    let top = 0.035;
-    let side = 0.025;
+    let (top, side) = (0.035, 0.025);
     let leg_y = [0.0, desk_top - top];
     let [left, right] = ends(x, side, 0.0);
     if d > 1.1 && w > 1.5 {
@@ -91,18 +100,28 @@ pub fn desk(s: &mut Sketch<'_>) {
     s.cuboid(left, leg_y, z, front);
     s.cuboid(right, leg_y, z, front);
     s.cuboid(inside(x, side), [0.45 * desk_top, desk_top - top], ends(z, 0.015, 0.03)[0], front);
-    if w > 1.0 {
-        let block = between(x, 0.7, 0.98);
-        s.cuboid(block, [0.08, desk_top - top], inside(z, 0.02), front);
-        let handle = between(block, 0.35, 0.65);
-        for k in 1..4 {
-            let y = 0.08 + (desk_top - top - 0.08) * (f64::from(k) - 0.5) / 3.0;
-            s.cuboid(
-                handle,
-                [y - 0.008, y + 0.008],
-                [z[1] - 0.025, z[1] - 0.008],
-                shade(front, 0.5),
-            );
+    let low: Vec<f64> = levels.iter().copied().filter(|&y| y < desk_top - 0.06).collect();
+    let left_block = between(x, side / w, 0.36);
+    let right_block = between(x, 0.64, 1.0 - side / w);
+    let block = if RIGHT_HANDED.contains(&id) { right_block } else { left_block };
+    if low.is_empty() && w > 1.0 {
+        drawer_block(s, block, desk_top - top, front);
+    }
+    if low.iter().any(|&level| level <= desk_top - 0.16) {
+        // The upright that carries the boards' inner ends.
+        let edge = if RIGHT_HANDED.contains(&id) { block[0] } else { block[1] - side };
+        s.cuboid([edge, edge + side], leg_y, inside(z, 0.02), front);
+        if id == "Desk_301_1" {
+            s.cuboid([right_block[0], right_block[0] + side], leg_y, inside(z, 0.02), front);
+        }
+    }
+    for level in low {
+        // One just under the top is a drawer or a ledge along the whole desk.
+        let is_ledge = level > desk_top - 0.16;
+        let board = [(level - 0.02).max(0.0), level];
+        s.cuboid(if is_ledge { inside(x, side) } else { block }, board, inside(z, 0.02), wood);
+        if id == "Desk_301_1" {
+            s.cuboid(right_block, board, inside(z, 0.02), wood);
         }
     }
     if h > desk_top + 0.05 {
@@ -115,5 +134,16 @@ pub fn desk(s: &mut Sketch<'_>) {
         for level in levels.iter().copied().filter(|&y| y > desk_top + 0.1 && y < h - 0.05) {
             s.cuboid(inside(x, side), [level - 0.02, level], back, wood);
         }
+    }
+}
+
+/// Three closed drawers over each other.
+fn drawer_block(s: &mut Sketch<'_>, x: Span, top: f64, colour: Colour) {
+    let z = s.spans()[2];
+    s.cuboid(x, [0.08, top], inside(z, 0.02), colour);
+    for k in 1..4 {
+        let y = 0.08 + (top - 0.08) * (f64::from(k) - 0.5) / 3.0;
+        let grip = [z[1] - 0.025, z[1] - 0.008];
+        s.cuboid(between(x, 0.35, 0.65), [y - 0.008, y + 0.008], grip, shade(colour, 0.5));
     }
 }
