@@ -1,6 +1,7 @@
 """The `evonav` command. Exit codes: 0 done, 1 an error that is told, 2 wrong usage, 3 incomplete, 130 interrupted."""
 
 import os
+import signal
 import sys
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -181,6 +182,10 @@ def _evaluate(
 ) -> "list[AgentSummary]":
     from evonav.evaluation.engine import evaluate
 
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)  # what a scheduler sends is to be as good as Ctrl-C
     try:
         with _progress() as show:
             return evaluate(

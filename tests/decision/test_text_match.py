@@ -100,5 +100,6 @@ def test_verification_needs_the_label_at_the_place():
         (Sighting("Mug", 0.0, float("inf")), False),
         (Sighting("Bowl", 0.9, 0.0), False),
     ):
-        assert model.verify(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [sighting])).is_present is is_present
-    assert not model.verify(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [])).is_present
+        assert model.verify(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [sighting], 0.01)).is_present is is_present
+    assert not model.verify(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], 0.01)).is_present
+    assert model.verify(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], 0.0005)).is_present

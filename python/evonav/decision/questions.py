@@ -85,6 +85,8 @@ class VerifyQuestion:
     entry: ObjectCandidate
     seen: Sequence[Sighting]
     """What the present views show."""
+    image_share: float
+    """Share of the present view that the remembered object's box would cover if nothing hid it."""
 
 
 @dataclass(frozen=True, slots=True)

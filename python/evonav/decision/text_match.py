@@ -19,6 +19,7 @@ from evonav.decision.questions import (
     Verdict,
     VerifyQuestion,
 )
+from evonav.tasks.language import STRUCTURES
 from evonav.tasks.public import StageInput
 
 ROOM_SIGNS: dict[str, tuple[str, ...]] = {
@@ -59,8 +60,10 @@ class TextMatchConfig:
     """How far the centre of what stands on something may lie outside its box, and its bottom above it."""
     room_radius_m: float = 3.5
     """Within which things speak for a room."""
-    min_relations: float = 0.5
+    min_relations: float = 0.6
     """Share of an instruction's relations that must hold before exploration ends for a candidate."""
+    unknown_room: float = 0.5
+    """What a room that cannot be told counts for."""
     hurry_rounds: int = 8
     """With no more rounds left than this, any candidate of the right category will do."""
     min_similarity: float = 0.99
@@ -69,6 +72,8 @@ class TextMatchConfig:
     """A frontier this near something that the instruction mentions is worth a detour..."""
     lead_m: float = 3.0
     """...of this length."""
+    min_image_share: float = 0.002
+    """Verification: an object that would cover less of the image is not missed (detectors give up at 0.001)."""
     same_place_m: float = 0.5
     """Verification: centres this near are the same place."""
     min_overlap: float = 0.2
@@ -92,7 +97,7 @@ class TextMatch:
         for index, entry in enumerate(entries):
             score = self._label_score(parsed, entry.label)
             if score > 0.0:
-                held = self._relations_held(parsed, entry, entries) if self._names_goal(parsed, entry) else 0.0
+                held = self._fit(parsed, entry, entries) if self._names_goal(parsed, entry) else 0.0
                 distance_m = math.dist(_ground(entry), position_m)
                 keys.append((-score, -held, -entry.num_detections, distance_m, entry.entry_id, index))
         return [key[-1] for key in sorted(keys)]
@@ -102,7 +107,7 @@ class TextMatch:
         goal = self._parsed(question.goal)
         config = self.config
         named = [
-            (self._relations_held(goal, candidate, question.surroundings), index)
+            (self._fit(goal, candidate, question.surroundings), index)
             for index, candidate in enumerate(question.objects)
             if self._names_goal(goal, candidate)
         ]
@@ -110,7 +115,7 @@ class TextMatch:
             held, index = max(named, key=lambda pair: (pair[0], -pair[1]))
             is_last_chance = not question.frontiers or question.num_rounds_left <= config.hurry_rounds
             if held >= config.min_relations or is_last_chance:
-                return Choice("object", index, f"{question.objects[index].label}, {held:.0%} of the relations hold")
+                return Choice("object", index, f"{question.objects[index].label}, {held:.0%} of what is said fits")
         if question.frontiers:
             index = min(
                 range(len(question.frontiers)),
@@ -124,6 +129,8 @@ class TextMatch:
     def verify(self, question: VerifyQuestion) -> Verdict:
         """Present if something of the entry's label is seen at the entry's place."""
         entry, config = question.entry, self.config
+        if question.image_share < config.min_image_share:
+            return Verdict(True, "too small to be told from here")
         for seen in question.seen:
             is_here = seen.overlap > config.min_overlap or seen.distance_m < config.same_place_m
             if is_here and canonical(seen.label) == canonical(entry.label):
@@ -147,28 +154,29 @@ class TextMatch:
         said = [0.5 if r.kind == "on" else 0.4 for r in goal.relations if similarity(r.noun, label) >= 1.0]
         return max([0.9 * own if own >= 0.4 else 0.0, *said])
 
-    def _relations_held(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
-        """Share of the relations that hold, 1 if none can be judged. What was not seen at all does not count."""
-        judged = [self._holds(relation, entry, around) for relation in goal.relations]
-        known = [holds for holds in judged if holds is not None]
-        return sum(known) / len(known) if known else 1.0
+    def _fit(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
+        """Share of the relations that hold, a hair more if the size is as said: that settles ties alone."""
+        sizes = {"tiny": (0.0, 0.12), "small": (0.0, 0.45), "large": (1.2, math.inf)}
+        largest_m = max(entry.size_m)
+        fits = all(low <= largest_m <= high for low, high in (sizes[word] for word in goal.adjectives if word in sizes))
+        return self._relations_held(goal, entry, around) + (0.001 if fits else 0.0)
 
-    def _holds(self, relation: Relation, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> bool | None:
-        """Whether a relation of an entry holds; `None` if it cannot be told."""
+    def _relations_held(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
+        """Share of the relations that hold, 1 if there is none. Doors and windows are in no object memory."""
+        judged = [
+            self._holds(relation, entry, around) for relation in goal.relations if relation.noun not in STRUCTURES
+        ]
+        return sum(judged) / len(judged) if judged else 1.0
+
+    def _holds(self, relation: Relation, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
+        """1 if a relation of an entry holds, 0 if not."""
         if relation.kind == "in":
             room = self._room_around(_ground(entry), around)
-            return None if room is None else room == relation.noun
-        if relation.noun in ("doorway", "window"):
-            # Parts of the house need not be in an object memory: absence tells nothing.
-            is_seen = any(
-                similarity(relation.noun, other.label) >= 1.0 and _gap_m(entry, other) <= self.config.near_m
-                for other in around
-            )
-            return True if is_seen else None
+            return self.config.unknown_room if room is None else float(room == relation.noun)
         others = [o for o in around if o.entry_id != entry.entry_id and similarity(relation.noun, o.label) >= 1.0]
         if relation.kind == "on":
-            return any(self._is_on(entry, other) for other in others)
-        return any(_gap_m(entry, other) <= self.config.near_m for other in others)
+            return float(any(self._is_on(entry, other) for other in others))
+        return float(any(_gap_m(entry, other) <= self.config.near_m for other in others))
 
     def _is_on(self, entry: ObjectCandidate, support: ObjectCandidate) -> bool:
         margin_m = self.config.support_margin_m
