@@ -89,6 +89,24 @@ def report(run: Annotated[Path, typer.Argument(help="Folder of a run.")]) -> Non
 
 
 @app.command()
+def strip(
+    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    task: Annotated[str, typer.Argument(help="Id of a task of the run.")],
+    out: Annotated[Path, typer.Option(help="SVG file to write.")],
+    agents: Annotated[str, typer.Option(help="Agents of the run, comma-separated: a row each.")] = "ftu",
+    stages: Annotated[str, typer.Option(help="Stages, comma-separated; default: all.")] = "",
+) -> None:
+    """Draws one task of a run as a picture: stages side by side, agents below each other."""
+    from evonav.report import write_strip
+
+    try:
+        numbers = [int(stage) for stage in stages.split(",")] if stages else None
+    except ValueError:
+        raise typer.BadParameter(f"--stages {stages}: numbers, comma-separated") from None
+    typer.echo(f"picture: {write_strip(run, task, agents.split(','), out, stages=numbers)}")
+
+
+@app.command()
 def generate(
     houses: Annotated[Path, typer.Option(help="ProcTHOR JSON, JSONL or JSONL.gz.")],
     out: Annotated[Path, typer.Option(help="Folder for the tasks.")],

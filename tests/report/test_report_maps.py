@@ -5,12 +5,15 @@ from xml.etree import ElementTree
 
 import pytest
 from made_up_run import NEW_TABLE_M, WriteRun, entry, stage_map, stage_record
+from typer.testing import CliRunner
 
+from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records import EndState
-from evonav.report.maps import stage_svg, write_strip
+from evonav.report.maps import file_css, map_css, stage_svg
 from evonav.report.overlay import rounds as choices
 from evonav.report.plan import label_point
+from evonav.report.strip import write_strip
 from evonav.report.svg import polyline, simplified, slug
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -94,8 +97,35 @@ def test_strip_shows_the_stages_side_by_side(write_run: WriteRun, tmp_path: Path
     words = [element.text for element in with_class(root, "stage")]
     assert words == ["Stage 1", "Stage 2"]
     assert len(root.findall(f".//{SVG}svg")) == 2
-    assert {ring.get("r") for ring in with_class(root, "ring")} == {"150"}
+    assert [ring.get("r") for ring in with_class(root, "ring")] == ["150", "150", "9"]  # two maps, and the legend
     assert "RETAIN_GROUP in the kitchen: 2 objects moved" in "".join(root.itertext())
+
+
+def test_strip_has_a_row_an_agent(write_run: WriteRun, tmp_path: Path) -> None:
+    path = write_strip(write_run(), "task-0", ["fu", "ftu"], tmp_path / "strip.svg", stages=[2])
+    root = ElementTree.parse(path).getroot()
+    assert [element.text for element in with_class(root, "stage")] == ["Stage 2"]
+    assert [element.text for element in with_class(root, "ink")] == ["fu", "ftu"]
+    assert [element.text for element in with_class(root, "verdict")[0]] == ["fu", "failure"]
+    assert len(root.findall(f".//{SVG}svg")) == 2
+
+
+def test_strip_is_a_command(write_run: WriteRun, tmp_path: Path) -> None:
+    run_dir, out = write_run(), tmp_path / "strip.svg"
+    arguments = ["strip", str(run_dir), "task-0", "--out", str(out), "--agents", "fu,ftu"]
+    assert CliRunner().invoke(app, [*arguments, "--stages", "1,2"]).exit_code == 0
+    assert len(ElementTree.parse(out).getroot().findall(f".//{SVG}svg")) == 4
+    assert CliRunner().invoke(app, [*arguments, "--stages", "x"]).exit_code == 2
+
+
+def test_files_write_colours_out() -> None:
+    assert "var(" not in file_css()
+    assert "--" not in file_css()
+    # Light and dark have the same names, and every name that a rule uses.
+    light, dark, rules = map_css().split("/* --- */")
+    names = {frozenset(re.findall(r"--(\w+):", block)) for block in (light, dark)}
+    assert len(names) == 1
+    assert set(re.findall(r"var\(--(\w+)\)", rules)) <= names.pop()
 
 
 def test_strip_of_what_is_not_there_names_it(write_run: WriteRun, tmp_path: Path) -> None:

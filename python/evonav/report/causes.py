@@ -4,6 +4,7 @@ import math
 from enum import Enum
 
 from evonav.evaluation.records import EndState, EntryRecord, StageRecord
+from evonav.tasks.language import noun_of
 
 NEAR_TARGET_M = 1.0
 """Ground-plane distance within which an entry of the goal's category is taken for the target's."""
@@ -48,13 +49,16 @@ def sentence(record: StageRecord) -> str:
     cause = cause_of(record)
     if record.state is EndState.NOT_RUN:
         return "Not run."
-    distance = "" if record.terminal_distance_m is None else f" {record.terminal_distance_m:.1f} m from the target"
+    distance = "" if record.terminal_distance_m is None else f", {record.terminal_distance_m:.1f} m away"
     if cause is None:
-        how = "Stopped" if record.has_stopped else "Ran out of rounds"
+        how = "Stopped at it" if record.has_stopped else "There when the rounds ran out"
         return f"{how}{distance}."
     entry = record.trace[-1].chosen_entry if record.trace else None
-    named = f" ({entry.label})" if record.has_stopped and entry is not None else ""
-    return f"{cause.value.capitalize()}{named},{distance or ' place unknown'}."
+    named = ""
+    if record.has_stopped:
+        named = f" ({record.stop_reason})" if entry is None and record.stop_reason else ""
+        named = f" ({noun_of(entry.label)})" if entry is not None else named
+    return f"{cause.value.capitalize()}{named}{distance}."
 
 
 def _cause_of_stop(record: StageRecord) -> Cause:

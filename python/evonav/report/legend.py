@@ -2,7 +2,7 @@
 
 from markupsafe import Markup
 
-from evonav.report.svg import arrow_head, star
+from evonav.report.svg import arrow_head, escape, join, star
 
 _DASH = "stroke-dasharray:3 2"
 
@@ -75,3 +75,17 @@ def legend() -> Markup:
         for words, drawing, width in _ENTRIES
     ]
     return Markup("").join(items)
+
+
+def legend_row(width_px: int) -> tuple[str, int]:
+    """The legend as SVG, broken into lines of `width_px`, and its height in pixels."""
+    parts = []
+    x = y = 0.0
+    for words, drawing, icon_px in _ENTRIES:
+        item_px = icon_px + 6 + 6.3 * len(words) + 18
+        if x > 0 and x + item_px > width_px:
+            x, y = 0.0, y + 26
+        label = f'<text class="quiet" x="{icon_px + 6}" y="16">{escape(words)}</text>'
+        parts.append(f'<g transform="translate({x:.0f} {y:.0f})">{drawing}{label}</g>')
+        x += item_px
+    return join(parts), round(y + 26)
