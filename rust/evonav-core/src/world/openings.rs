@@ -18,8 +18,9 @@ const SKY: [u8; 3] = [190, 215, 235];
 /// Frame, and for doors the leaf: turned about its hinge by `openness` of 90 degrees.
 ///
 /// The leaf opens to the left of `wall0` seen from its start, as the ProcTHOR generator keeps free
-/// (away from `wall0`'s room); double doors have a leaf on each side. Which jamb carries the hinge
-/// of a single door is not in the files: the first is taken.
+/// (away from `wall0`'s room): of 102 recorded positions within 1.6 m of a single open door 9 would
+/// stand in a leaf on the other side, none in one on this. Double doors have a leaf at each jamb.
+/// Which jamb carries the hinge of a single door neither files nor positions tell: the first.
 pub(super) fn door_parts(house: &House, door: &Opening, asset: Option<&Asset>) -> Vec<Part> {
     let Some((frame, along, up)) = hole(house, door) else { return Vec::new() };
     let colours = asset.map_or(&[][..], |asset| &asset.colours);

@@ -90,15 +90,16 @@ impl Body {
         Self { id, category, kind, parts, aabb, oriented }
     }
 
-    /// `parent` is what it stands on, if that is an object.
-    fn object(object: &Object, asset: &Asset, parent: Option<&Self>) -> Self {
+    /// `parent` is what it stands on, if that is an object, and whether its shape is that of a known
+    /// asset.
+    fn object(object: &Object, asset: &Asset, parent: Option<(&Self, bool)>) -> Self {
         let rotation = euler_rotation_deg(object.rotation_deg);
         let place = |part: &Part| part.placed(object.position_m, &rotation);
         let mut parts: Vec<Part> = shape_of(asset).iter().map(place).collect();
         let mut centre_m = object.position_m;
         let mut aabb = aabb_of(&parts);
-        if let Some(parent) = parent.filter(|_| !object.is_kinematic) {
-            let fall_m = fall_m(&parent.parts, &aabb);
+        if let Some((parent, is_known)) = parent.filter(|_| !object.is_kinematic) {
+            let fall_m = fall_m(&parent.parts, &aabb, is_known);
             for height_m in parts.iter_mut().map(|part| &mut part.centre_m[1]) {
                 *height_m -= fall_m;
             }
@@ -151,9 +152,7 @@ impl Scene {
         let first_object = bodies.len();
         let bounds = bodies.iter().fold(Aabb::EMPTY, |bounds, body| bounds.union(body.aabb));
         for object in &house.objects {
-            let asset = catalogue.asset_of(house, object, unknown)?;
-            let parent = object.parent.and_then(|index| bodies.get(first_object + index));
-            let body = Body::object(object, &asset, parent);
+            let body = placed(house, object, catalogue, unknown, &bodies[first_object..])?;
             bodies.push(body);
         }
         Ok(Self { bodies, first_object, bounds })
@@ -176,8 +175,8 @@ impl Scene {
         unknown: UnknownAssets,
         moved: &[usize],
     ) -> Result<Self, Error> {
-        let (fixed, placed) = self.bodies.split_at(self.first_object.min(self.bodies.len()));
-        let known: HashMap<&str, &Body> = placed.iter().map(|b| (b.id.as_str(), b)).collect();
+        let (fixed, objects) = self.bodies.split_at(self.first_object.min(self.bodies.len()));
+        let known: HashMap<&str, &Body> = objects.iter().map(|b| (b.id.as_str(), b)).collect();
         let mut is_moved = vec![false; house.objects.len()];
         for &index in moved {
             if let Some(flag) = is_moved.get_mut(index) {
@@ -193,16 +192,28 @@ impl Scene {
             let old = known.get(object.id.as_str()).filter(|_| !is_moved[index]);
             let body = match old {
                 Some(&body) => body.clone(),
-                None => {
-                    let parent = object.parent.and_then(|parent| bodies.get(fixed.len() + parent));
-                    let asset = catalogue.asset_of(house, object, unknown)?;
-                    Body::object(object, &asset, parent)
-                }
+                None => placed(house, object, catalogue, unknown, &bodies[fixed.len()..])?,
             };
             bodies.push(body);
         }
         Ok(Self { bodies, ..*self })
     }
+}
+
+/// The body of an object, given those of the objects before it: its parent is one of them.
+fn placed(
+    house: &House,
+    object: &Object,
+    catalogue: &Catalogue,
+    unknown: UnknownAssets,
+    before: &[Body],
+) -> Result<Body, Error> {
+    let asset = catalogue.asset_of(house, object, unknown)?;
+    let parent = object.parent.and_then(|index| {
+        let is_known = catalogue.get(&house.objects.get(index)?.asset_id).is_some();
+        Some((before.get(index)?, is_known))
+    });
+    Ok(Body::object(object, &asset, parent))
 }
 
 /// Floors, ceilings, walls, doors and windows.

@@ -17,9 +17,9 @@ const CORNER: f64 = 0.7;
 /// How far a box falls until it rests on one of `parts`.
 ///
 /// Beside them all (houses made without physics hang things over the free inside of corner
-/// counters) it falls to the floor, y = 0; under or between them, where something that the parts do
-/// not show must hold it, it stays.
-pub(super) fn fall_m(parts: &[Part], aabb: &Aabb) -> f64 {
+/// counters) it falls to the floor, y = 0, if the parts are `exact` and not guessed. Under or between
+/// them, where something that the parts do not show must hold it, it stays.
+pub(super) fn fall_m(parts: &[Part], aabb: &Aabb, exact: bool) -> f64 {
     let bottom_m = aabb.min_m[1];
     let [x, _, z] = aabb.centre_m();
     let [w, _, d] = aabb.size_m().map(|edge| 0.5 * CORNER * edge);
@@ -32,10 +32,12 @@ pub(super) fn fall_m(parts: &[Part], aabb: &Aabb) -> f64 {
             support_m = support_m.max(top_m);
         }
     }
-    match (support_m.is_finite(), is_beside) {
-        (true, _) => (bottom_m - support_m).max(0.0),
-        (false, true) => bottom_m.max(0.0),
-        (false, false) => 0.0,
+    if support_m.is_finite() {
+        (bottom_m - support_m).max(0.0)
+    } else if is_beside && exact {
+        bottom_m.max(0.0)
+    } else {
+        0.0
     }
 }
 
