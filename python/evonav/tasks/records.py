@@ -94,8 +94,11 @@ def read_gzip(path: Path) -> bytes:
     Raises:
         TaskError: It cannot be read, is no gzip file, is cut short, or is too large.
     """
+    packed = read_file(path)
+    if not packed:
+        raise TaskError(f"{path}: empty")
     try:
-        with gzip.open(BytesIO(read_file(path))) as file:
+        with gzip.open(BytesIO(packed)) as file:
             data = file.read(MAX_FILE_BYTES + 1)
     except (OSError, EOFError, zlib.error) as error:
         raise TaskError(f"{path}: not a whole gzip file: {error}") from error

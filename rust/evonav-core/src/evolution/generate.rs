@@ -1,7 +1,5 @@
 //! Algorithm 1 of the paper (Sec. A.1): a task from a house, stage by stage.
 
-use std::collections::BTreeSet;
-
 use serde::Serialize;
 
 use super::{
@@ -9,12 +7,13 @@ use super::{
     layout::Layout,
     modify::{Modification, Modifier},
     record::{
-        ChangeRecord, EvolutionOutcome, EvolutionRecord, GeneratedStage, GeneratedTask, PoseRecord,
-        RejectReason, Rejected, RejectionRecord, RoomWeightRecord, StateRecord, TargetRecord,
+        ChangeRecord, EvolutionOutcome, EvolutionRecord, GeneratedStage, GeneratedTask,
+        RejectReason, Rejected, RejectionRecord, RoomWeightRecord, TargetRecord,
     },
     relations::relations_of,
     sample_evolved_room, sample_goal,
     stage::{Reference, StageWorld},
+    state::State,
     target_scores,
 };
 use crate::{
@@ -24,11 +23,6 @@ use crate::{
     house::{House, HouseDelta},
     rng::Stream,
 };
-
-/// Spacing of the points at which a path is asked for its room.
-const PATH_STEP_M: f64 = 0.05;
-/// Entries of the histories that the state keeps (paper, Sec. A.2).
-const HISTORY: usize = 2;
 
 /// What became of a house.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -120,98 +114,6 @@ pub fn generate_task(
         state.note_stage(&world, &reference, target.room);
     }
     Ok(Generation::Task(task))
-}
-
-/// S: what is known of the reference trajectory and of past changes and goals.
-struct State {
-    visited: Vec<bool>,
-    /// Per transition.
-    changed: Vec<Option<usize>>,
-    /// Per stage.
-    goals: Vec<usize>,
-    /// End of the reference trajectory.
-    pose: PoseRecord,
-    relocated: BTreeSet<String>,
-}
-
-impl State {
-    /// Before stage 1, at the house's own start pose.
-    fn at_start(world: &StageWorld) -> Result<Self, Rejected> {
-        let house = &world.house;
-        let rejected = |reason, detail| Err(Rejected { reason, stage: 0, detail });
-        let Some(start) = house.start else {
-            return rejected(RejectReason::NoStart, "no metadata.agent".to_owned());
-        };
-        let [x, y, z] = start.position_m;
-        let Some([x, z]) = world.navigation.snap([x, z]) else {
-            return rejected(RejectReason::StartNotFree, format!("start at x {x}, z {z}"));
-        };
-        let pose = PoseRecord {
-            position_m: [x, y, z],
-            yaw_deg: start.yaw_deg,
-            horizon_deg: start.horizon_deg,
-        };
-        let mut visited = vec![false; house.rooms.len()];
-        match house.room_of([x, z]) {
-            Some(room) => visited[room] = true,
-            None => {
-                return rejected(RejectReason::StartOutside, format!("start at x {x}, z {z}"));
-            }
-        }
-        let (changed, goals, relocated) = (vec![], vec![], BTreeSet::new());
-        Ok(Self { visited, changed, goals, pose, relocated })
-    }
-
-    fn position_m(&self) -> Vec2 {
-        [self.pose.position_m[0], self.pose.position_m[2]]
-    }
-
-    /// Where the reference trajectory ends.
-    fn transition_room(&self, house: &House) -> Option<usize> {
-        house.room_of(self.position_m())
-    }
-
-    fn note_evolution(&mut self, evolution: &EvolutionRecord, house: &House, stage: usize) {
-        if stage > 1 {
-            let is_evolved = evolution.outcome == EvolutionOutcome::Evolved;
-            let id = evolution.room_id.as_ref().filter(|_| is_evolved);
-            self.changed.push(house.rooms.iter().position(|room| Some(&room.id) == id));
-        }
-        let relocated = evolution.changes.iter().filter(|change| change.is_relocated);
-        self.relocated.extend(relocated.map(|change| change.id.clone()));
-    }
-
-    fn note_stage(&mut self, world: &StageWorld, reference: &Reference, goal_room: usize) {
-        for pair in reference.path_m.windows(2) {
-            let num_steps = (distance_2d_m(pair[0], pair[1]) / PATH_STEP_M).ceil().max(1.0);
-            for step in 0..=num_steps as usize {
-                let t = step as f64 / num_steps;
-                let point = [0, 1].map(|i| pair[0][i] + t * (pair[1][i] - pair[0][i]));
-                if let Some(room) = world.house.room_of(point) {
-                    self.visited[room] = true;
-                }
-            }
-        }
-        self.goals.push(goal_room);
-        self.pose = reference.pose;
-    }
-
-    fn record(&self, house: &House) -> StateRecord {
-        let id = |room: usize| house.rooms[room].id.clone();
-        let last = |len: usize| len.saturating_sub(HISTORY);
-        StateRecord {
-            visited_room_ids: (0..self.visited.len())
-                .filter(|&r| self.visited[r])
-                .map(id)
-                .collect(),
-            changed_room_ids: self.changed[last(self.changed.len())..]
-                .iter()
-                .map(|room| room.map(id))
-                .collect(),
-            goal_room_ids: self.goals[last(self.goals.len())..].iter().map(|&r| id(r)).collect(),
-            transition_room_id: self.transition_room(house).map(id),
-        }
-    }
 }
 
 /// A sampled target.

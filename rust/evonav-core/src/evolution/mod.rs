@@ -12,6 +12,7 @@ pub mod record;
 mod relations;
 mod rooms;
 mod stage;
+mod state;
 mod surfaces;
 
 pub use generate::{Generation, generate_task};

@@ -74,11 +74,14 @@ pub fn edges(polygon: &[Vec2]) -> impl Iterator<Item = [Vec2; 2]> + '_ {
     polygon.iter().zip(polygon.iter().cycle().skip(1)).map(|(&a, &b)| [a, b])
 }
 
-/// Whether a convex outline lies in a simple polygon, at least `margin_m` off its border.
+/// Whether a convex outline lies in a simple polygon, off its border by `margin_m` at least.
 pub fn is_within(outline: &[Vec2], polygon: &[Vec2], margin_m: f64) -> bool {
+    let is_off = |side: [Vec2; 2], wall: [Vec2; 2]| {
+        let distance_m = segment_distance_m(side, wall);
+        distance_m > 0.0 && distance_m >= margin_m
+    };
     outline.first().is_some_and(|&p| polygon_contains(polygon, p))
-        && edges(outline)
-            .all(|side| edges(polygon).all(|wall| segment_distance_m(side, wall) >= margin_m))
+        && edges(outline).all(|side| edges(polygon).all(|wall| is_off(side, wall)))
 }
 
 /// Smallest distance between the outlines' points; 0 if they overlap.

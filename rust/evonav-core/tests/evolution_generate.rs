@@ -1,0 +1,469 @@
+//! Generated tasks against what the paper asks of them, checked on the houses themselves: points
+//! inside solids instead of outlines, boxes instead of scenes.
+
+#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use evonav_core::{
+    assets::{
+        Catalogue, UnknownAssets,
+        part::{Part, Primitive},
+        placement::Place,
+        shapes::shape_of,
+    },
+    evolution::{
+        Generation, Mode, Parameters, generate_task,
+        record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason},
+    },
+    geometry::{Vec2, Vec3, add, euler_rotation_deg, polygon_contains, rotate, sub},
+    house::{House, Object},
+    sensors::{
+        camera::Camera,
+        raster::{FrameBuffer, Want, render},
+    },
+    world::{
+        collision::AgentBody,
+        mesh::SceneMesh,
+        navigation::{Navigation, NavigationConfig},
+        scene::Scene,
+    },
+};
+
+const UNKNOWN: UnknownAssets = UnknownAssets::Error;
+
+fn houses() -> Vec<House> {
+    let texts =
+        [include_str!("data/house_39_objects.json"), include_str!("data/house_100_objects.json")];
+    texts.iter().map(|text| House::from_json("test house", text).unwrap()).collect()
+}
+
+fn generate(house: &House, seed: u64, parameters: &Parameters) -> GeneratedTask {
+    let made = generate_task(house, Catalogue::bundled(), UNKNOWN, seed, "test", parameters);
+    match made.unwrap() {
+        Generation::Task(task) => task,
+        Generation::Rejected(rejected) => panic!("{rejected:?}"),
+    }
+}
+
+/// Every transition evolves, by one mode.
+fn always(mode: Mode) -> Parameters {
+    let [salient, retain, shuffle] = Mode::ALL.map(|m| f64::from(u8::from(m == mode)));
+    Parameters {
+        evolve_probability: 1.0,
+        salient_object_probability: salient,
+        retain_group_probability: retain,
+        full_shuffle_probability: shuffle,
+        num_stages: vec![4],
+        ..Parameters::default()
+    }
+}
+
+fn stage_houses(task: &GeneratedTask) -> Vec<House> {
+    task.houses.iter().map(|json| House::from_json("stage", json).unwrap()).collect()
+}
+
+fn object<'a>(house: &'a House, id: &str) -> &'a Object {
+    &house.objects[house.object_index(id).unwrap()]
+}
+
+fn parts_of(house: &House, id: &str) -> Vec<Part> {
+    let object = object(house, id);
+    let asset = Catalogue::bundled().asset_of(house, object, UNKNOWN).unwrap();
+    let rotation = euler_rotation_deg(object.rotation_deg);
+    shape_of(&asset).iter().map(|part| part.placed(object.position_m, &rotation)).collect()
+}
+
+/// Half edges of a part's own box.
+fn half_of(part: &Part) -> Vec3 {
+    match part.primitive {
+        Primitive::Cuboid { half_m } | Primitive::Ellipsoid { half_m } => half_m,
+        Primitive::Frustum { bottom_m, top_m, half_height_m, .. } => {
+            [bottom_m[0].max(top_m[0]), half_height_m, bottom_m[1].max(top_m[1])]
+        }
+    }
+}
+
+/// Points throughout a part, `share` of the way out.
+fn points_in(part: &Part, share: f64) -> Vec<Vec3> {
+    let half = half_of(part);
+    let steps = [-1.0, -0.6, -0.2, 0.2, 0.6, 1.0].map(|t| share * t);
+    let mut points = Vec::new();
+    for x in steps {
+        for y in steps {
+            for z in steps {
+                let local = [x * half[0], y * half[1], z * half[2]];
+                if contains_local(&part.primitive, local, 0.0) {
+                    points.push(add(rotate(&part.rotation, local), part.centre_m));
+                }
+            }
+        }
+    }
+    points
+}
+
+/// Whether a point lies in a primitive, `inset_m` from its surface or deeper (roughly).
+fn contains_local(primitive: &Primitive, p: Vec3, inset_m: f64) -> bool {
+    match *primitive {
+        Primitive::Cuboid { half_m } => (0..3).all(|i| p[i].abs() <= half_m[i] - inset_m),
+        Primitive::Ellipsoid { half_m } => {
+            let terms = (0..3).map(|i| (p[i] / (half_m[i] - inset_m).max(1e-9)).powi(2));
+            terms.sum::<f64>() <= 1.0
+        }
+        Primitive::Frustum { bottom_m, top_m, half_height_m, sides } => {
+            if p[1].abs() > half_height_m - inset_m {
+                return false;
+            }
+            let t = 0.5 * (p[1] / half_height_m + 1.0);
+            // Within the circle that the polygon goes around.
+            let inner = (std::f64::consts::PI / f64::from(sides)).cos();
+            let half =
+                [0, 1].map(|i| inner * (bottom_m[i] + t * (top_m[i] - bottom_m[i])) - inset_m);
+            half.iter().all(|h| *h > 0.0)
+                && (p[0] / half[0]).powi(2) + (p[2] / half[1]).powi(2) <= 1.0
+        }
+    }
+}
+
+fn contains(part: &Part, point: Vec3, inset_m: f64) -> bool {
+    let offset = sub(point, part.centre_m);
+    let local = [0, 1, 2].map(|i| (0..3).map(|j| part.rotation[j][i] * offset[j]).sum());
+    contains_local(&part.primitive, local, inset_m)
+}
+
+/// Whether solids share points that lie more than 5 mm inside.
+fn interpenetrate(a: &[Part], b: &[Part]) -> bool {
+    let radius = |part: &Part| half_of(part).iter().map(|h| h * h).sum::<f64>().sqrt();
+    let are_near = |p: &Part, q: &Part| {
+        let offset = sub(p.centre_m, q.centre_m);
+        offset.iter().map(|v| v * v).sum::<f64>().sqrt() < radius(p) + radius(q)
+    };
+    let holds = |p: &Part, q: &Part| points_in(p, 0.98).iter().any(|&x| contains(q, x, 0.005));
+    a.iter().any(|p| b.iter().any(|q| are_near(p, q) && (holds(p, q) || holds(q, p))))
+}
+
+fn relocated(stage: &GeneratedStage) -> BTreeSet<&str> {
+    let changes = stage.evolution.changes.iter().filter(|change| change.is_relocated);
+    changes.map(|change| change.id.as_str()).collect()
+}
+
+#[test]
+fn moved_objects_stand_in_their_room_in_nothing_and_on_something() {
+    let mut num_moved = 0;
+    for (house, mode) in houses().iter().flat_map(|h| Mode::ALL.map(|m| (h.clone(), m))) {
+        for seed in 0..3 {
+            let task = generate(&house, seed, &always(mode));
+            let stages = stage_houses(&task);
+            for (k, stage) in task.stages.iter().enumerate().skip(1) {
+                let (before, after) = (&stages[k - 1], &stages[k]);
+                num_moved += relocated(stage).len();
+                check_places(before, after, stage, mode);
+            }
+        }
+    }
+    assert!(num_moved > 200, "{num_moved}");
+}
+
+fn check_places(before: &House, after: &House, stage: &GeneratedStage, mode: Mode) {
+    let moved: BTreeSet<&str> = stage.evolution.changes.iter().map(|c| c.id.as_str()).collect();
+    let solids: BTreeMap<&str, Vec<Part>> =
+        after.objects.iter().map(|o| (o.id.as_str(), parts_of(after, &o.id))).collect();
+    for id in &moved {
+        let (old, new) = (object(before, id), object(after, id));
+        assert_eq!(old.room, new.room, "{id} left its room");
+        let room = &after.rooms[new.room.unwrap()];
+        assert_eq!(Some(&room.id), stage.evolution.room_id.as_ref(), "{id}");
+        if new.parent.is_none() {
+            assert!((new.position_m[1] - old.position_m[1]).abs() < 1e-12, "{id} rose");
+            let corners = solids[id].iter().flat_map(|part| points_in(part, 1.0));
+            assert!(
+                corners.into_iter().all(|p| polygon_contains(&room.polygon_m, [p[0], p[2]])),
+                "{id} stands out of {}",
+                room.id,
+            );
+        } else if mode == Mode::FullShuffle {
+            check_support(before, after, id, &solids);
+        }
+        // What shared points before may go on doing so: it moved rigidly.
+        for (other, parts) in solids.iter().filter(|(other, _)| *other != id) {
+            let touched = interpenetrate(&parts_of(before, id), &parts_of(before, other));
+            assert!(
+                touched || !interpenetrate(&solids[id], parts),
+                "{id} is in {other} after {mode:?}",
+            );
+        }
+    }
+}
+
+/// An object that got a place of its own is borne: there is something right under its middle.
+fn check_support(before: &House, after: &House, id: &str, solids: &BTreeMap<&str, Vec<Part>>) {
+    let (old, new) = (object(before, id), object(after, id));
+    let parent = &after.objects[new.parent.unwrap()];
+    let was_on = old.parent.map(|p| before.objects[p].id.as_str());
+    if was_on == Some(parent.id.as_str()) {
+        return; // Carried along, perhaps.
+    }
+    let lowest = solids[id]
+        .iter()
+        .flat_map(|part| points_in(part, 1.0))
+        .fold(f64::INFINITY, |low, p| low.min(p[1]));
+    let [x, _, z] = new.position_m;
+    // Round bottoms touch in a point and their samples end above it.
+    let is_borne = (0..40)
+        .map(|i| lowest - 0.002 * f64::from(i))
+        .any(|y| solids[parent.id.as_str()].iter().any(|part| contains(part, [x, y, z], 0.0)));
+    assert!(is_borne, "{id} floats over {}", parent.id);
+}
+
+#[test]
+fn salient_moves_one_piece_of_furniture_with_what_stands_on_it() {
+    for (house, seed) in houses().iter().flat_map(|h| [0, 1, 2].map(|s| (h.clone(), s))) {
+        let task = generate(&house, seed, &always(Mode::SalientObject));
+        let stages = stage_houses(&task);
+        for (k, stage) in task.stages.iter().enumerate().skip(1) {
+            let Some(salient) = &stage.evolution.salient_id else {
+                assert_ne!(stage.evolution.outcome, EvolutionOutcome::Evolved);
+                continue;
+            };
+            let before = object(&stages[k - 1], salient);
+            assert_eq!(before.parent, None);
+            let mut expected = BTreeSet::from([salient.as_str()]);
+            expected.extend(before.children.iter().map(|&c| stages[k - 1].objects[c].id.as_str()));
+            let changed: BTreeSet<&str> =
+                stage.evolution.changes.iter().map(|c| c.id.as_str()).collect();
+            assert_eq!(changed, expected);
+            check_rigid(&stages[k - 1], &stages[k], &expected);
+        }
+    }
+}
+
+#[test]
+fn retained_groups_keep_their_shape() {
+    for (house, seed) in houses().iter().flat_map(|h| [0, 1, 2].map(|s| (h.clone(), s))) {
+        let task = generate(&house, seed, &always(Mode::RetainGroup));
+        let stages = stage_houses(&task);
+        for (k, stage) in task.stages.iter().enumerate().skip(1) {
+            let (before, after) = (&stages[k - 1], &stages[k]);
+            let mut groups: BTreeMap<String, BTreeSet<&str>> = BTreeMap::new();
+            for change in &stage.evolution.changes {
+                assert_eq!(change.from_support_id, change.to_support_id);
+                let root = change.from_support_id.as_ref().unwrap_or(&change.id);
+                let key = match root.split('|').collect::<Vec<_>>()[..] {
+                    [room, group, _] => format!("{room}|{group}"),
+                    _ => root.clone(),
+                };
+                groups.entry(key).or_default().insert(change.id.as_str());
+            }
+            for members in groups.values() {
+                check_rigid(before, after, members);
+            }
+        }
+    }
+}
+
+/// Distances between members, and of each to the floor, stay.
+fn check_rigid(before: &House, after: &House, members: &BTreeSet<&str>) {
+    let distance = |house: &House, a: &str, b: &str| {
+        let offset = sub(object(house, a).position_m, object(house, b).position_m);
+        offset.iter().map(|v| v * v).sum::<f64>().sqrt()
+    };
+    for a in members {
+        for b in members {
+            assert!((distance(before, a, b) - distance(after, a, b)).abs() < 1e-3, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn what_hangs_on_walls_stays() {
+    for (house, mode) in houses().iter().flat_map(|h| Mode::ALL.map(|m| (h.clone(), m))) {
+        for stage in &generate(&house, 5, &always(mode)).stages {
+            for change in &stage.evolution.changes {
+                let rule = Catalogue::bundled().placement(&change.category);
+                let is_hung = rule.is_some_and(|rule| rule.is_placed(Place::Wall));
+                assert!(!is_hung || change.from_support_id.is_some(), "{change:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn rooms_that_could_be_reached_still_can() {
+    for (house, mode) in houses().iter().flat_map(|h| Mode::ALL.map(|m| (h.clone(), m))) {
+        let task = generate(&house, 1, &always(mode));
+        let stages = stage_houses(&task);
+        for (k, stage) in task.stages.iter().enumerate().skip(1) {
+            let start = stage.start_pose.position_m;
+            let [before, after] = [&stages[k - 1], &stages[k]].map(|h| rooms_from(h, start));
+            assert!(!before.is_empty());
+            assert!(after.is_superset(&before), "{mode:?}: {before:?} became {after:?}");
+        }
+    }
+}
+
+fn rooms_from(house: &House, start: Vec3) -> BTreeSet<usize> {
+    let scene = Scene::build(house, Catalogue::bundled(), UNKNOWN).unwrap();
+    let navigation =
+        Navigation::build(&scene, AgentBody::DEFAULT, NavigationConfig::default()).unwrap();
+    let reached = navigation.reachable_positions([start[0], start[2]], 0.25).unwrap();
+    reached.iter().filter_map(|&p| house.room_of(p)).collect()
+}
+
+#[test]
+fn references_show_the_target_from_its_room_at_the_reference_distance() {
+    for house in houses() {
+        for seed in 0..4 {
+            let task = generate(&house, seed, &Parameters::default());
+            let mut end: Option<Vec3> = None;
+            for ((stage, house), image) in
+                task.stages.iter().zip(stage_houses(&task)).zip(&task.images)
+            {
+                let target = object(&house, &stage.target.id);
+                assert_eq!(target.position_m, stage.target.position_m);
+                let pose = stage.reference_pose;
+                let plan = |p: Vec3| -> Vec2 { [p[0], p[2]] };
+                let [a, b] = [plan(pose.position_m), plan(target.position_m)];
+                assert!((1.0..=1.5).contains(&(a[0] - b[0]).hypot(a[1] - b[1])));
+                assert_eq!(house.room_of(a), target.room);
+                if let Some(end) = end {
+                    assert_eq!(stage.start_pose.position_m, end);
+                }
+                end = Some(pose.position_m);
+                let path = &stage.reference_path_m;
+                let length: f64 =
+                    path.windows(2).map(|p| (p[0][0] - p[1][0]).hypot(p[0][1] - p[1][1])).sum();
+                assert!((length - stage.reference_path_length_m).abs() < 1e-9);
+                assert!(
+                    length >= {
+                        let s = plan(stage.start_pose.position_m);
+                        (s[0] - a[0]).hypot(s[1] - a[1]) - 0.05
+                    }
+                );
+
+                let scene = Scene::build(&house, Catalogue::bundled(), UNKNOWN).unwrap();
+                let camera = Camera {
+                    width_px: 300,
+                    height_px: 300,
+                    vertical_fov_rad: 90_f64.to_radians(),
+                    position_m: [a[0], 1.575, a[1]],
+                    yaw_rad: pose.yaw_deg.to_radians(),
+                    horizon_rad: pose.horizon_deg.to_radians(),
+                };
+                let mut frame = FrameBuffer::default();
+                let want = Want { rgb: true, instances: true };
+                render(&SceneMesh::build(&scene), &camera, want, &mut frame).unwrap();
+                let body = scene.bodies.iter().position(|b| b.id == stage.target.id).unwrap() + 1;
+                let count = frame.instances.iter().filter(|&&id| id == body as i32).count();
+                assert_eq!(count, stage.reference_visible_px);
+                assert!(count >= 50);
+                assert_eq!(&frame.rgb, image);
+            }
+        }
+    }
+}
+
+#[test]
+fn houses_follow_from_deltas_and_the_same_seed_gives_the_same_task() {
+    for house in houses() {
+        let parameters = Parameters { evolve_probability: 1.0, ..Parameters::default() };
+        let task = generate(&house, 9, &parameters);
+        assert_eq!(task, generate(&house, 9, &parameters));
+        assert_ne!(task, generate(&house, 10, &parameters));
+        let mut expected = house.clone();
+        for (stage, json) in task.stages.iter().zip(&task.houses) {
+            expected = expected.apply(&stage.delta).unwrap();
+            assert_eq!(&expected.to_json(), json);
+        }
+    }
+}
+
+#[test]
+fn history_records_say_what_happened() {
+    let house = &houses()[1];
+    for seed in 0..6 {
+        let task = generate(house, seed, &Parameters::default());
+        let mut ever: BTreeSet<String> = BTreeSet::new();
+        let mut changed = Vec::new();
+        let mut goals: Vec<String> = Vec::new();
+        for (k, stage) in task.stages.iter().enumerate() {
+            let evolution = &stage.evolution;
+            assert_eq!(evolution.outcome == EvolutionOutcome::FirstStage, k == 0);
+            ever.extend(relocated(stage).into_iter().map(str::to_owned));
+            assert_eq!(stage.ever_relocated_ids, ever.iter().cloned().collect::<Vec<_>>());
+            assert_eq!(stage.target.is_relocated_ever, ever.contains(&stage.target.id));
+            if k > 0 {
+                let is_evolved = evolution.outcome == EvolutionOutcome::Evolved;
+                changed.push(evolution.room_id.clone().filter(|_| is_evolved));
+                assert_eq!(stage.state.transition_room_id.as_ref(), goals.last());
+            }
+            let last_two = |len: usize| len.saturating_sub(2);
+            assert_eq!(stage.state.changed_room_ids, changed[last_two(changed.len())..]);
+            assert_eq!(stage.state.goal_room_ids, goals[last_two(goals.len())..]);
+            for weight in &evolution.room_weights {
+                let visited = stage.state.visited_room_ids.contains(&weight.room_id);
+                assert_eq!(weight.is_visited, visited);
+                let is_transition = Some(&weight.room_id) == goals.last();
+                assert_eq!(weight.is_transition_room, is_transition);
+                assert!(!is_transition || weight.weight == 0.0);
+            }
+            goals.push(stage.target.room_id.clone());
+        }
+    }
+}
+
+#[test]
+fn houses_that_allow_no_task_are_refused_with_a_reason() {
+    let house = &houses()[0];
+    let refused = |house: &House, parameters: &Parameters| match generate_task(
+        house,
+        Catalogue::bundled(),
+        UNKNOWN,
+        0,
+        "test",
+        parameters,
+    )
+    .unwrap()
+    {
+        Generation::Rejected(rejected) => rejected.reason,
+        Generation::Task(_) => panic!("made a task"),
+    };
+    let mut one_room = house.clone();
+    one_room.rooms.truncate(1);
+    assert_eq!(refused(&one_room, &Parameters::default()), RejectReason::TooFewRooms);
+    let mut no_start = house.clone();
+    no_start.start = None;
+    assert_eq!(refused(&no_start, &Parameters::default()), RejectReason::NoStart);
+    let mut outside = house.clone();
+    if let Some(start) = &mut outside.start {
+        start.position_m = [-50.0, 0.9, -50.0];
+    }
+    assert_eq!(refused(&outside, &Parameters::default()), RejectReason::StartNotFree);
+    let blind = Parameters { reference_min_visible_px: usize::MAX, ..Parameters::default() };
+    assert_eq!(refused(house, &blind), RejectReason::NoValidGoal);
+}
+
+#[test]
+fn bad_parameters_are_named() {
+    let bad = [
+        Parameters { evolve_probability: 1.5, ..Parameters::default() },
+        Parameters { num_stages: vec![], ..Parameters::default() },
+        Parameters { num_stages: vec![0], ..Parameters::default() },
+        Parameters { visited_factor: f64::NAN, ..Parameters::default() },
+        Parameters { reference_max_m: 0.5, ..Parameters::default() },
+        Parameters { placement_tries: 0, ..Parameters::default() },
+        Parameters {
+            salient_object_probability: 0.0,
+            retain_group_probability: 0.0,
+            full_shuffle_probability: 0.0,
+            ..Parameters::default()
+        },
+    ];
+    for parameters in bad {
+        let house = &houses()[0];
+        let made = generate_task(house, Catalogue::bundled(), UNKNOWN, 0, "", &parameters);
+        assert!(matches!(made, Err(evonav_core::Error::InvalidArgument { .. })), "{parameters:?}");
+    }
+    assert!(Parameters::from_json("{}").is_err());
+    let written = serde_json::to_string(&Parameters::default()).unwrap();
+    assert_eq!(Parameters::from_json(&written), Ok(Parameters::default()));
+}

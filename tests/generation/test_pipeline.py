@@ -1,0 +1,174 @@
+import importlib.util
+import json
+import re
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from importlib.resources import as_file, files
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from evonav.errors import InvalidArgumentError, TaskError
+from evonav.generation import (
+    GenerationParameters,
+    Rejections,
+    TaskRejectedError,
+    generate_task,
+    generate_tasks,
+    write_task,
+)
+from evonav.house import House, bundled_houses
+from evonav.tasks import Task, load_tasks
+from evonav.tasks.language import COLOURS, SIZES, STRUCTURES, noun_of
+
+
+@pytest.fixture(scope="module")
+def houses() -> list[House]:
+    return list(bundled_houses(16))
+
+
+@pytest.fixture(scope="module")
+def tasks(houses: list[House]) -> list[Task]:
+    return list(generate_tasks(houses, seed=0))
+
+
+def bytes_of(directory: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
+def test_the_same_seed_writes_the_same_bytes_on_any_number_of_threads(houses: list[House], tmp_path: Path) -> None:
+    for num_threads in (1, 3):
+        with ThreadPoolExecutor(num_threads) as pool:
+            # Other order of work, same files.
+            ordered = houses if num_threads == 1 else houses[::-1]
+            for task in pool.map(partial(generate_task, seed=7), ordered):
+                write_task(task, tmp_path / str(num_threads))
+    assert bytes_of(tmp_path / "1") == bytes_of(tmp_path / "3")
+
+
+def test_the_draws_follow_contents_and_seed_not_the_name(houses: list[House]) -> None:
+    one, other = houses[0], House(houses[0].to_json(), name="elsewhere.json")
+    assert generate_task(one, seed=1).oracle_stages == generate_task(other, seed=1).oracle_stages
+    assert generate_task(one, seed=1).oracle_stages != generate_task(one, seed=2).oracle_stages
+
+
+def test_unusable_houses_are_counted_and_left_out(houses: list[House]) -> None:
+    document = json.loads(houses[0].to_json())
+    without_start = {**document, "metadata": {}}
+    unknown = json.loads(json.dumps(document))
+    unknown["objects"][0]["assetId"] = "no_such_asset"
+    broken = [House(json.dumps(wrong), name=name) for name, wrong in (("a", without_start), ("b", unknown))]
+    rejections = Rejections()
+    made = list(generate_tasks([*broken, houses[0]], seed=0, rejections=rejections))
+    assert [task.header.house.name for task in made] == [houses[0].name]
+    assert rejections.reasons == {"no_start": 1, "unusable_house": 1}
+    assert (rejections.num_houses, rejections.num_rejected) == (3, 2)
+    with pytest.raises(TaskRejectedError, match=r"a: no_start at stage 0") as caught:
+        generate_task(broken[0], seed=0)
+    assert isinstance(caught.value, TaskError)
+    assert caught.value.reason == "no_start"
+
+
+def test_a_bad_parameter_is_named(houses: list[House]) -> None:
+    config = GenerationParameters(reference_min_m=3.0)
+    with pytest.raises(InvalidArgumentError, match="reference_max_m"):
+        generate_task(houses[0], seed=0, config=config)
+
+
+NOUN = r"[a-zA-Z]+(?: [a-zA-Z]+)*?"
+GRAMMAR = re.compile(
+    rf"Please navigate to the (?P<target>{NOUN})"
+    rf"(?: in the (?P<room>{NOUN}))?"
+    rf"(?: on the (?P<support>{NOUN}))?"
+    rf"(?: next to the (?P<first>{NOUN})(?: and the (?P<second>{NOUN}))?)?"
+    rf"(?: near the (?P<structure>{'|'.join(STRUCTURES)}))?"
+    rf"(?: (?P<how>below|near) the (?P<wall>{NOUN}))?\."
+)
+
+
+def test_instructions_follow_the_grammar_and_are_true(tasks: list[Task]) -> None:
+    num_supported = 0
+    for task in tasks:
+        for stage in range(1, task.num_stages + 1):
+            public, target = task.public(stage), task.oracle(stage).target
+            house = House(task.house_json(stage), name="stage")
+            objects = {entry.id: entry for entry in house.objects}
+            parsed = GRAMMAR.fullmatch(public.basic_instruction)
+            assert parsed, public.basic_instruction
+            assert parsed["target"] == noun_of(target.category)
+            is_unique = [entry.category for entry in house.objects].count(target.category) == 1
+            room = next(room for room in house.rooms if room.id == target.room_id)
+            assert parsed["room"] == (None if is_unique else noun_of(room.room_type))
+            if target.support_id is None:
+                assert parsed["support"] is None
+            else:
+                num_supported += 1
+                assert parsed["support"] == noun_of(objects[target.support_id].category or "")
+            for anchor in (parsed["first"], parsed["second"], parsed["wall"]):
+                near = [noun_of(entry.category or "") for entry in house.objects if entry.room_id == target.room_id]
+                assert anchor is None or anchor in near
+            adjectives = public.unified_instruction.removeprefix("Please navigate to the ").split(
+                noun_of(target.category)
+            )
+            words = adjectives[0].split()
+            assert words
+            assert set(words) <= {*SIZES, *COLOURS}
+            plain = public.unified_instruction.replace(f"the {adjectives[0]}", "the ", 1)
+            assert plain == public.basic_instruction
+            assert public.appearance_instruction == (
+                f"Please navigate to the {adjectives[0]}{noun_of(target.category)}."
+            )
+    assert num_supported > 10
+
+
+def test_transitions_and_modes_are_drawn_as_the_paper_says(houses: list[House]) -> None:
+    """About 500 transitions: 50% evolve; of these 50/40/10% by mode; bounds of three standard deviations and more."""
+    outcomes: Counter[str] = Counter()
+    modes: Counter[str] = Counter()
+    lengths: Counter[int] = Counter()
+    small = sorted(houses, key=lambda house: len(house.objects))[:9]
+    for seed in range(20):
+        for task in generate_tasks(small, seed=seed):
+            lengths[task.num_stages] += 1
+            for stage in task.oracle_stages[1:]:
+                outcomes[stage.evolution.outcome] += 1
+                if stage.evolution.mode is not None:
+                    modes[stage.evolution.mode] += 1
+    num_transitions = sum(outcomes.values())
+    assert num_transitions > 450
+    assert abs(outcomes["not_triggered"] / num_transitions - 0.5) < 0.07
+    assert outcomes["no_room"] + outcomes["no_placement"] <= 0.01 * num_transitions
+    num_modes = sum(modes.values())
+    for mode, share in {"SALIENT_OBJECT": 0.5, "RETAIN_GROUP": 0.4, "FULL_SHUFFLE": 0.1}.items():
+        assert abs(modes[mode] / num_modes - share) < 0.1, modes
+    assert set(lengths) == {3, 4, 5}
+    assert min(lengths.values()) > 0.25 * sum(lengths.values())
+
+
+def bundle_script() -> ModuleType:
+    path = Path(__file__).resolve().parents[2] / "scripts" / "build_tasks.py"
+    spec = importlib.util.spec_from_file_location("build_tasks", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_bundled_tasks_are_what_the_script_makes() -> None:
+    """Headers hold the checksums of all else."""
+    made = {task.task_id: task for task in bundle_script().build_tasks()}
+    with as_file(files("evonav") / "data" / "tasks") as directory:
+        there = {task.task_id: task for task in load_tasks(directory)}
+        assert made.keys() == there.keys()
+        assert len(there) >= 24
+        differing = [task_id for task_id, task in there.items() if task.header != made[task_id].header]
+        assert not differing, "run scripts/build_tasks.py"
+        assert {task.header.house.num_rooms for task in there.values()} >= {2, 3, 4, 5, 6, 7, 8, 10}
+
+
+def test_bundled_tasks_are_small() -> None:
+    with as_file(files("evonav") / "data" / "tasks") as directory:
+        assert sum(path.stat().st_size for path in directory.rglob("*") if path.is_file()) < 3_000_000
