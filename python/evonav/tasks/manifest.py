@@ -329,8 +329,8 @@ def _check(task: Task, root: Path) -> None:
     if task.header.start_pose != task.oracle_stages[0].start_pose:
         raise field_error(header_path, "start_pose", task.header.start_pose, "expected that of oracle stage 1")
     if sha256_of(task.first_house_json.encode()) != task.header.house.sha256:
-        found = task.header.house.sha256
-        raise field_error(header_path, "house.sha256", found, "does not match houses/stage_1.json.gz")
+        message = "does not match houses/stage_1.json.gz"
+        raise field_error(header_path, "house.sha256", task.header.house.sha256, message)
     expected = checksums_of(task)
     for name in sorted(expected.keys() | task.header.checksums.keys()):
         if expected.get(name) != task.header.checksums.get(name):
