@@ -60,7 +60,8 @@ def evaluate(
     config = _config(seed, allow_unknown_assets)
     with _tasks(out, houses, tasks, limit, seed, allow_unknown_assets) as task_files:
         summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored)
-    _finish(summaries)
+    _print_table(summaries)
+    _exit(summaries)
 
 
 @app.command()
@@ -75,8 +76,9 @@ def demo(
     num_workers = _num_workers(workers)
     with _tasks(out, None, None, limit, seed, False) as task_files:
         summaries = _evaluate(out, agents, task_files, _config(seed, False), num_workers, retry_errored=False)
+    _print_table(summaries)
     _report(out)
-    _finish(summaries)
+    _exit(summaries)
 
 
 @app.command()
@@ -228,8 +230,7 @@ def _config(seed: int, allow_unknown_assets: bool) -> "RunConfig":
     return RunConfig(seed=seed, backend=Backend(simulator=lenient) if allow_unknown_assets else Backend())
 
 
-def _finish(summaries: "list[AgentSummary]") -> None:
-    _print_table(summaries)
+def _exit(summaries: "list[AgentSummary]") -> None:
     if any(summary.is_incomplete for summary in summaries):
         raise typer.Exit(EXIT_INCOMPLETE)
 
@@ -250,9 +251,9 @@ def _print_table(summaries: "list[AgentSummary]") -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title="SR and SPL in %, 95% intervals over tasks; SR by target, stages 2 and on")
+    table = Table(title="SR and SPL in % with 95% intervals; SR by whether the target was moved")
     table.add_column("agent", no_wrap=True)
-    for heading in ("n", "SR", "", "SPL", "", "relocated", "not relocated"):
+    for heading in ("n", "SR", "", "SPL", "", "moved", "not moved"):
         table.add_column(heading, justify="right")
     for summary in summaries:
         splits = (summary.splits.get(name) for name in ("relocated", "not_relocated"))
@@ -278,7 +279,7 @@ def _percent(value: float | None) -> str:
 
 
 def _percent_interval(interval: tuple[float, float] | None) -> str:
-    return "" if interval is None else f"{100 * interval[0]:.1f}-{100 * interval[1]:.1f}"
+    return "" if interval is None else f"{100 * interval[0]:.0f}-{100 * interval[1]:.0f}"
 
 
 @contextmanager

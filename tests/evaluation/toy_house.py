@@ -199,6 +199,7 @@ class ToySimulator:
     def shortest_path(self, start_m, target_m):
         start = self._cell(start_m if self.is_free(start_m) else self.nearest_reachable_position(start_m))
         goal = self._cell(target_m if self.is_free(target_m) else self.nearest_reachable_position(target_m))
+        blocked = np.pad(self._blocked, 1, constant_values=1).tolist()  # the pad also catches index -1
         cost, parent, queue = {start: 0.0}, {}, [(0.0, start)]
         while queue:
             so_far, cell = heapq.heappop(queue)
@@ -206,7 +207,7 @@ class ToySimulator:
                 break
             for d_row, d_col in ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)):
                 after = (cell[0] + d_row, cell[1] + d_col)
-                if not self.is_free(((after[1] + 0.5) * CELL_M, 0.0, (after[0] + 0.5) * CELL_M)):
+                if blocked[after[0] + 1][after[1] + 1]:
                     continue
                 length = so_far + math.hypot(d_row, d_col)
                 if length < cost.get(after, math.inf):
