@@ -1,11 +1,18 @@
-//! Loading a house of 100 objects: the document, the assets of its objects, and a change to it.
+//! Loading a house of 100 objects: the document, the assets of its objects, a world of it, and a change to it.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use evonav_core::{
+    Error,
     assets::{Asset, Catalogue, UnknownAssets},
     house::{House, HouseDelta, ObjectMove},
+    world::{
+        collision::AgentBody,
+        mesh::SceneMesh,
+        navigation::{Navigation, NavigationConfig},
+        scene::Scene,
+    },
 };
 
 const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");
@@ -31,6 +38,17 @@ fn bench_house(c: &mut Criterion) {
             assets
                 .map(|object| catalogue.asset_of(&house, black_box(object), UnknownAssets::Error))
                 .collect::<Result<Vec<Asset>, _>>()
+        });
+    });
+    // Everything a simulator holds once a house is loaded; the aim is 20 ms.
+    c.bench_function("house/into_world", |b| {
+        b.iter(|| {
+            let house = House::from_json("house", black_box(HOUSE))?;
+            let scene = Scene::build(&house, catalogue, UnknownAssets::Error)?;
+            let mesh = SceneMesh::build(&scene);
+            let navigation =
+                Navigation::build(&scene, AgentBody::DEFAULT, NavigationConfig::default())?;
+            Ok::<_, Error>((house, scene, mesh, navigation))
         });
     });
     c.bench_function("house/to_json", |b| b.iter(|| black_box(&house).to_json()));
