@@ -75,7 +75,7 @@ pub fn fridge(s: &mut Sketch<'_>) {
     let [x, _, z] = s.spans();
     let steel = s.tint(0, s.choose(&[[215, 217, 220], [235, 235, 232], [160, 163, 167]], STEEL));
     let (door, grip) = (shade(steel, 1.06), shade(steel, 0.55));
-    let (body, inner) = ([z[0], z[1] - 0.09], shade(steel, 0.9));
+    let (body, inner) = ([z[0], z[1] - 0.11], shade(steel, 0.9));
     let wall = 0.05;
     for side in ends(x, wall, 0.0) {
         s.cuboid(side, [0.0, h], body, inner);
@@ -91,11 +91,11 @@ pub fn fridge(s: &mut Sketch<'_>) {
     }
     let split = 0.68 * h;
     for (is_upper, y) in [(false, [0.05, split - 0.005]), (true, [split + 0.005, h - 0.01])] {
-        s.cuboid(x, y, [z[1] - 0.085, z[1] - 0.04], door);
+        s.cuboid(x, y, [z[1] - 0.105, z[1] - 0.06], door);
         let reach = 0.35 * (y[1] - y[0]);
         let low = if is_upper { y[0] + 0.05 } else { y[1] - 0.05 - reach };
         let handle = [x[0] + 0.06 * w, x[0] + 0.06 * w + 0.03];
-        s.cuboid(handle, [low, low + reach], [z[1] - 0.04, z[1]], grip);
+        s.cuboid(handle, [low, low + reach], [z[1] - 0.06, z[1]], grip);
     }
 }
 

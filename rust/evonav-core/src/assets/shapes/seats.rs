@@ -92,14 +92,16 @@ pub fn sofa(s: &mut Sketch<'_>) {
     let feet = s.tint(1, WOODS[4]);
     s.legs([0.0, foot], 0.05, 0.03, feet);
     let pad = (0.3 * seat).min(0.14);
-    s.cuboid(inner, [foot, seat - pad], [back[1], z[1] - 0.02], fabric);
+    // The arms reach farthest: a recorded robot stood nearer to the cushions than to the box.
+    let front = z[1] - 0.03;
+    s.cuboid(inner, [foot, seat - pad], [back[1], front - 0.02], fabric);
     s.cuboid(inner, [foot, h], back, fabric);
     s.cuboid(left, [foot, arm_top], z, fabric);
     s.cuboid(right, [foot, arm_top], z, fabric);
     let count = (if is_sofa { (w / 0.8).round() } else { 1.0 }).clamp(1.0, 4.0) as usize;
     for i in 0..count {
         let cushion = slot(inner, i, count);
-        s.cuboid(cushion, [seat - pad, seat], [back[1], z[1]], soft);
+        s.cuboid(cushion, [seat - pad, seat], [back[1], front], soft);
         if is_sofa {
             let lean = [back[1], back[1] + 0.12 * d];
             s.cuboid(inside(cushion, 0.01), [seat, seat + 0.75 * (h - seat)], lean, soft);
