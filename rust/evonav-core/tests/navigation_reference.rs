@@ -118,7 +118,8 @@ fn paths_in_real_houses_are_those_of_a_fine_any_angle_lattice() {
     let num_pairs: usize =
         std::env::var("EVONAV_NUM_PAIRS").ok().and_then(|v| v.parse().ok()).unwrap_or(200);
     let houses = lines(&data.join("roseh-procthor-100k-history/tiny-val.jsonl.gz"));
-    let (mut worst, mut best, mut sum, mut num_done) = (0.0_f64, f64::INFINITY, 0.0, 0);
+    let (mut worst, mut best, mut sum) = (0.0_f64, f64::INFINITY, 0.0);
+    let (mut num_done, mut num_close) = (0, 0);
     for (i, line) in houses.iter().enumerate() {
         let house = house_of(&format!("tiny-val:{i}"), line);
         let navigation = navigation_of(&scene_of(&house), AgentBody::DEFAULT);
@@ -137,11 +138,16 @@ fn paths_in_real_houses_are_those_of_a_fine_any_angle_lattice() {
             let fine_m = path_length_m(&pulled_taut(&navigation, &fine));
             let ratio = length_m / fine_m;
             assert!(length_m >= distance_2d_m(a, b) - 1e-9);
-            assert!((0.98..=1.02).contains(&ratio), "house {i} {a:?} {b:?}: {length_m} {fine_m}");
+            // The lattice is coarse where passages are narrow: there it is the longer one.
+            assert!((0.95..=1.001).contains(&ratio), "house {i} {a:?} {b:?}: {length_m} {fine_m}");
+            num_close += usize::from(ratio >= 0.98);
             (worst, best) = (worst.max(ratio), best.min(ratio));
             (sum, num_done) = (sum + ratio, num_done + 1);
         }
     }
-    let mean = sum / f64::from(num_done);
-    eprintln!("{num_done} pairs: ours / fine reference {best:.4} to {worst:.4}, mean {mean:.5}");
+    let mean = sum / num_done as f64;
+    assert!(num_close * 100 >= num_done * 99, "{num_close} of {num_done} within 2%");
+    eprintln!(
+        "{num_done} pairs, {num_close} within 2%: ours / fine reference {best:.4} to {worst:.4}, mean {mean:.5}"
+    );
 }
