@@ -293,7 +293,8 @@ impl Sweep {
 }
 
 impl Obstacle {
-    fn new(footprint: Footprint, radius_m: f64, body: usize) -> Self {
+    /// The polygon grown by `radius_m`.
+    pub(super) fn new(footprint: Footprint, radius_m: f64, body: usize) -> Self {
         let mut min_m = [f64::INFINITY; 2];
         let mut max_m = [f64::NEG_INFINITY; 2];
         for point in &footprint.outline_m {
@@ -313,7 +314,7 @@ impl Obstacle {
     }
 
     /// Whether the agent's axis at `point_m` is too close.
-    fn blocks(&self, point_m: Vec2) -> bool {
+    pub(super) fn blocks(&self, point_m: Vec2) -> bool {
         let is_near = (0..2).all(|i| self.min_m[i] < point_m[i] && point_m[i] < self.max_m[i]);
         is_near && distance_squared(&self.outline_m, point_m) < self.radius_m * self.radius_m
     }

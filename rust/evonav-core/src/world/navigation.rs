@@ -7,7 +7,7 @@ use crate::{
     geometry::{Vec2, distance_2d_m},
     grid::{GridSpec, MAX_CELLS},
     world::{
-        collision::{AgentBody, Obstacles, distance_squared},
+        collision::{AgentBody, Obstacle, Obstacles},
         footprint::footprint,
         paths::VisibilityGraph,
         scene::{BodyKind, Scene},
@@ -59,7 +59,7 @@ pub struct Navigation {
     config: NavigationConfig,
     obstacles: Obstacles,
     /// Footprints of the floors' parts.
-    floors_m: Vec<Vec<Vec2>>,
+    floors: Vec<Obstacle>,
     min_m: Vec2,
     max_m: Vec2,
     graph: OnceLock<VisibilityGraph>,
@@ -87,15 +87,15 @@ impl Navigation {
         Error::require("snap_m", config.snap_m, "between 0 and 10", |v| (0.0..=10.0).contains(&v))?;
         let thinner = AgentBody { radius_m: agent.radius_m - config.tolerance_m, ..agent };
         let obstacles = Obstacles::build(&scene.bodies, thinner, config.step_height_m)?;
-        let floors_m = floors_of(scene)?;
+        let floors = floors_of(scene)?;
         let (mut min_m, mut max_m) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for point in floors_m.iter().flatten() {
+        for point in floors.iter().flat_map(|floor| &floor.outline_m) {
             for axis in 0..2 {
                 min_m[axis] = min_m[axis].min(point[axis]);
                 max_m[axis] = max_m[axis].max(point[axis]);
             }
         }
-        Ok(Self { agent, config, obstacles, floors_m, min_m, max_m, graph: OnceLock::new() })
+        Ok(Self { agent, config, obstacles, floors, min_m, max_m, graph: OnceLock::new() })
     }
 
     /// The same agent and settings in a changed scene.
@@ -218,6 +218,12 @@ impl Navigation {
         self.graph().shortest_path(&self.obstacles, start_m, target_m)
     }
 
+    /// Whether there is a path between two points, both free as they are.
+    pub fn is_connected(&self, a_m: Vec2, b_m: Vec2) -> bool {
+        let is_path = || self.graph().shortest_path(&self.obstacles, a_m, b_m).is_some();
+        self.is_free(a_m) && self.is_free(b_m) && is_path()
+    }
+
     /// Length of the shortest path to each target, infinite where there is none.
     pub fn distances_m(&self, start_m: Vec2, targets_m: &[Vec2]) -> Vec<f64> {
         let Some(start_m) = self.snap(start_m) else {
@@ -258,7 +264,7 @@ impl Navigation {
     }
 
     fn is_indoors(&self, point_m: Vec2) -> bool {
-        self.floors_m.iter().any(|f| distance_squared(f, point_m) <= FLOOR_SLACK_M * FLOOR_SLACK_M)
+        self.floors.iter().any(|floor| floor.blocks(point_m))
     }
 
     fn graph(&self) -> &VisibilityGraph {
@@ -267,19 +273,21 @@ impl Navigation {
     }
 }
 
-fn floors_of(scene: &Scene) -> Result<Vec<Vec<Vec2>>, Error> {
-    let floors_m: Vec<Vec<Vec2>> = scene
-        .bodies
-        .iter()
-        .filter(|body| body.kind == BodyKind::Floor)
-        .flat_map(|body| &body.parts)
-        .filter_map(|part| footprint(part, f64::MIN, f64::MAX))
-        .map(|shadow| shadow.outline_m)
+/// The floors' parts, as polygons that hold what comes within the slack of them.
+fn floors_of(scene: &Scene) -> Result<Vec<Obstacle>, Error> {
+    let bodies = scene.bodies.iter().enumerate();
+    let floors: Vec<Obstacle> = bodies
+        .filter(|(_, body)| body.kind == BodyKind::Floor)
+        .flat_map(|(index, body)| body.parts.iter().map(move |part| (index, part)))
+        .filter_map(|(index, part)| Some((index, footprint(part, f64::MIN, f64::MAX)?)))
+        .map(|(index, shadow)| Obstacle::new(shadow, FLOOR_SLACK_M, index))
         .collect();
-    let is_sound =
-        !floors_m.is_empty() && floors_m.iter().flatten().flatten().all(|v| v.is_finite());
-    let message = || "the house has no floor, or one that is not finite".to_owned();
-    if is_sound { Ok(floors_m) } else { Err(Error::Simulation { message: message() }) }
+    let mut numbers = floors.iter().flat_map(|floor| &floor.outline_m).flatten();
+    if floors.is_empty() || !numbers.all(|v| v.is_finite()) {
+        let message = "the house has no floor, or one that is not finite".to_owned();
+        return Err(Error::Simulation { message });
+    }
+    Ok(floors)
 }
 
 /// Marks the cells that share more than a border with a convex outline.

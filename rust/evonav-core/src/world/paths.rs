@@ -63,18 +63,21 @@ pub struct VisibilityGraph {
     edges: Vec<OnceLock<Box<[Edge]>>>,
 }
 
-/// Where a search stands: least cost first, then least node, so that ties have one outcome.
-#[derive(PartialEq)]
+/// A way to a node that a search may take: least bound first, then least node, so that ties have
+/// one outcome.
+#[derive(Debug, Clone, Copy)]
 struct Open {
+    /// Least length of a path through here.
+    bound_m: f64,
+    /// Length so far.
     cost_m: f64,
     node: u32,
+    parent: u32,
 }
-
-impl Eq for Open {}
 
 impl Ord for Open {
     fn cmp(&self, other: &Self) -> Ordering {
-        other.cost_m.total_cmp(&self.cost_m).then(other.node.cmp(&self.node))
+        other.bound_m.total_cmp(&self.bound_m).then(other.node.cmp(&self.node))
     }
 }
 
@@ -84,10 +87,16 @@ impl PartialOrd for Open {
     }
 }
 
-/// Node number of a search's target.
-const TARGET: u32 = u32::MAX;
-/// Parent of the nodes that a search's start sees.
-const START: u32 = u32::MAX - 1;
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Open {}
+
+/// Parent of the nodes that a search reaches straight from its start.
+const START: u32 = u32::MAX;
 
 impl VisibilityGraph {
     /// Nodes around every obstacle, where `is_free` allows the agent to stand.
@@ -107,7 +116,7 @@ impl VisibilityGraph {
     ///
     /// # Complexity
     /// A* with the straight line as heuristic: O(k (n + log n)) for k expansions among n nodes
-    /// the first time, O(k log n) where earlier searches have been.
+    /// the first time, O(n + k log n) where earlier searches have been.
     pub fn shortest_path(
         &self,
         obstacles: &Obstacles,
@@ -117,33 +126,26 @@ impl VisibilityGraph {
         if obstacles.is_clear_between(start_m, target_m) {
             return Some(vec![start_m, target_m]);
         }
-        let ahead_m: Vec<f64> =
-            self.nodes.iter().map(|node| distance_2d_m(node.point_m, target_m)).collect();
+        let ahead_m = |node: u32| distance_2d_m(self.nodes[node as usize].point_m, target_m);
         let mut search = Search::new(self.nodes.len());
-        for edge in self.seen_from(obstacles, start_m) {
-            let ahead = ahead_m[edge.to as usize];
-            search.reach(edge.to, START, edge.length_m, ahead);
-        }
-        let mut to_target = (f64::INFINITY, START);
-        while let Some((node, _)) = search.pop() {
-            if node == TARGET {
-                return Some(self.trace(&search, to_target.1, start_m, target_m));
-            }
-            let i = node as usize;
-            let total_m = search.cost_m[i] + ahead_m[i];
-            if total_m < to_target.0
-                && self.nodes[i].is_tangent_to(target_m)
-                && obstacles.is_clear_between(self.nodes[i].point_m, target_m)
+        search.leave(self, start_m, ahead_m);
+        let mut last = None;
+        let mut best_m = f64::INFINITY;
+        while let Some(node) = search.pop(self, obstacles, start_m, best_m) {
+            let cost_m = search.cost_m[node as usize];
+            let total_m = cost_m + ahead_m(node);
+            let here = &self.nodes[node as usize];
+            if total_m < best_m
+                && here.is_tangent_to(target_m)
+                && obstacles.is_clear_between(here.point_m, target_m)
             {
-                to_target = (total_m, node);
-                search.open.push(Open { cost_m: total_m, node: TARGET });
+                (best_m, last) = (total_m, Some(node));
             }
             for edge in self.edges_of(obstacles, node) {
-                let cost_m = search.cost_m[i] + edge.length_m;
-                search.reach(edge.to, node, cost_m, ahead_m[edge.to as usize]);
+                search.reach(edge.to, node, cost_m + edge.length_m, ahead_m);
             }
         }
-        None
+        last.map(|last| self.trace(&search, last, start_m, target_m))
     }
 
     /// Shortest distances from a free point to many free points; infinite where there is no way.
@@ -154,12 +156,11 @@ impl VisibilityGraph {
         targets_m: &[Vec2],
     ) -> Vec<f64> {
         let mut search = Search::new(self.nodes.len());
-        for edge in self.seen_from(obstacles, start_m) {
-            search.reach(edge.to, START, edge.length_m, 0.0);
-        }
-        while let Some((node, cost_m)) = search.pop() {
+        search.leave(self, start_m, |_| 0.0);
+        while let Some(node) = search.pop(self, obstacles, start_m, f64::INFINITY) {
+            let cost_m = search.cost_m[node as usize];
             for edge in self.edges_of(obstacles, node) {
-                search.reach(edge.to, node, cost_m + edge.length_m, 0.0);
+                search.reach(edge.to, node, cost_m + edge.length_m, |_| 0.0);
             }
         }
         targets_m
@@ -175,31 +176,22 @@ impl VisibilityGraph {
 
     /// Least cost to a target over the nodes that see it, given the costs to all nodes.
     fn last_leg(&self, obstacles: &Obstacles, search: &Search, target_m: Vec2) -> f64 {
-        let mut open: BinaryHeap<Open> = (0..self.nodes.len())
-            .filter(|&i| search.cost_m[i].is_finite() && self.nodes[i].is_tangent_to(target_m))
-            .map(|i| Open {
-                cost_m: search.cost_m[i] + distance_2d_m(self.nodes[i].point_m, target_m),
-                node: i as u32,
-            })
-            .collect();
-        while let Some(Open { cost_m, node }) = open.pop() {
+        let to_open = |(i, node): (usize, &Node)| {
+            let cost_m = search.cost_m[i];
+            let bound_m = cost_m + distance_2d_m(node.point_m, target_m);
+            Open { bound_m, cost_m, node: i as u32, parent: START }
+        };
+        let is_open = |&(i, node): &(usize, &Node)| {
+            search.cost_m[i].is_finite() && node.is_tangent_to(target_m)
+        };
+        let mut open: BinaryHeap<Open> =
+            self.nodes.iter().enumerate().filter(is_open).map(to_open).collect();
+        while let Some(Open { bound_m, node, .. }) = open.pop() {
             if obstacles.is_clear_between(self.nodes[node as usize].point_m, target_m) {
-                return cost_m;
+                return bound_m;
             }
         }
         f64::INFINITY
-    }
-
-    /// Nodes that a taut path from `point_m` may go to first.
-    fn seen_from(&self, obstacles: &Obstacles, point_m: Vec2) -> Vec<Edge> {
-        let is_seen = |node: &Node| {
-            node.is_tangent_to(point_m) && obstacles.is_clear_between(point_m, node.point_m)
-        };
-        let to_edge = |(i, node): (usize, &Node)| Edge {
-            to: i as u32,
-            length_m: distance_2d_m(point_m, node.point_m),
-        };
-        self.nodes.iter().enumerate().filter(|(_, node)| is_seen(node)).map(to_edge).collect()
     }
 
     fn edges_of(&self, obstacles: &Obstacles, node: u32) -> &[Edge] {
@@ -256,24 +248,49 @@ impl Search {
         }
     }
 
-    fn reach(&mut self, node: u32, parent: u32, cost_m: f64, ahead_m: f64) {
+    /// Opens every node that a taut path from the start may go to first. Whether the start sees
+    /// it is asked when it comes up: of most nodes, never.
+    fn leave(&mut self, graph: &VisibilityGraph, start_m: Vec2, ahead_m: impl Fn(u32) -> f64) {
+        let first = graph.nodes.iter().enumerate().filter(|(_, n)| n.is_tangent_to(start_m));
+        let open = first.map(|(i, node)| {
+            let (node_index, cost_m) = (i as u32, distance_2d_m(start_m, node.point_m));
+            let bound_m = cost_m + ahead_m(node_index);
+            Open { bound_m, cost_m, node: node_index, parent: START }
+        });
+        self.open = open.collect();
+    }
+
+    /// Opens a way along an edge, if it is the best so far.
+    fn reach(&mut self, node: u32, parent: u32, cost_m: f64, ahead_m: impl Fn(u32) -> f64) {
         if cost_m < self.cost_m[node as usize] {
             self.cost_m[node as usize] = cost_m;
             self.parents[node as usize] = parent;
-            self.open.push(Open { cost_m: cost_m + ahead_m, node });
+            self.open.push(Open { bound_m: cost_m + ahead_m(node), cost_m, node, parent });
         }
     }
 
-    /// The best open node, once each, with its cost; or the target.
-    fn pop(&mut self) -> Option<(u32, f64)> {
-        while let Some(Open { node, cost_m }) = self.open.pop() {
-            if node == TARGET {
-                return Some((node, cost_m));
+    /// Closes the best open node; `None` if none is better than `limit_m`.
+    fn pop(
+        &mut self,
+        graph: &VisibilityGraph,
+        obstacles: &Obstacles,
+        start_m: Vec2,
+        limit_m: f64,
+    ) -> Option<u32> {
+        while let Some(Open { bound_m, cost_m, node, parent }) = self.open.pop() {
+            if bound_m >= limit_m {
+                return None;
             }
-            let is_closed = &mut self.is_closed[node as usize];
-            if !std::mem::replace(is_closed, true) {
-                return Some((node, self.cost_m[node as usize]));
+            let i = node as usize;
+            // An edge's cost is set when it is opened, a start's once it is known to see the node.
+            let is_stale = self.is_closed[i] || cost_m > self.cost_m[i];
+            if is_stale
+                || parent == START && !obstacles.is_clear_between(start_m, graph.nodes[i].point_m)
+            {
+                continue;
             }
+            (self.cost_m[i], self.parents[i], self.is_closed[i]) = (cost_m, parent, true);
+            return Some(node);
         }
         None
     }
