@@ -21,6 +21,9 @@ use crate::{
 const BUCKET_M: f64 = 0.5;
 /// Most buckets along an axis, whatever a house file says its size is.
 const MAX_BUCKETS: f64 = 1024.0;
+/// The rounded corner of an obstacle lies between this and 1 times its radius from the outline's
+/// corner, once paths take its tangents for it ([`crate::world::paths`]).
+const HUG: f64 = 1.02;
 /// Margin of bucket look-ups, far above rounding and far below any geometry.
 const HAIR_M: f64 = 1e-7;
 
@@ -60,7 +63,7 @@ pub struct Obstacle {
     pub radius_m: f64,
     /// Index of its body in the scene.
     pub body: usize,
-    /// Smallest corner of the box around the grown outline.
+    /// Smallest corner of a box around the grown outline and a little more.
     min_m: Vec2,
     /// Largest corner.
     max_m: Vec2,
@@ -119,6 +122,16 @@ impl Obstacles {
     pub fn is_clear(&self, point_m: Vec2) -> bool {
         let Some([row, col]) = self.bucket_of(point_m) else { return true };
         self.bucket(row, col).iter().all(|&i| !self.obstacles[i as usize].blocks(point_m))
+    }
+
+    /// Whether a point is in collision or so close to it that it may lie between a rounded corner
+    /// and the corner's tangents.
+    pub(super) fn is_hugged(&self, point_m: Vec2) -> bool {
+        let Some([row, col]) = self.bucket_of(point_m) else { return false };
+        self.bucket(row, col).iter().any(|&i| {
+            let Obstacle { outline_m, radius_m, .. } = &self.obstacles[i as usize];
+            distance_squared(outline_m, point_m) < (HUG * radius_m).powi(2)
+        })
     }
 
     /// Whether the agent can slide straight from one point to the other.
@@ -299,8 +312,8 @@ impl Obstacle {
         let mut max_m = [f64::NEG_INFINITY; 2];
         for point in &footprint.outline_m {
             for axis in 0..2 {
-                min_m[axis] = min_m[axis].min(point[axis] - radius_m);
-                max_m[axis] = max_m[axis].max(point[axis] + radius_m);
+                min_m[axis] = min_m[axis].min(point[axis] - HUG * radius_m);
+                max_m[axis] = max_m[axis].max(point[axis] + HUG * radius_m);
             }
         }
         Self { outline_m: footprint.outline_m, radius_m, body, min_m, max_m }

@@ -13,7 +13,12 @@
 //! polyhedral obstacles", CACM 1979; tangent pruning as in Oh & Leong, "Edge N-Level Sparse
 //! Visibility Graphs", SoCS 2017.
 
-use std::{cmp::Ordering, collections::BinaryHeap, sync::OnceLock};
+use std::{
+    cmp::Ordering,
+    collections::BinaryHeap,
+    f64::consts::{FRAC_PI_2, FRAC_PI_8, TAU},
+    sync::OnceLock,
+};
 
 use crate::{
     geometry::{Vec2, distance_2d_m},
@@ -21,7 +26,10 @@ use crate::{
 };
 
 /// Most that a path turns at one node around a corner.
-const TURN_RAD: f64 = std::f64::consts::FRAC_PI_8;
+const TURN_RAD: f64 = FRAC_PI_8;
+/// How often the turn at a node is halved to pass a narrow gap: down to a hundredth of a
+/// millimetre of room.
+const MOST_SPLITS: u32 = 5;
 /// Nodes keep this much more than the agent's radius, so that rounding never blocks an edge.
 const SKIN_M: f64 = 1e-6;
 /// Slack of the tangency test, metres over the length of an edge: errs towards more edges.
@@ -47,6 +55,17 @@ impl Node {
         let leg = [point_m[0] - self.point_m[0], point_m[1] - self.point_m[1]];
         let [a, b] = self.normals.map(|n| n[0] * leg[0] + n[1] * leg[1]);
         a.min(b) <= TANGENT_SLACK_M && a.max(b) >= -TANGENT_SLACK_M
+    }
+
+    /// Whether a path from `before_m` over this node to `after_m` bends towards the obstacle.
+    fn is_taut(&self, before_m: Vec2, after_m: Vec2) -> bool {
+        let cross = |a: Vec2, b: Vec2| a[0] * b[1] - a[1] * b[0];
+        let [a, b] = self.normals;
+        let [x, z] = self.point_m;
+        let (arrive, leave) =
+            ([x - before_m[0], z - before_m[1]], [after_m[0] - x, after_m[1] - z]);
+        let side = cross([a[0] + b[0], a[1] + b[1]], arrive).signum();
+        side * cross(arrive, leave) >= -TANGENT_SLACK_M * (arrive[0].abs() + arrive[1].abs())
     }
 }
 
@@ -102,7 +121,7 @@ impl VisibilityGraph {
     /// Nodes around every obstacle, where `is_free` allows the agent to stand.
     pub fn build(obstacles: &Obstacles, is_free: impl Fn(Vec2) -> bool) -> Self {
         let nodes: Vec<Node> =
-            obstacles.iter().flat_map(corner_nodes).filter(|node| is_free(node.point_m)).collect();
+            obstacles.iter().flat_map(|obstacle| corner_nodes(obstacle, &is_free)).collect();
         let edges = nodes.iter().map(|_| OnceLock::new()).collect();
         Self { nodes, edges }
     }
@@ -110,6 +129,15 @@ impl VisibilityGraph {
     /// Number of places where paths may bend.
     pub fn num_nodes(&self) -> usize {
         self.nodes.len()
+    }
+
+    /// The test of a node whether a taut path may go straight between it and `end_m`.
+    ///
+    /// An end that lies inside the tangents of a corner cannot pass that corner tangentially: from
+    /// there every node will do.
+    fn leads_to(obstacles: &Obstacles, end_m: Vec2) -> impl Fn(&Node) -> bool {
+        let is_hugged = obstacles.is_hugged(end_m);
+        move |node| is_hugged || node.is_tangent_to(end_m)
     }
 
     /// Shortest path between two free points, both included; `None` if there is none.
@@ -128,7 +156,8 @@ impl VisibilityGraph {
         }
         let ahead_m = |node: u32| distance_2d_m(self.nodes[node as usize].point_m, target_m);
         let mut search = Search::new(self.nodes.len());
-        search.leave(self, start_m, ahead_m);
+        search.leave(self, obstacles, start_m, ahead_m);
+        let leads_to_target = Self::leads_to(obstacles, target_m);
         let mut last = None;
         let mut best_m = f64::INFINITY;
         while let Some(node) = search.pop(self, obstacles, start_m, best_m) {
@@ -136,7 +165,7 @@ impl VisibilityGraph {
             let total_m = cost_m + ahead_m(node);
             let here = &self.nodes[node as usize];
             if total_m < best_m
-                && here.is_tangent_to(target_m)
+                && leads_to_target(here)
                 && obstacles.is_clear_between(here.point_m, target_m)
             {
                 (best_m, last) = (total_m, Some(node));
@@ -156,7 +185,7 @@ impl VisibilityGraph {
         targets_m: &[Vec2],
     ) -> Vec<f64> {
         let mut search = Search::new(self.nodes.len());
-        search.leave(self, start_m, |_| 0.0);
+        search.leave(self, obstacles, start_m, |_| 0.0);
         while let Some(node) = search.pop(self, obstacles, start_m, f64::INFINITY) {
             let cost_m = search.cost_m[node as usize];
             for edge in self.edges_of(obstacles, node) {
@@ -169,20 +198,48 @@ impl VisibilityGraph {
                 if obstacles.is_clear_between(start_m, target_m) {
                     return distance_2d_m(start_m, target_m);
                 }
-                self.last_leg(obstacles, &search, target_m)
+                self.last_leg(obstacles, &search, start_m, target_m)
             })
             .collect()
     }
 
     /// Least cost to a target over the nodes that see it, given the costs to all nodes.
-    fn last_leg(&self, obstacles: &Obstacles, search: &Search, target_m: Vec2) -> f64 {
+    fn last_leg(
+        &self,
+        obstacles: &Obstacles,
+        search: &Search,
+        start_m: Vec2,
+        target_m: Vec2,
+    ) -> f64 {
+        let parent_m = |i: usize| match search.parents[i] {
+            START => start_m,
+            parent => self.nodes[parent as usize].point_m,
+        };
+        // A shortest path bends around the corner it touches. Where corners stand so close that
+        // some of their nodes are not free, only another way may be left.
+        let bends = |i: usize, node: &Node| node.is_taut(parent_m(i), target_m);
+        let taut_m = self.last_leg_over(obstacles, search, target_m, bends);
+        if taut_m.is_finite() {
+            return taut_m;
+        }
+        self.last_leg_over(obstacles, search, target_m, |_, _| true)
+    }
+
+    fn last_leg_over(
+        &self,
+        obstacles: &Obstacles,
+        search: &Search,
+        target_m: Vec2,
+        is_taken: impl Fn(usize, &Node) -> bool,
+    ) -> f64 {
+        let leads_to_target = Self::leads_to(obstacles, target_m);
         let to_open = |(i, node): (usize, &Node)| {
             let cost_m = search.cost_m[i];
             let bound_m = cost_m + distance_2d_m(node.point_m, target_m);
             Open { bound_m, cost_m, node: i as u32, parent: START }
         };
         let is_open = |&(i, node): &(usize, &Node)| {
-            search.cost_m[i].is_finite() && node.is_tangent_to(target_m)
+            search.is_closed[i] && leads_to_target(node) && is_taken(i, node)
         };
         let mut open: BinaryHeap<Open> =
             self.nodes.iter().enumerate().filter(is_open).map(to_open).collect();
@@ -250,8 +307,15 @@ impl Search {
 
     /// Opens every node that a taut path from the start may go to first. Whether the start sees
     /// it is asked when it comes up: of most nodes, never.
-    fn leave(&mut self, graph: &VisibilityGraph, start_m: Vec2, ahead_m: impl Fn(u32) -> f64) {
-        let first = graph.nodes.iter().enumerate().filter(|(_, n)| n.is_tangent_to(start_m));
+    fn leave(
+        &mut self,
+        graph: &VisibilityGraph,
+        obstacles: &Obstacles,
+        start_m: Vec2,
+        ahead_m: impl Fn(u32) -> f64,
+    ) {
+        let leads_to_start = VisibilityGraph::leads_to(obstacles, start_m);
+        let first = graph.nodes.iter().enumerate().filter(|(_, node)| leads_to_start(node));
         let open = first.map(|(i, node)| {
             let (node_index, cost_m) = (i as u32, distance_2d_m(start_m, node.point_m));
             let bound_m = cost_m + ahead_m(node_index);
@@ -296,41 +360,69 @@ impl Search {
     }
 }
 
-/// Corners of the polygon of tangents around an obstacle's grown outline.
-fn corner_nodes(obstacle: &Obstacle) -> Vec<Node> {
+/// Corners of the polygon of tangents around an obstacle's grown outline, where they are free.
+fn corner_nodes(obstacle: &Obstacle, is_free: &impl Fn(Vec2) -> bool) -> Vec<Node> {
     let outline = &obstacle.outline_m;
-    let radius_m = obstacle.radius_m + SKIN_M;
     let num_corners = outline.len();
     let mut nodes = Vec::new();
-    for (i, &corner) in outline.iter().enumerate() {
+    for (i, &corner_m) in outline.iter().enumerate() {
         let before = outline[(i + num_corners - 1) % num_corners];
         let after = outline[(i + 1) % num_corners];
         let heading = |a: Vec2, b: Vec2| (b[1] - a[1]).atan2(b[0] - a[0]);
         // The outline turns left, so its outward normals are a quarter turn to the right.
         let (first_rad, turn_rad) = if num_corners == 1 {
-            (0.0, std::f64::consts::TAU)
+            (0.0, TAU)
         } else {
-            let (arrive, leave) = (heading(before, corner), heading(corner, after));
-            (
-                arrive - std::f64::consts::FRAC_PI_2,
-                (leave - arrive).rem_euclid(std::f64::consts::TAU),
-            )
+            let (arrive, leave) = (heading(before, corner_m), heading(corner_m, after));
+            (arrive - FRAC_PI_2, (leave - arrive).rem_euclid(TAU))
         };
         let num_steps = (turn_rad / TURN_RAD - 1e-9).ceil().max(1.0);
-        let step_rad = turn_rad / num_steps;
-        let reach_m = radius_m / (0.5 * step_rad).cos();
-        let normal = |k: f64| {
-            let (sin, cos) = (first_rad + k * step_rad).sin_cos();
-            [cos, sin]
-        };
+        let arc = Arc { corner_m, radius_m: obstacle.radius_m + SKIN_M };
         for k in 0..num_steps as usize {
-            let k = k as f64;
-            let towards = normal(k + 0.5);
-            nodes.push(Node {
-                point_m: [corner[0] + reach_m * towards[0], corner[1] + reach_m * towards[1]],
-                normals: [normal(k), normal(k + 1.0)],
-            });
+            let at = |k: usize| first_rad + turn_rad * k as f64 / num_steps;
+            arc.push_nodes([at(k), at(k + 1)], 0, is_free, &mut nodes);
         }
     }
     nodes
+}
+
+/// The rounded corner of a grown obstacle.
+struct Arc {
+    corner_m: Vec2,
+    radius_m: f64,
+}
+
+impl Arc {
+    /// The node between two tangents; or, where another obstacle is so near that it is not free
+    /// but the arc is, the nodes of both halves, which are nearer to the arc.
+    fn push_nodes(
+        &self,
+        span_rad: [f64; 2],
+        depth: u32,
+        is_free: &impl Fn(Vec2) -> bool,
+        nodes: &mut Vec<Node>,
+    ) {
+        let normal = |angle_rad: f64| [angle_rad.cos(), angle_rad.sin()];
+        let at =
+            |towards: Vec2, reach_m: f64| [0, 1].map(|i| self.corner_m[i] + reach_m * towards[i]);
+        let middle_rad = 0.5 * (span_rad[0] + span_rad[1]);
+        let reach_m = self.radius_m / (0.5 * (span_rad[1] - span_rad[0])).cos();
+        let (middle, normals) = (normal(middle_rad), span_rad.map(normal));
+        let point_m = at(middle, reach_m);
+        if is_free(point_m) {
+            nodes.push(Node { point_m, normals });
+            return;
+        }
+        let is_arc_free = |towards: Vec2| is_free(at(towards, self.radius_m));
+        let num_free =
+            [normals[0], middle, normals[1]].into_iter().filter(|&n| is_arc_free(n)).count() as u32;
+        // A gap that the arc passes through is followed until it is too narrow to matter, an arc
+        // that ends at another obstacle only until it ends within 3 degrees of it.
+        let most = if num_free == 3 { MOST_SPLITS } else { num_free.min(1) * 3 };
+        if depth < most {
+            for half in [[span_rad[0], middle_rad], [middle_rad, span_rad[1]]] {
+                self.push_nodes(half, depth + 1, is_free, nodes);
+            }
+        }
+    }
 }
