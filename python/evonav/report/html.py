@@ -207,10 +207,9 @@ def _facts(record: StageRecord) -> str:
     """Figures of a stage in a line."""
     parts = [f"{record.num_rounds} rounds"]
     if record.path_length_m is not None:
-        parts.append(f"{record.path_length_m:.1f} m walked")
-    if record.reference_length_m is not None:
-        parts.append(f"{record.reference_length_m:.1f} m shortest")
-    parts.append(f"in view in {record.num_target_visible_rounds} rounds")
+        shortest = "" if record.reference_length_m is None else f" (shortest {record.reference_length_m:.1f} m)"
+        parts.append(f"{record.path_length_m:.1f} m{shortest}")
+    parts.append(f"target seen in {record.num_target_visible_rounds}")
     num_stale = sum(entry.is_stale for entry in record.entries)
     if record.entries:
         parts.append(f"{len(record.entries)} entries, {num_stale} stale")
