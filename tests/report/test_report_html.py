@@ -1,3 +1,4 @@
+import hashlib
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -155,6 +156,7 @@ def test_the_same_records_give_the_same_page(write_run: WriteRun) -> None:
 def test_houses_are_drawn_once_a_task(write_run: WriteRun) -> None:
     text = write_report(write_run()).read_text(encoding="utf-8")
     assert len(re.findall(r'class="floor kitchen"', text)) == 6
+    assert text.count("<title>fridge</title>") == 6
 
 
 def test_no_run_is_an_error_that_names_the_folder(tmp_path: Path) -> None:
@@ -166,3 +168,48 @@ def test_agents_come_in_the_order_of_the_paper(tmp_path: Path) -> None:
     agents = ["ftu", "a-walk", "stage-reset", "fu"]
     records = [stage_record(agent, "t", 1, EndState.SUCCESS) for agent in agents]
     assert load_run(record_run(tmp_path, records, {"t": 1}, agents)).agents == ("fu", "stage-reset", "ftu", "a-walk")
+
+
+def test_what_moves_is_not_part_of_what_stages_share(write_run: WriteRun) -> None:
+    text = write_report(write_run()).read_text(encoding="utf-8")
+    still, _, moving = text.partition('<g class="map" id="h0s1">')
+    shared = still.partition('<g class="map" id="h0">')[2]
+    assert shared.count("<title>fridge</title>") == 1
+    assert "dining table" not in shared
+    assert "<title>dining table</title>" in moving.partition('<g class="map" id="h0s2">')[0]
+
+
+def test_tasks_carry_what_the_filters_look_at(write_run: WriteRun) -> None:
+    page = Page(write_report(write_run()))
+    (first, second) = page.all("section", "task")[:2]
+    # Of the first task each agent fails one stage, the other agent succeeding; of the second, fu fails stage 2.
+    assert (first["data-failures"], first["data-disagreements"]) == ("2", "2")
+    assert (second["data-failures"], second["data-disagreements"]) == ("1", "1")
+    assert first["data-causes"] == "NO_OBJECT STALE_ENTRY"
+    assert first["data-words"] == "task-0 plate"
+
+
+def test_the_digest_is_that_of_the_rows_as_stored(write_run: WriteRun) -> None:
+    run_dir = write_run()
+    with RunStore(run_dir) as store:
+        rows = "".join(f"{text}\n" for text in store.record_texts("fu"))
+    assert load_run(run_dir).rows_sha256["fu"] == hashlib.sha256(rows.encode()).hexdigest()
+
+
+def test_tasks_without_a_record_are_listed(tmp_path: Path) -> None:
+    run_dir = record_run(tmp_path, [stage_record("fu", "a", 1, EndState.SUCCESS)], {"a": 2, "b": 3}, ["fu"])
+    run = load_run(run_dir)
+    assert dict(run.num_stages) == {"a": 2, "b": 3}
+    assert run.summaries[0].counts["not_run"] == 4
+    assert Page(write_report(run_dir)).count("figure", "not_run") == 4
+
+
+def test_statements_follow_the_numbers(write_run: WriteRun, tmp_path: Path) -> None:
+    first, second = html.statements(load_run(write_run()))
+    assert first.startswith("ftu has the highest success rate, 91.7 [")
+    assert second.endswith("points on the 12 stages that both scored: ftu is ahead beyond the interval.")
+    few = html.statements(load_run(write_run("few", num_tasks=2)))
+    assert few[1] == "2 tasks are too few to tell agents apart."
+    records = [stage_record(agent, "t", 1, EndState.SUCCESS) for agent in ("fu", "ftu")]
+    tied = html.statements(load_run(record_run(tmp_path / "tied", records, {"t": 1}, ["fu", "ftu"])))
+    assert tied[0] == "fu and ftu have the same success rate, 100.0 %."

@@ -14,7 +14,7 @@ from evonav.report.maps import file_css, map_css, stage_svg
 from evonav.report.overlay import rounds as choices
 from evonav.report.plan import label_point
 from evonav.report.strip import write_strip
-from evonav.report.svg import polyline, simplified, slug
+from evonav.report.svg import Point, polyline, simplified, slug
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -159,7 +159,23 @@ def test_simplified_keeps_ends_and_corners() -> None:
     assert polyline([(3, 4)]) == "M3 4h0"
 
 
-def test_labels_lie_inside_rooms_that_are_no_rectangles() -> None:
-    ell = [(0.0, 0.0), (0.0, 8.0), (2.0, 8.0), (2.0, 2.0), (8.0, 2.0), (8.0, 0.0)]
-    x, z = label_point(ell)
-    assert (0 < x < 2 and 0 < z < 8) or (0 < x < 8 and 0 < z < 2)
+@pytest.mark.parametrize(
+    ("polygon_m", "least_gap_m"),
+    [
+        ([(0, 0), (0, 8), (2, 8), (2, 2), (8, 2), (8, 0)], 0.8),
+        ([(0, 0), (0, 6), (1, 6), (1, 1), (7, 1), (7, 6), (8, 6), (8, 0)], 0.35),
+        ([(0, 0), (4, 6), (8, 0)], 1.5),
+        ([(5, 5), (5, 9), (12, 9), (12, 5)], 1.8),
+    ],
+)
+def test_labels_lie_well_inside_rooms_of_any_shape(polygon_m: list[Point], least_gap_m: float) -> None:
+    x, z = label_point(polygon_m)
+    edges = list(zip(polygon_m, polygon_m[1:] + polygon_m[:1], strict=True))
+    # Winding number: the angle under which the edges are seen adds up to a full turn from inside, to nothing outside.
+    turn = 0.0
+    for a, b in edges:
+        angle = math.atan2(b[1] - z, b[0] - x) - math.atan2(a[1] - z, a[0] - x)
+        turn += (angle + math.pi) % math.tau - math.pi
+        along = [(a[0] + t * (b[0] - a[0]) / 50, a[1] + t * (b[1] - a[1]) / 50) for t in range(51)]
+        assert min(math.dist((x, z), point) for point in along) >= least_gap_m
+    assert abs(turn) == pytest.approx(math.tau)

@@ -86,3 +86,12 @@ def test_rates_without_spread_claim_no_interval() -> None:
     assert tables.percent(1.0, (1.0, 1.0)) == "100.0"
     assert tables.percent(0.5, (0.25, 0.75)) == "50.0 [25.0, 75.0]"
     assert tables.percent(None, None) == "–"
+
+
+def test_paired_differences_name_who_succeeded_alone(write_run: WriteRun) -> None:
+    table = tables.paired_table(load_run(write_run()).pairs)
+    (row,) = [dict(zip(table.columns, row, strict=True)) for row in table.rows]
+    # ftu alone succeeds in six second stages, fu alone in one first stage.
+    assert (row["Agents"], row["only first"], row["only second"]) == ("ftu less fu", "6", "1")
+    assert row["SR difference [95% CI]"].startswith("+41.7 [")
+    assert row["SR says"] == "ftu is ahead beyond the interval"

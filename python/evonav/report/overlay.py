@@ -88,7 +88,7 @@ def _is_carried(
     area_m2 = _area_m2(now.get(relocation.object_id))
     for other in relocations:
         old, new = before.get(other.object_id), now.get(other.object_id)
-        if other.object_id == relocation.object_id or old is None or new is None:
+        if old is None or new is None:
             continue
         if _area_m2(new) > area_m2 and _is_over(relocation.from_m, old) and _is_over(relocation.to_m, new):
             return True
