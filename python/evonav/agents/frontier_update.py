@@ -1,5 +1,6 @@
 """Frontier-Update (paper, Sec. C.4): object entries and a map over all stages; the map is rebuilt when contradicted."""
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -30,6 +31,8 @@ class FrontierUpdateConfig:
     """Questions asked before an invalid answer is given up on."""
     observation_distance_m: float = 1.5
     """Where to stand to look at an object."""
+    aim_again_m: float = 0.25
+    """The place to stand is chosen again when the middle of the entry has shifted by more than this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +86,26 @@ class FrontierUpdate:
             self._reject(reached.entry_id)
             self._target = None
         if self._target is not None:
+            self._target = self._aimed(self._target)
             return self._approach(self._target)
         return self._decide(observation)
+
+    def _aimed(self, target: _Target) -> _Target:
+        """The target, with its place as far as it is known by now: the first glimpse of a table may be its corner."""
+        entry = self._objects.entry(target.entry_id)
+        if entry is None:
+            return target
+        centre_m = (entry.centre_m[0], entry.centre_m[2])
+        if math.dist(centre_m, target.centre_m) <= self.config.aim_again_m:
+            return target
+        return _Target(entry.id, self._observation_point(centre_m) or target.goal_m, centre_m)
+
+    def _observation_point(self, centre_m: Point2) -> Point2 | None:
+        """Where to stand to look at a place; `None` where the map knows no free floor around it."""
+        occupancy = self._explorer.map
+        return observation_point(
+            occupancy.cells == FREE, occupancy.map_frame, centre_m, self.config.observation_distance_m
+        )
 
     def _stops_at_sight_of_place(self) -> bool:
         """Whether arriving at an entry's place ends the stage without another look."""
@@ -162,10 +183,7 @@ class FrontierUpdate:
     def _go_to_object(self, chosen: ObjectCandidate, frontiers: list[Frontier], reason: str) -> AgentAction:
         """Commits to an entry whose surroundings the map knows; else explores towards it."""
         centre_m = (chosen.centre_m[0], chosen.centre_m[2])
-        occupancy = self._explorer.map
-        goal_m = observation_point(
-            occupancy.cells == FREE, occupancy.map_frame, centre_m, self.config.observation_distance_m
-        )
+        goal_m = self._observation_point(centre_m)
         if goal_m is None:
             self._counters["unsupported_choices"] += 1
             frontier = nearest_frontier(frontiers, centre_m)
@@ -221,7 +239,7 @@ def _candidate(entry: ObjectEntry) -> ObjectCandidate:
 
 def _frontier_candidate(frontier: Frontier, here: Point2) -> FrontierCandidate:
     x_m, z_m = frontier.position_m
-    return FrontierCandidate(frontier.id, (x_m, z_m), ((x_m - here[0]) ** 2 + (z_m - here[1]) ** 2) ** 0.5)
+    return FrontierCandidate(frontier.id, (x_m, z_m), math.dist((x_m, z_m), here))
 
 
 def _belief(entry: ObjectEntry) -> EntryBelief:
