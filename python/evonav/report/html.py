@@ -280,9 +280,12 @@ def statements(run: Run) -> list[str]:
     if not scored:
         return ["No stage has been scored yet."]
     best = scored[0]
-    lines = [
-        f"{best.agent} has the highest success rate, {tables.percent(best.sr, best.sr_ci95)} % of {best.n} stages."
-    ]
+    equal = [summary.agent for summary in scored if summary.sr == best.sr]
+    if len(equal) > 1:
+        lines = [f"{' and '.join(equal)} have the same success rate, {tables.percent(best.sr, None)} %."]
+    else:
+        measured = tables.percent(best.sr, best.sr_ci95)
+        lines = [f"{best.agent} has the highest success rate, {measured} % of {best.n} stages."]
     pairs = [pair for pair in run.pairs if best.agent in (pair.a, pair.b)]
     if pairs and all(pair.num_tasks < tables.MIN_TASKS_FOR_VERDICT for pair in pairs):
         lines.append(f"{pairs[0].num_tasks} tasks are too few to tell agents apart.")
