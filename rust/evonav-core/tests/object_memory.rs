@@ -194,10 +194,7 @@ impl NaiveMap {
             .filter(|(_, k)| Some(**k) == best)
             .map(|(p, _)| *p)
             .collect();
-        Some(first_of_voxels(
-            if cluster.len() >= 5 { &cluster } else { &points },
-            self.config.voxel_m,
-        ))
+        Some(if cluster.len() >= 5 { cluster } else { points })
     }
 
     fn update(&mut self, view: &DetectedView<'_>) -> Vec<Option<u64>> {
@@ -308,7 +305,7 @@ fn see(map: &mut ObjectMap, boxes: &[SolidBox], camera: &Camera) -> Update {
     let image = MaskedDepth { camera, depth_m: &depth_m, masks: &masks };
     let confidences = vec![1.0; labels.len()];
     map.update(&DetectedView { image, labels: &labels, confidences: &confidences, features: &[] })
-        .unwrap()
+        .expect("a valid view")
 }
 
 const SOFA: SolidBox = ([0.0, 0.5, 2.0], [1.0, 0.6, 0.5], "Sofa");

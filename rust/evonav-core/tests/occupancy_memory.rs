@@ -93,7 +93,7 @@ proptest! {
         assumed in proptest::option::of(([-0.9..5.9, 0.6..1.0], 0.0..0.4)),
     ) {
         let spec = spec(6, 70);
-        let mut map = OccupancyMap::new(spec).unwrap();
+        let mut map = OccupancyMap::new(spec).expect("a valid grid");
         let (mut state, mut explored) = (BTreeMap::new(), BTreeSet::new());
         let distance = |cell: Cell, point: [f64; 2]| {
             let centre = spec.centre_m(cell.map(|i| i as usize));
@@ -135,7 +135,7 @@ proptest! {
         }
         let cells: Vec<Cell> = state.keys().copied().collect();
         map.forget(&cells).unwrap();
-        prop_assert_eq!(map, OccupancyMap::new(spec).unwrap());
+        prop_assert_eq!(map, OccupancyMap::new(spec).expect("a valid grid"));
     }
 }
 
@@ -157,12 +157,13 @@ fn walked(seed: u64, num_steps: usize, side: usize) -> (OccupancyMap, [f64; 2]) 
             }
         }
     }
-    let mut map = OccupancyMap::new(spec).unwrap();
+    let mut map = OccupancyMap::new(spec).expect("a valid grid");
     let mut origin_m = spec.centre_m([side / 2, side / 2]);
     for _ in 0..num_steps {
         let yaw_rad = stream.uniform() * 6.0;
-        let seen = visible_cells(&blocked, &spec, origin_m, yaw_rad, 2.0, 3.0).unwrap();
-        map.integrate(&seen, origin_m, 1.0).unwrap();
+        let seen =
+            visible_cells(&blocked, &spec, origin_m, yaw_rad, 2.0, 3.0).expect("a valid view");
+        map.integrate(&seen, origin_m, 1.0).expect("cells of the map");
         if !seen.free.is_empty() {
             let next = seen.free[stream.below(seen.free.len())];
             origin_m = spec.centre_m(next.map(|i| i as usize));
@@ -190,7 +191,7 @@ fn regions_naive(map: &OccupancyMap, agent_m: [f64; 2], min_cells: usize) -> Vec
     let nearest = free.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
     let own = spec.cell_of(agent_m).map(|c| c.map(|i| i as i32)).filter(|c| free.contains(c));
     let Some(start) = own.or(nearest.copied()) else { return Vec::new() };
-    let island = islands.into_iter().find(|island| island.contains(&start)).unwrap();
+    let island = islands.into_iter().find(|island| island.contains(&start)).expect("an island");
     let num_unexplored = |[row, col]: Cell| {
         let around = (-1..=1).flat_map(|r| (-1..=1).map(move |c| [row + r, col + c]));
         around.filter(|&c| c != [row, col] && is_on(c) && !explored[at(c)]).count()

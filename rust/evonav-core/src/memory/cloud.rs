@@ -1,7 +1,7 @@
 //! An object's point cloud, kept so that new points are matched and merged without a rebuild.
 
 use crate::{
-    geometry::{Aabb, Vec3},
+    geometry::Aabb,
     memory::{
         dbscan::distance2,
         voxels::{VoxelTable, voxel_of},
@@ -52,12 +52,6 @@ impl Cloud {
     /// Smallest box around the points.
     pub fn bounds_m(&self) -> &Aabb {
         &self.bounds_m
-    }
-
-    /// Mean of the points; the origin for an empty cloud.
-    pub fn centroid_m(&self) -> Vec3 {
-        let count = self.points.len().max(1) as f64;
-        [0, 1, 2].map(|i| self.points.iter().map(|p| f64::from(p[i])).sum::<f64>() / count)
     }
 
     /// Adds the points that fall into voxels without one.

@@ -1,8 +1,9 @@
 //! One object as remembered.
 
 use crate::{
-    geometry::Vec3,
+    geometry::{Aabb, Vec3},
     memory::{cloud::Cloud, objects::ObjectMapConfig},
+    sensors::unproject::Point,
 };
 
 /// A detection that passed the filters.
@@ -11,7 +12,8 @@ pub(crate) struct Sighting {
     pub(crate) label: String,
     pub(crate) confidence: f32,
     pub(crate) feature: Option<Vec<f32>>,
-    pub(crate) cloud: Cloud,
+    pub(crate) points: Vec<Point>,
+    pub(crate) bounds_m: Aabb,
 }
 
 /// An object entry: detections that seem to be of one object.
@@ -38,14 +40,20 @@ pub struct Entry {
 }
 
 impl Entry {
-    pub(crate) fn new(id: u64, sighting: Sighting, stage: u32, view: u64) -> Self {
+    pub(crate) fn new(
+        id: u64,
+        sighting: Sighting,
+        stage: u32,
+        view: u64,
+        config: &ObjectMapConfig,
+    ) -> Self {
         Self {
             id,
             label_counts: vec![(sighting.label, 1)],
             num_detections: 1,
             confidence: sighting.confidence,
             feature: sighting.feature,
-            cloud: sighting.cloud,
+            cloud: Cloud::new(&sighting.points, config.voxel_m, config.overlap_radius_m as f32),
             first_seen_stage: stage,
             last_seen_stage: stage,
             last_seen_view: view,
@@ -76,39 +84,46 @@ impl Entry {
         }
     }
 
-    /// Whether the boxes touch when grown by the radius of overlap: if not, nothing overlaps.
-    pub(crate) fn is_beside(&self, other: &Cloud, config: &ObjectMapConfig) -> bool {
+    /// Whether a box touches this one's grown by the radius of overlap: if not, nothing overlaps.
+    pub(crate) fn is_beside(&self, other_m: &Aabb, config: &ObjectMapConfig) -> bool {
         let mut bounds_m = *self.cloud.bounds_m();
         bounds_m.min_m = bounds_m.min_m.map(|v| v - config.overlap_radius_m);
         bounds_m.max_m = bounds_m.max_m.map(|v| v + config.overlap_radius_m);
-        bounds_m.intersects(other.bounds_m())
+        bounds_m.intersects(other_m)
     }
 
     /// Joins a detection.
     pub(crate) fn see(&mut self, sighting: Sighting, stage: u32, view: u64) {
-        self.absorb(Self::new(0, sighting, stage, view));
+        self.count(vec![(sighting.label, 1)], sighting.feature, 1);
+        self.confidence = self.confidence.max(sighting.confidence);
+        self.cloud.merge(&sighting.points);
+        self.last_seen_stage = stage;
+        self.last_seen_view = view;
     }
 
     /// Joins another entry; the id stays.
     pub(crate) fn absorb(&mut self, other: Self) {
-        for (label, count) in other.label_counts {
-            match self.label_counts.iter_mut().find(|(known, _)| *known == label) {
-                Some((_, known)) => *known += count,
-                None => self.label_counts.push((label, count)),
-            }
-        }
-        self.feature = match (self.feature.take(), other.feature) {
-            (Some(a), Some(b)) => {
-                Some(weighted_mean(&a, self.num_detections, &b, other.num_detections))
-            }
-            (a, b) => a.or(b),
-        };
-        self.num_detections += other.num_detections;
+        self.count(other.label_counts, other.feature, other.num_detections);
         self.confidence = self.confidence.max(other.confidence);
         self.cloud.merge(other.cloud.points());
         self.first_seen_stage = self.first_seen_stage.min(other.first_seen_stage);
         self.last_seen_stage = self.last_seen_stage.max(other.last_seen_stage);
         self.last_seen_view = self.last_seen_view.max(other.last_seen_view);
+    }
+
+    /// Takes over what so many detections say of labels and looks.
+    fn count(&mut self, labels: Vec<(String, u32)>, feature: Option<Vec<f32>>, num: u32) {
+        for (label, count) in labels {
+            match self.label_counts.iter_mut().find(|(known, _)| *known == label) {
+                Some((_, known)) => *known += count,
+                None => self.label_counts.push((label, count)),
+            }
+        }
+        self.feature = match (self.feature.take(), feature) {
+            (Some(a), Some(b)) => Some(weighted_mean(&a, self.num_detections, &b, num)),
+            (a, b) => a.or(b),
+        };
+        self.num_detections += num;
     }
 }
 

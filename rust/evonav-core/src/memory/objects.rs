@@ -8,12 +8,10 @@ use crate::{
     Error,
     geometry::{Vec3, distance_2d_m},
     memory::{
-        cloud::Cloud,
-        dbscan::largest_cluster,
+        cleaning::{centroid_m, clean, denoise},
         entry::{Entry, Sighting},
-        voxels::voxel_filter,
     },
-    sensors::unproject::{MaskedDepth, Point, unproject_masks},
+    sensors::unproject::{MaskedDepth, unproject_masks},
 };
 
 /// Parameters of the object map; the defaults are 3D-Mem's.
@@ -238,8 +236,8 @@ impl ObjectMap {
         let compare = |sighting: Option<Sighting>| match sighting {
             None => Comparison { overlap: 0.0, distance_m: f64::INFINITY },
             Some(sighting) => Comparison {
-                overlap: entry.cloud.overlap(sighting.cloud.points()),
-                distance_m: distance_m(sighting.cloud.centroid_m(), centre_m),
+                overlap: entry.cloud.overlap(&sighting.points),
+                distance_m: distance_m(centroid_m(&sighting.points), centre_m),
             },
         };
         Ok(self.sightings(view, f64::INFINITY)?.into_iter().map(compare).collect())
@@ -257,14 +255,15 @@ impl ObjectMap {
         let [x, _, z] = view.image.camera.position_m;
         let clouds = unproject_masks(view.image, num, config.max_points)?;
         let sightings = clouds.into_iter().enumerate().map(|(index, points)| {
-            let cloud = clean_cloud(&points, config)?;
-            let [centre_x, _, centre_z] = cloud.bounds_m().centre_m();
+            let (points, bounds_m) = clean(&points, config)?;
+            let [centre_x, _, centre_z] = bounds_m.centre_m();
             let is_near = distance_2d_m([x, z], [centre_x, centre_z]) <= max_distance_m;
             is_near.then(|| Sighting {
                 label: view.labels[index].clone(),
                 confidence: view.confidences[index],
                 feature: features.map(|n| view.features[index * n..(index + 1) * n].to_vec()),
-                cloud,
+                points,
+                bounds_m,
             })
         });
         Ok(sightings.collect())
@@ -300,10 +299,10 @@ impl ObjectMap {
         for (index, entry) in self.entries[..num].iter().enumerate() {
             let visual = entry.similarity(&sighting.label, sighting.feature.as_deref());
             // Even lying wholly inside the entry could not lift it over the best so far.
-            if visual + 1.0 <= best.0 || !entry.is_beside(&sighting.cloud, &self.config) {
+            if visual + 1.0 <= best.0 || !entry.is_beside(&sighting.bounds_m, &self.config) {
                 continue;
             }
-            let similarity = visual + entry.cloud.overlap(sighting.cloud.points());
+            let similarity = visual + entry.cloud.overlap(&sighting.points);
             if similarity > best.0 {
                 best = (similarity, Some(index));
             }
@@ -314,7 +313,7 @@ impl ObjectMap {
     fn insert(&mut self, sighting: Sighting) -> u64 {
         let id = self.next_id;
         self.next_id += 1;
-        self.entries.push(Entry::new(id, sighting, self.stage, self.num_views));
+        self.entries.push(Entry::new(id, sighting, self.stage, self.num_views, &self.config));
         id
     }
 
@@ -348,7 +347,7 @@ impl ObjectMap {
             for (j, b) in self.entries.iter().enumerate() {
                 let is_alike =
                     || a.similarity(b.label(), b.feature.as_deref()) > config.merge_similarity;
-                if i != j && a.is_beside(&b.cloud, &config) && is_alike() {
+                if i != j && a.is_beside(b.cloud.bounds_m(), &config) && is_alike() {
                     let overlap = b.cloud.overlap(a.cloud.points());
                     if overlap > config.merge_overlap {
                         pairs.push((overlap, i, j));
@@ -376,32 +375,6 @@ impl ObjectMap {
         }
         let mut is_gone = is_gone.into_iter();
         self.entries.retain(|_| !is_gone.next().unwrap_or(false));
-    }
-}
-
-/// A detection's points as a clean cloud, `None` if too little is left.
-fn clean_cloud(points: &[Point], config: &ObjectMapConfig) -> Option<Cloud> {
-    if points.len() < config.min_points {
-        return None;
-    }
-    let filtered = voxel_filter(points, config.voxel_m);
-    let radius_m = config.cluster_radius_m as f32;
-    let cluster = largest_cluster(&filtered, radius_m, config.cluster_min_points)
-        .filter(|cluster| cluster.len() >= 5)
-        .unwrap_or(filtered);
-    let cloud = Cloud::new(&cluster, config.voxel_m, config.overlap_radius_m as f32);
-    // A picture seen from the front is a plane; as a set of voxels it has a volume all the same.
-    let volume_m3: f64 =
-        cloud.bounds_m().size_m().iter().map(|edge| edge.max(config.voxel_m)).product();
-    (volume_m3 >= config.min_box_m3).then_some(cloud)
-}
-
-/// Keeps the largest cluster of an entry's cloud, if that leaves enough.
-fn denoise(cloud: &mut Cloud, config: &ObjectMapConfig) {
-    let radius_m = config.cluster_radius_m as f32;
-    let cluster = largest_cluster(cloud.points(), radius_m, config.cluster_min_points);
-    if let Some(cluster) = cluster.filter(|c| (4..cloud.points().len()).contains(&c.len())) {
-        *cloud = Cloud::new(&cluster, config.voxel_m, config.overlap_radius_m as f32);
     }
 }
 

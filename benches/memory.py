@@ -1,0 +1,283 @@
+"""The memory at the size of one observation, against OpenCV, Open3D with faiss, and scikit-learn."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import cv2
+import faiss
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+from sklearn.cluster import DBSCAN
+
+from benches.table import Row, compare
+from evonav.memory import ObjectMap, ObjectMapConfig, OccupancyMap
+from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
+from evonav.sensors.visibility import visible_occupancy
+from evonav.world.pose import Pose
+from evonav.world.simulator import Intrinsics, OccupancyGrid
+
+NOTES = """Visibility: one view of 90 degrees and 3 m on 0.1 m cells; the peer casts 300 rays in steps of half a cell
+with NumPy and misses what lies between them. Frontiers: a 400x400 map; the peer finds the agent's island, the cells
+with 8 unexplored neighbours and their components with OpenCV (checked to be the same regions), but no directions and
+view positions. Object memory: one 300x300 frame with 20 masks against 100 entries of about 7,000 points at 3D-Mem's
+voxel of 0.01 m: unproject, voxel filter, DBSCAN, overlap, association and merge; the peer does so as ConceptGraphs and
+3D-Mem do, with Open3D clouds and a flat faiss index an entry, and its associations are checked to be the same.
+Clean-up: DBSCAN of ten entries (ours also filters and merges them).
+"""
+
+SIDE_PX = 300
+BOX_M = 0.4
+_Call = Callable[[int], object]
+_INTRINSICS = Intrinsics(SIDE_PX, SIDE_PX, math.pi / 2)
+
+
+def run() -> list[Row]:
+    """Times visibility, frontiers, one frame of object memory, and clean-up."""
+    return [*_visibility(), *_frontiers(), *_object_frame(), *_clean_up()]
+
+
+# Occupancy
+
+
+def _floor() -> OccupancyGrid:
+    """Rooms of 40 x 40 cells with a door in every wall and something in the way."""
+    row, col = np.mgrid[:400, :400] % 40
+    is_door = ((row >= 15) & (row < 23)) | ((col >= 15) & (col < 23))
+    furniture = (row >= 25) & (row < 33) & (col >= 8) & (col < 13)
+    return OccupancyGrid((((row < 2) | (col < 2)) & ~is_door | furniture).astype(np.uint8), 0.1, (0.0, 0.0))
+
+
+def _place(x_m: float, z_m: float, yaw_rad: float) -> Pose:
+    return Pose(x_m, 0.0, z_m, yaw_rad)
+
+
+def _visibility() -> list[Row]:
+    grid, rng = _floor(), np.random.default_rng(0)
+    poses = [_place(*rng.uniform(8, 30, 2), yaw) for yaw in rng.uniform(0, 6, 200)]
+    bearings, ranges_m = np.linspace(-math.pi / 4, math.pi / 4, 300)[:, None], np.arange(0, 3, 0.05)[None]
+
+    def sampled(number: int) -> object:
+        pose = poses[number]
+        heading = pose.yaw_rad + bearings
+        col = ((pose.x_m + np.sin(heading) * ranges_m) / grid.cell_m).astype(np.int32)
+        row = ((pose.z_m + np.cos(heading) * ranges_m) / grid.cell_m).astype(np.int32)
+        is_hit = grid.cells[row, col] != 0
+        is_reached = np.cumsum(is_hit, axis=1) - is_hit == 0
+        seen = np.zeros(grid.cells.shape, np.bool_)
+        seen[row[is_reached], col[is_reached]] = True
+        return np.argwhere(seen & (grid.cells == 0)), np.argwhere(seen & (grid.cells != 0))
+
+    def ours(number: int) -> VisibleOccupancy:
+        return visible_occupancy(grid, poses[number], _INTRINSICS, 3.0)
+
+    return compare("visible cells of a view", ours, {"NumPy, 300 sampled rays": sampled}, len(poses), repeats=20)
+
+
+def _frontiers() -> list[Row]:
+    grid = _floor()
+    seen = OccupancyMap(MapFrame(400, 400, grid.cell_m, grid.corner_m))
+    for step in range(60):
+        x_m, z_m = 5.9 + 0.45 * (step % 40), 5.9 + 4.0 * (step // 20)
+        for quarter in range(4):
+            pose = _place(x_m, z_m, quarter * math.pi / 2)
+            seen.integrate(visible_occupancy(grid, pose, _INTRINSICS, 3.0), (x_m, z_m))
+    agent_m = (14.0, 9.9)
+    free, unexplored = (seen.cells == 1).astype(np.uint8), (~seen.explored).astype(np.uint8)
+
+    def ours(_: int) -> object:
+        seen.clear_frontiers()
+        return seen.update_frontiers(agent_m)
+
+    def peer(_: int) -> list[frozenset[tuple[int, int]]]:
+        return _frontiers_opencv(free, unexplored, (99, 140))
+
+    regions = _frontiers_opencv(free, unexplored, (99, 140), cells=True)
+    found = {tuple(cell) for frontier in seen.update_frontiers(agent_m) for cell in frontier.cells.tolist()}
+    if {cell for region in regions for cell in region} != found:
+        raise AssertionError("the peer found other frontiers")
+    return compare("frontiers, 400x400", ours, {"OpenCV, regions only": peer}, 200)
+
+
+_NEIGHBOURS = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], np.float32)
+
+
+def _frontiers_opencv(
+    free: NDArray[np.uint8], unexplored: NDArray[np.uint8], agent: tuple[int, int], *, cells: bool = False
+) -> list[frozenset[tuple[int, int]]]:
+    _, labels = cv2.connectedComponents(free, connectivity=4)
+    island = labels == labels[agent]
+    num_unexplored = cv2.filter2D(unexplored, cv2.CV_8U, _NEIGHBOURS, borderType=cv2.BORDER_CONSTANT)
+    inner = (island & (num_unexplored == 8)).astype(np.uint8)
+    edges = island & (num_unexplored >= 4) & (num_unexplored <= 6)
+    count, regions, statistics, _ = cv2.connectedComponentsWithStats(inner, connectivity=4)
+    large = [i for i in range(1, count) if statistics[i, cv2.CC_STAT_AREA] >= 20] if edges.any() else []
+    return [frozenset(map(tuple, np.argwhere(regions == i).tolist())) for i in large] if cells else []
+
+
+# Objects
+
+
+def _boxes() -> NDArray[np.float64]:
+    """`(100, 3)` middles of boxes on a floor, ten a row."""
+    i = np.arange(100)
+    return np.stack([i % 10 * 0.8, 0.2 + 0.05 * (i % 7), i // 10 * 0.8], axis=1)
+
+
+def _axes(pose: Pose) -> NDArray[np.float64]:
+    """Rows: right, down, forward."""
+    sin, cos, tilt, level = (
+        math.sin(pose.yaw_rad),
+        math.cos(pose.yaw_rad),
+        math.sin(pose.horizon_rad),
+        math.cos(pose.horizon_rad),
+    )
+    return np.array([[cos, 0, -sin], [-sin * tilt, -level, -cos * tilt], [sin * level, -tilt, cos * level]])
+
+
+def _look(boxes: NDArray[np.float64], x_m: float, height_m: float, z_m: float, yaw_rad: float, tilt_rad: float) -> View:
+    """Depth and masks of boxes, ray by ray; masks count in their order."""
+    pose = Pose(x_m, 0.0, z_m, yaw_rad, tilt_rad)
+    uv = (np.arange(SIDE_PX) + 0.5 - SIDE_PX / 2) / _INTRINSICS.focal_px
+    local = np.stack([*np.meshgrid(uv, uv), np.ones((SIDE_PX, SIDE_PX))], axis=-1)
+    rays = local @ _axes(pose)
+    depth_m = np.full((SIDE_PX, SIDE_PX), np.inf, np.float32)
+    masks = np.full((SIDE_PX, SIDE_PX), -1, np.int32)
+    for index, box in enumerate(boxes):
+        middle = box - (x_m, height_m, z_m)
+        sides = np.stack([(middle - BOX_M / 2) / rays, (middle + BOX_M / 2) / rays])
+        enter, leave = sides.min(0).max(-1), sides.max(0).min(-1)
+        is_hit = (enter < leave) & (enter > 0) & (enter < depth_m)
+        depth_m[is_hit], masks[is_hit] = enter[is_hit], index
+    return _view(pose, height_m, depth_m, masks, len(boxes))
+
+
+def _view(pose: Pose, height_m: float, depth_m: NDArray[np.float32], masks: NDArray[np.int32], num: int) -> View:
+    nothing = np.zeros((0, 2), np.int32)
+    found = Detections(masks, ("Box",) * num, np.ones(num, np.float32))
+    occupancy = VisibleOccupancy(nothing, nothing)
+    return View(pose, _INTRINSICS, depth_m, found, occupancy, camera_height_m=height_m)
+
+
+def _full_map(num_boxes: int = 100, views_per_cleanup: int = 0) -> ObjectMap:
+    """Every box seen from four sides and above."""
+    entries = ObjectMap(ObjectMapConfig(views_per_cleanup=views_per_cleanup))
+    for box in _boxes()[:num_boxes]:
+        x, y, z = box.tolist()
+        for turn, (dx, dz) in enumerate([(0, -0.9), (-0.9, 0), (0, 0.9), (0.9, 0)]):
+            entries.update(_look(box[None], x + dx, y + 0.7, z + dz, turn * math.pi / 2, 0.7))
+    return entries
+
+
+def _frame() -> View:
+    """The twenty boxes that show most of themselves."""
+    view = _look(_boxes(), 3.4, 1.9, 1.2, 0.2, 0.6)
+    areas = np.bincount(view.detections.masks[view.detections.masks >= 0], minlength=100)
+    number_of = np.full(101, -1, np.int32)
+    number_of[np.argsort(-areas, kind="stable")[:20]] = np.arange(20)
+    return _view(view.pose, view.camera_height_m, view.depth_m, number_of[view.detections.masks], 20)
+
+
+@dataclass
+class _Cloud:
+    """An object as ConceptGraphs keeps it."""
+
+    points: o3d.geometry.PointCloud
+    box: o3d.geometry.OrientedBoundingBox
+    label: str
+
+
+def _cloud(points: NDArray[np.float64]) -> o3d.geometry.PointCloud:
+    return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+
+
+def _largest_cluster(cloud: o3d.geometry.PointCloud) -> o3d.geometry.PointCloud:
+    labels = np.asarray(cloud.cluster_dbscan(eps=0.1, min_points=10))
+    if not (labels >= 0).any():
+        return cloud
+    return cloud.select_by_index(np.flatnonzero(labels == np.bincount(labels[labels >= 0]).argmax()))
+
+
+def _detect_open3d(view: View) -> list[_Cloud]:
+    uv = (np.arange(SIDE_PX) + 0.5 - SIDE_PX / 2) / _INTRINSICS.focal_px
+    u, v = np.meshgrid(uv, uv)
+    axes, camera_m = _axes(view.pose), (view.pose.x_m, view.camera_height_m, view.pose.z_m)
+    clouds = []
+    for number, label in enumerate(view.detections.labels):
+        mask = view.detections.masks == number
+        depth = view.depth_m[mask].astype(np.float64)
+        points = np.stack([u[mask] * depth, v[mask] * depth, depth], axis=1) @ axes + camera_m
+        cloud = _largest_cluster(_cloud(points).voxel_down_sample(0.01))
+        clouds.append(_Cloud(cloud, cloud.get_oriented_bounding_box(robust=True), label))
+    return clouds
+
+
+def _associate_open3d(stored: list[_Cloud], view: View) -> list[int]:
+    """Entry of each detection, -1 for a new one; entries are not changed, merged ones are made and dropped."""
+    found = _detect_open3d(view)
+    points = [np.asarray(cloud.points.points, np.float32) for cloud in stored]
+    bounds = [(p.min(0), p.max(0)) for p in points]
+    indices = []
+    for entry in points:
+        index = faiss.IndexFlatL2(3)
+        index.add(entry)
+        indices.append(index)
+    matches = []
+    for detection in found:
+        query = np.asarray(detection.points.points, np.float32)
+        low, high = query.min(0), query.max(0)
+        scores = np.zeros(len(stored))
+        for i, (entry_low, entry_high) in enumerate(bounds):
+            if (low <= entry_high).all() and (entry_low <= high).all():
+                distances2, _ = indices[i].search(query, 1)
+                scores[i] = float((distances2 < 0.025**2).mean()) + (detection.label == stored[i].label)
+        best = int(scores.argmax())
+        matches.append(best if scores[best] > 1.2 else -1)
+        if matches[-1] >= 0:
+            merged = (stored[best].points + detection.points).voxel_down_sample(0.01)
+            merged.get_oriented_bounding_box(robust=True)
+    return matches
+
+
+def _object_frame() -> list[Row]:
+    view, num = _frame(), 7
+    maps = [_full_map() for _ in range(num)]
+    first = maps[0]
+    stored = []
+    for entry in first.entries:
+        points = first.points_m(entry.id)
+        assert points is not None
+        cloud = _cloud(points.astype(np.float64))
+        stored.append(_Cloud(cloud, cloud.get_oriented_bounding_box(robust=True), entry.label))
+    theirs = [first.entries[i].id if i >= 0 else None for i in _associate_open3d(stored, view)]
+    if list(_full_map().update(view).entry_ids) != theirs or len(first) != 100:
+        raise AssertionError("the peer associates otherwise")
+
+    def ours(number: int) -> object:
+        return maps[number].update(view)
+
+    def peer(_: int) -> object:
+        return _associate_open3d(stored, view)
+
+    faiss.omp_set_num_threads(1)
+    return compare("object memory, 20 masks, 100 entries", ours, {"Open3D + faiss": peer}, num)
+
+
+def _clean_up() -> list[Row]:
+    entries = _full_map(10, views_per_cleanup=1)
+    clouds = [entries.points_m(entry.id) for entry in entries.entries]
+    points = [cloud.astype(np.float64) for cloud in clouds if cloud is not None]
+    view = _frame()
+    nothing = replace(view, detections=Detections(np.full_like(view.detections.masks, -1), (), np.ones(0, np.float32)))
+
+    def open3d(_: int) -> object:
+        return [_largest_cluster(_cloud(cloud)) for cloud in points]
+
+    def scikit(_: int) -> object:
+        return [DBSCAN(eps=0.1, min_samples=10).fit_predict(cloud) for cloud in points]
+
+    def ours(_: int) -> object:
+        return entries.update(nothing)
+
+    return compare("clean-up of 10 entries", ours, {"Open3D DBSCAN": open3d, "scikit-learn DBSCAN": scikit}, 5)

@@ -1,0 +1,40 @@
+//! Cleaning point clouds.
+
+use crate::{
+    geometry::{Aabb, Vec3},
+    memory::{
+        cloud::Cloud, dbscan::largest_cluster, objects::ObjectMapConfig, voxels::voxel_filter,
+    },
+    sensors::unproject::Point,
+};
+
+/// A detection's points cleaned, and the box around them; `None` if too little is left.
+pub(crate) fn clean(points: &[Point], config: &ObjectMapConfig) -> Option<(Vec<Point>, Aabb)> {
+    if points.len() < config.min_points {
+        return None;
+    }
+    let filtered = voxel_filter(points, config.voxel_m);
+    let radius_m = config.cluster_radius_m as f32;
+    let cluster = largest_cluster(&filtered, radius_m, config.cluster_min_points)
+        .filter(|cluster| cluster.len() >= 5)
+        .unwrap_or(filtered);
+    let bounds_m = Aabb::of_points(cluster.iter().map(|point| point.map(f64::from)));
+    // A picture seen from the front is a plane; as a set of voxels it has a volume all the same.
+    let volume_m3: f64 = bounds_m.size_m().iter().map(|edge| edge.max(config.voxel_m)).product();
+    (volume_m3 >= config.min_box_m3).then_some((cluster, bounds_m))
+}
+
+/// Keeps the largest cluster of an entry's cloud, if that leaves enough.
+pub(crate) fn denoise(cloud: &mut Cloud, config: &ObjectMapConfig) {
+    let radius_m = config.cluster_radius_m as f32;
+    let cluster = largest_cluster(cloud.points(), radius_m, config.cluster_min_points);
+    if let Some(cluster) = cluster.filter(|c| (4..cloud.points().len()).contains(&c.len())) {
+        *cloud = Cloud::new(&cluster, config.voxel_m, config.overlap_radius_m as f32);
+    }
+}
+
+/// Mean of points; the origin for none.
+pub(crate) fn centroid_m(points: &[Point]) -> Vec3 {
+    let count = points.len().max(1) as f64;
+    [0, 1, 2].map(|i| points.iter().map(|p| f64::from(p[i])).sum::<f64>() / count)
+}
