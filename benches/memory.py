@@ -162,7 +162,7 @@ def _view(pose: Pose, height_m: float, depth_m: NDArray[np.float32], masks: NDAr
 
 def _full_map(num_boxes: int = 100, views_per_cleanup: int = 0) -> ObjectMap:
     """Every box seen from four sides and above."""
-    entries = ObjectMap(ObjectMapConfig(views_per_cleanup=views_per_cleanup))
+    entries = ObjectMap(ObjectMapConfig(max_distance_m=10.0, views_per_cleanup=views_per_cleanup))
     for box in _boxes()[:num_boxes]:
         x, y, z = box.tolist()
         for turn, (dx, dz) in enumerate([(0, -0.9), (-0.9, 0), (0, 0.9), (0.9, 0)]):
