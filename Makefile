@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
-.PHONY: setup demo test lint bench wheel clean
+.PHONY: setup demo test lint bench wheel data readme clean
 
 $(VENV)/.dependencies: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -42,6 +42,17 @@ bench: setup
 
 wheel: $(VENV)/.dependencies
 	$(BIN)/maturin build --release --out dist
+
+# The bundled tasks, made again from the bundled houses.
+data: setup
+	$(BIN)/python scripts/build_tasks.py
+
+# The results and the picture of the README, from a fresh demo.
+readme: setup
+	rm -rf out/demo
+	$(BIN)/evonav demo --out out/demo
+	$(BIN)/python scripts/update_readme.py out/demo
+	$(BIN)/evonav strip out/demo bundled-0143-9c54b9-s0 --agents ftu --stages 3,4,5 --out docs/images/episode.svg
 
 clean:
 	rm -rf $(VENV) target dist out
