@@ -16,7 +16,7 @@ from evonav.tasks import Task, load_tasks, write_task
 
 ROOT = Path(__file__).resolve().parents[1] / "python" / "evonav" / "data" / "tasks"
 SEED = 0
-FIRST_TEST_HOUSE = 89
+FIRST_TEST_HOUSE = 84
 """Line of the first house with test assets."""
 NUM_TASKS = {2: 6, 3: 4, 4: 6, 5: 4, 6: 3, 7: 2, 8: 3, 10: 2}
 """Tasks by number of rooms."""
