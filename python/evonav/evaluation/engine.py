@@ -147,7 +147,7 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
     with RunStore(run_dir) as store:
         agents: list[str] = store.meta("agents") or []
         num_stages = sum(store.meta("num_stages").values())
-        records = {agent: list(store.records(agent)) for agent in agents}
+        records = {agent: list(store.records(agent, is_brief=True)) for agent in agents}
     summaries = {agent: summarise(agent, records[agent], num_stages) for agent in agents}
     content = summary_json(list(summaries.values()), paired_differences(records))
     _write_atomically(run_dir / SUMMARY_NAME, json.dumps(content, indent=2, sort_keys=True) + "\n")

@@ -128,13 +128,22 @@ class RunStore:
         except sqlite3.Error as error:
             raise StoreError(f"{self.path}: {error}") from error
 
-    def records(self, agent: str | None = None, task_id: str | None = None) -> Iterator[StageRecord]:
+    def records(
+        self, agent: str | None = None, task_id: str | None = None, *, is_brief: bool = False
+    ) -> Iterator[StageRecord]:
         """Stage records by agent, task and stage, whatever order they were finished in.
+
+        Args:
+            agent: Only this one's.
+            task_id: Only of this task.
+            is_brief: Leave out traces and entries, which are most of a record and no part of a measure.
 
         Raises:
             StoreError: A row is not a valid record.
         """
-        for text in self.record_texts(agent, task_id):
+        for text in self._texts(
+            "json_remove(record, '$.trace', '$.entries')" if is_brief else "record", agent, task_id
+        ):
             try:
                 yield StageRecord.model_validate_json(text)
             except ValidationError as error:
@@ -142,8 +151,11 @@ class RunStore:
 
     def record_texts(self, agent: str | None = None, task_id: str | None = None) -> Iterator[str]:
         """The records as stored, in the order of `records`: equal runs give equal texts."""
+        return self._texts("record", agent, task_id)
+
+    def _texts(self, column: str, agent: str | None, task_id: str | None) -> Iterator[str]:
         query = (
-            "SELECT record FROM stages WHERE (?1 IS NULL OR agent = ?1) AND (?2 IS NULL OR task_id = ?2) "
+            f"SELECT {column} FROM stages WHERE (?1 IS NULL OR agent = ?1) AND (?2 IS NULL OR task_id = ?2) "  # noqa: S608
             "ORDER BY agent, task_id, stage"
         )
         for (text,) in self._db.execute(query, (agent, task_id)):

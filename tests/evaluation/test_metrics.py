@@ -1,0 +1,145 @@
+"""Measures against a second implementation, and intervals against their definition."""
+
+import math
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from toy_house import episode_case
+
+from evonav.errors import StoreError
+from evonav.evaluation.metrics import (
+    bootstrap_means,
+    paired_differences,
+    rates,
+    stage_soft_spl,
+    stage_spl,
+    summarise,
+    wilson,
+)
+from evonav.evaluation.protocol import as_errored
+from evonav.evaluation.records import EndState, ErrorKind
+from evonav.evaluation.store import RunStore
+
+LENGTHS = st.floats(0.0, 100.0)
+
+
+@given(st.booleans(), LENGTHS, LENGTHS)
+def test_spl_is_the_papers_formula(is_success, path_m, reference_m):
+    got = stage_spl(is_success, path_m, reference_m)
+    assert 0.0 <= got <= 1.0
+    if not is_success:
+        assert got == 0.0
+    elif max(path_m, reference_m) > 0.0:
+        assert got == pytest.approx(reference_m / max(path_m, reference_m))
+    else:
+        assert got == 1.0
+
+
+@given(LENGTHS, LENGTHS, LENGTHS, LENGTHS)
+def test_soft_spl_is_a_share(start_m, end_m, path_m, reference_m):
+    assert 0.0 <= stage_soft_spl(start_m, end_m, path_m, reference_m) <= 1.0
+
+
+def test_wilson_is_the_published_interval():
+    # Newcombe, Statistics in Medicine 17 (1998), table I: 81/263 and 0/20.
+    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
+    assert wilson(0, 20) == pytest.approx((0.0, 0.1611), abs=5e-5)
+    assert wilson(0, 0) is None
+
+
+def test_bootstrap_resamples_tasks():
+    """Against a plain loop, and wider than if stages were independent."""
+    random = Random(3)
+    tasks = [f"t{i}" for i in range(12) for _ in range(random.choice((3, 4, 5)))]
+    level = {task: random.random() for task in tasks}
+    values = np.array([[float(random.random() < level[task]), level[task]] for task in tasks])
+    got = bootstrap_means(values, tasks)
+    names = sorted(set(tasks))
+    rows = {name: values[[i for i, task in enumerate(tasks) if task == name]] for name in names}
+    means = [np.concatenate([rows[random.choice(names)] for _ in names]).mean(axis=0) for _ in range(10_000)]
+    assert got == pytest.approx(np.quantile(means, [0.025, 0.975], axis=0).T, abs=0.015)
+    alone = bootstrap_means(values, [str(i) for i in range(len(tasks))])
+    assert got[1, 1] - got[1, 0] > alone[1, 1] - alone[1, 0]
+    assert bootstrap_means(values, tasks) == pytest.approx(got, abs=0.0)
+
+
+def made(agent, successes):
+    """Records of `successes`: (task, stage, success, spl, is_relocated)."""
+    blank = episode_case("toy-moved").blank_record(agent, 1)
+    return [
+        blank.model_copy(
+            update={
+                "task_id": task,
+                "stage": stage,
+                "state": EndState.SUCCESS if success else EndState.FAILURE,
+                "spl": spl if success else 0.0,
+                "target": blank.target.model_copy(update={"is_relocated": moved}),
+            }
+        )
+        for task, stage, success, spl, moved in successes
+    ]
+
+
+OUTCOMES = st.lists(
+    st.tuples(st.sampled_from("abcd"), st.integers(1, 5), st.booleans(), st.floats(0.0, 1.0), st.booleans()),
+    min_size=1,
+    max_size=20,
+    unique_by=lambda outcome: outcome[:2],
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(OUTCOMES)
+def test_a_summary_agrees_with_arithmetic(outcomes):
+    summary = summarise("x", made("x", outcomes), num_stages=len(outcomes))
+    assert summary.n == len(outcomes)
+    assert not summary.is_incomplete
+    assert summary.sr == pytest.approx(sum(o[2] for o in outcomes) / len(outcomes), abs=1e-12)
+    assert summary.spl == pytest.approx(math.fsum(o[3] for o in outcomes if o[2]) / len(outcomes), abs=1e-12)
+    later = [o for o in outcomes if o[1] > 1]
+    for name, part in (
+        ("stage_1", [o for o in outcomes if o[1] == 1]),
+        ("relocated", [o for o in later if o[4]]),
+        ("not_relocated", [o for o in later if not o[4]]),
+    ):
+        found = summary.splits.get(name)
+        assert (found.n if found else 0) == len(part)
+        if part:
+            assert found.sr == pytest.approx(sum(o[2] for o in part) / len(part))
+
+
+def test_errored_stages_are_no_failures():
+    records = made("x", [("a", 1, True, 1.0, False), ("a", 2, True, 0.5, False)])
+    records.append(as_errored(records[0].model_copy(update={"stage": 3}), ErrorKind.CRASH, "died"))
+    summary = summarise("x", records, num_stages=5)
+    assert (summary.sr, summary.n) == (1.0, 2)
+    assert summary.counts == {"success": 2, "failure": 0, "errored": 1, "not_run": 2}
+    assert summary.is_incomplete
+    assert rates(records[2:]).sr is None
+
+
+def test_pairs_are_compared_on_common_stages():
+    a = made("a", [("t", 1, True, 1.0, False), ("t", 2, False, 0.0, False), ("u", 1, True, 0.5, False)])
+    b = made("b", [("t", 1, False, 0.0, False), ("t", 2, True, 0.8, False), ("v", 1, True, 0.5, False)])
+    (pair,) = paired_differences({"a": a, "b": b})
+    assert (pair.n, pair.num_only_a, pair.num_only_b) == (2, 1, 1)
+    assert pair.sr == 0.0
+    assert pair.spl == pytest.approx(-0.1)
+
+
+def test_a_stage_is_recorded_once(tmp_path):
+    (record,) = made("a", [("t", 1, True, 1.0, False)])
+    with RunStore(tmp_path, create=True) as store:
+        store.add_stage(record, wall_s=1.0, cpu_s=0.5)
+        with pytest.raises(StoreError):
+            store.add_stage(record, wall_s=1.0, cpu_s=0.5)
+        assert list(store.records()) == [record]
+        assert [brief.trace for brief in store.records(is_brief=True)] == [()]
+        assert store.timings() == {("a", "t", 1): (1.0, 0.5)}
+    with RunStore(tmp_path) as store:
+        store._db.execute("UPDATE stages SET record = '{}'")
+        with pytest.raises(StoreError):
+            list(store.records())

@@ -1,0 +1,146 @@
+"""Motion and the floor plan: waypoints on any path, views on any schedule, rooms and footprints from above."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from toy_house import ToySimulator, episode_case
+
+from evonav.agents.agent import NavigateTo, Sensing, ViewSchedule
+from evonav.agents.viewpoint import observation_point
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.cases import _turned_corners, room_at, stage_map
+from evonav.evaluation.motion import Planner, navigate, polyline_length_m, waypoints
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.sensing import view_yaws_rad
+from evonav.sensors.observation import MapFrame
+from evonav.world.pose import Pose
+
+POINTS = st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), min_size=1, max_size=6)
+
+
+@given(POINTS, st.floats(0.05, 2.0), st.floats(0.1, 20.0))
+def test_waypoints_follow_the_path(corners, spacing_m, max_travel_m):
+    points, is_end = waypoints(corners, spacing_m, max_travel_m)
+    path = [corners[0], *points]
+    whole_m = polyline_length_m(corners)
+    assert polyline_length_m(path) == pytest.approx(min(whole_m, max_travel_m), abs=1e-6)
+    assert all(math.dist(a, b) <= spacing_m + 1e-6 for a, b in pairwise(path))
+    if is_end:
+        assert path[-1] == corners[-1]
+        assert whole_m <= max_travel_m + 1e-6
+    passed = [corner for corner in corners if corner in path]
+    assert passed[:1] == corners[:1]
+
+
+@given(st.integers(1, 7), st.floats(10.0, 90.0), st.floats(-math.pi, math.pi))
+def test_views_are_evenly_spaced_and_the_heading_is_last(count, spacing_deg, heading_rad):
+    yaws = view_yaws_rad(ViewSchedule(count, spacing_deg), heading_rad)
+    assert len(yaws) == count
+    steps = np.diff(np.sort(yaws))
+    assert steps == pytest.approx(math.radians(spacing_deg))
+    if count % 2:
+        assert yaws[-1] == pytest.approx(heading_rad)
+        assert sum(yaws) / count == pytest.approx(heading_rad)
+
+
+def test_navigation_stops_after_a_metre_and_turns_on_arrival():
+    simulator = ToySimulator()
+    case = episode_case("toy-static")
+    simulator.reset(case.stages[0].house_json, case.start)
+    planner = Planner(simulator)
+    action = NavigateTo((2.5, 4.0), face_m=(2.5, 5.0))
+    first = navigate(simulator, planner, action, spacing_m=0.25, max_travel_m=1.0)
+    assert first.length_m == pytest.approx(1.0)
+    assert not first.has_arrived
+    second = navigate(simulator, planner, action, spacing_m=0.25, max_travel_m=1.0)
+    assert second.has_arrived
+    assert (simulator.pose.x_m, simulator.pose.z_m) == pytest.approx((2.5, 4.0), abs=0.1)
+    assert simulator.pose.yaw_rad == pytest.approx(0.0, abs=0.2)
+
+
+def test_the_protocol_caps_what_an_agent_may_sense():
+    ProtocolConfig().check(Sensing())
+    for sensing in (
+        Sensing(first_round=ViewSchedule(8, 40.0)),
+        Sensing(later_rounds=ViewSchedule(0, 40.0)),
+        Sensing(max_travel_m=1.5),
+        Sensing(max_travel_m=float("nan")),
+        Sensing(occupancy_range_m=3.5),
+    ):
+        with pytest.raises(InvalidArgumentError):
+            ProtocolConfig().check(sensing)
+
+
+def test_the_floor_plan_holds_rooms_walls_and_footprints():
+    simulator = ToySimulator()
+    case = episode_case("toy-static")
+    simulator.reset(case.stages[0].house_json, case.start)
+    plan = stage_map(case, 1, simulator.objects)
+    assert room_at(plan, (1.0, 1.0)) == "room|1"
+    assert room_at(plan, (7.0, 1.0)) == "room|2"
+    assert room_at(plan, (9.0, 1.0)) is None
+    assert len(plan.walls) == 6
+    bed = next(entry for entry in plan.objects if entry.category == "Bed")
+    corners = np.array(sorted(bed.polygon_m)).round(6)
+    assert corners.tolist() == [[5.8, 3.2], [5.8, 4.8], [7.8, 3.2], [7.8, 4.8]]
+
+
+@given(st.floats(0.2, 3.0), st.floats(0.2, 3.0), st.floats(-180.0, 180.0))
+def test_footprints_have_the_box_of_the_body(width_m, depth_m, yaw_deg):
+    yaw_rad = math.radians(yaw_deg)
+    c, s = abs(math.cos(yaw_rad)), abs(math.sin(yaw_rad))
+    box = (width_m * c + depth_m * s, width_m * s + depth_m * c)
+    corners = np.array(_turned_corners(*box, yaw_rad))
+    assert np.ptp(corners, axis=0) == pytest.approx(box, abs=1e-6)
+    if abs(c * c - s * s) > 0.11:
+        sides = sorted(math.dist(a, b) for a, b in pairwise(corners))
+        assert sides[0] == pytest.approx(min(width_m, depth_m), abs=1e-6) or sides[-1] == pytest.approx(
+            max(width_m, depth_m), abs=1e-6
+        )
+
+
+FRAME = MapFrame(rows=60, cols=60, cell_m=0.1, corner_m=(-1.0, -1.0))
+
+
+def test_the_observation_point_lies_where_most_floor_is():
+    free = np.zeros((60, 60), dtype=bool)
+    free[:, 25:] = True  # everything at x >= 1.5
+    free[5:8, 5:8] = True  # and a small pocket
+    point = observation_point(free, FRAME, (1.0, 2.0))
+    assert point == pytest.approx((2.45, 2.0), abs=0.1)
+    assert observation_point(free, FRAME, (-0.9, 4.9)) is None
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(-1.5, 5.5), st.floats(-1.5, 5.5))
+def test_the_observation_point_is_free(seed, x_m, z_m):
+    free = np.random.default_rng(seed).random((60, 60)) < 0.3
+    point = observation_point(free, FRAME, (x_m, z_m))
+    if point is None:
+        rows, cols = np.nonzero(free)
+        assert np.hypot((cols + 0.5) * 0.1 - 1.0 - x_m, (rows + 0.5) * 0.1 - 1.0 - z_m).min() > 1.5 - 1e-9
+    else:
+        assert free[math.floor((point[1] + 1.0) / 0.1), math.floor((point[0] + 1.0) / 0.1)]
+        assert math.dist(point, (x_m, z_m)) < 1.9
+
+
+def test_a_pose_that_is_taken_is_snapped_and_recorded():
+    from evonav.evaluation.backend import make_agent
+    from evonav.evaluation.protocol import EpisodeCase
+    from evonav.evaluation.rollout import Episode
+    from evonav.sensors.ground_truth import GroundTruthPerception
+
+    case = episode_case("toy-static")
+    inside_table = EpisodeCase("t", "toy", Pose(2.0, 0.9, 1.2, 1.25), case.stages)
+    episode = Episode(
+        inside_table, "a", make_agent("random-walk"), ToySimulator(), GroundTruthPerception(), ProtocolConfig(), 0
+    )
+    record = next(iter(episode.run())).record
+    assert record.is_snapped
+    assert (record.requested_start.x_m, record.requested_start.z_m) == (2.0, 1.2)
+    assert record.effective_start != record.requested_start
+    assert record.effective_start.yaw_rad == 1.25
+    assert record.trace[0].pose == record.effective_start
