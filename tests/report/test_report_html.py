@@ -1,5 +1,6 @@
 import hashlib
 import re
+import sqlite3
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote
@@ -10,7 +11,7 @@ from made_up_run import WriteRun, record_run, stage_record
 from evonav.errors import StoreError
 from evonav.evaluation.records import EndState
 from evonav.evaluation.store import RunStore
-from evonav.report import html, tables, write_report
+from evonav.report import findings, html, tables, write_report
 from evonav.report.run import load_run
 
 VOID = {"meta", "input", "br", "link", "img"}
@@ -78,7 +79,7 @@ def test_the_page_shows_the_numbers_of_the_tables(write_run: WriteRun) -> None:
     run_dir = write_run()
     text = write_report(run_dir).read_text(encoding="utf-8")
     run = load_run(run_dir)
-    for table in html.run_tables(run):
+    for table in findings.run_tables(run):
         for row in table.rows:
             for cell in row:
                 assert f">{cell}<" in text, cell
@@ -205,11 +206,38 @@ def test_tasks_without_a_record_are_listed(tmp_path: Path) -> None:
 
 
 def test_statements_follow_the_numbers(write_run: WriteRun, tmp_path: Path) -> None:
-    first, second = html.statements(load_run(write_run()))
+    first, second = findings.statements(load_run(write_run()))
     assert first.startswith("ftu has the highest success rate, 91.7 [")
     assert second.endswith("points on the 12 stages that both scored: ftu is ahead beyond the interval.")
-    few = html.statements(load_run(write_run("few", num_tasks=2)))
+    few = findings.statements(load_run(write_run("few", num_tasks=2)))
     assert few[1] == "2 tasks are too few to tell agents apart."
     records = [stage_record(agent, "t", 1, EndState.SUCCESS) for agent in ("fu", "ftu")]
-    tied = html.statements(load_run(record_run(tmp_path / "tied", records, {"t": 1}, ["fu", "ftu"])))
+    tied = findings.statements(load_run(record_run(tmp_path / "tied", records, {"t": 1}, ["fu", "ftu"])))
     assert tied[0] == "fu and ftu have the same success rate, 100.0 %."
+
+
+def test_effort_counts_the_way_to_stale_entries(write_run: WriteRun) -> None:
+    run = load_run(write_run())
+    table = findings.effort_table(run)
+    fu, ftu = (dict(zip(table.columns, row, strict=True)) for row in table.rows)
+    # fu chose a stale entry in the three moves (1 m each) of each of its second stages.
+    assert (fu["of it to stale entries m"], fu["stale entries"], fu["rounds"]) == ("1.5", "0.5", "4.0")
+    assert (ftu["of it to stale entries m"], ftu["stale entries"]) == ("0.0", "0.0")
+    assert (fu["walked m"], fu["SoftSPL %"], fu["ended itself"]) == ("3.0", "50.0", "12 of 12")
+    assert run.wall_s == {"fu": 1.0, "ftu": 1.0}
+
+
+def test_a_row_that_is_no_record_is_an_error_that_names_the_run(write_run: WriteRun) -> None:
+    run_dir = write_run()
+    with sqlite3.connect(run_dir / "records.sqlite") as database:
+        database.execute("UPDATE stages SET record = '{}' WHERE task_id = 'task-2'")
+    database.close()
+    with pytest.raises(StoreError, match="validation errors for StageRecord"):
+        write_report(run_dir)
+
+
+def test_places_off_the_planet_do_not_stop_a_report(tmp_path: Path) -> None:
+    record = stage_record("fu", "t", 1, EndState.FAILURE)
+    target = record.target.model_copy(update={"position_m": (1e308, 0.0, -1e308)})
+    run_dir = record_run(tmp_path, [record.model_copy(update={"target": target})], {"t": 1}, ["fu"])
+    Page(write_report(run_dir))

@@ -1,12 +1,17 @@
 """A run as a report needs it: measures of all agents held at once, stages with their traces a task at a time."""
 
 import hashlib
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
+from evonav.errors import StoreError
 from evonav.evaluation.metrics import AgentSummary, PairedDifference, paired_differences, summarise
 from evonav.evaluation.records import StageMap, StageRecord
 from evonav.evaluation.store import RunStore
@@ -24,6 +29,10 @@ class StageOutcome:
     record: StageRecord
     """Without trace and entries."""
     cause: Cause | None
+    num_stale_entries: int
+    """In memory at the end."""
+    stale_path_m: float
+    """Walked in rounds that had chosen a stale entry."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +59,8 @@ class Run:
     """By (agent, task, stage)."""
     rows_sha256: Mapping[str, str]
     """By agent, of its records as stored: equal runs have equal ones."""
-    mean_wall_s: float | None
-    """A stage; not part of the records."""
+    wall_s: Mapping[str, float]
+    """Mean of a stage's wall time, by agent; not part of the records."""
     summaries: tuple[AgentSummary, ...]
     pairs: tuple[PairedDifference, ...]
 
@@ -76,6 +85,10 @@ class Run:
         for (agent, _, _), outcome in self.outcomes.items():
             found[agent].append(outcome.record)
         return found
+
+    def scored(self, agent: str) -> list[StageOutcome]:
+        """An agent's stages that count in rates."""
+        return [outcome for key, outcome in self.outcomes.items() if key[0] == agent and outcome.record.is_scored]
 
     def cause_counts(self) -> dict[str, Counter[Cause | None]]:
         """Stages by cause, for each agent."""
@@ -115,13 +128,12 @@ def load_run(run_dir: Path) -> Run:
             for text in store.record_texts(agent):
                 digest.update(text.encode())
                 digest.update(b"\n")
-                record = StageRecord.model_validate_json(text)
-                slim = record.model_copy(update={"trace": (), "entries": ()})
-                outcomes[agent, record.task_id, record.stage] = StageOutcome(slim, cause_of(record))
+                outcome = _outcome(text, run_dir)
+                outcomes[agent, outcome.record.task_id, outcome.record.stage] = outcome
             digests[agent] = digest.hexdigest()
         num_stages = _num_stages(store.meta("num_stages"), outcomes)
         config = store.meta("config") or {}
-        walls_s = [wall_s for wall_s, _ in store.timings().values() if wall_s > 0]
+        wall_s = _mean_wall_s(store.timings())
     records: dict[str, list[StageRecord]] = {agent: [] for agent in agents}
     for (agent, _, _), outcome in outcomes.items():
         records[agent].append(outcome.record)
@@ -133,9 +145,27 @@ def load_run(run_dir: Path) -> Run:
         config=config,
         outcomes=outcomes,
         rows_sha256=digests,
-        mean_wall_s=sum(walls_s) / len(walls_s) if walls_s else None,
+        wall_s=wall_s,
         summaries=tuple(summarise(agent, records[agent], total) for agent in agents),
         pairs=tuple(paired_differences(records)),
+    )
+
+
+def _outcome(text: str, run_dir: Path) -> StageOutcome:
+    try:
+        record = StageRecord.model_validate_json(text)
+    except ValidationError as error:
+        raise StoreError(f"{run_dir}: {error}") from error
+    return StageOutcome(
+        record=record.model_copy(update={"trace": (), "entries": ()}),
+        cause=cause_of(record),
+        num_stale_entries=sum(entry.is_stale for entry in record.entries),
+        stale_path_m=sum(
+            math.dist(a, b)
+            for decision in record.trace
+            if decision.chosen_entry is not None and decision.chosen_entry.is_stale
+            for a, b in pairwise(decision.path_m)
+        ),
     )
 
 
@@ -143,6 +173,15 @@ def _agents(asked: Sequence[str] | None, recorded: Sequence[str]) -> tuple[str, 
     """The agents of a run: the paper's in the order of its tables, then the others by name."""
     rank = {agent: i for i, agent in enumerate(PAPER_ORDER)}
     return tuple(sorted({*(asked or ()), *recorded}, key=lambda agent: (rank.get(agent, len(rank)), agent)))
+
+
+def _mean_wall_s(timings: Mapping[tuple[str, str, int], tuple[float, float]]) -> dict[str, float]:
+    """Mean over the stages that ran: one that was never begun has taken no time."""
+    found: dict[str, list[float]] = {}
+    for (agent, _, _), (wall_s, _) in timings.items():
+        if wall_s > 0.0:
+            found.setdefault(agent, []).append(wall_s)
+    return {agent: sum(times) / len(times) for agent, times in found.items()}
 
 
 def _num_stages(

@@ -14,6 +14,7 @@ Point = tuple[float, float]
 """`(x, z)` in metres, as in records."""
 
 MAX_SLUG_LENGTH = 80
+MAX_M = 1e7
 
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _NOT_SLUG = re.compile(r"[^A-Za-z0-9._-]+")
@@ -39,9 +40,9 @@ def slug(name: str) -> str:
 
 
 def cm(point_m: Point) -> tuple[int, int]:
-    """Page coordinates of a point; the origin where a coordinate is not finite."""
+    """Page coordinates of a point; the origin for one that is not finite or not on this planet."""
     x_m, z_m = point_m
-    if not (math.isfinite(x_m) and math.isfinite(z_m)):
+    if not (abs(x_m) < MAX_M and abs(z_m) < MAX_M):
         return (0, 0)
     return (round(100 * x_m), round(-100 * z_m))
 

@@ -1,0 +1,150 @@
+"""A task as the page shows it: what was asked, and a map with its outcome for every agent and stage."""
+
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from evonav.evaluation.records import EndState, StageRecord
+from evonav.report.causes import sentence
+from evonav.report.maps import change_words, outcome_words, task_frame
+from evonav.report.overlay import change, course, rounds
+from evonav.report.plan import Frame, furniture, ground, item_labels, labels, moving_ids
+from evonav.report.run import Run, Task
+from evonav.report.svg import clean, join, slug
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A stage of an agent in a task's grid."""
+
+    state: str
+    words: str
+    sentence: str
+    facts: str
+    rounds: list[str]
+    svg: Markup
+    change: str
+
+
+@dataclass(frozen=True, slots=True)
+class TaskView:
+    """A task as the template shows it."""
+
+    anchor: str
+    task_id: str
+    house: str
+    num_rooms: int
+    defs: Markup
+    goals: list[tuple[int, StageRecord | None, str, str | None]]
+    """Stage, a record that tells the goal, what changed before, and the reference image as a data URI."""
+    rows: list[tuple[str, list[Cell]]]
+    data: dict[str, str]
+
+
+def task_view(run: Run, task: Task, prefix: str) -> TaskView:
+    """Draws a task: the house once, what moves once a stage, every agent's stages over them."""
+    records = list(task.records.values())
+    frame = task_frame(task.maps, records)
+    shared = list(task.maps.values())
+    moving = moving_ids(shared)
+    defs = []
+    if shared:
+        fixed = [item for item in shared[0].objects if item.object_id not in moving]
+        defs.append(_shared(prefix, ground(shared[0], frame, moving)))
+        defs.append(_shared(f"{prefix}n", labels(shared[0], frame)))
+        defs.append(_shared(f"{prefix}f", item_labels(fixed, frame)))
+    for stage, stage_map in task.maps.items():
+        items = [item for item in stage_map.objects if item.object_id in moving]
+        told = next((record for record in records if record.stage == stage), None)
+        changed = "" if told is None else _changed(told, task, frame)
+        defs.append(_shared(f"{prefix}s{stage}", furniture(items, frame) + changed))
+        defs.append(_shared(f"{prefix}f{stage}", item_labels(items, frame)))
+    stages = range(1, task.num_stages + 1)
+
+    def cell(agent: str, stage: int) -> Cell:
+        record = task.records.get((agent, stage))
+        if record is None:
+            return Cell("not_run", "no record yet", "This stage has no record yet.", "", [], Markup(""), "")
+        below = _uses(prefix, stage) if stage in task.maps else _changed(record, task, frame)
+        name = clean(f"Map of stage {stage} for {agent}")
+        opening = Markup('<svg class="map" viewBox="{}" role="img" aria-label="{}">').format(frame.view_box, name)
+        drawn = opening + Markup(below + course(record, frame, run.success_radius_m) + "</svg>")  # noqa: S704
+        return Cell(
+            record.state.value,
+            outcome_words(record),
+            sentence(record),
+            _facts(record),
+            rounds(record.trace),
+            drawn,
+            change_words(record, task.maps),
+        )
+
+    goals = []
+    for stage in stages:
+        told = next((task.records[agent, stage] for agent in run.agents if (agent, stage) in task.records), None)
+        image = task.maps[stage].reference_image if stage in task.maps else None
+        goals.append((stage, told, "" if told is None else change_words(told, task.maps), image))
+    return TaskView(
+        anchor=slug(task.task_id),
+        task_id=task.task_id,
+        house=records[0].house if records else "",
+        num_rooms=len(shared[0].rooms) if shared else 0,
+        defs=Markup(join(defs)),  # noqa: S704 - our own SVG
+        goals=goals,
+        rows=[(agent, [cell(agent, stage) for stage in stages]) for agent in run.agents],
+        data=filter_data(run, task.task_id),
+    )
+
+
+def _shared(name: str, drawing: str) -> str:
+    """A group that many pictures show; style rules reach into it from its own root only, hence the class."""
+    return f'<g class="map" id="{name}">{drawing}</g>'
+
+
+def _uses(prefix: str, stage: int) -> str:
+    """A stage's house from its shared groups; names of furniture (`fine`) are for large pictures."""
+    ids = (prefix, f"{prefix}s{stage}", f"{prefix}n")
+    fine = (f"{prefix}f", f"{prefix}f{stage}")
+    return join([f'<use href="#{name}"/>' for name in ids] + [f'<use class="fine" href="#{name}"/>' for name in fine])
+
+
+def _changed(record: StageRecord, task: Task, frame: Frame) -> str:
+    maps = task.maps
+    return change(record.transition, frame, stage_map=maps.get(record.stage), previous_map=maps.get(record.stage - 1))
+
+
+def _facts(record: StageRecord) -> str:
+    """Figures of a stage in a line."""
+    parts = [f"{record.num_rounds} rounds"]
+    if record.path_length_m is not None:
+        shortest = "" if record.reference_length_m is None else f" (shortest {record.reference_length_m:.1f} m)"
+        parts.append(f"{record.path_length_m:.1f} m{shortest}")
+    parts.append(f"target seen in {record.num_target_visible_rounds}")
+    num_stale = sum(entry.is_stale for entry in record.entries)
+    if record.entries:
+        parts.append(f"{len(record.entries)} entries, {num_stale} stale")
+    if record.is_snapped:
+        parts.append("start moved to the nearest free place")
+    if record.transition.is_agent_in_room:
+        parts.append("stood in the room as it changed")
+    return " · ".join(parts)
+
+
+def filter_data(run: Run, task_id: str) -> dict[str, str]:
+    """What the page's filters look at: `data-*` attributes of a task."""
+    keys = [(agent, task_id, stage) for agent in run.agents for stage in range(1, run.num_stages[task_id] + 1)]
+    outcomes = {key: run.outcomes[key] for key in keys if key in run.outcomes}
+    states = {key: outcome.record.state for key, outcome in outcomes.items()}
+    num_disagreements = 0
+    for stage in range(1, run.num_stages[task_id] + 1):
+        found = {states.get((agent, task_id, stage)) for agent in run.agents}
+        num_disagreements += EndState.SUCCESS in found and len(found) > 1
+    causes = sorted({outcome.cause.name for outcome in outcomes.values() if outcome.cause is not None})
+    words = {outcome.record.goal.category.lower() for outcome in outcomes.values()}
+    return {
+        "task": slug(task_id),
+        "failures": str(sum(state is not EndState.SUCCESS for state in states.values())),
+        "disagreements": str(num_disagreements),
+        "causes": " ".join(causes),
+        "words": " ".join([task_id.lower(), *sorted(words)]),
+    }

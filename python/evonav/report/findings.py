@@ -1,0 +1,70 @@
+"""What a run shows: all its tables, and sentences that claim no more than the numbers allow."""
+
+from evonav.report import tables
+from evonav.report.run import Run
+
+
+def markdown_tables(run: Run) -> str:
+    """All tables of a run as one Markdown text."""
+    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in run_tables(run) if table.rows)
+
+
+def run_tables(run: Run) -> list[tables.Table]:
+    """All tables of a run, in reading order."""
+    records = run.records_by_agent()
+    return [
+        tables.headline(run.summaries),
+        tables.paired_table(run.pairs),
+        tables.stage_table(records),
+        tables.relocation_table(run.summaries),
+        tables.mode_table(run.summaries),
+        tables.cause_count_table(run.cause_counts()),
+        effort_table(run),
+    ]
+
+
+def effort_table(run: Run) -> tables.Table:
+    """What success cost, and what believing stale entries cost: means a scored stage."""
+    columns = ("Agent", "SoftSPL %", "rounds", "walked m", "of it to stale entries m", "stale entries", "ended itself")
+    rows = []
+    for summary in run.summaries:
+        scored = run.scored(summary.agent)
+        if not scored:
+            continue
+        means = (
+            sum(outcome.record.num_rounds for outcome in scored) / len(scored),
+            summary.mean_path_length_m or 0.0,
+            sum(outcome.stale_path_m for outcome in scored) / len(scored),
+            sum(outcome.num_stale_entries for outcome in scored) / len(scored),
+        )
+        ended = f"{summary.num_stopped} of {summary.n}"
+        rows.append((summary.agent, tables.percent(summary.soft_spl, None), *(f"{x:.1f}" for x in means), ended))
+    note = (
+        "Means a scored stage. Walked to stale entries: in rounds that chose an object entry with no object of its "
+        "label there. Stale entries: in memory at the end of a stage."
+    )
+    return tables.Table("Effort and staleness", columns, tuple(rows), (note,))
+
+
+def statements(run: Run) -> list[str]:
+    """What the run shows, in sentences that claim no more than the intervals allow."""
+    scored = sorted((s for s in run.summaries if s.sr is not None), key=lambda s: -(s.sr or 0.0))
+    if not scored:
+        return ["No stage has been scored yet."]
+    best = scored[0]
+    equal = [summary.agent for summary in scored if summary.sr == best.sr]
+    if len(equal) > 1:
+        lines = [f"{' and '.join(equal)} have the same success rate, {tables.percent(best.sr, None)} %."]
+    else:
+        measured = tables.percent(best.sr, best.sr_ci95)
+        lines = [f"{best.agent} has the highest success rate, {measured} % of {best.n} stages."]
+    pairs = [pair for pair in run.pairs if best.agent in (pair.a, pair.b)]
+    if pairs and all(pair.num_tasks < tables.MIN_TASKS_FOR_VERDICT for pair in pairs):
+        lines.append(f"{pairs[0].num_tasks} tasks are too few to tell agents apart.")
+        return lines
+    for pair in pairs:
+        lines.append(
+            f"{pair.b} less {pair.a}: {tables.points(pair.sr, pair.sr_ci95)} points on the {pair.n} stages that both "
+            f"scored: {tables.verdict(pair)}."
+        )
+    return lines
