@@ -54,6 +54,9 @@ class GenerationParameters(Record):
     changed_room_multiplier: NonNegativeFloat = 9.0
     previous_goal_room_multiplier: NonNegativeFloat = 0.2
     moved_object_multiplier: NonNegativeFloat = 9.0
+    goals_on_walls: bool = False
+    """Whether what hangs on walls, which no modification moves, may be a goal. The paper uses it as an anchor of
+    instructions; leaving it out of the goals brings the share of relocated goals (Sec. 3.2) to the published one."""
     reference_min_m: PositiveFloat = 1.0
     reference_max_m: PositiveFloat = 1.5
     reference_image_px: Annotated[int, Field(ge=16, le=4096)] = 300

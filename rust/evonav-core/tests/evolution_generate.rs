@@ -288,6 +288,22 @@ fn what_hangs_on_walls_stays() {
 }
 
 #[test]
+fn goals_hang_on_walls_only_where_that_is_allowed() {
+    for goals_on_walls in [false, true] {
+        let parameters = Parameters { goals_on_walls, ..Parameters::default() };
+        let mut num_hung = 0;
+        for (house, seed) in houses().iter().flat_map(|h| (0..12).map(|s| (h.clone(), s))) {
+            for stage in &generate(&house, seed, &parameters).stages {
+                let rule = Catalogue::bundled().placement(&stage.target.category);
+                let is_hung = rule.is_some_and(|rule| rule.is_placed(Place::Wall));
+                num_hung += usize::from(is_hung && stage.target.support_id.is_none());
+            }
+        }
+        assert_eq!(num_hung > 0, goals_on_walls, "{num_hung}");
+    }
+}
+
+#[test]
 fn rooms_that_could_be_reached_still_can() {
     for (house, mode) in houses().iter().flat_map(|h| Mode::ALL.map(|m| (h.clone(), m))) {
         let task = generate(&house, 1, &always(mode));

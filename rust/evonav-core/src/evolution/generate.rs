@@ -241,8 +241,11 @@ impl Generator<'_> {
             .iter()
             .enumerate()
             .filter_map(|(index, object)| {
-                let category = world.layout.items[index].asset.category.as_str();
-                Some((index, Candidate { category, room: object.room? }))
+                let item = &world.layout.items[index];
+                let is_allowed = !item.is_hung() || self.parameters.goals_on_walls;
+                let category = item.asset.category.as_str();
+                let room = object.room.filter(|_| is_allowed)?;
+                Some((index, Candidate { category, room }))
             })
             .unzip();
         let bias = GoalBias {

@@ -58,6 +58,11 @@ impl Item {
     pub fn solids_at(&self, placement: &Placement) -> Vec<Footprint> {
         solids_of(&self.parts, placement)
     }
+
+    /// Whether it hangs on a wall: on nothing, and not on the floor.
+    pub fn is_hung(&self) -> bool {
+        self.placement.parent.is_none() && !self.is_on_floor
+    }
 }
 
 /// All objects of a house, and the structure around them.

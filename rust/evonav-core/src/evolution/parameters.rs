@@ -30,6 +30,10 @@ pub struct Parameters {
     pub previous_goal_room_multiplier: f64,
     /// Weight of the salient object that just moved among its room's objects, which weigh 1.
     pub moved_object_multiplier: f64,
+    /// Whether what hangs on walls, which no modification moves, may be a goal. The paper uses it
+    /// as an anchor of instructions; leaving it out of the goals brings the share of relocated
+    /// goals to the published one.
+    pub goals_on_walls: bool,
     /// Least distance of the reference pose from the target, ground plane.
     pub reference_min_m: f64,
     /// Largest distance of the reference pose from the target, ground plane.
@@ -58,6 +62,7 @@ impl Default for Parameters {
             changed_room_multiplier: 9.0,
             previous_goal_room_multiplier: 0.2,
             moved_object_multiplier: 9.0,
+            goals_on_walls: false,
             reference_min_m: 1.0,
             reference_max_m: 1.5,
             reference_image_px: 300,

@@ -54,9 +54,8 @@ pub fn relations_of(house: &House, layout: &Layout, index: usize) -> Relations {
             kept.push(other.to_owned());
         }
     }
-    let is_hung = |item: &Item| item.placement.parent.is_none() && !item.is_on_floor;
     let wall_object = others()
-        .filter(|(_, item)| is_hung(item) && !is_hung(target) && item.asset.category != *category)
+        .filter(|(_, item)| item.is_hung() && !target.is_hung() && item.asset.category != *category)
         .map(|(_, item)| (gap_m(&outline, &outline_of(item)), item))
         .filter(|(gap, _)| *gap < WALL_OBJECT_M)
         .min_by(|a, b| a.0.total_cmp(&b.0));
