@@ -23,7 +23,7 @@ PANEL_PX = 360
 GAP_PX = 18
 HEAD_PX = 112
 FOOT_PX = 50
-IMAGE_PX = 84
+IMAGE_PX = 78
 
 
 def write_strip(
@@ -93,7 +93,7 @@ def strip_svg(rows: Sequence[Sequence[StageRecord]], maps: Mapping[int, StageMap
 def _head(record: StageRecord, maps: Mapping[int, StageMap], left_px: int) -> str:
     """What was asked in a stage, what the agents were shown, and what had changed."""
     image = None if record.stage not in maps else maps[record.stage].reference_image
-    width = 54 if image is None else 41
+    width = 54 if image is None else 38
     lines = join(
         f'<text class="instruction" y="{48 + 17 * i}">{escape(line)}</text>'
         for i, line in enumerate(text_lines(record.goal.instruction, width, 3))
@@ -103,11 +103,11 @@ def _head(record: StageRecord, maps: Mapping[int, StageMap], left_px: int) -> st
     shown = (
         ""
         if image is None
-        else f'<image href="{escape(image)}" x="{PANEL_PX - IMAGE_PX}" y="12" width="{IMAGE_PX}" height="{IMAGE_PX}"/>'
+        else f'<image href="{escape(image)}" x="{PANEL_PX - IMAGE_PX}" y="10" width="{IMAGE_PX}" height="{IMAGE_PX}"/>'
     )
     return (
         f'<g transform="translate({left_px} 0)"><text class="stage" y="27">Stage {record.stage}</text>{lines}{shown}'
-        f'<text class="{css}" y="{HEAD_PX - 8}">{escape(changed)}</text></g>'
+        f'<text class="{css}" y="{HEAD_PX - 7}">{escape(changed)}</text></g>'
     )
 
 

@@ -65,9 +65,16 @@
     }
   };
   slider.addEventListener("input", show);
+  const maps = all(".cell svg.map");
+  for (const svg of maps) svg.setAttribute("tabindex", "0");
+  document.addEventListener("keydown", (event) => {
+    if (event.key === "Enter" && maps.includes(event.target)) open(event.target);
+  });
   document.addEventListener("click", (event) => {
     const svg = event.target.closest(".cell svg.map");
-    if (!svg) return;
+    if (svg) open(svg);
+  });
+  const open = (svg) => {
     const cell = svg.closest(".cell"), task = svg.closest(".task"), big = dialog.querySelector(".big");
     const copy = svg.cloneNode(true);
     big.replaceChildren(copy);
@@ -89,6 +96,6 @@
     slider.parentNode.hidden = rounds.length < 2;
     show();
     dialog.showModal();
-  });
+  };
   dialog.addEventListener("click", (event) => { if (event.target === dialog) dialog.close(); });
 })();
