@@ -84,6 +84,7 @@ def test_the_page_shows_the_numbers_of_the_tables(write_run: WriteRun) -> None:
             for cell in row:
                 assert f">{cell}<" in text, cell
     assert tables.headline(run.summaries).markdown() in (run_dir / "table.md").read_text(encoding="utf-8")
+    assert (run_dir / "table.tex").read_text(encoding="utf-8").startswith(tables.headline(run.summaries).latex())
     assert (run_dir / "table.csv").read_text(encoding="utf-8") == tables.summary_csv(run.summaries)
     assert "Incomplete" not in text
     assert all(digest in text for digest in run.rows_sha256.values())
@@ -211,6 +212,8 @@ def test_statements_follow_the_numbers(write_run: WriteRun, tmp_path: Path) -> N
     assert second.endswith("points on the 12 stages that both scored: ftu is ahead beyond the interval.")
     few = findings.statements(load_run(write_run("few", num_tasks=2)))
     assert few[1] == "2 tasks are too few to tell agents apart."
+    (partial,) = findings.statements(load_run(write_run("partial", is_complete=False)))
+    assert partial.startswith("Not every agent has been scored on every stage")
     records = [stage_record(agent, "t", 1, EndState.SUCCESS) for agent in ("fu", "ftu")]
     tied = findings.statements(load_run(record_run(tmp_path / "tied", records, {"t": 1}, ["fu", "ftu"])))
     assert tied[0] == "fu and ftu have the same success rate, 100.0 %."

@@ -42,6 +42,7 @@ def test_csv_holds_unrounded_measures(write_run: WriteRun) -> None:
 def test_incomplete_runs_say_so_in_words(write_run: WriteRun) -> None:
     table = tables.headline(load_run(write_run(is_complete=False)).summaries)
     assert table.rows[1][-1] == "10 of 12, incomplete"
+    assert not table.best  # rates over different stages
     assert table.rows[1][6:8] == ("1", "1")  # errored, not run: the stage that has no record
     assert "Incomplete: ftu." in table.notes[1]
     for text in (table.markdown(), table.latex()):

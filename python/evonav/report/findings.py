@@ -9,6 +9,11 @@ def markdown_tables(run: Run) -> str:
     return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in run_tables(run) if table.rows)
 
 
+def latex_tables(run: Run) -> str:
+    """All tables of a run as LaTeX, for `\\usepackage{booktabs}`."""
+    return "\n".join(table.latex() for table in run_tables(run) if table.rows)
+
+
 def run_tables(run: Run) -> list[tables.Table]:
     """All tables of a run, in reading order."""
     records = run.records_by_agent()
@@ -52,6 +57,8 @@ def statements(run: Run) -> list[str]:
     if not scored:
         return ["No stage has been scored yet."]
     best = scored[0]
+    if any(summary.is_incomplete for summary in run.summaries):
+        return ["Not every agent has been scored on every stage: compare agents by their paired differences alone."]
     equal = [summary.agent for summary in scored if summary.sr == best.sr]
     if len(equal) > 1:
         lines = [f"{' and '.join(equal)} have the same success rate, {tables.percent(best.sr, None)} %."]

@@ -14,7 +14,7 @@ from evonav.evaluation.metrics import AgentSummary, Interval
 from evonav.report import tables
 from evonav.report.cards import TaskView, filter_data, task_view
 from evonav.report.causes import Cause
-from evonav.report.findings import markdown_tables, run_tables, statements
+from evonav.report.findings import latex_tables, markdown_tables, run_tables, statements
 from evonav.report.legend import legend
 from evonav.report.maps import map_css, map_name, outcome_words, stage_svg
 from evonav.report.run import Run, StageOutcome, load_run
@@ -28,7 +28,7 @@ MAP_DIR = "maps"
 
 
 def write_report(run_dir: Path, out_dir: Path | None = None) -> Path:
-    """Writes `report.html`, `table.md`, `table.csv` and, for runs that are not large, `maps/*.svg`.
+    """Writes `report.html`, `table.md`, `.tex`, `.csv` and, for runs that are not large, `maps/*.svg`.
 
     Deterministic but for wall-clock figures, safe on a run that is not finished or still being written.
 
@@ -47,6 +47,7 @@ def write_report(run_dir: Path, out_dir: Path | None = None) -> Path:
     try:
         out_dir.mkdir(parents=True, exist_ok=True)
         (out_dir / "table.md").write_text(markdown_tables(run), encoding="utf-8")
+        (out_dir / "table.tex").write_text(latex_tables(run), encoding="utf-8")
         (out_dir / "table.csv").write_text(tables.summary_csv(run.summaries), encoding="utf-8")
         is_paged = run.num_recorded > MAX_INLINE_STAGES
         views = _paged_views(run, out_dir) if is_paged else _inline_views(run, out_dir)

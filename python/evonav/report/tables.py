@@ -98,8 +98,9 @@ def headline(summaries: Sequence[AgentSummary]) -> Table:
     incomplete = [summary.agent for summary in summaries if summary.is_incomplete]
     if incomplete:
         notes.append(f"Incomplete: {', '.join(incomplete)}. Some stages errored or were not run; rates are not final.")
-    best = frozenset(_best([s.sr for s in summaries], 1) + _best([s.spl for s in summaries], 2))
-    return Table("Success rate and SPL", columns, rows, tuple(notes), best)
+    # Rates over different stages have no best.
+    best = [] if incomplete else _best([s.sr for s in summaries], 1) + _best([s.spl for s in summaries], 2)
+    return Table("Success rate and SPL", columns, rows, tuple(notes), frozenset(best))
 
 
 SPLIT_TITLES = {
