@@ -5,7 +5,7 @@ import sys
 
 from benches.table import write_section
 
-SECTIONS = {"memory": "Memory", "rendering": "Rendering"}
+SECTIONS = {"memory": "Memory", "navigation": "Navigation", "rendering": "Rendering"}
 """Module by title. A module has `NOTES` (Markdown) and `run() -> list[Row]`."""
 
 

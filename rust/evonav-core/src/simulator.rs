@@ -149,8 +149,7 @@ impl EmbeddedSimulator {
 
     /// Whether an agent fits at `[x, z]` and can walk there from the house's start.
     pub fn is_reachable(&self, point_m: Vec2) -> bool {
-        let length_m = || self.navigation.distances_m(self.start_m, &[point_m])[0];
-        self.navigation.is_free(point_m) && length_m().is_finite()
+        self.navigation.is_connected(self.start_m, point_m)
     }
 
     /// Whether nothing is between two points but the bodies in `ignored` (indices).

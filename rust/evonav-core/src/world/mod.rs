@@ -9,3 +9,4 @@ pub mod paths;
 pub mod scene;
 mod settle;
 mod structure;
+mod tangents;

@@ -118,7 +118,7 @@ impl Navigation {
 
     /// Whether the agent can stand at `[x, z]`: on a floor and in collision with nothing.
     pub fn is_free(&self, point_m: Vec2) -> bool {
-        self.is_indoors(point_m) && self.obstacles.is_clear(point_m)
+        self.obstacles.is_clear(point_m) && self.is_indoors(point_m)
     }
 
     /// Whether the agent can move straight from one point to the other, the sweep of its whole
