@@ -10,7 +10,7 @@ def markdown_tables(run: Run) -> str:
 
 
 def latex_tables(run: Run) -> str:
-    """All tables of a run as LaTeX, for `\\usepackage{booktabs}`."""
+    """All tables of a run as LaTeX, for the package `booktabs`."""
     return "\n".join(table.latex() for table in run_tables(run) if table.rows)
 
 
