@@ -192,8 +192,10 @@ class TextMatch:
         votes: dict[str, list[float]] = defaultdict(list)
         for other in around:
             room = _ROOM_OF_SIGN.get(canonical(other.label))
+            if room is None:
+                continue
             weight = 1.0 - math.dist(_ground(other), place_m) / self.config.room_radius_m
-            if room is not None and weight > 0.0:
+            if weight > 0.0:
                 votes[room].append(weight)
         return max(sorted(votes), key=lambda room: math.fsum(votes[room]), default=None)
 

@@ -124,6 +124,7 @@ class _StageRun:
         self._record = record
         self._requested = requested
         self._planner = motion.Planner(self._simulator)
+        self._bodies: dict[str, list[SceneObject]] = {}
         self._trace: list[RoundRecord] = []
         self._length_m = 0.0
         self.plan: StageMap | None = None
@@ -148,6 +149,8 @@ class _StageRun:
         with _blame(ErrorKind.SIMULATION):
             start = self._simulator.reset(self._stage.house_json, self._requested)
             is_snapped = math.dist((start.x_m, start.z_m), (self._requested.x_m, self._requested.z_m)) > 1e-6
+        for body in self._simulator.objects:
+            self._bodies.setdefault(body.category, []).append(body)
         self.plan = stage_map(self._case, stage, self._simulator.objects)
         room_id = room_at(self.plan, (self._requested.x_m, self._requested.z_m))
         evolved_room_id = self._record.transition.room_id
@@ -296,8 +299,8 @@ class _StageRun:
             size_m=belief.size_m,
             num_detections=belief.num_detections,
             is_stale=not any(
-                body.category == belief.label and _distance_to_box_m(belief.centre_m, body) <= STALE_MARGIN_M
-                for body in self._simulator.objects
+                _distance_to_box_m(belief.centre_m, body) <= STALE_MARGIN_M
+                for body in self._bodies.get(belief.label, ())
             ),
         )
 
