@@ -52,7 +52,7 @@ readme: setup
 	rm -rf out/demo
 	$(BIN)/evonav demo --out out/demo
 	$(BIN)/python scripts/update_readme.py out/demo
-	$(BIN)/evonav strip out/demo bundled-0143-9c54b9-s0 --agents ftu --stages 3,4,5 --out docs/images/episode.svg
+	$(BIN)/evonav strip out/demo --agents ftu --out docs/images/episode.svg
 
 clean:
 	rm -rf $(VENV) target dist out

@@ -93,8 +93,8 @@ def report(run: Annotated[Path, typer.Argument(help="Folder of a run.")]) -> Non
 @app.command()
 def strip(
     run: Annotated[Path, typer.Argument(help="Folder of a run.")],
-    task: Annotated[str, typer.Argument(help="Id of a task of the run.")],
     out: Annotated[Path, typer.Option(help="SVG file to write.")],
+    task: Annotated[str | None, typer.Argument(help="Id of a task of the run; default: the most telling one.")] = None,
     agents: Annotated[str, typer.Option(help="Agents of the run, comma-separated: a row each.")] = "ftu",
     stages: Annotated[str, typer.Option(help="Stages, comma-separated; default: all.")] = "",
 ) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from made_up_run import NEW_TABLE_M, WriteRun, entry, stage_map, stage_record
+from made_up_run import NEW_TABLE_M, WriteRun, entry, record_run, stage_map, stage_record
 from typer.testing import CliRunner
 
 from evonav.cli import app
@@ -13,7 +13,8 @@ from evonav.evaluation.records import EndState
 from evonav.report.maps import file_css, map_css, stage_svg
 from evonav.report.overlay import rounds as choices
 from evonav.report.plan import label_point
-from evonav.report.strip import write_strip
+from evonav.report.run import load_run
+from evonav.report.strip import most_telling, write_strip
 from evonav.report.svg import Point, polyline, simplified, slug
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -116,6 +117,25 @@ def test_strip_is_a_command(write_run: WriteRun, tmp_path: Path) -> None:
     assert CliRunner().invoke(app, [*arguments, "--stages", "1,2"]).exit_code == 0
     assert len(ElementTree.parse(out).getroot().findall(f".//{SVG}svg")) == 4
     assert CliRunner().invoke(app, [*arguments, "--stages", "x"]).exit_code == 2
+    assert CliRunner().invoke(app, ["strip", str(run_dir), "--out", str(out)]).exit_code == 0
+    assert len(ElementTree.parse(out).getroot().findall(f".//{SVG}svg")) == 2
+
+
+def test_the_most_telling_task_is_one_where_memory_misleads(write_run: WriteRun, tmp_path: Path) -> None:
+    # fu is misled in every stage 2; in task-0 ftu failed the stage before, so task-1 is the first that tells all.
+    assert most_telling(load_run(write_run()), ["fu", "ftu"]) == ("task-1", [1, 2])
+    records = [
+        stage_record("fu", task_id, 1, state, num_stages=1, chosen=entry("Plate", (2.3, 0.8, 2.0), is_stale=is_stale))
+        for task_id, state, is_stale in (
+            ("a", EndState.SUCCESS, False),
+            ("b", EndState.FAILURE, True),
+            ("c", EndState.SUCCESS, True),
+        )
+    ]
+    run = load_run(record_run(tmp_path / "one", records, dict.fromkeys("abc", 1), ["fu"]))
+    assert most_telling(run, ["fu"]) == ("c", [1])
+    with pytest.raises(InvalidArgumentError, match="no task has records of ftu"):
+        most_telling(run, ["ftu"])
 
 
 def test_files_write_colours_out() -> None:

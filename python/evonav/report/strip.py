@@ -6,7 +6,7 @@ from pathlib import Path
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.evaluation.store import RunStore
-from evonav.report.causes import sentence
+from evonav.report.causes import Cause, sentence
 from evonav.report.legend import legend_row
 from evonav.report.maps import (
     change_words,
@@ -17,6 +17,7 @@ from evonav.report.maps import (
     task_frame,
 )
 from evonav.report.plan import Frame
+from evonav.report.run import Run, load_run
 from evonav.report.svg import escape, join, text_lines
 
 PANEL_PX = 360
@@ -27,16 +28,16 @@ IMAGE_PX = 78
 
 
 def write_strip(
-    run_dir: Path, task_id: str, agents: str | Sequence[str], path: Path, *, stages: Sequence[int] | None = None
+    run_dir: Path, task_id: str | None, agents: str | Sequence[str], path: Path, *, stages: Sequence[int] | None = None
 ) -> Path:
     """Writes a task as a strip.
 
     Args:
         run_dir: A run.
-        task_id: One of its tasks.
+        task_id: One of its tasks; `None` for the `most_telling` one.
         agents: One of its agents, or several: a row each.
         path: The SVG file to write.
-        stages: Which stages; default all that have a record.
+        stages: Which stages; default all that have a record (of the most telling task, three).
 
     Returns:
         `path`.
@@ -46,6 +47,9 @@ def write_strip(
         StoreError: There is no run, it cannot be read, or the file cannot be written.
     """
     agents = [agents] if isinstance(agents, str) else list(agents)
+    if task_id is None:
+        task_id, telling = most_telling(load_run(run_dir), agents)
+        stages = stages or telling
     with RunStore(run_dir) as store:
         rows = [
             [record for record in store.records(agent, task_id) if stages is None or record.stage in stages]
@@ -62,6 +66,47 @@ def write_strip(
     except OSError as error:
         raise StoreError(f"{path}: {error}") from error
     return path
+
+
+def most_telling(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[str, list[int]]:
+    """The episode whose picture tells most about the benchmark, and the stages to show.
+
+    Looks for a stage where one of the agents is misled by a stale entry and another is not, or is misled and recovers;
+    then for moved targets, and for change and success on the way there. The first of equals.
+
+    Args:
+        run: A run.
+        agents: Whose episodes to show; the last one should succeed.
+        num_stages: How many stages to show, ending with the telling one.
+
+    Raises:
+        InvalidArgumentError: None of the run's tasks has a record of every one of the agents.
+    """
+    best: tuple[float, str, list[int]] | None = None
+    for task_id, last_stage in run.num_stages.items():
+        for stage in range(1, last_stage + 1):
+            shown = list(range(max(1, stage - num_stages + 1), stage + 1))
+            keys = [(agent, task_id, k) for agent in agents for k in shown]
+            if any(key not in run.outcomes for key in keys):
+                continue
+            score = _telling(run, agents, task_id, shown)
+            if best is None or score > best[0]:
+                best = (score, task_id, shown)
+    if best is None:
+        raise InvalidArgumentError(f"{run.run_dir}: no task has records of {', '.join(agents)}")
+    return best[1], best[2]
+
+
+def _telling(run: Run, agents: Sequence[str], task_id: str, stages: Sequence[int]) -> float:
+    last = [run.outcomes[agent, task_id, stages[-1]] for agent in agents]
+    hero = last[-1]
+    has_success = hero.record.state is EndState.SUCCESS
+    is_misled = any(outcome.cause is Cause.STALE_ENTRY for outcome in last)
+    score = 6.0 * (is_misled and has_success) + 4.0 * (hero.stale_path_m > 0 and has_success)
+    score += 2.0 * hero.record.target.is_relocated_now + 2.0 * has_success + len(stages)
+    window = [run.outcomes[agents[-1], task_id, k].record for k in stages]
+    score += sum(record.transition.mode is not None for record in window)
+    return score + sum(record.state is EndState.SUCCESS for record in window)
 
 
 def strip_svg(rows: Sequence[Sequence[StageRecord]], maps: Mapping[int, StageMap], *, success_radius_m: float) -> str:
