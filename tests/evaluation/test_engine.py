@@ -17,7 +17,7 @@ from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.store import RunStore, writing
 
 TOY = Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator")
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
@@ -198,6 +198,12 @@ def test_a_file_that_is_no_run_is_refused(tmp_path):
     (tmp_path / "records.sqlite").write_bytes(b"not a database" * 100)
     with pytest.raises(StoreError):
         RunStore(tmp_path)
+
+
+def test_a_second_writer_is_kept_out(tasks, tmp_path):
+    with writing(tmp_path / "run"), pytest.raises(StoreError, match="another evonav"):
+        evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+    evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
 
 
 INTERRUPTED = """

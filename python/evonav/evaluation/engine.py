@@ -14,7 +14,7 @@ from evonav.evaluation.backend import Backend, check_agent_name
 from evonav.evaluation.metrics import AgentSummary, paired_differences, summarise, summary_json
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, as_errored, as_not_run
 from evonav.evaluation.records import EndState, ErrorKind, StageRecord
-from evonav.evaluation.store import RunStore, check_same_run
+from evonav.evaluation.store import RunStore, check_same_run, writing
 from evonav.evaluation.workers import EpisodeJob, JobEvent, run_here, run_in_workers
 
 SUMMARY_NAME = "summary.json"
@@ -111,7 +111,7 @@ def evaluate(
     """
     config = config or RunConfig()
     _check_request(agents, tasks, num_workers)
-    with RunStore(run_dir, create=True) as store:
+    with writing(run_dir), RunStore(run_dir, create=True) as store:
         _claim(store, run_dir, tasks, config)
         store.set_meta("agents", sorted({*(store.meta("agents") or []), *agents}))
         run = _Run(store, agents, tasks, config)

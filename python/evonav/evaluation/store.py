@@ -8,6 +8,7 @@ records of equal runs are equal to the byte.
 import json
 import sqlite3
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -17,7 +18,13 @@ from pydantic import ValidationError
 from evonav.errors import StoreError
 from evonav.evaluation.records import SCHEMA_VERSION, EndState, StageMap, StageRecord
 
+try:
+    import fcntl
+except ImportError:  # Windows: SQLite's own locks still keep rows whole
+    fcntl = None  # type: ignore[assignment]
+
 FILE_NAME = "records.sqlite"
+LOCK_NAME = ".lock"
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -186,6 +193,27 @@ class RunStore:
             self._db.execute(query, values)
         except sqlite3.Error as error:
             raise StoreError(f"{self.path}: {error}") from error
+
+
+@contextmanager
+def writing(run_dir: Path) -> Iterator[None]:
+    """Keeps a second writer out of a run's folder; a writer that died keeps nobody out.
+
+    Raises:
+        StoreError: Another process is writing there, or the folder cannot be made.
+    """
+    try:
+        run_dir.mkdir(parents=True, exist_ok=True)
+        file = (run_dir / LOCK_NAME).open("w")
+    except OSError as error:
+        raise StoreError(f"{run_dir}: {error}") from error
+    with file:
+        if fcntl is not None:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                raise StoreError(f"{run_dir}: another evonav is writing to this run") from error
+        yield
 
 
 def check_same_run(stored: Mapping[str, Any], asked: Mapping[str, Any], run_dir: Path) -> None:
