@@ -52,7 +52,7 @@ fn visible_naive(
     fov_rad: f64,
     range_m: f64,
 ) -> BTreeSet<usize> {
-    let own = SPEC.index(SPEC.cell_of(origin_m).unwrap());
+    let own = SPEC.index(SPEC.cell_of(origin_m).expect("on the grid"));
     let corners = (0..=SPEC.rows).flat_map(|row| (0..=SPEC.cols).map(move |col| (row, col)));
     let first_rad = yaw_rad - 0.5 * fov_rad;
     let mut turns: Vec<f64> = corners
