@@ -227,28 +227,41 @@ impl View {
 /// Turns the canvas into images.
 fn resolve(mesh: &SceneMesh, camera: &Camera, want: Want, out: &mut FrameBuffer) {
     let FrameBuffer { depth_m, instances, rgb, canvas, shader, .. } = out;
-    let (width, num_pixels) = (camera.width_px, camera.width_px * camera.height_px);
+    let num_pixels = camera.width_px * camera.height_px;
     depth_m.resize(num_pixels, 0.0);
-    let rows = canvas.inverse_depth.chunks_exact(canvas.blocks_per_row());
-    for (row, blocks) in depth_m.chunks_exact_mut(width).zip(rows) {
-        for (pixels, block) in row.chunks_mut(LANES).zip(blocks) {
-            let depths = block.map(|w| 1.0 / w);
-            pixels.copy_from_slice(&depths[..pixels.len()]);
-        }
-    }
+    unpad(canvas, &canvas.inverse_depth, depth_m, |block| block.map(|w| 1.0 / w));
     instances.resize(if want.instances { num_pixels } else { 0 }, 0);
-    if want.instances {
-        let rows = canvas.tags.chunks_exact(canvas.blocks_per_row());
-        for (row, blocks) in instances.chunks_exact_mut(width).zip(rows) {
-            for (pixels, block) in row.chunks_mut(LANES).zip(blocks) {
-                let ids = if want.rgb { bodies_of(mesh, block) } else { block.map(|t| t as i32) };
-                pixels.copy_from_slice(&ids[..pixels.len()]);
-            }
+    match want {
+        Want { instances: true, rgb: true } => {
+            unpad(canvas, &canvas.tags, instances, |block| bodies_of(mesh, block));
         }
+        Want { instances: true, rgb: false } => {
+            unpad(canvas, &canvas.tags, instances, |block| block.map(|tag| tag as i32));
+        }
+        Want { instances: false, .. } => {}
     }
     rgb.resize(if want.rgb { 3 * num_pixels } else { 0 }, 0);
     if want.rgb {
         shader.shade(canvas, rgb);
+    }
+}
+
+/// Rows of padded blocks to rows of exactly the image's width.
+fn unpad<T: Copy, U: Copy>(
+    canvas: &Canvas,
+    blocks: &[[T; LANES]],
+    image: &mut [U],
+    of_block: impl Fn(&[T; LANES]) -> [U; LANES],
+) {
+    let rows = blocks.chunks_exact(canvas.blocks_per_row());
+    for (row, blocks) in image.chunks_exact_mut(canvas.width_px).zip(rows) {
+        let (whole, rest) = row.as_chunks_mut();
+        for (pixels, block) in whole.iter_mut().zip(blocks) {
+            *pixels = of_block(block);
+        }
+        if let Some(block) = blocks.last() {
+            rest.copy_from_slice(&of_block(block)[..rest.len()]);
+        }
     }
 }
 

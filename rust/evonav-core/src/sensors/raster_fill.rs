@@ -123,22 +123,42 @@ impl Span {
     fn draw(&self, inverse_depth: &mut [[f32; LANES]], tags: &mut [[u32; LANES]]) {
         let in_block = LANE_INDEX.map(|lane| lane * self.step);
         let block_step = LANES as f32 * self.step;
+        let last = inverse_depth.len().saturating_sub(1);
         for (block, (stored, tags)) in inverse_depth.iter_mut().zip(tags).enumerate() {
             let base = self.start + block as f32 * block_step;
-            let first = (block * LANES) as u32;
-            let mut candidate = in_block.map(|offset| base + offset);
-            if first < self.left || first + LANES as u32 > self.right {
-                for (lane, value) in candidate.iter_mut().enumerate() {
-                    let position = first + lane as u32;
-                    let is_covered = position >= self.left && position < self.right;
-                    *value = if is_covered { *value } else { 0.0 };
-                }
-            }
-            for lane in 0..LANES {
-                let is_nearer = candidate[lane] > stored[lane];
-                stored[lane] = if is_nearer { candidate[lane] } else { stored[lane] };
-                tags[lane] = if is_nearer { self.tag } else { tags[lane] };
-            }
+            let candidate = in_block.map(|offset| base + offset);
+            // Where only some pixels of a block are covered, the others get what is never nearer.
+            let candidate = if block == 0 || block == last {
+                self.covered((block * LANES) as u32, candidate)
+            } else {
+                candidate
+            };
+            merge(candidate, self.tag, stored, tags);
         }
     }
+
+    fn covered(&self, first: u32, candidate: [f32; LANES]) -> [f32; LANES] {
+        std::array::from_fn(|lane| {
+            let position = first + lane as u32;
+            let is_covered = position >= self.left && position < self.right;
+            if is_covered { candidate[lane] } else { 0.0 }
+        })
+    }
+}
+
+/// Keeps the nearer of candidate and stored, lane by lane.
+///
+/// Written on whole arrays with masks: compilers turn a conditional store into a branch, and the
+/// loop is then three times as slow.
+#[inline(always)]
+fn merge(candidate: [f32; LANES], tag: u32, stored: &mut [f32; LANES], tags: &mut [u32; LANES]) {
+    let (old, old_tags) = (*stored, *tags);
+    let mask: [u32; LANES] =
+        std::array::from_fn(|lane| u32::from(candidate[lane] > old[lane]).wrapping_neg());
+    *stored = std::array::from_fn(|lane| {
+        f32::from_bits(
+            (candidate[lane].to_bits() & mask[lane]) | (old[lane].to_bits() & !mask[lane]),
+        )
+    });
+    *tags = std::array::from_fn(|lane| (tag & mask[lane]) | (old_tags[lane] & !mask[lane]));
 }

@@ -1,0 +1,74 @@
+//! One view of a house of 100 objects: what a step of the simulator costs.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use evonav_core::{
+    assets::{Catalogue, UnknownAssets},
+    geometry::Pose,
+    house::House,
+    sensors::{
+        camera::Camera,
+        raster::{FrameBuffer, Want, render},
+        raycast3d::RayCaster,
+    },
+    world::{mesh::SceneMesh, scene::Scene},
+};
+
+const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");
+
+fn scene() -> Scene {
+    let house = House::from_json("house", HOUSE).expect("a valid house");
+    Scene::build(&house, Catalogue::bundled(), UnknownAssets::Error).expect("known assets")
+}
+
+/// Views all around from four places.
+fn cameras(scene: &Scene, image_px: [usize; 2]) -> Vec<Camera> {
+    let (min_m, size_m) = (scene.bounds.min_m, scene.bounds.size_m());
+    let places = [[0.3, 0.3], [0.7, 0.3], [0.3, 0.7], [0.7, 0.7]];
+    let poses = places.iter().flat_map(|share| {
+        (0..8).map(move |turn| Pose {
+            position_m: [min_m[0] + share[0] * size_m[0], 0.9, min_m[2] + share[1] * size_m[2]],
+            yaw_rad: f64::from(turn) * std::f64::consts::FRAC_PI_4,
+            horizon_rad: 0.5,
+        })
+    });
+    poses.map(|pose| Camera::at(&pose, image_px, std::f64::consts::FRAC_PI_2, 1.575)).collect()
+}
+
+fn bench_raster(c: &mut Criterion) {
+    let scene = scene();
+    let mesh = SceneMesh::build(&scene);
+    for image_px in [[300, 300], [640, 480]] {
+        for (name, want) in [
+            ("depth", Want { rgb: false, instances: false }),
+            ("depth_instances", Want { rgb: false, instances: true }),
+            ("depth_instances_rgb", Want { rgb: true, instances: true }),
+        ] {
+            let cameras = cameras(&scene, image_px);
+            let mut frame = FrameBuffer::default();
+            let mut next = cameras.iter().cycle();
+            c.bench_function(&format!("raster/{name}_{}x{}", image_px[0], image_px[1]), |b| {
+                b.iter(|| next.next().map(|camera| render(&mesh, camera, want, &mut frame)));
+            });
+        }
+    }
+    // The twin that shares no idea with it: a ray a pixel.
+    let caster = RayCaster::build(&mesh);
+    let cameras = cameras(&scene, [300, 300]);
+    let mut next = cameras.iter().cycle();
+    c.bench_function("raycast3d/100_rays", |b| {
+        b.iter(|| {
+            let camera = next.next().expect("a cycle");
+            for i in 0..100 {
+                let ray = camera.ray([f64::from(i) * 3.0, f64::from(i) * 2.0 + 50.0]);
+                black_box(caster.cast(&mesh, camera.position_m, ray, 100.0));
+            }
+        });
+    });
+    c.bench_function("mesh/build", |b| b.iter(|| SceneMesh::build(black_box(&scene))));
+    c.bench_function("raycast3d/build", |b| b.iter(|| RayCaster::build(black_box(&mesh))));
+}
+
+criterion_group!(benches, bench_raster);
+criterion_main!(benches);
