@@ -78,7 +78,7 @@ pub fn render(
     camera.check()?;
     let view = View::new(camera);
     out.canvas.clear(camera.width_px, camera.height_px);
-    out.shader.begin(mesh.faces.len());
+    out.shader.begin(mesh.faces.len(), camera);
     view.collect_visible(mesh, &mut out.scratch.visible);
     for index in 0..out.scratch.visible.len() {
         let part = &mesh.parts[out.scratch.visible[index].1 as usize];
@@ -112,7 +112,7 @@ fn draw_part(mesh: &SceneMesh, part: &PartMesh, view: &View, want: Want, out: &m
         }
         let tag = if want.rgb { index as u32 } else { face.body } + 1;
         if want.rgb {
-            shader.light(index, face);
+            shader.light(index, face, height_m);
         }
         canvas.fill(polygon_px, view.inverse_depth_plane(face, height_m), tag);
     }

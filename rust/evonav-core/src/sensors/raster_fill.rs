@@ -1,5 +1,7 @@
 //! The inner loops of the rasteriser: convex polygons into a buffer of inverse depths.
 
+use std::ops::Range;
+
 use crate::geometry::{Vec2, Vec3};
 
 /// Pixels that one step of the inner loops handles: plain arrays, which compilers turn into SIMD.
@@ -34,6 +36,16 @@ impl Canvas {
         self.width_px.div_ceil(LANES)
     }
 
+    /// Blocks of a row.
+    pub fn row_blocks(&self, row: usize) -> Range<usize> {
+        row * self.blocks_per_row()..(row + 1) * self.blocks_per_row()
+    }
+
+    /// Inverse depths of a row, its padding included.
+    pub fn row(&self, row: usize) -> &[f32] {
+        self.inverse_depth[self.row_blocks(row)].as_flattened()
+    }
+
     /// Draws a convex polygon that runs clockwise on the screen, where it is nearer than what is
     /// there. `plane` gives the inverse depth at `[u, v]`: `plane . [u, v, 1]`.
     ///
@@ -64,7 +76,7 @@ impl Canvas {
     }
 
     /// Sets `left` and `right` for the rows that the polygon covers, and returns those.
-    fn scan(&mut self, corners_px: &[Vec2]) -> std::ops::Range<usize> {
+    fn scan(&mut self, corners_px: &[Vec2]) -> Range<usize> {
         let (mut top, mut bottom) = (f64::INFINITY, f64::NEG_INFINITY);
         for corner in corners_px {
             top = top.min(corner[1]);

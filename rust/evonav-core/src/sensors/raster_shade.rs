@@ -1,46 +1,192 @@
-//! Colours after visibility: flat faces lit from above and from the camera, with drawn edges.
+//! Colours after visibility.
+//!
+//! A face has one colour, lit from above and from one side so that the faces of a box differ. On
+//! top of that come, a pixel at a time and from depth alone: a lamp at the camera, so that walls
+//! fade with angle; darkness in concave corners and where things stand; and a thin line around
+//! silhouettes.
 
 use crate::{
-    sensors::raster_fill::{Canvas, LANES},
+    geometry::Vec3,
+    sensors::{
+        camera::Camera,
+        raster_fill::{Canvas, LANES},
+    },
     world::mesh::{Face, dot},
 };
 
-/// Colours of the faces in view.
+/// Reach of the corners' darkness, as a share of the image's height.
+const CORNER_REACH: f64 = 0.025;
+/// How dark a corner becomes, and how dark a silhouette's line.
+const CORNER_SHADE: f32 = 0.38;
+const LINE_SHADE: f32 = 0.30;
+/// Bend at which a corner stops being one.
+const CORNER_BEND: f32 = 1.2;
+/// Share of a face's light that comes from the camera.
+const LAMP_SHARE: f32 = 0.36;
+/// What windows and missing walls look out on, before the lamp's share is taken off.
+const SKY: [f32; 3] =
+    [204.0 / (1.0 - LAMP_SHARE), 222.0 / (1.0 - LAMP_SHARE), 236.0 / (1.0 - LAMP_SHARE)];
+
+/// A face as it is lit in this view.
+#[derive(Debug, Clone, Copy)]
+struct LitFace {
+    rgb: [f32; 3],
+    /// Distance of its plane from the camera.
+    height_m: f32,
+}
+
+impl LitFace {
+    const SKY: Self = Self { rgb: SKY, height_m: 0.0 };
+}
+
+/// Colours of the faces in view, and one row's working memory.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Shader {
-    /// Lit colour by face tag; 0 is the background.
-    lit: Vec<[f32; 3]>,
+    /// By face tag; 0 is the background.
+    faces: Vec<LitFace>,
+    focal_px: f32,
+    /// The row at hand with its ends continued.
+    padded: Vec<f32>,
+    light: Vec<f32>,
 }
 
 impl Shader {
-    pub fn begin(&mut self, num_faces: usize) {
-        self.lit.resize(num_faces + 1, [0.0; 3]);
+    pub fn begin(&mut self, num_faces: usize, camera: &Camera) {
+        self.faces.resize(num_faces + 1, LitFace::SKY);
+        self.focal_px = camera.focal_px() as f32;
     }
 
-    /// Lights a face: soft light from above, a weaker one from the side, so that the faces of a
-    /// box differ.
-    pub fn light(&mut self, index: usize, face: &Face) {
+    /// Lights a face that the camera, `height_m` above its plane, may see.
+    pub fn light(&mut self, index: usize, face: &Face, height_m: f64) {
         let from_above = 0.5 + 0.5 * face.normal[1];
-        let from_side = dot(face.normal, [0.64, 0.0, 0.77]);
-        let light = (0.62 + 0.28 * from_above + 0.10 * from_side) as f32;
-        self.lit[index + 1] = face.colour.map(|c| f32::from(c) * light);
+        let from_side = dot(face.normal, SIDE);
+        let light = (0.80 + 0.22 * from_above + 0.09 * from_side) as f32;
+        let rgb = face.colour.map(|c| f32::from(c) * light);
+        self.faces[index + 1] = LitFace { rgb, height_m: height_m as f32 };
     }
 
-    pub fn shade(&self, canvas: &Canvas, rgb: &mut [u8]) {
-        let blocks_per_row = canvas.blocks_per_row();
+    /// Fills `rgb` from a drawn canvas.
+    pub fn shade(&mut self, canvas: &Canvas, rgb: &mut [u8]) {
         for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
-            let blocks = row * blocks_per_row..(row + 1) * blocks_per_row;
-            let tags = &canvas.tags[blocks.clone()];
-            let depths = &canvas.inverse_depth[blocks];
-            for ((pixels, tags), inverse) in pixels.chunks_mut(3 * LANES).zip(tags).zip(depths) {
-                for (lane, pixel) in pixels.chunks_exact_mut(3).enumerate() {
-                    let fade = 0.75 + 0.25 * (2.0 * inverse[lane]).min(1.0);
-                    let lit = self.lit[tags[lane] as usize];
-                    for channel in 0..3 {
-                        pixel[channel] = (lit[channel] * fade) as u8;
-                    }
-                }
+            self.darken(canvas, row);
+            self.paint(canvas, row, pixels);
+        }
+    }
+
+    /// Sets `light` to what corners and silhouettes leave of it in a row.
+    fn darken(&mut self, canvas: &Canvas, row: usize) {
+        let corner_px = ((canvas.height_px as f64 * CORNER_REACH) as usize).max(2);
+        self.light.clear();
+        self.light.resize(canvas.blocks_per_row() * LANES, 1.0);
+        self.pad(canvas.row(row), canvas.width_px, corner_px);
+        for (reach_px, is_line) in [(corner_px, false), (1, true)] {
+            let scale = self.focal_px / reach_px as f32;
+            let centre = canvas.row(row);
+            let has_both = row >= reach_px && row + reach_px < canvas.height_px;
+            let (above, below) = match has_both {
+                true => (canvas.row(row - reach_px), canvas.row(row + reach_px)),
+                false => (centre, centre),
+            };
+            let left = &self.padded[corner_px - reach_px..];
+            let right = &self.padded[corner_px + reach_px..];
+            let width = canvas.width_px;
+            let neighbours = [left, right, above, below].map(|row| &row[..width]);
+            let (light, centre) = (&mut self.light[..width], &centre[..width]);
+            match is_line {
+                true => darken_row(light, centre, neighbours, scale, line_shade),
+                false => darken_row(light, centre, neighbours, scale, corner_shade),
             }
         }
     }
+
+    /// Copies a row and continues it on both sides as the planes there go on.
+    fn pad(&mut self, row: &[f32], width_px: usize, reach_px: usize) {
+        let row = &row[..width_px];
+        let (first, last) = (row[0], row[width_px - 1]);
+        let (second, one_but_last) = (row[1.min(width_px - 1)], row[width_px.saturating_sub(2)]);
+        self.padded.clear();
+        let ahead = (1..=reach_px).rev().map(|k| first + (first - second) * k as f32);
+        self.padded.extend(ahead);
+        self.padded.extend_from_slice(row);
+        self.padded.extend((1..=reach_px).map(|k| last + (last - one_but_last) * k as f32));
+    }
+
+    fn paint(&self, canvas: &Canvas, row: usize, pixels: &mut [u8]) {
+        let blocks = canvas.row_blocks(row);
+        let (tags, depths) = (&canvas.tags[blocks.clone()], &canvas.inverse_depth[blocks]);
+        let down = row as f32 + 0.5 - canvas.height_px as f32 / 2.0;
+        let centre_u = canvas.width_px as f32 / 2.0;
+        let (whole, rest) = pixels.as_chunks_mut::<{ 3 * LANES }>();
+        let mut whole = whole.iter_mut();
+        let lights = self.light.as_chunks().0;
+        for (block, ((tags, depths), lights)) in tags.iter().zip(depths).zip(lights).enumerate() {
+            let right = (block * LANES) as f32 + 0.5 - centre_u;
+            let rgb = self.colours(tags, &self.facing(depths, [right, down]), lights);
+            match whole.next() {
+                Some(pixels) => pixels.copy_from_slice(rgb.as_flattened()),
+                None => rest.copy_from_slice(&rgb.as_flattened()[..rest.len()]),
+            }
+        }
+    }
+
+    /// Inverse depth over the length of the ray at depth 1: times the camera's distance from a
+    /// plane, the cosine between the plane's normal and the look at it.
+    fn facing(&self, depths: &[f32; LANES], [right, down]: [f32; 2]) -> [f32; LANES] {
+        let per_focal = 1.0 / (self.focal_px * self.focal_px);
+        std::array::from_fn(|lane| {
+            let right = right + lane as f32;
+            depths[lane] / (1.0 + (right * right + down * down) * per_focal).sqrt()
+        })
+    }
+
+    fn colours(
+        &self,
+        tags: &[u32; LANES],
+        facing: &[f32; LANES],
+        lights: &[f32; LANES],
+    ) -> [[u8; 3]; LANES] {
+        let pixel = |face: &LitFace, lane: usize| {
+            let lamp = 1.0 - LAMP_SHARE + LAMP_SHARE * face.height_m * facing[lane];
+            face.rgb.map(|channel| (channel * lights[lane] * lamp).min(255.0) as i32 as u8)
+        };
+        // Most blocks lie within one face.
+        if tags.iter().all(|&tag| tag == tags[0]) {
+            let face = self.faces[tags[0] as usize];
+            return std::array::from_fn(|lane| pixel(&face, lane));
+        }
+        std::array::from_fn(|lane| pixel(&self.faces[tags[lane] as usize], lane))
+    }
 }
+
+/// Takes from `light` what `shade` makes of the bend of each pixel's surroundings.
+///
+/// Inverse depth is linear on a plane: the bend is how much nearer the surroundings are than a
+/// plane would be, relative to depth and to the neighbours' spacing.
+#[inline(always)]
+fn darken_row(
+    light: &mut [f32],
+    centre: &[f32],
+    [left, right, above, below]: [&[f32]; 4],
+    scale: f32,
+    shade: impl Fn(f32) -> f32,
+) {
+    for i in 0..light.len() {
+        let around = 0.25 * (left[i] + right[i] + above[i] + below[i]);
+        let bend = (around - centre[i]) / (centre[i] + 1e-6) * scale;
+        light[i] *= 1.0 - shade(bend);
+    }
+}
+
+/// Darkness in a corner. A large bend is no corner but something far behind an edge.
+fn corner_shade(bend: f32) -> f32 {
+    let bend = bend.clamp(0.0, CORNER_BEND);
+    CORNER_SHADE * bend * (CORNER_BEND - bend) * (4.0 / (CORNER_BEND * CORNER_BEND))
+}
+
+/// Darkness of a line around what stands before something else.
+fn line_shade(bend: f32) -> f32 {
+    LINE_SHADE * (bend - 1.0).clamp(0.0, 1.0)
+}
+
+/// Where the weaker light comes from.
+const SIDE: Vec3 = [0.64, 0.0, 0.77];
