@@ -19,10 +19,12 @@ const CORNER_REACH: f64 = 0.025;
 /// How dark a corner becomes, and how dark a silhouette's line.
 const CORNER_SHADE: f32 = 0.38;
 const LINE_SHADE: f32 = 0.30;
-/// Bend at which a corner stops being one.
-const CORNER_BEND: f32 = 1.2;
+/// Bend in the middle of a corner of a room.
+const FULL_BEND: f32 = 0.7;
 /// Share of a face's light that comes from the camera.
 const LAMP_SHARE: f32 = 0.36;
+/// Black surfaces are drawn as bright as this, or their corners could not be seen.
+const BLACK: f32 = 22.0;
 /// What windows and missing walls look out on, before the lamp's share is taken off.
 const SKY: [f32; 3] =
     [204.0 / (1.0 - LAMP_SHARE), 222.0 / (1.0 - LAMP_SHARE), 236.0 / (1.0 - LAMP_SHARE)];
@@ -61,7 +63,7 @@ impl Shader {
         let from_above = 0.5 + 0.5 * face.normal[1];
         let from_side = dot(face.normal, SIDE);
         let light = (0.80 + 0.22 * from_above + 0.09 * from_side) as f32;
-        let rgb = face.colour.map(|c| f32::from(c) * light);
+        let rgb = face.colour.map(|c| BLACK + f32::from(c) * (light - BLACK / 255.0));
         self.faces[index + 1] = LitFace { rgb, height_m: height_m as f32 };
     }
 
@@ -179,8 +181,8 @@ fn darken_row(
 
 /// Darkness in a corner. A large bend is no corner but something far behind an edge.
 fn corner_shade(bend: f32) -> f32 {
-    let bend = bend.clamp(0.0, CORNER_BEND);
-    CORNER_SHADE * bend * (CORNER_BEND - bend) * (4.0 / (CORNER_BEND * CORNER_BEND))
+    let is_corner = ((3.0 - bend) / 2.0).clamp(0.0, 1.0);
+    CORNER_SHADE * (bend / FULL_BEND).clamp(0.0, 1.0) * is_corner
 }
 
 /// Darkness of a line around what stands before something else.
