@@ -180,6 +180,7 @@ class OccupancyMap:
         cell_m: float,
         corner_m: tuple[float, float],
         min_cells: int = 20,
+        min_border_cells: int = 3,
         max_span_rad: float = ...,
         clearance_m: float = 0.5,
         push_step_m: float = 0.05,

@@ -18,10 +18,12 @@ UNKNOWN, FREE, BLOCKED = 0, 1, 2
 
 @dataclass(frozen=True, slots=True)
 class FrontierConfig:
-    """When free cells are a frontier (3D-Mem's parameters)."""
+    """When free cells are a frontier (3D-Mem's parameters, and a last resort of our own)."""
 
     min_cells: int = 20
     """Fewest cells of a region."""
+    min_border_cells: int = 3
+    """Without such regions, groups of so many unknown cells beside free ones are frontiers; 0: never, as in 3D-Mem."""
     max_span_deg: float = 150.0
     """A region wider than this, seen from the agent, is split."""
     clearance_m: float = 0.5
@@ -74,6 +76,7 @@ class OccupancyMap:
             cell_m=map_frame.cell_m,
             corner_m=map_frame.corner_m,
             min_cells=frontiers.min_cells,
+            min_border_cells=frontiers.min_border_cells,
             max_span_rad=math.radians(frontiers.max_span_deg),
             clearance_m=frontiers.clearance_m,
             push_step_m=frontiers.push_step_m,

@@ -212,7 +212,7 @@ proptest! {
         seed in any::<u64>(), num_steps in 1..12_usize, side in 20..90_usize, min_cells in 1..40_usize,
     ) {
         let (map, agent_m) = walked(seed, num_steps, side);
-        let config = FrontierConfig { min_cells, ..Default::default() };
+        let config = FrontierConfig { min_cells, min_border_cells: 0, ..Default::default() };
         let frontiers = extract(&map, agent_m, &config).unwrap();
         let naive = regions_naive(&map, agent_m, min_cells);
         // A region split by angle gives several frontiers; together they are the region.
@@ -238,12 +238,43 @@ proptest! {
         }
     }
 
+    /// Only without regions: unknown cells beside the island, each group looked at from beside it.
+    #[test]
+    fn the_unknown_beside_the_known_is_the_last_resort(
+        seed in any::<u64>(), num_steps in 1..12_usize, side in 20..60_usize,
+    ) {
+        let (map, agent_m) = walked(seed, num_steps, side);
+        let config = FrontierConfig { min_cells: 500, min_border_cells: 1, ..Default::default() };
+        let frontiers = extract(&map, agent_m, &config).unwrap();
+        prop_assume!(regions_naive(&map, agent_m, 500).is_empty());
+        let own = map.spec().cell_of(agent_m).unwrap().map(|i| i as i32);
+        let cells = map.cells();
+        let of = |value: u8| -> BTreeSet<Cell> {
+            let all = (0..side as i32).flat_map(|row| (0..side as i32).map(move |col| [row, col]));
+            all.filter(|c| cells[c[0] as usize * side + c[1] as usize] == value).collect()
+        };
+        let islands = components_naive(&of(FREE));
+        let island = islands.into_iter().find(|i| i.contains(&own));
+        prop_assume!(island.is_some());
+        let island = island.unwrap();
+        let mut expected = of(UNKNOWN);
+        expected.retain(|c| neighbours4(*c).iter().any(|n| island.contains(n)));
+        let found: BTreeSet<Cell> = frontiers.iter().flat_map(|f| f.cells.iter().copied()).collect();
+        prop_assert_eq!(found.len(), frontiers.iter().map(|f| f.cells.len()).sum::<usize>());
+        prop_assert_eq!(found, expected);
+        for frontier in &frontiers {
+            let at = map.spec().cell_of(frontier.position_m).unwrap().map(|i| i as i32);
+            prop_assert!(island.contains(&at) && frontier.cells.is_sorted());
+            prop_assert!(neighbours4(at).iter().any(|n| frontier.cells.contains(n)));
+        }
+    }
+
     #[test]
     fn an_unchanged_map_keeps_every_frontier_and_a_cleared_one_counts_on(
         seed in any::<u64>(), num_steps in 1..12_usize,
     ) {
         let (map, agent_m) = walked(seed, num_steps, 70);
-        let config = FrontierConfig::default();
+        let config = FrontierConfig { min_border_cells: 0, ..Default::default() };
         let mut frontiers = Frontiers::default();
         let first = frontiers.update(&map, agent_m, &config).unwrap().to_vec();
         prop_assert_eq!(&first, frontiers.update(&map, agent_m, &config).unwrap());
@@ -285,7 +316,19 @@ fn a_frontier_looks_from_the_edge_of_the_explored_into_the_open() {
     assert!((east.direction_rad - 1.57).abs() < 0.1, "{}", east.direction_rad);
     assert!((east.position_m[0] - (agent_m[0] + 1.7)).abs() < 0.3, "{:?}", east.position_m);
     map.explore_around([0.5, 1.1], 9.0).unwrap();
-    assert!(extract(&map, agent_m, &FrontierConfig::default()).unwrap().is_empty());
+    let config = FrontierConfig { min_border_cells: 0, ..Default::default() };
+    assert!(extract(&map, agent_m, &config).unwrap().is_empty());
+    // What is left is the unknown end of the corridor, until the agent has stood there in vain.
+    let mut frontiers = Frontiers::default();
+    let config = FrontierConfig::default();
+    let mut agent_m = agent_m;
+    for _ in 0..20 {
+        match frontiers.update(&map, agent_m, &config).unwrap() {
+            [] => return,
+            list => agent_m = list[0].position_m,
+        }
+    }
+    panic!("the agent looks at the same unknown cells for ever");
 }
 
 proptest! {

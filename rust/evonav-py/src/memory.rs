@@ -52,7 +52,7 @@ impl OccupancyMap {
     #[new]
     #[pyo3(signature = (
         *, rows, cols, cell_m, corner_m,
-        min_cells = 20, max_span_rad = 150.0_f64.to_radians(),
+        min_cells = 20, min_border_cells = 3, max_span_rad = 150.0_f64.to_radians(),
         clearance_m = 0.5, push_step_m = 0.05, max_push_m = 0.3,
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python class")]
@@ -62,6 +62,7 @@ impl OccupancyMap {
         cell_m: f64,
         corner_m: [f64; 2],
         min_cells: usize,
+        min_border_cells: usize,
         max_span_rad: f64,
         clearance_m: f64,
         push_step_m: f64,
@@ -69,6 +70,7 @@ impl OccupancyMap {
     ) -> PyResult<Self> {
         let config = frontiers::FrontierConfig {
             min_cells,
+            min_border_cells,
             max_span_rad,
             clearance_m,
             push_step_m,

@@ -9,8 +9,13 @@ use std::f64::consts::TAU;
 
 use crate::{
     Error,
-    geometry::Vec2,
-    memory::{occupancy::OccupancyMap, regions::find_regions, viewpoints::place},
+    geometry::{Vec2, distance_2d_m},
+    memory::{
+        bits::BitGrid,
+        occupancy::OccupancyMap,
+        regions::find_regions,
+        viewpoints::{place, place_at_border},
+    },
 };
 
 /// When free cells are a frontier, and where to look at it from.
@@ -18,6 +23,10 @@ use crate::{
 pub struct FrontierConfig {
     /// Fewest cells of a region.
     pub min_cells: usize,
+    /// When there is no such region, groups of at least so many unknown cells beside free ones are
+    /// frontiers, each looked at from close by; 0 for never, as in 3D-Mem, where a glimpse of a
+    /// room past a door is too small a region and the room stays undiscovered.
+    pub min_border_cells: usize,
     /// A region that spans more than this, seen from the agent, is split.
     pub max_span_rad: f64,
     /// A view position keeps this far from obstacles where it can ...
@@ -32,6 +41,7 @@ impl Default for FrontierConfig {
     fn default() -> Self {
         Self {
             min_cells: 20,
+            min_border_cells: 3,
             max_span_rad: 150.0_f64.to_radians(),
             clearance_m: 0.5,
             push_step_m: 0.05,
@@ -65,7 +75,8 @@ pub struct Frontier {
     pub id: u64,
     /// `[x, z]` where to stand.
     pub position_m: Vec2,
-    /// Where to look: from the agent, as it stood when the frontier was made, to the region.
+    /// Where to look: from the agent, as it stood when the frontier was made, to the region; for
+    /// the last resort ([`FrontierConfig::min_border_cells`]), from `position_m`.
     pub direction_rad: f64,
     /// `[row, col]` of the region, row-major.
     pub cells: Vec<[i32; 2]>,
@@ -76,6 +87,10 @@ pub struct Frontier {
 pub struct Frontiers {
     list: Vec<Frontier>,
     next_id: u64,
+    /// Whether the list holds borders, for want of regions ([`FrontierConfig::min_border_cells`]).
+    is_last_resort: bool,
+    given_up: Option<BitGrid>,
+    last_agent_m: Option<Vec2>,
 }
 
 impl Frontiers {
@@ -87,6 +102,7 @@ impl Frontiers {
     /// Drops all frontiers. Ids go on counting.
     pub fn clear(&mut self) {
         self.list.clear();
+        self.given_up = None;
     }
 
     /// Brings the frontiers up to date with the map. A frontier whose region has hardly changed
@@ -106,15 +122,40 @@ impl Frontiers {
             .filter_map(|old| old.cells.get(old.cells.len() / 2))
             .copied()
             .collect();
-        let found = find_regions(map, agent_m, &seeds, config)?;
+        if self.is_last_resort {
+            self.give_up_around(map, agent_m);
+        }
+        let found = find_regions(map, agent_m, &seeds, self.given_up.as_ref(), config)?;
+        self.is_last_resort = found.is_last_resort;
+        self.last_agent_m = Some(agent_m);
+        if found.is_last_resort {
+            self.list.clear();
+        }
         let (kept, fresh) = reconcile(std::mem::take(&mut self.list), found.regions, config);
         self.list = kept;
         for region in fresh {
+            let place = if found.is_last_resort { place_at_border } else { place };
             let frontier = place(map, &found.edges, agent_m, region, self.next_id, config);
             self.list.push(frontier);
             self.next_id += 1;
         }
         Ok(&self.list)
+    }
+
+    /// Unknown cells that the agent did not get to see from the place meant for it, or from as
+    /// near as it could get (it went nowhere since the last update), it will not see at all.
+    fn give_up_around(&mut self, map: &OccupancyMap, agent_m: Vec2) {
+        let is_standing = self.last_agent_m.is_some_and(|last| distance_2d_m(last, agent_m) < 0.1);
+        let (reached_m, around_m) = if is_standing { (0.8, 1.0) } else { (0.3, 0.5) };
+        let given_up =
+            self.given_up.get_or_insert_with(|| BitGrid::new(map.spec().rows, map.spec().cols));
+        let reached = self.list.iter().filter(|f| distance_2d_m(f.position_m, agent_m) < reached_m);
+        for cell in reached.flat_map(|frontier| &frontier.cells) {
+            let cell = cell.map(|i| i as usize);
+            if distance_2d_m(map.spec().centre_m(cell), agent_m) < around_m {
+                given_up.insert(cell[0], cell[1]);
+            }
+        }
     }
 }
 

@@ -17,12 +17,15 @@ use crate::{
 pub(crate) struct Found {
     pub(crate) regions: Vec<Vec<[i32; 2]>>,
     pub(crate) edges: BitGrid,
+    /// Whether these are borders of the known, for want of regions.
+    pub(crate) is_last_resort: bool,
 }
 
 pub(crate) fn find_regions(
     map: &OccupancyMap,
     agent_m: Vec2,
     seeds: &[[i32; 2]],
+    given_up: Option<&BitGrid>,
     config: &FrontierConfig,
 ) -> Result<Found, Error> {
     config.check()?;
@@ -44,7 +47,66 @@ pub(crate) fn find_regions(
             }
         }
     }
-    Ok(Found { regions, edges })
+    if !regions.is_empty() || config.min_border_cells == 0 {
+        return Ok(Found { regions, edges, is_last_resort: false });
+    }
+    let (unknown, edges) = borders(map, &island, given_up);
+    let mut regions = groups(unknown);
+    regions.retain(|cells| cells.len() >= config.min_border_cells);
+    Ok(Found { regions, edges, is_last_resort: true })
+}
+
+/// Unknown cells beside island cells (4 neighbours), less those given up, and the island cells beside them.
+fn borders(map: &OccupancyMap, island: &BitGrid, given_up: Option<&BitGrid>) -> (BitGrid, BitGrid) {
+    let (rows, cols) = (island.rows(), island.cols());
+    let (mut unknown, mut edges) = (BitGrid::new(rows, cols), BitGrid::new(rows, cols));
+    for [row, col] in island.cells() {
+        let beside = [
+            [row.wrapping_sub(1), col],
+            [row, col.wrapping_sub(1)],
+            [row, col + 1],
+            [row + 1, col],
+        ];
+        for [r, c] in beside {
+            let is_known = map.free().get(r, c) || map.blocked().get(r, c);
+            if r < rows && c < cols && !is_known && !given_up.is_some_and(|g| g.get(r, c)) {
+                unknown.insert(r, c);
+                edges.insert(row, col);
+            }
+        }
+    }
+    (unknown, edges)
+}
+
+/// Cells grouped with their 8 neighbours, in the order of the first cells, each row-major.
+fn groups(mut cells: BitGrid) -> Vec<Vec<[i32; 2]>> {
+    let mut groups = Vec::new();
+    for row in 0..cells.rows() {
+        for col in 0..cells.cols() {
+            let mut stack = Vec::new();
+            if cells.get(row, col) {
+                cells.remove(row, col);
+                stack.push([row, col]);
+            }
+            let mut group = Vec::new();
+            while let Some([row, col]) = stack.pop() {
+                group.push([row as i32, col as i32]);
+                for next_row in row.saturating_sub(1)..=row + 1 {
+                    for next_col in col.saturating_sub(1)..=col + 1 {
+                        if cells.get(next_row, next_col) {
+                            cells.remove(next_row, next_col);
+                            stack.push([next_row, next_col]);
+                        }
+                    }
+                }
+            }
+            group.sort_unstable();
+            if !group.is_empty() {
+                groups.push(group);
+            }
+        }
+    }
+    groups
 }
 
 /// The free cells connected (4 neighbours) to the agent, or to the free cell nearest to it, or to a seed.

@@ -45,6 +45,27 @@ pub(crate) fn place(
     Frontier { id, position_m, direction_rad, cells }
 }
 
+/// Puts a viewpoint right beside a region of unknown cells, on the nearest border cell, and looks at it.
+pub(crate) fn place_at_border(
+    map: &OccupancyMap,
+    edges: &BitGrid,
+    agent_m: Vec2,
+    cells: Vec<[i32; 2]>,
+    id: u64,
+    _: &FrontierConfig,
+) -> Frontier {
+    let is_beside = |row: i32, col: i32| edges.get(row as usize, col as usize);
+    let nearest = cells
+        .iter()
+        .flat_map(|&[r, c]| [[r - 1, c], [r, c - 1], [r, c + 1], [r + 1, c]])
+        .filter(|&[row, col]| row >= 0 && col >= 0 && is_beside(row, col))
+        .map(|cell| map.spec().centre_m(cell.map(|i| i as usize)))
+        .min_by(|a, b| distance_2d_m(*a, agent_m).total_cmp(&distance_2d_m(*b, agent_m)));
+    let position_m = nearest.unwrap_or(agent_m);
+    let [x, z] = mean_direction(map, position_m, &cells);
+    Frontier { id, position_m, direction_rad: x.atan2(z), cells }
+}
+
 /// Edge cells with 2 to 12 cells of the region in the 5 x 5 cells around them, row-major.
 fn edges_beside(edges: &BitGrid, cells: &[[i32; 2]]) -> Vec<[usize; 2]> {
     let mut region = BitGrid::new(edges.rows(), edges.cols());
