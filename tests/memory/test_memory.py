@@ -1,0 +1,186 @@
+"""The agent's memory through its Python interface."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from evonav.errors import InvalidArgumentError
+from evonav.memory import FrontierConfig, ObjectMap, ObjectMapConfig, OccupancyMap
+from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
+from evonav.sensors.visibility import visible_occupancy
+from evonav.world.pose import Pose
+from evonav.world.simulator import Intrinsics, OccupancyGrid
+
+INTRINSICS = Intrinsics(60, 60, math.pi / 2)
+FRAME = MapFrame(40, 60, 0.1, (-1.0, 2.0))
+
+
+def cells(*pairs: tuple[int, int]) -> NDArray[np.int32]:
+    return np.array(pairs, np.int32).reshape(-1, 2)
+
+
+def seen(free: NDArray[np.int32], blocked: NDArray[np.int32]) -> VisibleOccupancy:
+    return VisibleOccupancy(free=free, blocked=blocked)
+
+
+def a_view(depth_m: NDArray[np.float32], masks: NDArray[np.int32], *labels: str) -> View:
+    found = Detections(masks, labels, np.ones(len(labels), np.float32))
+    return View(Pose(0.0, 0.9, 0.0, 0.0, 0.0), INTRINSICS, depth_m, found, seen(cells(), cells()))
+
+
+def block(col: int = 20, depth_m: float = 2.0) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """A slanted square of 20 x 20 pixels, somewhere in the middle rows."""
+    depth = np.full((60, 60), np.inf, np.float32)
+    masks = np.full((60, 60), -1, np.int32)
+    depth[20:40, col : col + 20] = depth_m + np.linspace(0, 0.3, 20, dtype=np.float32)
+    masks[20:40, col : col + 20] = 0
+    return depth, masks
+
+
+def test_conflicts_tell_both_ways_and_the_last_observation_wins() -> None:
+    memory = OccupancyMap(FRAME)
+    assert len(memory.integrate(seen(cells((3, 4), (3, 5)), cells((3, 6))), (-0.6, 2.3))) == 0
+    again = seen(cells((3, 6)), cells((3, 5), (9, 9)))
+    assert memory.conflicts(again).freed.tolist() == [[3, 6]]
+    conflicts = memory.integrate(again, (-0.6, 2.3))
+    assert len(conflicts) == 2
+    assert conflicts.obstructed.tolist() == [[3, 5]]
+    assert memory.cells[3, 4:7].tolist() == [1, 2, 1]
+    assert memory.explored[3, 4]
+    assert not memory.explored[39, 59]
+    memory.clear()
+    assert not memory.cells.any()
+    assert not memory.explored.any()
+
+
+def test_what_is_only_assumed_contradicts_nothing() -> None:
+    memory = OccupancyMap(FRAME)
+    memory.assume_free((0.0, 3.0), 0.3)
+    assert memory.cells[10, 10] == 1
+    assert memory.explored[10, 10]
+    assert len(memory.integrate(seen(cells(), cells((10, 10))), (0.0, 3.0))) == 0
+    assert memory.cells[10, 10] == 2
+    memory.forget(cells((10, 10)))
+    assert memory.cells[10, 10] == 0
+
+
+def test_exploring_by_frontiers_sees_every_room() -> None:
+    blocked = np.zeros((40, 60), np.uint8)
+    blocked[[0, -1]] = blocked[:, [0, -1]] = 1
+    blocked[:, 25], blocked[20, 25:] = 1, 1
+    blocked[5:11, 25], blocked[20, 45:51] = 0, 0
+    grid = OccupancyGrid(blocked, FRAME.cell_m, FRAME.corner_m)
+    memory = OccupancyMap(FRAME)
+    place, ids = (-0.5, 5.5), []
+    for _ in range(30):
+        for quarter in range(4):
+            look = visible_occupancy(grid, Pose(place[0], 0, place[1], quarter * math.pi / 2), INTRINSICS, 3.0)
+            assert len(memory.integrate(look, place)) == 0
+        frontiers = memory.update_frontiers(place)
+        assert [f.id for f in frontiers] == sorted(f.id for f in memory.frontiers)
+        if not frontiers:
+            break
+        place = frontiers[0].position_m
+        ids.append(frontiers[0].id)
+    assert (memory.cells[blocked == 0] == 1).all()
+    assert memory.update_frontiers(place) == []
+    assert ids == sorted(ids)
+
+
+def test_a_wall_hides_what_lies_behind_it_and_the_view_ends_with_range_and_angle() -> None:
+    blocked = np.zeros((40, 60), np.uint8)
+    blocked[30] = 1
+    grid = OccupancyGrid(blocked, FRAME.cell_m, FRAME.corner_m)
+    look = visible_occupancy(grid, Pose(2.05, 0, 4.05, 0.0), INTRINSICS, 2.0)
+    assert set(look.blocked[:, 0].tolist()) == {30}
+    assert look.free[:, 0].min() == 20
+    assert look.free[:, 0].max() == 29
+    assert (np.abs(look.free[:, 1] - 30) <= look.free[:, 0] - 19).all()
+    east = visible_occupancy(grid, Pose(2.05, 0, 4.05, math.pi / 2), INTRINSICS, 1.0)
+    assert len(east.blocked) == 0
+    assert east.free[:, 1].max() == 30 + 10
+
+
+def test_a_stale_entry_is_told_from_one_still_there() -> None:
+    entries = ObjectMap()
+    here, moved = a_view(*block(), "Mug"), a_view(*block(35, 2.6), "Mug")
+    assert entries.update(here).entry_ids == (1,)
+    assert entries.update(here).entry_ids == (1,)
+    entries.begin_stage(2)
+    assert entries.update(moved).entry_ids == (2,)
+    assert entries.is_supported(1, here)
+    assert not entries.is_supported(1, moved)
+    other = replace(here, detections=replace(here.detections, labels=("Bowl",)))
+    assert not entries.is_supported(1, other), "another object stands there now"
+    entry = entries.entries[0]
+    assert (entry.label, entry.label_counts, entry.num_detections) == ("Mug", [("Mug", 2)], 2)
+    assert (entry.first_seen_stage, entry.last_seen_stage, entry.last_seen_view) == (1, 1, 2)
+    points_m = entries.points_m(1)
+    assert points_m is not None
+    assert points_m.shape == (entry.num_points, 3)
+    low, high = points_m.min(0), points_m.max(0)
+    np.testing.assert_allclose(entry.centre_m, (low + high) / 2, atol=1e-6)
+    np.testing.assert_allclose(entry.size_m, high - low, atol=1e-6)
+    assert entry.centre_m[1] == pytest.approx(here.camera_height_m, abs=0.1)
+    assert entries.remove(1)
+    assert entries.entry(1) is None
+    assert len(entries) == 1
+    with pytest.raises(InvalidArgumentError, match="entry_id"):
+        entries.is_supported(1, here)
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("depth_m", {"depth_m": np.full((60, 60), np.nan, np.float32)}),
+        ("depth_m", {"depth_m": np.ones((30, 120), np.float32)}),
+        ("depth_m", {"depth_m": np.ones((60, 60), np.float32).T[::-1]}),
+        ("depth_m", {"depth_m": np.ones((60, 60))}),
+        ("depth_m", {"depth_m": np.ones(60, np.float32)}),
+    ],
+)
+def test_depth_that_does_not_fit_is_named(name: str, change: dict[str, NDArray[np.float32]]) -> None:
+    entries = ObjectMap()
+    with pytest.raises((InvalidArgumentError, TypeError), match=name):
+        entries.update(replace(a_view(*block(), "Mug"), **change))
+    assert entries.num_views == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("masks", {"masks": np.full((60, 60), 5, np.int32)}),
+        ("masks", {"masks": np.full((60, 60), -1, np.int64)}),
+        ("confidences", {"confidences": np.ones(3, np.float32)}),
+        ("confidences", {"confidences": np.full(1, np.nan, np.float32)}),
+        ("features", {"features": np.ones((3, 4), np.float32)}),
+        ("features", {"features": np.full((1, 4), np.inf, np.float32)}),
+    ],
+)
+def test_detections_that_do_not_fit_are_named(name: str, change: dict[str, NDArray[np.float32]]) -> None:
+    entries, view = ObjectMap(), a_view(*block(), "Mug")
+    with pytest.raises((InvalidArgumentError, TypeError), match=name):
+        entries.update(replace(view, detections=replace(view.detections, **change)))
+    assert entries.num_views == 0
+
+
+def test_cells_and_parameters_that_do_not_fit_are_named() -> None:
+    memory = OccupancyMap(FRAME)
+    with pytest.raises(InvalidArgumentError, match="`free`"):
+        memory.integrate(seen(cells((40, 0)), cells()), (0.0, 0.0))
+    with pytest.raises(InvalidArgumentError, match="`blocked`"):
+        memory.integrate(seen(cells(), np.zeros((2, 3), np.int32)), (0.0, 0.0))
+    with pytest.raises(InvalidArgumentError, match="`agent_m`"):
+        memory.update_frontiers((math.nan, 0.0))
+    with pytest.raises(InvalidArgumentError, match="`max_span_rad`"):
+        OccupancyMap(FRAME, FrontierConfig(max_span_deg=0.0))
+    with pytest.raises(InvalidArgumentError, match="`voxel_m`"):
+        ObjectMap(ObjectMapConfig(voxel_m=math.inf))
+    grid = OccupancyGrid(np.zeros((4, 4), np.uint8), 0.1, (0.0, 0.0))
+    with pytest.raises(InvalidArgumentError, match="`origin_m`"):
+        visible_occupancy(grid, Pose(9, 0, 9, 0), INTRINSICS, 3.0)
+    with pytest.raises(InvalidArgumentError, match="`range_m`"):
+        visible_occupancy(grid, Pose(0.1, 0, 0.1, 0), INTRINSICS, math.nan)
