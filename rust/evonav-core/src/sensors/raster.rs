@@ -78,7 +78,9 @@ pub fn render(
     camera.check()?;
     let view = View::new(camera);
     out.canvas.clear(camera.width_px, camera.height_px);
-    out.shader.begin(mesh.faces.len(), camera);
+    if want.rgb {
+        out.shader.begin(mesh.faces.len(), camera);
+    }
     view.collect_visible(mesh, &mut out.scratch.visible);
     for index in 0..out.scratch.visible.len() {
         let part = &mesh.parts[out.scratch.visible[index].1 as usize];

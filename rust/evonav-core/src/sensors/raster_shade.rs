@@ -46,7 +46,11 @@ impl LitFace {
 pub(super) struct Shader {
     /// By face tag; 0 is the background.
     faces: Vec<LitFace>,
+    /// Of the camera that `shortness` was made for.
+    size_px: [usize; 2],
     focal_px: f32,
+    /// 1 over the length of each pixel's ray at depth 1.
+    shortness: Vec<[f32; LANES]>,
     /// The row at hand with its ends continued.
     padded: Vec<f32>,
     light: Vec<f32>,
@@ -55,7 +59,22 @@ pub(super) struct Shader {
 impl Shader {
     pub fn begin(&mut self, num_faces: usize, camera: &Camera) {
         self.faces.resize(num_faces + 1, LitFace::SKY);
-        self.focal_px = camera.focal_px() as f32;
+        let (size_px, focal_px) = ([camera.width_px, camera.height_px], camera.focal_px() as f32);
+        if (size_px, focal_px) == (self.size_px, self.focal_px) {
+            return;
+        }
+        (self.size_px, self.focal_px) = (size_px, focal_px);
+        let [width, height] = size_px.map(|side| side as f32);
+        let shortness = |row: usize, block: usize| {
+            std::array::from_fn(|lane| {
+                let right = ((block * LANES + lane) as f32 + 0.5 - width / 2.0) / focal_px;
+                let down = (row as f32 + 0.5 - height / 2.0) / focal_px;
+                1.0 / (1.0 + right * right + down * down).sqrt()
+            })
+        };
+        let blocks = 0..camera.width_px.div_ceil(LANES);
+        let rows = (0..camera.height_px).flat_map(|row| blocks.clone().map(move |b| (row, b)));
+        self.shortness = rows.map(|(row, block)| shortness(row, block)).collect();
     }
 
     /// Lights a face that the camera, `height_m` above its plane, may see.
@@ -115,15 +134,15 @@ impl Shader {
 
     fn paint(&self, canvas: &Canvas, row: usize, pixels: &mut [u8]) {
         let blocks = canvas.row_blocks(row);
-        let (tags, depths) = (&canvas.tags[blocks.clone()], &canvas.inverse_depth[blocks]);
-        let down = row as f32 + 0.5 - canvas.height_px as f32 / 2.0;
-        let centre_u = canvas.width_px as f32 / 2.0;
         let (whole, rest) = pixels.as_chunks_mut::<{ 3 * LANES }>();
         let mut whole = whole.iter_mut();
-        let lights = self.light.as_chunks().0;
-        for (block, ((tags, depths), lights)) in tags.iter().zip(depths).zip(lights).enumerate() {
-            let right = (block * LANES) as f32 + 0.5 - centre_u;
-            let rgb = self.colours(tags, &self.facing(depths, [right, down]), lights);
+        let tags = &canvas.tags[blocks.clone()];
+        let depths = canvas.inverse_depth[blocks.clone()].iter().zip(&self.shortness[blocks]);
+        for ((tags, (depths, shortness)), lights) in
+            tags.iter().zip(depths).zip(self.light.as_chunks().0)
+        {
+            let facing = std::array::from_fn(|lane| depths[lane] * shortness[lane]);
+            let rgb = self.colours(tags, &facing, lights);
             match whole.next() {
                 Some(pixels) => pixels.copy_from_slice(rgb.as_flattened()),
                 None => rest.copy_from_slice(&rgb.as_flattened()[..rest.len()]),
@@ -131,33 +150,35 @@ impl Shader {
         }
     }
 
-    /// Inverse depth over the length of the ray at depth 1: times the camera's distance from a
-    /// plane, the cosine between the plane's normal and the look at it.
-    fn facing(&self, depths: &[f32; LANES], [right, down]: [f32; 2]) -> [f32; LANES] {
-        let per_focal = 1.0 / (self.focal_px * self.focal_px);
-        std::array::from_fn(|lane| {
-            let right = right + lane as f32;
-            depths[lane] / (1.0 + (right * right + down * down) * per_focal).sqrt()
-        })
-    }
-
+    /// Colours of a block. `facing` is inverse depth over the length of the ray at depth 1: times
+    /// the camera's distance from a plane, the cosine between its normal and the look at it.
     fn colours(
         &self,
         tags: &[u32; LANES],
         facing: &[f32; LANES],
         lights: &[f32; LANES],
     ) -> [[u8; 3]; LANES] {
-        let pixel = |face: &LitFace, lane: usize| {
-            let lamp = 1.0 - LAMP_SHARE + LAMP_SHARE * face.height_m * facing[lane];
-            face.rgb.map(|channel| (channel * lights[lane] * lamp).min(255.0) as i32 as u8)
+        let lit = |face: &LitFace, lane: usize| {
+            lights[lane] * (1.0 - LAMP_SHARE + LAMP_SHARE * face.height_m * facing[lane])
         };
         // Most blocks lie within one face.
         if tags.iter().all(|&tag| tag == tags[0]) {
             let face = self.faces[tags[0] as usize];
-            return std::array::from_fn(|lane| pixel(&face, lane));
+            let light: [f32; LANES] = std::array::from_fn(|lane| lit(&face, lane));
+            let channels = face.rgb.map(|channel| light.map(|light| to_byte(channel * light)));
+            return std::array::from_fn(|lane| channels.map(|channel| channel[lane] as u8));
         }
-        std::array::from_fn(|lane| pixel(&self.faces[tags[lane] as usize], lane))
+        std::array::from_fn(|lane| {
+            let face = &self.faces[tags[lane] as usize];
+            face.rgb.map(|channel| to_byte(channel * lit(face, lane)) as u8)
+        })
     }
+}
+
+/// Rounds a number of 0 or more to the low byte of the result, 255 at most: by the mantissa of a
+/// sum with 2^23, which unlike a conversion needs no care for numbers out of range.
+fn to_byte(value: f32) -> u32 {
+    (value.min(255.0) + 8_388_608.0).to_bits()
 }
 
 /// Takes from `light` what `shade` makes of the bend of each pixel's surroundings.
