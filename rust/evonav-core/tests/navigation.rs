@@ -113,6 +113,7 @@ proptest! {
             prop_assert!(nav.try_move(a, b));
         }
         prop_assert_eq!(nav.try_move(a, b), nav.try_move(b, a));
+        prop_assert_eq!(nav.try_move(a, b), nav.obstacles().is_clear_between(a, b));
     }
 
     /// Flood fill on the same lattice, every step sampled densely.
@@ -239,6 +240,19 @@ fn a_path_around_a_corner_has_the_length_of_the_taut_string() {
     let exact_m = 2.0 * (straight_m + 0.2 * arc_rad) + 0.1;
     let got_m = path_length_m(&path);
     assert!(got_m >= exact_m - 1e-6 && got_m < exact_m + 0.012, "{got_m} {exact_m}");
+}
+
+#[test]
+fn a_gap_half_a_millimetre_wider_than_the_agent_is_passed() {
+    // Two boxes whose corners face each other half-way between two tangents of their arcs.
+    let [x, z] = [33.75_f64.to_radians().cos(), 33.75_f64.to_radians().sin()];
+    for (gap_m, is_open) in [(0.4005, true), (0.3995, false)] {
+        let [half_x, half_z] = [x, z].map(|v| (5.0 - 2.3 - gap_m * v) / 2.0);
+        let near = cuboid([1.15, 1.0, 1.15], [1.15, 1.0, 1.15], 0.0);
+        let far = cuboid([5.0 - half_x, 1.0, 5.0 - half_z], [half_x, 1.0, half_z], 0.0);
+        let path = navigation(&[near, far]).shortest_path([1.0, 4.0], [4.0, 1.0]);
+        assert_eq!(path.is_some(), is_open);
+    }
 }
 
 #[test]

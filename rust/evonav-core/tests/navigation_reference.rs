@@ -136,6 +136,8 @@ fn paths_in_real_houses_are_those_of_a_fine_any_angle_lattice() {
             }
             let path = navigation.shortest_path(a, b).expect("both are reachable");
             let length_m = path_length_m(&path);
+            let field_m = navigation.distances_m(a, &[b])[0];
+            assert!((length_m - field_m).abs() < 1e-6, "{length_m} {field_m}");
             let fine = lattice.path(lattice.index_of(a), lattice.index_of(b)).expect("a path");
             let fine_m = path_length_m(&pulled_taut(&navigation, &fine));
             let ratio = length_m / fine_m;

@@ -117,23 +117,19 @@ impl VisibilityGraph {
         let mut search = Search::new(self.nodes.len());
         search.leave(self, obstacles, start_m, ahead_m);
         let leads_to_target = Self::leads_to(obstacles, target_m);
-        let mut last = None;
-        let mut best_m = f64::INFINITY;
-        while let Some(node) = search.pop(self, obstacles, start_m, best_m) {
-            let cost_m = search.cost_m[node as usize];
-            let total_m = cost_m + ahead_m(node);
+        while let Some(node) = search.pop(self, obstacles, start_m) {
             let here = &self.nodes[node as usize];
-            if total_m < best_m
-                && leads_to_target(here)
-                && obstacles.is_clear_between(here.point_m, target_m)
-            {
-                (best_m, last) = (total_m, Some(node));
+            // Nodes come up by the length of the shortest path that may lead over them, so the
+            // first from where the target is seen is on the shortest of all.
+            if leads_to_target(here) && obstacles.is_clear_between(here.point_m, target_m) {
+                return Some(self.trace(&search, node, start_m, target_m));
             }
+            let cost_m = search.cost_m[node as usize];
             for edge in self.edges_of(obstacles, node) {
                 search.reach(edge.to, node, cost_m + edge.length_m, ahead_m);
             }
         }
-        last.map(|last| self.trace(&search, last, start_m, target_m))
+        None
     }
 
     /// Shortest distances from a free point to many free points; infinite where there is no way.
@@ -145,7 +141,7 @@ impl VisibilityGraph {
     ) -> Vec<f64> {
         let mut search = Search::new(self.nodes.len());
         search.leave(self, obstacles, start_m, |_| 0.0);
-        while let Some(node) = search.pop(self, obstacles, start_m, f64::INFINITY) {
+        while let Some(node) = search.pop(self, obstacles, start_m) {
             let cost_m = search.cost_m[node as usize];
             for edge in self.edges_of(obstacles, node) {
                 search.reach(edge.to, node, cost_m + edge.length_m, |_| 0.0);
@@ -292,18 +288,14 @@ impl Search {
         }
     }
 
-    /// Closes the best open node; `None` if none is better than `limit_m`.
+    /// Closes the best open node.
     fn pop(
         &mut self,
         graph: &VisibilityGraph,
         obstacles: &Obstacles,
         start_m: Vec2,
-        limit_m: f64,
     ) -> Option<u32> {
-        while let Some(Open { bound_m, cost_m, node, parent }) = self.open.pop() {
-            if bound_m >= limit_m {
-                return None;
-            }
+        while let Some(Open { cost_m, node, parent, .. }) = self.open.pop() {
             let i = node as usize;
             // An edge's cost is set when it is opened, a start's once it is known to see the node.
             let is_stale = self.is_closed[i] || cost_m > self.cost_m[i];
