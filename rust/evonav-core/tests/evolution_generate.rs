@@ -207,12 +207,47 @@ fn check_support(before: &House, after: &House, id: &str, solids: &BTreeMap<&str
         .iter()
         .flat_map(|part| points_in(part, 1.0))
         .fold(f64::INFINITY, |low, p| low.min(p[1]));
-    let [x, _, z] = new.position_m;
     // Round bottoms touch in a point and their samples end above it.
-    let is_borne = (0..40)
-        .map(|i| lowest - 0.002 * f64::from(i))
-        .any(|y| solids[parent.id.as_str()].iter().any(|part| contains(part, [x, y, z], 0.0)));
-    assert!(is_borne, "{id} floats over {}", parent.id);
+    let is_borne = |x: f64, z: f64| {
+        (0..40)
+            .map(|i| lowest - 0.002 * f64::from(i))
+            .any(|y| solids[parent.id.as_str()].iter().any(|part| contains(part, [x, y, z], 0.0)))
+    };
+    let [x, _, z] = new.position_m;
+    assert!(is_borne(x, z), "{id} floats over {}", parent.id);
+    for p in solids[id].iter().flat_map(|part| points_in(part, 1.0)) {
+        let [x, z] = [x + 0.7 * (p[0] - x), z + 0.7 * (p[2] - z)];
+        assert!(is_borne(x, z), "{id} overhangs {}", parent.id);
+    }
+}
+
+#[test]
+fn furniture_that_moved_stands_off_doors() {
+    for (house, seed) in houses().iter().flat_map(|h| (0..8).map(|s| (h.clone(), s))) {
+        let task = generate(&house, seed, &always(Mode::RetainGroup));
+        for (stage, house) in task.stages.iter().zip(stage_houses(&task)) {
+            let furniture = stage.evolution.changes.iter().filter(|c| c.to_support_id.is_none());
+            for change in furniture {
+                let solids = parts_of(&house, &change.id);
+                for p in solids.iter().flat_map(|part| points_in(part, 1.0)) {
+                    assert!(!is_at_door(&house, [p[0], p[2]]), "{} at a door", change.id);
+                }
+            }
+        }
+    }
+}
+
+/// Whether a point lies less than 0.49 m in front of or behind a door.
+fn is_at_door(house: &House, point: Vec2) -> bool {
+    house.doors.iter().any(|door| {
+        let wall = house.walls.iter().find(|wall| wall.id == door.wall0).unwrap();
+        let [dx, dz] = [wall.to_m[0] - wall.from_m[0], wall.to_m[1] - wall.from_m[1]];
+        let length = dx.hypot(dz);
+        let [px, pz] = [point[0] - wall.from_m[0], point[1] - wall.from_m[1]];
+        let (along, across) = ((px * dx + pz * dz) / length, (px * dz - pz * dx) / length);
+        let hole = door.hole_min_m[0] + 0.01..door.hole_max_m[0] - 0.01;
+        across.abs() < 0.49 && hole.contains(&along)
+    })
 }
 
 #[test]
