@@ -163,7 +163,7 @@ class EmbeddedSimulator:
 
     def is_visible(self, from_m: _Position, to_m: _Position, ignored_instances: Sequence[int] = ()) -> bool:
         """Whether nothing stands between two points but bodies with the given instance ids."""
-        return self._world.is_visible(from_m, to_m, [instance - 1 for instance in ignored_instances])
+        return self._world.is_visible(from_m, to_m, [instance - 1 for instance in ignored_instances if instance > 0])
 
     def shortest_path(self, start_m: _Position, target_m: _Position) -> NDArray[np.float64]:
         """`(M, 3)` corners of the geodesic; `(0, 3)` when there is none. Both ends snap to the nearest free point."""

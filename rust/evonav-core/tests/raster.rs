@@ -279,3 +279,34 @@ fn numbers_that_are_not_finite_draw_nothing_and_do_not_panic() {
     render(&mesh, &camera, Want { rgb: true, instances: true }, &mut frame).unwrap();
     assert!(frame.instances.iter().all(|&id| id == 0));
 }
+
+/// Sky where nothing is; the walls' own colour, darkest where they meet.
+#[test]
+fn colours_show_corners_and_sky() {
+    let wall = |half_m: Vec3, centre_m: Vec3| Part {
+        primitive: Primitive::Cuboid { half_m },
+        centre_m,
+        rotation: euler_rotation_deg([0.0; 3]),
+        colour: [200, 40, 40],
+    };
+    // A wall across and one to the right of it that meets it; nothing to the left.
+    let ahead = wall([1.5, 3.0, 0.1], [1.5, 0.0, 3.1]);
+    let beside = wall([0.1, 3.0, 3.0], [2.1, 0.0, 0.0]);
+    let mesh = SceneMesh::build(&scene_of(&[ahead, beside]));
+    let camera = Camera {
+        width_px: 301,
+        height_px: 301,
+        vertical_fov_rad: 90.0_f64.to_radians(),
+        position_m: [0.5, 0.0, 0.0],
+        yaw_rad: 0.0,
+        horizon_rad: 0.0,
+    };
+    let mut frame = FrameBuffer::default();
+    render(&mesh, &camera, Want { rgb: true, instances: false }, &mut frame).unwrap();
+    let at = |col: usize| &frame.rgb[3 * (150 * 301 + col)..][..3];
+    assert_eq!(at(20), [204, 222, 236]);
+    assert!(at(160)[0] > 3 * at(160)[1]);
+    // The walls meet at x = 2, z = 3.
+    let corner = (150.5 + 150.5 * 1.5 / 3.0) as usize;
+    assert!(u32::from(at(corner)[0]) * 10 < u32::from(at(corner - 30)[0]) * 8);
+}

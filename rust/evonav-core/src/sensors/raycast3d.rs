@@ -74,7 +74,7 @@ impl RayCaster {
     }
 
     /// Whether nothing stands between two points, bodies for which `ignores` holds left aside
-    /// (an object is not in the way of a look at itself).
+    /// (an object is not in the way of a look at itself). Points that are not finite see nothing.
     pub fn is_visible(
         &self,
         mesh: &SceneMesh,
@@ -84,6 +84,9 @@ impl RayCaster {
     ) -> bool {
         let vector = |v: Vec3| Vector::new(v[0], v[1], v[2]);
         let direction = sub(to_m, from_m);
+        if ![from_m, direction].as_flattened().iter().all(|v| v.is_finite()) {
+            return false;
+        }
         let ray = Ray::new(vector(from_m), vector(direction));
         let is_blocked = self
             .bvh
