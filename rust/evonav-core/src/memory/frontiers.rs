@@ -91,6 +91,7 @@ pub struct Frontiers {
     is_last_resort: bool,
     given_up: Option<BitGrid>,
     last_agent_m: Option<Vec2>,
+    num_stands: u32,
 }
 
 impl Frontiers {
@@ -103,6 +104,7 @@ impl Frontiers {
     pub fn clear(&mut self) {
         self.list.clear();
         self.given_up = None;
+        self.num_stands = 0;
     }
 
     /// Brings the frontiers up to date with the map. A frontier whose region has hardly changed
@@ -122,9 +124,7 @@ impl Frontiers {
             .filter_map(|old| old.cells.get(old.cells.len() / 2))
             .copied()
             .collect();
-        if self.is_last_resort {
-            self.give_up_around(map, agent_m);
-        }
+        self.give_up(map, agent_m);
         let found = find_regions(map, agent_m, &seeds, self.given_up.as_ref(), config)?;
         self.is_last_resort = found.is_last_resort;
         self.last_agent_m = Some(agent_m);
@@ -143,13 +143,21 @@ impl Frontiers {
     }
 
     /// Unknown cells that the agent did not get to see from the place meant for it, or from as
-    /// near as it could get (it went nowhere since the last update), it will not see at all.
-    fn give_up_around(&mut self, map: &OccupancyMap, agent_m: Vec2) {
+    /// near as it could get (it went nowhere since the last update), it will not see at all. An
+    /// agent that goes nowhere twice cannot get to the nearest place.
+    fn give_up(&mut self, map: &OccupancyMap, agent_m: Vec2) {
         let is_standing = self.last_agent_m.is_some_and(|last| distance_2d_m(last, agent_m) < 0.1);
+        self.num_stands = if is_standing { self.num_stands + 1 } else { 0 };
         let (reached_m, around_m) = if is_standing { (0.8, 1.0) } else { (0.3, 0.5) };
         let given_up =
             self.given_up.get_or_insert_with(|| BitGrid::new(map.spec().rows, map.spec().cols));
-        let reached = self.list.iter().filter(|f| distance_2d_m(f.position_m, agent_m) < reached_m);
+        let far_m = |f: &&Frontier| distance_2d_m(f.position_m, agent_m);
+        let nearest = self.list.iter().min_by(|a, b| far_m(a).total_cmp(&far_m(b)));
+        if let Some(nearest) = nearest.filter(|_| self.num_stands >= 2) {
+            let cells = nearest.cells.iter();
+            cells.for_each(|cell| given_up.insert(cell[0] as usize, cell[1] as usize));
+        }
+        let reached = self.list.iter().filter(|f| self.is_last_resort && far_m(f) < reached_m);
         for cell in reached.flat_map(|frontier| &frontier.cells) {
             let cell = cell.map(|i| i as usize);
             if distance_2d_m(map.spec().centre_m(cell), agent_m) < around_m {

@@ -33,7 +33,8 @@ pub(crate) fn find_regions(
         Error::require("agent_m", value, "finite", f64::is_finite)?;
     }
     let island = island(map, agent_m, seeds);
-    let (inner, edges) = split_by_unexplored_neighbours(&island, map.explored());
+    let (mut inner, edges) = split_by_unexplored_neighbours(&island, map.explored());
+    given_up.into_iter().flat_map(BitGrid::cells).for_each(|[row, col]| inner.remove(row, col));
     let mut regions = Vec::new();
     if edges.count() > 0 {
         for runs in Components::new(&inner).by_component() {
