@@ -37,6 +37,10 @@ pub struct Entry {
     pub last_seen_stage: u32,
     /// View of the last detection, counted from 1 since the map began.
     pub last_seen_view: u64,
+    /// Seen or merged since the last clean-up.
+    pub(crate) is_changed: bool,
+    /// Its cloud has got points since the last clean-up.
+    pub(crate) has_grown: bool,
 }
 
 impl Entry {
@@ -57,6 +61,8 @@ impl Entry {
             first_seen_stage: stage,
             last_seen_stage: stage,
             last_seen_view: view,
+            is_changed: true,
+            has_grown: true,
         }
     }
 
@@ -96,16 +102,24 @@ impl Entry {
     pub(crate) fn see(&mut self, sighting: Sighting, stage: u32, view: u64) {
         self.count(vec![(sighting.label, 1)], sighting.feature, 1);
         self.confidence = self.confidence.max(sighting.confidence);
-        self.cloud.merge(&sighting.points);
+        self.grow(&sighting.points);
         self.last_seen_stage = stage;
         self.last_seen_view = view;
+    }
+
+    /// Takes over points where it has none yet.
+    fn grow(&mut self, points: &[Point]) {
+        let num_points = self.cloud.points().len();
+        self.cloud.merge(points);
+        self.is_changed = true;
+        self.has_grown |= self.cloud.points().len() != num_points;
     }
 
     /// Joins another entry; the id stays.
     pub(crate) fn absorb(&mut self, other: Self) {
         self.count(other.label_counts, other.feature, other.num_detections);
         self.confidence = self.confidence.max(other.confidence);
-        self.cloud.merge(other.cloud.points());
+        self.grow(other.cloud.points());
         self.first_seen_stage = self.first_seen_stage.min(other.first_seen_stage);
         self.last_seen_stage = self.last_seen_stage.max(other.last_seen_stage);
         self.last_seen_view = self.last_seen_view.max(other.last_seen_view);

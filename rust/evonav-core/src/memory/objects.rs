@@ -319,7 +319,8 @@ impl ObjectMap {
 
     fn clean_up(&mut self, agent_m: [f64; 2], update: &mut Update) {
         let config = self.config;
-        for entry in &mut self.entries {
+        // What was not seen since the last clean-up is as that one left it.
+        for entry in self.entries.iter_mut().filter(|entry| entry.has_grown) {
             denoise(&mut entry.cloud, &config);
         }
         self.entries.retain(|entry| {
@@ -332,6 +333,9 @@ impl ObjectMap {
             keep
         });
         self.merge_alike(update);
+        for entry in &mut self.entries {
+            (entry.is_changed, entry.has_grown) = (false, false);
+        }
         for id in &mut update.entry_ids {
             *id = id.filter(|id| !update.removed.contains(id)).map(|id| {
                 update.merged.iter().fold(id, |id, pair| if pair[0] == id { pair[1] } else { id })
@@ -347,7 +351,9 @@ impl ObjectMap {
             for (j, b) in self.entries.iter().enumerate() {
                 let is_alike =
                     || a.similarity(b.label(), b.feature.as_deref()) > config.merge_similarity;
-                if i != j && a.is_beside(b.cloud.bounds_m(), &config) && is_alike() {
+                // Two that have not changed were not to be merged the last time, nor are they now.
+                let is_new = i != j && (a.is_changed || b.is_changed);
+                if is_new && a.is_beside(b.cloud.bounds_m(), &config) && is_alike() {
                     let overlap = b.cloud.overlap(a.cloud.points());
                     if overlap > config.merge_overlap {
                         pairs.push((overlap, i, j));
