@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Reach of the corners' darkness, as a share of the image's height.
-const CORNER_REACH: f64 = 0.025;
+const CORNER_REACH: f64 = 0.012;
 /// How dark a corner becomes, and how dark a silhouette's line.
 const CORNER_SHADE: f32 = 0.38;
 const LINE_SHADE: f32 = 0.30;
@@ -202,7 +202,7 @@ fn darken_row(
 
 /// Darkness in a corner. A large bend is no corner but something far behind an edge.
 fn corner_shade(bend: f32) -> f32 {
-    let is_corner = ((3.0 - bend) / 2.0).clamp(0.0, 1.0);
+    let is_corner = (1.8 - bend).clamp(0.0, 1.0);
     CORNER_SHADE * (bend / FULL_BEND).clamp(0.0, 1.0) * is_corner
 }
 
