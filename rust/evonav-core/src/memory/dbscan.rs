@@ -1,7 +1,7 @@
 //! Density clusters of a point cloud.
 
 use crate::{
-    memory::voxels::{Voxel, VoxelTable, voxel_of},
+    memory::voxels::{Voxel, VoxelIndex, voxel_of},
     sensors::unproject::Point,
 };
 
@@ -48,27 +48,26 @@ struct Grid<'a> {
     /// Point indices by cell, ascending in each; cell `c` has `members[starts[c]..starts[c + 1]]`.
     members: Vec<u32>,
     starts: Vec<u32>,
-    /// Cells that may hold neighbours, itself left out; each pair once, from the later to the earlier cell.
-    earlier: Vec<Vec<u32>>,
+    /// Cells that may hold neighbours of each other, each pair once, the nearest first.
+    pairs: Vec<[u32; 2]>,
 }
 
 impl<'a> Grid<'a> {
     fn new(points: &'a [Point], radius_m: f32) -> Self {
         // A hair less than radius / sqrt(3), so that rounding cannot part the points of a cell.
         let inverse_edge = 3.0_f64.sqrt() * 1.0001 / f64::from(radius_m);
-        let mut table = VoxelTable::with_capacity(points.len() / 4);
+        let voxel_of_point: Vec<Voxel> =
+            points.iter().map(|&point| voxel_of(point, inverse_edge)).collect();
+        let mut index = VoxelIndex::spanning(&voxel_of_point, REACH);
         let mut voxels: Vec<Voxel> = Vec::new();
-        let cell_of: Vec<u32> = points
-            .iter()
-            .map(|&point| {
-                let voxel = voxel_of(point, inverse_edge);
-                let (&mut cell, is_new) = table.entry(voxel, voxels.len() as u32);
-                if is_new {
-                    voxels.push(voxel);
-                }
-                cell
-            })
-            .collect();
+        let enter = |&voxel: &Voxel| {
+            let cell = index.entry(voxel, voxels.len() as u32);
+            if cell as usize == voxels.len() {
+                voxels.push(voxel);
+            }
+            cell
+        };
+        let cell_of: Vec<u32> = voxel_of_point.iter().map(enter).collect();
         let mut starts = vec![0_u32; voxels.len() + 1];
         cell_of.iter().for_each(|&cell| starts[cell as usize + 1] += 1);
         (0..voxels.len()).for_each(|cell| starts[cell + 1] += starts[cell]);
@@ -78,12 +77,12 @@ impl<'a> Grid<'a> {
             members[next[cell as usize] as usize] = point as u32;
             next[cell as usize] += 1;
         }
-        let earlier = neighbour_cells(&voxels, &table);
-        Self { points, radius2: radius_m * radius_m, members, starts, earlier }
+        let pairs = neighbour_pairs(&voxels, &index);
+        Self { points, radius2: radius_m * radius_m, members, starts, pairs }
     }
 
     fn num_cells(&self) -> usize {
-        self.earlier.len()
+        self.starts.len() - 1
     }
 
     fn members(&self, cell: usize) -> &[u32] {
@@ -95,49 +94,44 @@ impl<'a> Grid<'a> {
     }
 
     fn core_points(&self, min_points: usize) -> Vec<bool> {
-        let is_dense = |cell: usize| self.members(cell).len() >= min_points;
-        // Neighbours of the points in thin cells; those in dense ones are core points at once.
-        let mut counts = vec![0_u32; self.points.len()];
+        // Neighbours found so far; there is no need to count on from `min_points`.
+        let mut counts = vec![0_usize; self.points.len()];
         for cell in 0..self.num_cells() {
             let here = self.members(cell);
-            here.iter().for_each(|&point| counts[point as usize] += here.len() as u32);
-            for &other in &self.earlier[cell] {
-                let other = other as usize;
-                if is_dense(cell) && is_dense(other) {
+            here.iter().for_each(|&point| counts[point as usize] = here.len());
+        }
+        for &[a, b] in &self.pairs {
+            for (cell, other) in [(a, b), (b, a)] {
+                let here = self.members(cell as usize);
+                if here.len() >= min_points {
                     continue;
                 }
-                for &a in here {
-                    for &b in self.members(other) {
-                        let is_near = u32::from(self.is_near(a, b));
-                        counts[a as usize] += is_near;
-                        counts[b as usize] += is_near;
+                for &point in here {
+                    let count = &mut counts[point as usize];
+                    if *count < min_points {
+                        let others = self.members(other as usize).iter();
+                        *count += others.filter(|&&other| self.is_near(point, other)).count();
                     }
                 }
             }
         }
-        counts.into_iter().map(|count| count as usize >= min_points).collect()
+        counts.into_iter().map(|count| count >= min_points).collect()
     }
 
     /// Cells joined by core points within the radius: a representative a cell.
     fn join_cells(&self, is_core: &[bool]) -> Vec<u32> {
         let mut parents: Vec<u32> = (0..self.num_cells() as u32).collect();
-        let core_of = |cell: usize| {
-            self.members(cell).iter().copied().filter(|&point| is_core[point as usize])
+        let core_of = |cell: u32| {
+            self.members(cell as usize).iter().copied().filter(|&point| is_core[point as usize])
         };
-        for cell in 0..self.num_cells() {
-            for &other in &self.earlier[cell] {
-                let (a, b) = (root(&parents, cell as u32), root(&parents, other));
-                if a == b {
-                    continue;
-                }
-                let touches =
-                    core_of(cell).any(|a| core_of(other as usize).any(|b| self.is_near(a, b)));
-                if touches {
-                    parents[a.max(b) as usize] = a.min(b);
-                }
+        // Near cells first: most of the farther pairs are then joined already.
+        for &[cell, other] in &self.pairs {
+            let (a, b) = (root(&mut parents, cell), root(&mut parents, other));
+            if a != b && core_of(cell).any(|a| core_of(other).any(|b| self.is_near(a, b))) {
+                parents[a.max(b) as usize] = a.min(b);
             }
         }
-        (0..self.num_cells() as u32).map(|cell| root(&parents, cell)).collect()
+        (0..self.num_cells() as u32).map(|cell| root(&mut parents, cell)).collect()
     }
 
     fn label(&self, is_core: &[bool], cluster_of_cell: Vec<u32>) -> Vec<i32> {
@@ -176,38 +170,43 @@ impl<'a> Grid<'a> {
                 }
             }
         };
-        for (cell, earlier) in self.earlier.iter().enumerate() {
-            adopt(&borders[cell], cell);
-            for &other in earlier {
-                adopt(&borders[cell], other as usize);
-                adopt(&borders[other as usize], cell);
-            }
+        for (cell, borders) in borders.iter().enumerate() {
+            adopt(borders, cell);
+        }
+        for [a, b] in self.pairs.iter().map(|pair| pair.map(|cell| cell as usize)) {
+            adopt(&borders[a], b);
+            adopt(&borders[b], a);
         }
     }
 }
 
-fn root(parents: &[u32], mut cell: u32) -> u32 {
+/// The representative of a cell; shortens the way there.
+fn root(parents: &mut [u32], mut cell: u32) -> u32 {
     while parents[cell as usize] != cell {
-        cell = parents[cell as usize];
+        let parent = parents[cell as usize];
+        parents[cell as usize] = parents[parent as usize];
+        cell = parent;
     }
     cell
 }
 
-/// For each cell the earlier cells at most two steps away an axis.
-fn neighbour_cells(voxels: &[Voxel], table: &VoxelTable) -> Vec<Vec<u32>> {
-    let steps: Vec<Voxel> = (-2..=2)
-        .flat_map(|x| (-2..=2).flat_map(move |y| (-2..=2).map(move |z| [x, y, z])))
+/// Cells at most this many steps away an axis may hold neighbours.
+const REACH: i32 = 2;
+
+fn neighbour_pairs(voxels: &[Voxel], index: &VoxelIndex) -> Vec<[u32; 2]> {
+    let reach = -REACH..=REACH;
+    let mut steps: Vec<Voxel> = reach
+        .clone()
+        .flat_map(|x| reach.clone().flat_map(move |y| (-REACH..=REACH).map(move |z| [x, y, z])))
         .filter(|&step| step > [0, 0, 0])
         .collect();
-    let mut earlier = vec![Vec::new(); voxels.len()];
-    for (cell, voxel) in voxels.iter().enumerate() {
-        for step in &steps {
+    steps.sort_by_key(|step| step.iter().map(|i| i * i).sum::<i32>());
+    let mut pairs = Vec::with_capacity(8 * voxels.len());
+    for step in steps {
+        for (cell, voxel) in voxels.iter().enumerate() {
             let beside = [0, 1, 2].map(|i| voxel[i].saturating_add(step[i]));
-            if let Some(other) = table.get(beside) {
-                let (late, early) = (other.max(cell as u32), other.min(cell as u32));
-                earlier[late as usize].push(early);
-            }
+            pairs.extend(index.get(beside).map(|other| [cell as u32, other]));
         }
     }
-    earlier
+    pairs
 }

@@ -72,6 +72,68 @@ impl VoxelTable {
     }
 }
 
+/// From voxels to small numbers: an array where the voxels are close together, else a table.
+#[derive(Debug, Clone)]
+pub(crate) enum VoxelIndex {
+    Dense { corner: Voxel, size: [usize; 3], slots: Vec<u32> },
+    Sparse(VoxelTable),
+}
+
+const FREE_INDEX: u32 = u32::MAX;
+/// An array has at most this many slots a voxel entered.
+const SLOTS_A_VOXEL: usize = 64;
+
+impl VoxelIndex {
+    /// Room for these voxels, to be looked up at most `margin` steps beyond their bounds.
+    pub(crate) fn spanning(voxels: &[Voxel], margin: i32) -> Self {
+        let bound = |pick: fn(i32, i32) -> i32| {
+            voxels.iter().copied().reduce(|a, b| [0, 1, 2].map(|i| pick(a[i], b[i])))
+        };
+        let (low, high) = (bound(i32::min).unwrap_or([0; 3]), bound(i32::max).unwrap_or([0; 3]));
+        let size =
+            [0, 1, 2].map(|i| i64::from(high[i]) - i64::from(low[i]) + 1 + 2 * i64::from(margin));
+        let num_slots = size.iter().try_fold(1_i64, |product, &side| product.checked_mul(side));
+        match num_slots.and_then(|num| usize::try_from(num).ok()) {
+            Some(num) if num <= SLOTS_A_VOXEL * voxels.len() => Self::Dense {
+                corner: low.map(|i| i.saturating_sub(margin)),
+                size: size.map(|side| side as usize),
+                slots: vec![FREE_INDEX; num],
+            },
+            _ => Self::Sparse(VoxelTable::with_capacity(voxels.len() / 4)),
+        }
+    }
+
+    pub(crate) fn get(&self, voxel: Voxel) -> Option<u32> {
+        match self {
+            Self::Dense { corner, size, slots } => slots
+                .get(slot_of(voxel, corner, size))
+                .copied()
+                .filter(|&value| value != FREE_INDEX),
+            Self::Sparse(table) => table.get(voxel),
+        }
+    }
+
+    /// The value of a voxel; `value` is entered if there is none.
+    pub(crate) fn entry(&mut self, voxel: Voxel, value: u32) -> u32 {
+        match self {
+            Self::Dense { corner, size, slots } => {
+                let slot = &mut slots[slot_of(voxel, corner, size)];
+                if *slot == FREE_INDEX {
+                    *slot = value;
+                }
+                *slot
+            }
+            Self::Sparse(table) => *table.entry(voxel, value).0,
+        }
+    }
+}
+
+/// Place of a voxel in the array with this corner.
+fn slot_of(voxel: Voxel, corner: &Voxel, size: &[usize; 3]) -> usize {
+    let [x, y, z] = [0, 1, 2].map(|i| voxel[i].wrapping_sub(corner[i]) as usize);
+    (x * size[1] + y) * size[2] + z
+}
+
 /// Exact for voxels within a million of the origin (10 km at 0.01 m); beyond, indices clamp.
 fn key_of(voxel: Voxel) -> u64 {
     const HALF: i32 = 1 << 20;
