@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[1] / "python" / "evonav" / "data" / "tas
 SEED = 0
 FIRST_TEST_HOUSE = 84
 """Line of the first house with test assets."""
-NUM_TASKS = {2: 6, 3: 4, 4: 6, 5: 4, 6: 3, 7: 2, 8: 3, 10: 2}
+NUM_TASKS = {2: 5, 3: 4, 4: 4, 5: 4, 6: 3, 7: 2, 8: 1, 10: 1}
 """Tasks by number of rooms."""
 
 

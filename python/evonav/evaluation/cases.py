@@ -137,7 +137,7 @@ def room_at(plan: StageMap, point_m: Point2) -> str | None:
 def _thumbnail(image: NDArray[np.uint8]) -> str:
     """An RGB image as a small `data:` URI."""
     buffer = BytesIO()
-    Image.fromarray(image).resize((THUMBNAIL_PX, THUMBNAIL_PX)).save(buffer, "WEBP", quality=70)
+    Image.fromarray(image).resize((THUMBNAIL_PX, THUMBNAIL_PX)).save(buffer, "WEBP", quality=70, method=0)
     return f"data:image/webp;base64,{b64encode(buffer.getvalue()).decode()}"
 
 
