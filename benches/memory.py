@@ -1,15 +1,14 @@
-"""The memory at the size of one observation, against OpenCV, Open3D with faiss, and scikit-learn."""
+"""The memory at the size of one observation, against OpenCV and Open3D with faiss."""
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import cv2
 import faiss
 import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
-from sklearn.cluster import DBSCAN
 
 from benches.table import Row, compare
 from evonav.memory import ObjectMap, ObjectMapConfig, OccupancyMap
@@ -24,7 +23,6 @@ with 8 unexplored neighbours and their components with OpenCV (checked to be the
 view positions. Object memory: one 300x300 frame with 20 masks against 100 entries of about 7,000 points at 3D-Mem's
 voxel of 0.01 m: unproject, voxel filter, DBSCAN, overlap, association and merge; the peer does so as ConceptGraphs and
 3D-Mem do, with Open3D clouds and a flat faiss index an entry, and its associations are checked to be the same.
-Clean-up: DBSCAN of ten entries (ours also filters and merges them).
 """
 
 SIDE_PX = 300
@@ -34,8 +32,8 @@ _INTRINSICS = Intrinsics(SIDE_PX, SIDE_PX, math.pi / 2)
 
 
 def run() -> list[Row]:
-    """Times visibility, frontiers, one frame of object memory, and clean-up."""
-    return [*_visibility(), *_frontiers(), *_object_frame(), *_clean_up()]
+    """Times visibility, frontiers and one frame of object memory."""
+    return [*_visibility(), *_frontiers(), *_object_frame()]
 
 
 # Occupancy
@@ -160,9 +158,9 @@ def _view(pose: Pose, height_m: float, depth_m: NDArray[np.float32], masks: NDAr
     return View(pose, _INTRINSICS, depth_m, found, occupancy, camera_height_m=height_m)
 
 
-def _full_map(num_boxes: int = 100, views_per_cleanup: int = 0) -> ObjectMap:
+def _full_map(num_boxes: int = 100) -> ObjectMap:
     """Every box seen from four sides and above."""
-    entries = ObjectMap(ObjectMapConfig(max_distance_m=10.0, views_per_cleanup=views_per_cleanup))
+    entries = ObjectMap(ObjectMapConfig(max_distance_m=10.0, views_per_cleanup=0))
     for box in _boxes()[:num_boxes]:
         x, y, z = box.tolist()
         for turn, (dx, dz) in enumerate([(0, -0.9), (-0.9, 0), (0, 0.9), (0.9, 0)]):
@@ -262,22 +260,3 @@ def _object_frame() -> list[Row]:
 
     faiss.omp_set_num_threads(1)
     return compare("object memory, 20 masks, 100 entries", ours, {"Open3D + faiss": peer}, num)
-
-
-def _clean_up() -> list[Row]:
-    entries = _full_map(10, views_per_cleanup=1)
-    clouds = [entries.points_m(entry.id) for entry in entries.entries]
-    points = [cloud.astype(np.float64) for cloud in clouds if cloud is not None]
-    view = _frame()
-    nothing = replace(view, detections=Detections(np.full_like(view.detections.masks, -1), (), np.ones(0, np.float32)))
-
-    def open3d(_: int) -> object:
-        return [_largest_cluster(_cloud(cloud)) for cloud in points]
-
-    def scikit(_: int) -> object:
-        return [DBSCAN(eps=0.1, min_samples=10).fit_predict(cloud) for cloud in points]
-
-    def ours(_: int) -> object:
-        return entries.update(nothing)
-
-    return compare("clean-up of 10 entries", ours, {"Open3D DBSCAN": open3d, "scikit-learn DBSCAN": scikit}, 5)
