@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from update_readme import headline, readme_results
 
 REPOSITORY = Path(__file__).parents[2]
 NUM_TASKS_AGAIN = 3
@@ -37,11 +38,6 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_readme_shows_what_the_demo_measures(demo: Path) -> None:
-    sys.path.insert(0, str(REPOSITORY / "scripts"))
-    try:
-        from update_readme import headline, readme_results
-    finally:
-        sys.path.pop(0)
     assert readme_results() == headline(demo), "run `make readme`"
 
 

@@ -1,4 +1,3 @@
-import importlib.util
 import json
 import re
 from collections import Counter
@@ -6,9 +5,9 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
-from types import ModuleType
 
 import pytest
+from build_tasks import build_tasks
 
 from evonav.errors import InvalidArgumentError, TaskError
 from evonav.generation import (
@@ -148,19 +147,9 @@ def test_transitions_and_modes_are_drawn_as_the_paper_says(houses: list[House]) 
     assert min(lengths.values()) > 0.25 * sum(lengths.values())
 
 
-def bundle_script() -> ModuleType:
-    path = Path(__file__).resolve().parents[2] / "scripts" / "build_tasks.py"
-    spec = importlib.util.spec_from_file_location("build_tasks", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_bundled_tasks_are_what_the_script_makes() -> None:
     """Headers hold the checksums of all else."""
-    made = {task.task_id: task for task in bundle_script().build_tasks()}
+    made = {task.task_id: task for task in build_tasks()}
     with as_file(files("evonav") / "data" / "tasks") as directory:
         there = {task.task_id: task for task in load_tasks(directory)}
         assert made.keys() == there.keys()

@@ -1,13 +1,9 @@
 """The bundled houses are fit for use: every room is reached, and nothing small has fallen off its support."""
 
-import sys
-from pathlib import Path
+from build_houses import fallen_ids, unreached_rooms
 
 from evonav.house import bundled_houses
 from evonav.world.embedded import EmbeddedSimulator
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "scripts"))
-from build_houses import fallen_ids, unreached_rooms
 
 MIN_HOUSES = 24
 

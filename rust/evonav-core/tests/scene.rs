@@ -13,6 +13,10 @@ use evonav_core::{
 };
 use proptest::{collection::vec, prelude::*};
 
+use crate::solids::holds;
+
+mod solids;
+
 const UNKNOWN: UnknownAssets = UnknownAssets::CategoryDefault;
 
 /// Two rooms of 4 x 4 m side by side, a doorway between them, a window, an L counter and a table
@@ -80,23 +84,6 @@ fn is_blocked(scene: &Scene, from_m: Vec3, to_m: Vec3, kinds: &[BodyKind]) -> bo
         let point = add(from_m, sub(to_m, from_m).map(|d| d * t));
         parts.iter().any(|part| holds(part, point))
     })
-}
-
-fn holds(part: &Part, point_m: Vec3) -> bool {
-    let offset = sub(point_m, part.centre_m);
-    let own: Vec3 = std::array::from_fn(|j| (0..3).map(|i| part.rotation[i][j] * offset[i]).sum());
-    match part.primitive {
-        Primitive::Cuboid { half_m } => (0..3).all(|i| own[i].abs() <= half_m[i]),
-        Primitive::Ellipsoid { half_m } => {
-            (0..3).map(|i| (own[i] / half_m[i]).powi(2)).sum::<f64>() <= 1.0
-        }
-        Primitive::Frustum { bottom_m, top_m, half_height_m, .. } => {
-            let t = 0.5 * (own[1] / half_height_m + 1.0);
-            let half = |i: usize| bottom_m[i] + t * (top_m[i] - bottom_m[i]);
-            (0.0..=1.0).contains(&t)
-                && (own[0] / half(0)).powi(2) + (own[2] / half(1)).powi(2) <= 1.0
-        }
-    }
 }
 
 const BUILT: [BodyKind; 3] = [BodyKind::Wall, BodyKind::Door, BodyKind::Window];

@@ -6,9 +6,13 @@ use evonav_core::{
         part::{Part, Primitive, aabb_of},
         shapes::shape_of,
     },
-    geometry::{Vec3, sub},
+    geometry::Vec3,
 };
 use proptest::prelude::*;
+
+use crate::solids::holds;
+
+mod solids;
 
 fn asset(id: &str) -> Asset {
     Catalogue::bundled().get(id).expect("an asset of the catalogue").clone()
@@ -20,24 +24,6 @@ fn num_triangles(part: &Part) -> usize {
         Primitive::Cuboid { .. } => 12,
         Primitive::Frustum { sides, .. } => 4 * usize::from(sides) - 4,
         Primitive::Ellipsoid { .. } => 120,
-    }
-}
-
-/// Whether a point lies in a part, tested from the definition of each primitive.
-fn holds(part: &Part, point_m: Vec3) -> bool {
-    let offset = sub(point_m, part.centre_m);
-    let own: Vec3 = std::array::from_fn(|j| (0..3).map(|i| part.rotation[i][j] * offset[i]).sum());
-    match part.primitive {
-        Primitive::Cuboid { half_m } => (0..3).all(|i| own[i].abs() <= half_m[i]),
-        Primitive::Ellipsoid { half_m } => {
-            (0..3).map(|i| (own[i] / half_m[i]).powi(2)).sum::<f64>() <= 1.0
-        }
-        Primitive::Frustum { bottom_m, top_m, half_height_m, .. } => {
-            let t = 0.5 * (own[1] / half_height_m + 1.0);
-            let half = |i: usize| bottom_m[i] + t * (top_m[i] - bottom_m[i]);
-            (0.0..=1.0).contains(&t)
-                && (own[0] / half(0)).powi(2) + (own[2] / half(1)).powi(2) <= 1.0
-        }
     }
 }
 
