@@ -1,0 +1,61 @@
+"""The scene that actions read and change: a ProcTHOR house, and the simulator of it as it now is."""
+
+import json
+from typing import Any
+
+from evonav.thor.actions import ActionError
+from evonav.world.embedded import EmbeddedSimulator
+from evonav.world.simulator import SimulatorConfig
+
+Document = dict[str, Any]
+"""A house as JSON."""
+
+
+class Scene:
+    """One house. After `begin_edit` it may be changed; the next use of `simulator` builds that anew."""
+
+    def __init__(self, name: str = "Procedural") -> None:
+        self.name = name
+        self.house: Document | None = None
+        self.config = SimulatorConfig()
+        self.version = 0
+        """Grows with every change; what is derived from the house is kept under it."""
+        self._simulator: EmbeddedSimulator | None = None
+
+    def load(self, house: Document) -> None:
+        """Replaces the house.
+
+        Raises:
+            HouseError: It is malformed; the house at hand stays.
+        """
+        simulator = self._built(house)
+        self.house, self._simulator = house, simulator
+        self.version += 1
+
+    def begin_edit(self) -> Document:
+        """The house, to be changed in place."""
+        if self.house is None:
+            raise ActionError(f"scene {self.name} holds no house: call CreateHouse first")
+        self._simulator = None
+        self.version += 1
+        return self.house
+
+    def configure(self, config: SimulatorConfig) -> None:
+        """Sets the agent's camera and body."""
+        if config != self.config:
+            self.config, self._simulator = config, None
+            self.version += 1
+
+    @property
+    def simulator(self) -> EmbeddedSimulator:
+        """Of the house as it now is."""
+        if self.house is None:
+            raise ActionError(f"scene {self.name} holds no house: call CreateHouse first")
+        if self._simulator is None:
+            self._simulator = self._built(self.house)
+        return self._simulator
+
+    def _built(self, house: Document) -> EmbeddedSimulator:
+        simulator = EmbeddedSimulator(self.config, allow_unknown_assets=True)
+        simulator.reset(json.dumps(house), name=self.name)
+        return simulator
