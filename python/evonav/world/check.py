@@ -11,6 +11,8 @@ from evonav.world.simulator import Action, Frame, Simulator
 
 KINDS = frozenset({"object", "wall", "floor", "ceiling", "door", "window"})
 _TOLERANCE_M = 1e-3
+_TOLERANCE_RAD = 2e-6
+"""Simulators may round angles to 1e-4 degrees (`Pose.canonical`)."""
 _BOX_SLACK_M = 0.05
 """How far a seen point may lie outside the box of the object it is said to belong to."""
 
@@ -68,11 +70,13 @@ def _check_turns(simulator: Simulator) -> None:
         _check(simulator.step(action), f"{action.value} failed; turning cannot collide")
         turned_rad = _angle(simulator.pose.yaw_rad - pose.yaw_rad)
         asked_rad = sign * math.radians(simulator.config.turn_deg)
-        _check(abs(turned_rad - asked_rad) < 1e-6, f"{action.value} turned by {turned_rad} rad, not {asked_rad}")
+        _check(
+            abs(turned_rad - asked_rad) < _TOLERANCE_RAD, f"{action.value} turned by {turned_rad} rad, not {asked_rad}"
+        )
         _check(simulator.pose.position_m == pose.position_m, f"{action.value} moved the agent")
-    _check(abs(_angle(simulator.pose.yaw_rad - before.yaw_rad)) < 1e-6, "TURN_LEFT does not undo TURN_RIGHT")
+    _check(abs(_angle(simulator.pose.yaw_rad - before.yaw_rad)) < _TOLERANCE_RAD, "TURN_LEFT does not undo TURN_RIGHT")
     _check(simulator.step(Action.STOP), "STOP failed")
-    _check(abs(_angle(simulator.pose.yaw_rad - before.yaw_rad)) < 1e-6, "STOP turned the agent")
+    _check(abs(_angle(simulator.pose.yaw_rad - before.yaw_rad)) < _TOLERANCE_RAD, "STOP turned the agent")
 
 
 def _check_reachable(simulator: Simulator) -> NDArray[np.float64]:
@@ -269,6 +273,6 @@ def _is_close(a: Pose, b: Pose, *, y: bool = False) -> bool:
     return (
         math.dist((a.x_m, a.z_m), (b.x_m, b.z_m)) < _TOLERANCE_M
         and (not y or abs(a.y_m - b.y_m) < _TOLERANCE_M)
-        and abs(_angle(a.yaw_rad - b.yaw_rad)) < 1e-6
-        and abs(a.horizon_rad - b.horizon_rad) < 1e-6
+        and abs(_angle(a.yaw_rad - b.yaw_rad)) < _TOLERANCE_RAD
+        and abs(a.horizon_rad - b.horizon_rad) < _TOLERANCE_RAD
     )

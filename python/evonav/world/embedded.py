@@ -19,8 +19,9 @@ _Position = tuple[float, float, float]
 class EmbeddedSimulator:
     """A `Simulator` over the Rust core: one house at a time, deterministic, about 1,000 images a second a core.
 
-    Calls release the GIL. Pickling carries the house and the pose, not what is derived from them, which loading makes
-    again in a few milliseconds.
+    Angles of poses are canonical (`Pose.canonical`), so that this and a simulator that talks in degrees give the same
+    bits. Calls release the GIL. Pickling carries the house and the pose, not what is derived from them, which loading
+    makes again in a few milliseconds.
 
     Example:
         >>> simulator = EmbeddedSimulator()  # doctest: +SKIP
@@ -124,7 +125,7 @@ class EmbeddedSimulator:
             z_m = pose.z_m + self.config.move_m * math.cos(pose.yaw_rad)
             if not self._world.can_move((pose.x_m, pose.z_m), (x_m, z_m)):
                 return False
-            self._pose = Pose(x_m, self._body_y_m, z_m, pose.yaw_rad, pose.horizon_rad)
+            self._pose = self._standing(pose, x_m, z_m)
         return True
 
     def teleport(self, pose: Pose) -> bool:
@@ -140,7 +141,7 @@ class EmbeddedSimulator:
         Raises:
             InvalidArgumentError: The pose is not finite.
         """
-        at = pose or self._pose
+        at = (pose or self._pose).canonical()
         depth_m, colours, ids = self._world.render(
             at.position_m, at.yaw_rad, at.horizon_rad, rgb=rgb, instances=instances
         )
@@ -228,7 +229,7 @@ class EmbeddedSimulator:
     def _enter(self, core: _core.EmbeddedSimulator, pose: Pose | None) -> Pose:
         self._loaded, self._objects = core, None
         start_m, yaw_rad, horizon_rad = core.start()
-        self._pose = Pose(*start_m, yaw_rad=yaw_rad, horizon_rad=horizon_rad)
+        self._pose = Pose(*start_m, yaw_rad=yaw_rad, horizon_rad=horizon_rad).canonical()
         if pose is not None:
             x_m, z_m = pose.x_m, pose.z_m
             if not core.is_reachable((x_m, z_m)):
@@ -237,7 +238,7 @@ class EmbeddedSimulator:
         return self._pose
 
     def _standing(self, pose: Pose, x_m: float, z_m: float) -> Pose:
-        return Pose(x_m, self._body_y_m, z_m, pose.yaw_rad, pose.horizon_rad)
+        return Pose(x_m, self._body_y_m, z_m, pose.yaw_rad, pose.horizon_rad).canonical()
 
     def _raised(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         raised = np.full((len(points_m), 3), self._body_y_m)
@@ -246,8 +247,7 @@ class EmbeddedSimulator:
 
 
 def _turned(pose: Pose, angle_rad: float) -> Pose:
-    yaw_rad = (pose.yaw_rad + angle_rad) % math.tau
-    return Pose(pose.x_m, pose.y_m, pose.z_m, yaw_rad, pose.horizon_rad)
+    return Pose(pose.x_m, pose.y_m, pose.z_m, pose.yaw_rad + angle_rad, pose.horizon_rad).canonical()
 
 
 def _nearest(reachable_m: NDArray[np.float64], position_m: _Position) -> _Position:
