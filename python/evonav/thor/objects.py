@@ -1,0 +1,308 @@
+"""Object records: the metadata's `objects`, as AI2-THOR writes them.
+
+Fields, their order of corners and what is listed follow AI2-THOR's source (`ObjectMetadataFromSimObjPhysics`,
+`SimObjPhysics`, `ProceduralTools`) and its recorded records. Besides the house's objects AI2-THOR lists doors, windows,
+the floor as a whole (`Floor`, the receptacle), each room's floor, and walls; not ceilings or open-plan walls. It also
+lists parts of furniture (drawers `id___0`), which evonav does not know: their furniture holds what lies in them.
+"""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.thor.agent import Agent
+from evonav.thor.facts import AssetFacts, facts_of
+from evonav.thor.scene import Scene
+from evonav.world.simulator import SceneObject
+
+Record = dict[str, Any]
+_Vec3 = tuple[float, float, float]
+
+FLOOR_ID = "Floor"
+
+_FLAGS = (
+    *("receptacle", "toggleable", "breakable", "canFillWithLiquid", "dirtyable", "canBeUsedUp", "cookable"),
+    *("isHeatSource", "isColdSource", "sliceable", "openable", "pickupable", "moveable"),
+)
+# State, the flag it needs, and the house file's key for it.
+_STATES = (
+    ("isToggled", "toggleable", "isOn"),
+    ("isBroken", "breakable", "isBroken"),
+    ("isFilledWithLiquid", "canFillWithLiquid", "isFilledWithLiquid"),
+    ("isDirty", "dirtyable", "isDirty"),
+    ("isUsedUp", "canBeUsedUp", "isUsedUp"),
+    ("isCooked", "cookable", "isCooked"),
+    ("isSliced", "sliceable", "isSliced"),
+)
+_OPEN = 1.0
+# Where a receptacle trigger box of the floor ends when the house does not say.
+_FLOOR_REACH_M = 0.7
+
+
+class View(NamedTuple):
+    """What an agent makes of an object."""
+
+    distance_m: float
+    """From the agent's position to the object's, in three dimensions."""
+    is_visible: bool
+    is_interactable: bool
+
+
+def static_records(scene: Scene) -> list[Record]:
+    """All fields of all objects; `distance`, `visible` and `isInteractable`, which depend on the agent, are unset.
+
+    Do not change them: they are kept until the scene changes.
+    """
+    return _table(scene).records
+
+
+def views(scene: Scene, agent: Agent, settings: Any) -> list[View]:  # noqa: ANN401
+    """What the agent makes of each of `static_records`, in the same order."""
+    table = _table(scene)
+    distances_m = np.linalg.norm(table.positions_m - (agent.x_m, agent.y_m, agent.z_m), axis=1).tolist()
+    seen = visible_ids(scene, agent, float(settings.visibilityDistance))
+    return [
+        View(distance_m, record["objectId"] in seen, record["objectId"] in seen)
+        for distance_m, record in zip(distances_m, table.records, strict=True)
+    ]
+
+
+class _Table(NamedTuple):
+    version: int
+    records: list[Record]
+    positions_m: NDArray[np.float64]
+    """`(N, 3)`."""
+    instances: dict[str, int]
+    """Instance id in images, by object id."""
+
+
+_tables: WeakKeyDictionary[Scene, _Table] = WeakKeyDictionary()
+
+
+def _table(scene: Scene) -> _Table:
+    table = _tables.get(scene)
+    if table is None or table.version != scene.version:
+        table = _tables[scene] = _build(scene)
+    return table
+
+
+def _build(scene: Scene) -> _Table:
+    house = scene.house or {}
+    bodies: dict[str, tuple[int, SceneObject]] = {}
+    if scene.house is not None:
+        for index, body in enumerate(scene.simulator.objects):
+            if body.kind != "ceiling":
+                bodies[body.id] = (index + 1, body)
+    records: list[Record] = []
+    parents: dict[str, list[str]] = defaultdict(list)
+    for entry, parent_id in placed_objects(house):
+        _, body = bodies[entry["id"]]
+        records.append(_object_record(entry, body))
+        if parent_id is not None:
+            parents[entry["id"]].append(parent_id)
+    reach_m = _floor_reach_m(house)
+    floor_id = house.get("id") or FLOOR_ID
+    for record in records:
+        if _bottom_m(record) < reach_m:
+            parents[record["objectId"]].append(floor_id)
+    openings = [*house.get("doors", ()), *house.get("windows", ())]
+    records += [_opening_record(entry, bodies[entry["id"]][1], house) for entry in openings]
+    if house:
+        records += _structure_records(house, floor_id, {key: body for key, (_, body) in bodies.items()})
+    _relate(records, parents)
+    positions_m = np.array([list(record["position"].values()) for record in records], dtype=np.float64).reshape(-1, 3)
+    return _Table(scene.version, records, positions_m, {key: instance for key, (instance, _) in bodies.items()})
+
+
+def placed_objects(house: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str | None]]:
+    """Entries of a house file's objects, depth first, each with its parent's id."""
+
+    def walk(entries: Sequence[dict[str, Any]], parent_id: str | None) -> Iterator[tuple[dict[str, Any], str | None]]:
+        for entry in entries:
+            yield entry, parent_id
+            yield from walk(entry.get("children") or (), entry["id"])
+
+    yield from walk(house.get("objects") or (), None)
+
+
+def _relate(records: list[Record], parents: Mapping[str, list[str]]) -> None:
+    """Fills in `parentReceptacles` and `receptacleObjectIds`; only receptacles hold anything."""
+    receptacles = {record["objectId"]: record["receptacleObjectIds"] for record in records if record["receptacle"]}
+    for record in records:
+        known = [parent_id for parent_id in parents.get(record["objectId"], ()) if parent_id in receptacles]
+        record["parentReceptacles"] = known or None
+        for parent_id in known:
+            receptacles[parent_id].append(record["objectId"])
+
+
+def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
+    facts = facts_of(str(entry.get("assetId", "")), body.category)
+    rotation = {axis: float(entry["rotation"][axis]) % 360.0 for axis in "xyz"}
+    centre_m = (float(entry["position"]["x"]), body.centre_m[1], float(entry["position"]["z"]))
+    record = _record(entry, body.category, facts, centre_m, rotation)
+    record["axisAlignedBoundingBox"] = _aligned_box(body.centre_m, body.size_m)
+    if facts.is_movable:
+        is_upright = rotation["x"] % 180 == 0 and rotation["z"] % 180 == 0
+        size_m, turn = (facts.size_m, rotation) if facts.size_m and is_upright else (body.size_m, None)
+        record["objectOrientedBoundingBox"] = {"cornerPoints": _oriented_corners(centre_m, size_m, turn)}
+    return record
+
+
+def _opening_record(entry: Mapping[str, Any], body: SceneObject, house: Mapping[str, Any]) -> Record:
+    facts = facts_of(str(entry.get("assetId", "")), body.category)
+    wall = next((wall for wall in house["walls"] if wall["id"] == entry.get("wall0")), None)
+    yaw_deg = (_wall_yaw_deg(wall) + 180.0) % 360.0 if wall else 0.0
+    record = _record(entry, body.category, facts, body.centre_m, {"x": 0.0, "y": yaw_deg, "z": 0.0})
+    record["axisAlignedBoundingBox"] = _aligned_box(body.centre_m, body.size_m)
+    return record
+
+
+def _structure_records(house: Mapping[str, Any], floor_id: str, bodies: Mapping[str, SceneObject]) -> Iterator[Record]:
+    rooms = [bodies[room["id"]] for room in house.get("rooms", ())]
+    low = np.min([np.subtract(room.centre_m, np.multiply(room.size_m, 0.5)) for room in rooms], axis=0)
+    high = np.max([np.add(room.centre_m, np.multiply(room.size_m, 0.5)) for room in rooms], axis=0)
+    level = {"x": 0.0, "y": 0.0, "z": 0.0}
+    floor = AssetFacts("Floor", frozenset({"receptacle"}))
+    record = _record({"id": floor_id}, "Floor", floor, (0.0, 0.0, 0.0), level)
+    record["axisAlignedBoundingBox"] = _aligned_box(tuple((0.5 * (low + high)).tolist()), tuple((high - low).tolist()))
+    yield record
+    for room in rooms:
+        record = _record({"id": room.id}, "Floor", AssetFacts("Floor"), (0.0, 0.0, 0.0), level)
+        record["axisAlignedBoundingBox"] = _aligned_box(room.centre_m, room.size_m)
+        yield record
+    for wall in house.get("walls", ()):
+        if not wall.get("empty"):
+            body = bodies[wall["id"]]
+            turn = {"x": 0.0, "y": _wall_yaw_deg(wall), "z": 0.0}
+            record = _record(wall, "Wall", AssetFacts("Wall"), body.centre_m, turn)
+            record["axisAlignedBoundingBox"] = _aligned_box(body.centre_m, body.size_m)
+            yield record
+
+
+def _record(
+    entry: Mapping[str, Any],
+    object_type: str,
+    facts: AssetFacts,
+    centre_m: _Vec3,
+    rotation: dict[str, float],
+) -> Record:
+    """A record without boxes and relations. `position` is the asset's pivot."""
+    is_openable = "openable" in facts.flags
+    openness = float(entry.get("openness", _OPEN if "isOpen" in facts.first_states else 0.0)) if is_openable else 0.0
+    pivot_m = np.add(centre_m, rotation_of(rotation) @ facts.pivot_m).tolist()
+    states = {
+        state: flag in facts.flags and bool(entry.get(key, state in facts.first_states)) for state, flag, key in _STATES
+    }
+    return {
+        "name": str(entry.get("name", entry["id"])),
+        "position": dict(zip("xyz", pivot_m, strict=True)),
+        "rotation": rotation,
+        "visible": False,
+        "isInteractable": False,
+        **{flag: flag in facts.flags for flag in _FLAGS},
+        **states,
+        "fillLiquid": entry.get("fillLiquid") if states["isFilledWithLiquid"] else None,
+        "temperature": str(entry.get("temperature", "RoomTemp")),
+        "isOpen": openness > 0.0,
+        "openness": openness,
+        "isPickedUp": False,
+        "mass": facts.mass_kg if facts.materials else 0.0,
+        "salientMaterials": list(facts.materials) if facts.materials else None,
+        "receptacleObjectIds": [] if "receptacle" in facts.flags else None,
+        "distance": 0.0,
+        "objectType": object_type,
+        "objectId": entry["id"],
+        "assetId": str(entry.get("assetId", "")),
+        "parentReceptacles": None,
+        "controlledObjects": [] if "toggleable" in facts.flags else None,
+        "isMoving": False,
+        "axisAlignedBoundingBox": None,
+        "objectOrientedBoundingBox": None,
+    }
+
+
+def rotation_of(euler_deg: Mapping[str, float]) -> NDArray[np.float64]:
+    """Unity's rotation `(3, 3)` of Euler angles: about z, then x, then y."""
+    (sx, cx), (sy, cy), (sz, cz) = (
+        (math.sin(angle), math.cos(angle)) for angle in (math.radians(euler_deg[axis]) for axis in "xyz")
+    )
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    turned: NDArray[np.float64] = about_y @ about_x @ about_z
+    return turned
+
+
+def _aligned_box(centre_m: Sequence[float], size_m: Sequence[float]) -> Record:
+    spans = [(centre + 0.5 * size, centre - 0.5 * size) for centre, size in zip(centre_m, size_m, strict=True)]
+    return {
+        "cornerPoints": [[x, y, z] for x in spans[0] for y in spans[1] for z in spans[2]],
+        "center": dict(zip("xyz", centre_m, strict=True)),
+        "size": dict(zip("xyz", size_m, strict=True)),
+    }
+
+
+# Corners in half edges: the bottom's four around, then the top's.
+_ORIENTED = [(x, y, z) for y in (-0.5, 0.5) for x, z in ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))]
+
+
+def _oriented_corners(centre_m: _Vec3, size_m: _Vec3, rotation: Mapping[str, float] | None) -> list[list[float]]:
+    own_m = np.multiply(_ORIENTED, size_m)
+    turned_m = own_m @ rotation_of(rotation).T if rotation else own_m
+    corners_m: list[list[float]] = (turned_m + centre_m).tolist()
+    return corners_m
+
+
+def _bottom_m(record: Record) -> float:
+    box = record["axisAlignedBoundingBox"]
+    return float(box["center"]["y"] - 0.5 * box["size"]["y"])
+
+
+def _floor_reach_m(house: Mapping[str, Any]) -> float:
+    return float((house.get("proceduralParameters") or {}).get("receptacleHeight", _FLOOR_REACH_M))
+
+
+def _wall_yaw_deg(wall: Mapping[str, Any]) -> float:
+    corners = sorted(wall["polygon"], key=lambda corner: float(corner["y"]))
+    x_m, z_m = (float(corners[1][axis]) - float(corners[0][axis]) for axis in "xz")
+    return math.degrees(math.atan2(-z_m, x_m)) % 360.0
+
+
+# Visibility points: middles of faces, of edges and of the box, and corners, all a little inside.
+_INSIDE = 0.96
+_POINTS = _INSIDE * 0.5 * np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], dtype=float)
+
+
+def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
+    """Objects that AI2-THOR calls visible.
+
+    Near enough on the ground plane, and some visibility point of it is in the picture with nothing before it.
+    """
+    table = _table(scene)
+    if scene.house is None:
+        return set()
+    simulator = scene.simulator
+    half_height = math.tan(0.5 * simulator.intrinsics.vertical_fov_rad)
+    half_width = half_height * simulator.intrinsics.width_px / simulator.intrinsics.height_px
+    eye_m = np.array([agent.x_m, simulator.config.camera_height_m, agent.z_m])
+    seen = rotation_of({"x": agent.horizon_deg, "y": agent.yaw_deg, "z": 0.0})
+    ids = set()
+    for record in table.records:
+        instance = table.instances.get(record["objectId"])
+        box = record["axisAlignedBoundingBox"]
+        centre_m, size_m = (np.array(list(box[key].values())) for key in ("center", "size"))
+        gap_m = np.maximum(np.abs(eye_m - centre_m) - 0.5 * size_m, 0.0)
+        if instance is None or math.hypot(gap_m[0], gap_m[2]) > distance_m:
+            continue
+        points_m = centre_m + _POINTS * size_m
+        right, up, ahead = ((points_m - eye_m) @ seen).T
+        is_framed = (ahead > 0) & (np.abs(right) < half_width * ahead) & (np.abs(up) < half_height * ahead)
+        eye = (float(eye_m[0]), float(eye_m[1]), float(eye_m[2]))
+        if any(simulator.is_visible(eye, (x, y, z), (instance,)) for x, y, z in points_m[is_framed].tolist()):
+            ids.add(record["objectId"])
+    return ids
