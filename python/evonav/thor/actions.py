@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError, validate_call
 
 # Whose functions register themselves.
-_MODULES = ("engine",)
+_MODULES = ("engine", "motion", "teleport", "paths")
 
 # What the client or AI2-THOR's own dispatcher adds to any action.
 _COMMON = frozenset({"action", "sequenceId", "agentId", "renderImage", "physicsSimulationParams", "visibilityDistance"})
@@ -31,6 +31,8 @@ class ErrorCode(str, Enum):
     MISSING_ARGUMENTS = "MissingArguments"
     AMBIGUOUS_ACTION = "AmbiguousAction"
     INVALID_ARGUMENT = "InvalidArgument"
+    LOOK_DOWN_CANT_EXCEED_MIN = "LookDownCantExceedMin"
+    """The client does not raise for this one."""
 
 
 class ActionError(Exception):

@@ -1,23 +1,128 @@
-"""The agent's state, in AI2-THOR's units: metres and degrees."""
+"""The agent's body, state and camera, in AI2-THOR's units: metres and degrees."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
+import numpy as np
+
+from evonav.thor.actions import ActionError
 from evonav.world.pose import Pose
+
+BODY_Y_M = 0.9009992
+"""AI2-THOR's `agent.position.y` on a floor, in all of its agent modes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """What an agent mode sets: `InitializeBody` of AI2-THOR's controllers."""
+
+    mode: str
+    radius_m: float
+    height_m: float
+    camera_height_m: float
+    """Over the floor, standing."""
+    crouch_m: float
+    """How far the camera sinks."""
+    vertical_fov_deg: float
+    max_upward_deg: float
+    max_downward_deg: float
+
+
+BODIES = {
+    "default": Body("default", 0.2, 1.8, 1.575, 0.675, 90.0, 30.0, 60.0),
+    "locobot": Body("locobot", 0.175, 0.9, BODY_Y_M - 0.0312, 0.2206, 60.0, 29.0, 30.0),
+}
+"""By agent mode."""
+
+
+def body_of(agent_mode: str, max_upward_deg: float = 0.0, max_downward_deg: float = 0.0) -> Body:
+    """The body of an agent mode.
+
+    Args:
+        agent_mode: Case does not matter.
+        max_upward_deg: Of the default agent's camera; 0 for AI2-THOR's limit. The LoCoBot's own stays.
+        max_downward_deg: Likewise.
+
+    Raises:
+        ActionError: The mode is none of `BODIES`.
+    """
+    body = BODIES.get(agent_mode.lower())
+    if body is None:
+        raise ActionError(f"agentMode {agent_mode!r} is not supported by this engine, only {', '.join(BODIES)}")
+    if body.mode == "locobot":
+        return body
+    return replace(
+        body,
+        max_upward_deg=max_upward_deg or body.max_upward_deg,
+        max_downward_deg=max_downward_deg or body.max_downward_deg,
+    )
+
+
+def canonical_deg(angle_deg: float) -> float:
+    """An angle to 1e-4 degrees, so that degrees on the wire and radians inside name the same angle."""
+    return round(angle_deg, 4) + 0.0
+
+
+def canonical_yaw_deg(yaw_deg: float) -> float:
+    """A yaw in [0, 360), to 1e-4 degrees."""
+    wrapped_deg = canonical_deg(yaw_deg % 360.0)
+    return wrapped_deg if wrapped_deg < 360.0 else 0.0
 
 
 @dataclass(slots=True)
 class Agent:
-    """Where the agent stands and looks. `y_m` is AI2-THOR's: the middle of the body."""
+    """Where the agent stands and looks."""
 
     x_m: float = 0.0
-    y_m: float = 0.9009992
+    y_m: float = BODY_Y_M
     z_m: float = 0.0
     yaw_deg: float = 0.0
     horizon_deg: float = 0.0
     is_standing: bool = True
+    body: Body = BODIES["default"]
+    noise: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
+    """What the LoCoBot's motion noise is drawn from: the same after every `Reset`."""
 
     @property
     def pose(self) -> Pose:
         """The agent's pose as evonav's simulators take it."""
-        return Pose(self.x_m, self.y_m, self.z_m, math.radians(self.yaw_deg), math.radians(self.horizon_deg))
+        return Pose(self.x_m, self.y_m, self.z_m, self.yaw_rad, math.radians(self.horizon_deg))
+
+    @property
+    def yaw_rad(self) -> float:
+        """Heading."""
+        return math.radians(self.yaw_deg)
+
+    @property
+    def point_m(self) -> tuple[float, float]:
+        """`(x, z)`."""
+        return (self.x_m, self.z_m)
+
+    @property
+    def camera_height_m(self) -> float:
+        """Of the camera over the floor: lower when crouching, higher where a forced teleport lifted the agent."""
+        sunk_m = 0.0 if self.is_standing else self.body.crouch_m
+        return self.body.camera_height_m - sunk_m + (self.y_m - BODY_Y_M)
+
+    @property
+    def is_locobot(self) -> bool:
+        """Whether it rolls: no steps aside, no crouching, motion noise."""
+        return self.body.mode == "locobot"
+
+    def enter(self, house: Mapping[str, Any]) -> None:
+        """Takes the pose that `metadata.agentPoses` of a house gives for its mode; else stays where it is.
+
+        So does `setAgentPose` of AI2-THOR's `ProceduralTools`; `metadata.agent` is for the caller to teleport to.
+        """
+        pose = ((house.get("metadata") or {}).get("agentPoses") or {}).get(self.body.mode)
+        if pose is None:
+            return
+        position, rotation = pose.get("position"), pose.get("rotation")
+        if position is not None:
+            self.x_m, self.y_m, self.z_m = float(position["x"]), BODY_Y_M, float(position["z"])
+        if rotation is not None:
+            self.yaw_deg = canonical_yaw_deg(float(rotation["y"]))
+        self.horizon_deg = canonical_deg(float(pose.get("horizon") or 0.0))
+        self.is_standing = bool(pose.get("standing", self.is_standing))

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from evonav.errors import EvonavError
 from evonav.thor import actions
 from evonav.thor.actions import ActionError, ErrorCode, action
-from evonav.thor.agent import Agent
+from evonav.thor.agent import Agent, body_of
 from evonav.thor.scene import Document, Scene
 from evonav.world.simulator import SimulatorConfig
 
@@ -31,6 +31,13 @@ class Settings(BaseModel):
     rotateStepDegrees: float = 90.0
     visibilityDistance: float = 1.5
     fieldOfView: float | None = None
+    maxUpwardLookAngle: float = 0.0
+    maxDownwardLookAngle: float = 0.0
+    applyActionNoise: bool = True
+    movementGaussianMu: float = 0.0
+    movementGaussianSigma: float = 0.0
+    rotateGaussianMu: float = 0.0
+    rotateGaussianSigma: float = 0.0
     renderDepthImage: bool = False
     renderInstanceSegmentation: bool = False
     renderSemanticSegmentation: bool = False
@@ -74,11 +81,15 @@ class Engine:
 
     def configure(self) -> None:
         """Brings the scene's camera and body in line with the settings and the screen."""
+        body = self.agent.body
         self.scene.configure(
             SimulatorConfig(
                 width_px=self.width_px,
                 height_px=self.height_px,
-                vertical_fov_deg=self.settings.fieldOfView or 90.0,
+                vertical_fov_deg=self.settings.fieldOfView or body.vertical_fov_deg,
+                camera_height_m=body.camera_height_m,
+                agent_radius_m=body.radius_m,
+                agent_height_m=body.height_m,
                 move_m=self.settings.gridSize,
                 turn_deg=self.settings.rotateStepDegrees,
                 grid_m=self.settings.gridSize,
@@ -105,14 +116,38 @@ def get_scenes_in_build(engine: Engine) -> list[str]:
 def create_house(engine: Engine, *, house: Document) -> None:
     """Loads a ProcTHOR house."""
     engine.scene.load(house)
+    engine.agent.enter(house)
+
+
+def check_settings(settings: Settings) -> None:
+    """What AI2-THOR's `Initialize` asks of its arguments, in its words."""
+    if settings.fieldOfView is not None and (settings.fieldOfView < 0 or settings.fieldOfView >= 180):
+        raise ActionError("fov must be set to (0, 180) noninclusive.")
+    if settings.rotateStepDegrees <= 0:
+        raise ActionError("rotateStepDegrees must be a non-zero, non-negative float")
+    if settings.snapToGrid and settings.rotateStepDegrees % 90 != 0:
+        raise ActionError(
+            f"Invalid values 'rotateStepDegrees': ${settings.rotateStepDegrees:g} and 'snapToGrid':$True. "
+            "'snapToGrid': 'True' is not supported when 'rotateStepDegrees' is different from grid rotation steps of "
+            "0, 90, 180, 270 or 360."
+        )
+    if settings.maxDownwardLookAngle < 0:
+        raise ActionError("maxDownwardLookAngle must be a non-negative float")
+    if settings.maxUpwardLookAngle < 0:
+        raise ActionError("maxUpwardLookAngle must be a non-negative float")
+    if not 0 < settings.gridSize <= 5:
+        raise ActionError("grid size must be in the range (0,5]")
 
 
 @action("Initialize")
 def initialize(engine: Engine, **settings: Any) -> dict[str, float]:  # noqa: ANN401
     """Sets the settings; any keyword of the client's constructor may come."""
     try:
-        engine.settings = Settings(**settings)
+        wanted = Settings(**settings)
     except ValidationError as error:
         raise ActionError(f"Initialize: {error}", ErrorCode.INVALID_ARGUMENT) from error
+    check_settings(wanted)
+    engine.agent.body = body_of(wanted.agentMode, wanted.maxUpwardLookAngle, wanted.maxDownwardLookAngle)
+    engine.settings = wanted
     engine.configure()
     return {"cameraNearPlane": 0.1, "cameraFarPlane": 20.0}

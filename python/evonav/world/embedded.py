@@ -162,6 +162,15 @@ class EmbeddedSimulator:
         """Whether the agent's body fits at the position, and it can walk there from the house's start."""
         return self._world.is_reachable((position_m[0], position_m[2]))
 
+    def can_move(self, from_m: tuple[float, float], to_m: tuple[float, float]) -> bool:
+        """Whether the agent's body can move straight between two points `(x, z)`; to the same point: fits there."""
+        return self._world.can_move(from_m, to_m)
+
+    def blocker(self, from_m: tuple[float, float], to_m: tuple[float, float]) -> SceneObject | None:
+        """What a straight move between two points `(x, z)` touches; `None` for what lacks only a floor."""
+        index = self._world.blocker(from_m, to_m)
+        return None if index is None else self.objects[index]
+
     def is_visible(self, from_m: _Position, to_m: _Position, ignored_instances: Sequence[int] = ()) -> bool:
         """Whether nothing stands between two points but bodies with the given instance ids."""
         return self._world.is_visible(from_m, to_m, [instance - 1 for instance in ignored_instances if instance > 0])

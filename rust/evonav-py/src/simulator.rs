@@ -138,6 +138,11 @@ impl PyEmbeddedSimulator {
         self.core.navigation().try_move(from_m, to_m)
     }
 
+    /// Index of a body that a straight move touches.
+    fn blocker(&self, from_m: Vec2, to_m: Vec2) -> Option<usize> {
+        self.core.navigation().obstacles().blocker_between(from_m, to_m)
+    }
+
     fn is_visible(&self, py: Python<'_>, from_m: Vec3, to_m: Vec3, ignored: Vec<usize>) -> bool {
         py.detach(|| self.core.is_visible(from_m, to_m, &ignored))
     }

@@ -1,0 +1,306 @@
+"""Actions that move the agent: `Move*`, `Rotate*`, `Look*`, `Stand`, `Crouch`, and those that do nothing.
+
+After AI2-THOR's `BaseFPSAgentController`, `PhysicsRemoteFPSAgentController` and `LocobotFPSAgentController`, whose
+messages these are; where those throw, the message starts with the exception's name, as theirs does.
+"""
+
+import math
+
+from evonav.thor.actions import ActionError, ErrorCode, Vector3, action
+from evonav.thor.agent import canonical_deg, canonical_yaw_deg
+from evonav.thor.engine import Engine
+
+
+def invalid_operation(message: str) -> ActionError:
+    """What AI2-THOR says of an `InvalidOperationException`."""
+    return ActionError(f"InvalidOperationException: {message}")
+
+
+def missing_arguments(name: str, *arguments: str) -> ActionError:
+    """What AI2-THOR says of an action that lacks arguments."""
+    message = f"action: {name} is missing the following arguments: {','.join(arguments)}"
+    return ActionError(message, ErrorCode.MISSING_ARGUMENTS)
+
+
+@action("Pass", "Done", "NoOp", "Stop")
+def pass_(engine: Engine, **_: object) -> None:
+    """Does nothing."""
+
+
+@action("MoveAhead")
+def move_ahead(
+    engine: Engine,
+    *,
+    moveMagnitude: float | None = None,
+    objectId: str | None = None,
+    maxAgentsDistance: float = -1.0,
+    noise: float = 0.0,
+    **_: object,
+) -> None:
+    """A step along the heading."""
+    _move_relative(engine, (0.0, 1.0), moveMagnitude, noise, (objectId, maxAgentsDistance))
+
+
+@action("MoveBack")
+def move_back(
+    engine: Engine,
+    *,
+    moveMagnitude: float | None = None,
+    objectId: str | None = None,
+    maxAgentsDistance: float = -1.0,
+    noise: float = 0.0,
+    **_: object,
+) -> None:
+    """A step backwards."""
+    _move_relative(engine, (0.0, -1.0), moveMagnitude, noise, (objectId, maxAgentsDistance))
+
+
+@action("MoveRight")
+def move_right(
+    engine: Engine,
+    *,
+    moveMagnitude: float | None = None,
+    objectId: str | None = None,
+    maxAgentsDistance: float = -1.0,
+    noise: float = 0.0,
+    **_: object,
+) -> None:
+    """A step to the right; the LoCoBot has no wheels for that."""
+    _move_relative(engine, (1.0, 0.0), moveMagnitude, noise, (objectId, maxAgentsDistance))
+
+
+@action("MoveLeft")
+def move_left(
+    engine: Engine,
+    *,
+    moveMagnitude: float | None = None,
+    objectId: str | None = None,
+    maxAgentsDistance: float = -1.0,
+    noise: float = 0.0,
+    **_: object,
+) -> None:
+    """A step to the left."""
+    _move_relative(engine, (-1.0, 0.0), moveMagnitude, noise, (objectId, maxAgentsDistance))
+
+
+@action("MoveRelative")
+def move_relative(
+    engine: Engine,
+    *,
+    moveMagnitude: float | None = None,
+    x: float = 0.0,
+    z: float = 0.0,
+    noise: float = 0.0,
+    **_: object,
+) -> None:
+    """A LoCoBot's step of `moveMagnitude * |(x, z)|`, `z` along the heading."""
+    if not engine.agent.is_locobot:
+        raise ActionError("Invalid action: MoveRelative", ErrorCode.INVALID_ACTION)
+    if math.hypot(x, z) <= 1e-5:
+        raise ActionError("either x or z must be != 0 for the MoveRelative action")
+    _move_relative(engine, (x, z), moveMagnitude, noise, (None, -1.0))
+
+
+@action("MoveGlobal")
+def move_global(engine: Engine, *, x: float, z: float) -> None:
+    """A step of the world's `(x, z)`."""
+    _move_by(engine, x, z)
+
+
+def _move_relative(
+    engine: Engine,
+    direction: tuple[float, float],
+    magnitude_m: float | None,
+    noise_m: float,
+    leash: tuple[str | None, float],
+) -> None:
+    """Moves along `direction`, `(right, ahead)`."""
+    agent, (right, ahead) = engine.agent, direction
+    step_m = engine.settings.gridSize if magnitude_m is None else magnitude_m
+    if engine.agent.is_locobot:
+        if right != 0:
+            raise invalid_operation(
+                "Controller does not support horizontal movement. "
+                "Set AllowHorizontalMovement to true on the Controller."
+            )
+        if step_m <= 0:
+            raise invalid_operation("moveMagnitude must be null or >= 0.")
+        turn_deg, slip_m = _noise_of_move(engine)
+        agent.yaw_deg = canonical_yaw_deg(agent.yaw_deg + turn_deg)
+        step_m = abs(ahead) * step_m + noise_m + slip_m
+        ahead = math.copysign(1.0, ahead)
+    elif step_m <= 0:
+        raise invalid_operation("moveMagnitude must be > 0")
+    # Signed steps rather than signed sines: the same bits as `EmbeddedSimulator.step`.
+    sine, cosine = math.sin(agent.yaw_rad), math.cos(agent.yaw_rad)
+    if right:
+        _move_by(engine, right * step_m * cosine, -right * step_m * sine, *leash)
+    else:
+        _move_by(engine, ahead * step_m * sine, ahead * step_m * cosine, *leash)
+
+
+def _move_by(
+    engine: Engine, x_m: float, z_m: float, object_id: str | None = None, max_distance_m: float = -1.0
+) -> None:
+    agent, before_m = engine.agent, engine.agent.point_m
+    to_m = (agent.x_m + x_m, agent.z_m + z_m)
+    if not engine.scene.simulator.can_move(before_m, to_m):
+        raise ActionError(_why_blocked(engine, to_m, (x_m, 0.0, z_m)))
+    agent.x_m, agent.z_m = snapped(engine, to_m)
+    if object_id and max_distance_m > 0 and _distance_m(engine, object_id) > max_distance_m:
+        agent.x_m, agent.z_m = before_m
+        raise ActionError(f"Agent movement would bring it beyond the max distance of {object_id}")
+
+
+def snapped(engine: Engine, point_m: tuple[float, float]) -> tuple[float, float]:
+    """On the grid through the world's origin, with `snapToGrid`; halves go to the even line, as in C#."""
+    if not engine.settings.snapToGrid:
+        return point_m
+    per_m = 1 / engine.settings.gridSize
+    x_m, z_m = (round(value * per_m) / per_m + 0.0 for value in point_m)
+    return (x_m, z_m)
+
+
+def _why_blocked(engine: Engine, to_m: tuple[float, float], offset_m: tuple[float, float, float]) -> str:
+    if not is_within_bounds(engine, to_m):
+        return f"Scene bounds do not contain target position: {vector_text((to_m[0], engine.agent.y_m, to_m[1]), 2)}"
+    blocker = engine.scene.simulator.blocker(engine.agent.point_m, to_m)
+    name = "Floor" if blocker is None else blocker.id
+    return f"{name} is blocking Agent 0 from moving by {vector_text(offset_m, 4)}."
+
+
+def is_within_bounds(engine: Engine, point_m: tuple[float, float]) -> bool:
+    """Whether a point is in the box around the whole scene."""
+    bodies = engine.scene.simulator.objects
+    return all(
+        min(body.centre_m[axis] - body.size_m[axis] / 2 for body in bodies)
+        <= value
+        <= max(body.centre_m[axis] + body.size_m[axis] / 2 for body in bodies)
+        for axis, value in zip((0, 2), point_m, strict=True)
+    )
+
+
+def _distance_m(engine: Engine, object_id: str) -> float:
+    """From the agent to an object's box, on the ground plane."""
+    body = next((body for body in engine.scene.simulator.objects if body.id == object_id), None)
+    if body is None:
+        raise ActionError(f"No object with ID {object_id}")
+    return math.hypot(
+        *(
+            max(abs(value - body.centre_m[axis]) - body.size_m[axis] / 2, 0.0)
+            for axis, value in zip((0, 2), engine.agent.point_m, strict=True)
+        )
+    )
+
+
+def _noise_of_move(engine: Engine) -> tuple[float, float]:
+    """Degrees and metres that a LoCoBot's move is off."""
+    settings, normal = engine.settings, engine.agent.noise.normal
+    if not settings.applyActionNoise:
+        return 0.0, 0.0
+    mean_deg, deviation_deg = _turn_noise_deg(engine)
+    turn_deg = float(normal(mean_deg, deviation_deg / 2))
+    return turn_deg, float(normal(settings.movementGaussianMu or 0.001, settings.movementGaussianSigma or 0.005))
+
+
+def vector_text(vector: tuple[float, float, float], digits: int) -> str:
+    """As Unity prints vectors."""
+    return "(" + ", ".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in vector) + ")"
+
+
+@action("RotateRight")
+def rotate_right(engine: Engine, *, degrees: float | None = None, **_: object) -> None:
+    """Turns clockwise seen from above."""
+    _turn(engine, degrees, 1.0)
+
+
+@action("RotateLeft")
+def rotate_left(engine: Engine, *, degrees: float | None = None, **_: object) -> None:
+    """Turns counter-clockwise seen from above."""
+    _turn(engine, degrees, -1.0)
+
+
+@action("Rotate")
+def rotate(engine: Engine, *, rotation: Vector3, noise: float = 0.0, manualInteract: bool = False) -> None:
+    """Sets the yaw; turns a LoCoBot by it."""
+    agent = engine.agent
+    base_deg = agent.yaw_deg + noise + _noise_of_turn_deg(engine) if engine.agent.is_locobot else 0.0
+    agent.yaw_deg = canonical_yaw_deg(base_deg + rotation.y)
+
+
+@action("RotateLook")
+def rotate_look(engine: Engine, *, rotation: Vector3 | None = None, horizon: float = 0.0, **_: object) -> None:
+    """Sets yaw and horizon, whatever the limits."""
+    yaw_deg = 0.0 if rotation is None else rotation.y
+    engine.agent.yaw_deg, engine.agent.horizon_deg = canonical_yaw_deg(yaw_deg), canonical_deg(horizon)
+
+
+def _turn(engine: Engine, degrees: float | None, sign: float) -> None:
+    step_deg = engine.settings.rotateStepDegrees if degrees is None else degrees
+    noise_deg = 0.0
+    if engine.agent.is_locobot:
+        step_deg = step_deg or engine.settings.rotateStepDegrees
+        noise_deg = _noise_of_turn_deg(engine)
+    elif step_deg == 0:
+        raise invalid_operation(
+            "Cannot rotate by 0 degrees as this previously defaulted to rotating by a diferent amount."
+        )
+    engine.agent.yaw_deg = canonical_yaw_deg(engine.agent.yaw_deg + sign * step_deg + noise_deg)
+
+
+def _noise_of_turn_deg(engine: Engine) -> float:
+    return float(engine.agent.noise.normal(*_turn_noise_deg(engine))) if engine.settings.applyActionNoise else 0.0
+
+
+def _turn_noise_deg(engine: Engine) -> tuple[float, float]:
+    """Mean and standard deviation; 0 stands for AI2-THOR's own, as there."""
+    return engine.settings.rotateGaussianMu, engine.settings.rotateGaussianSigma or 0.5
+
+
+@action("LookDown")
+def look_down(engine: Engine, *, degrees: float = 0.0, **_: object) -> None:
+    """Lowers the camera, by 30 degrees unless told."""
+    horizon_deg = engine.agent.horizon_deg + _look_step_deg(engine, "LookDown", degrees)
+    limit_deg = engine.agent.body.max_downward_deg
+    if round(horizon_deg, 1) > limit_deg:
+        message = f"can't look down beyond {limit_deg:g} degrees below the forward horizon"
+        raise ActionError(message, ErrorCode.LOOK_DOWN_CANT_EXCEED_MIN)
+    engine.agent.horizon_deg = canonical_deg(horizon_deg)
+
+
+@action("LookUp")
+def look_up(engine: Engine, *, degrees: float = 0.0, **_: object) -> None:
+    """Raises the camera, by 30 degrees unless told."""
+    horizon_deg = engine.agent.horizon_deg - _look_step_deg(engine, "LookUp", degrees)
+    limit_deg = engine.agent.body.max_upward_deg
+    if round(-horizon_deg, 1) > limit_deg:
+        message = f"can't look up beyond {limit_deg:g} degrees above the forward horizon"
+        # AI2-THOR's own code for both directions.
+        raise ActionError(message, ErrorCode.LOOK_DOWN_CANT_EXCEED_MIN)
+    engine.agent.horizon_deg = canonical_deg(horizon_deg)
+
+
+def _look_step_deg(engine: Engine, name: str, degrees: float) -> float:
+    if engine.agent.is_locobot and degrees != 0:
+        raise ActionError("Must have degrees == 0 for now.")
+    if degrees < 0:
+        raise ActionError(f"{name} action requires positive degree value. Invalid value used: {degrees:g}")
+    if abs(degrees * 10 - round(degrees * 10)) > 1e-6:
+        raise ActionError(f"{name} action requires degree value to be a multiple of 0.1f")
+    return round(degrees, 1) or 30.0
+
+
+@action("Stand")
+def stand(engine: Engine) -> None:
+    """Raises the camera again."""
+    if engine.agent.is_standing:
+        raise ActionError("Already standing.")
+    engine.agent.is_standing = True
+
+
+@action("Crouch")
+def crouch(engine: Engine) -> None:
+    """Lowers the camera; the body stays as it is, as in AI2-THOR."""
+    if not engine.agent.is_standing:
+        raise ActionError("Already crouching.")
+    engine.agent.is_standing = False

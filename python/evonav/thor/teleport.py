@@ -1,0 +1,125 @@
+"""Actions that set the agent's pose: `Teleport`, `TeleportFull`.
+
+After `teleportFull` and its callers in AI2-THOR's `BaseFPSAgentController` and `PhysicsRemoteFPSAgentController`.
+"""
+
+import math
+
+from evonav.thor.actions import ActionError, ErrorCode, Vector3, action
+from evonav.thor.agent import BODY_Y_M, canonical_deg, canonical_yaw_deg
+from evonav.thor.engine import Engine
+from evonav.thor.motion import invalid_operation, is_within_bounds, missing_arguments, snapped, vector_text
+
+_GROUND_M = 0.05
+"""How far over the floor one may teleport and still be set down on it."""
+_FALL_M = 2 * 9.81
+"""How far AI2-THOR's agent falls where there is no floor: one step of its doubled gravity."""
+
+
+def _out_of_range(message: str) -> ActionError:
+    """What AI2-THOR says of an `ArgumentOutOfRangeException`, whose one argument is a parameter's name."""
+    reason = f"Specified argument was out of the range of valid values.\nParameter name: {message}"
+    return ActionError(f"ArgumentOutOfRangeException: {reason}")
+
+
+@action("Teleport")
+def teleport(
+    engine: Engine,
+    *,
+    position: Vector3 | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    z: float | None = None,
+    rotation: Vector3 | None = None,
+    horizon: float | None = None,
+    standing: bool | None = None,
+    forceAction: bool = False,
+) -> None:
+    """Changes what is given of the pose."""
+    agent = engine.agent
+    at = _position_of("Teleport", position, (x, y, z)) or Vector3(x=agent.x_m, y=agent.y_m, z=agent.z_m)
+    turned = Vector3(y=agent.yaw_deg) if rotation is None else rotation
+    is_standing = agent.is_standing if standing is None else standing
+    _teleport(engine, at, turned, agent.horizon_deg if horizon is None else horizon, is_standing, forceAction)
+
+
+@action("TeleportFull")
+def teleport_full(
+    engine: Engine,
+    *,
+    position: Vector3 | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    z: float | None = None,
+    rotation: Vector3,
+    horizon: float,
+    standing: bool | None = None,
+    forceAction: bool = False,
+) -> None:
+    """Sets the whole pose; a LoCoBot's has no `standing`, the default agent's must have it."""
+    at = _position_of("TeleportFull", position, (x, y, z))
+    missing = ["position"] if at is None else []
+    if engine.agent.is_locobot:
+        if standing is not None:
+            raise ActionError("TeleportFull of a locobot has no argument standing", ErrorCode.INVALID_ARGUMENT)
+    elif standing is None:
+        missing.append("standing")
+    if at is None or missing:
+        raise missing_arguments("TeleportFull", *missing)
+    _teleport(engine, at, rotation, horizon, standing is not False, forceAction)
+
+
+def _position_of(
+    name: str, position: Vector3 | None, parts: tuple[float | None, float | None, float | None]
+) -> Vector3 | None:
+    """From a vector or, the older form, from three numbers."""
+    if position is not None or parts == (None, None, None):
+        return position
+    x, y, z = parts
+    if x is None or y is None or z is None:
+        raise missing_arguments(name, *(axis for axis, value in zip("xyz", parts, strict=True) if value is None))
+    return Vector3(x=x, y=y, z=z)
+
+
+def _teleport(
+    engine: Engine, at: Vector3, rotation: Vector3, horizon_deg: float, is_standing: bool, is_forced: bool
+) -> None:
+    agent, y_m = engine.agent, at.y
+    if not is_forced:
+        _check_pose(engine, at, rotation, horizon_deg)
+        y_m = BODY_Y_M
+    agent.x_m, agent.y_m, agent.z_m = at.x, y_m, at.z
+    agent.yaw_deg, agent.horizon_deg = canonical_yaw_deg(rotation.y), canonical_deg(horizon_deg)
+    agent.is_standing = is_standing
+
+
+def _check_pose(engine: Engine, at: Vector3, rotation: Vector3, horizon_deg: float) -> None:
+    """What AI2-THOR asks of a teleport that is not forced, in its order."""
+    body, point_m, place = engine.agent.body, (at.x, at.z), vector_text((at.x, at.y, at.z), 6)
+    if max(abs(rotation.x), abs(rotation.z)) >= 1e-2:
+        given = vector_text((rotation.x, rotation.y, rotation.z), 6)
+        raise _out_of_range(
+            "No agents currently can change in pitch or roll. So, you must set rotation(x=0, y=yaw, z=0)."
+            f" You gave {given}."
+        )
+    if not -body.max_upward_deg <= horizon_deg <= body.max_downward_deg:
+        limits = f"[{-body.max_upward_deg:g}:{body.max_downward_deg:g}]"
+        raise _out_of_range(f"Each horizon must be in {limits}. You gave {horizon_deg:g}.")
+    if not is_within_bounds(engine, point_m):
+        raise _out_of_range(f"Teleport position {place} out of scene bounds! Ignore this by setting forceAction=true.")
+    if math.dist(snapped(engine, point_m), point_m) > 1e-5:
+        grid = f"{engine.settings.gridSize:g}"
+        raise _out_of_range(f"Teleport position {place} is not on the grid of size {grid}.")
+    simulator = engine.scene.simulator
+    blocker = simulator.blocker(point_m, point_m)
+    if blocker is not None:
+        raise invalid_operation(f"Collided with: {blocker.id}.")
+    if at.y < BODY_Y_M - _GROUND_M:
+        raise invalid_operation("Collided with: Floor.")
+    fallen_m = at.y - BODY_Y_M if simulator.can_move(point_m, point_m) else _FALL_M
+    if fallen_m > _GROUND_M:
+        raise invalid_operation(
+            "After teleporting and adjusting agent position to floor, there was too large a change"
+            f"({fallen_m:g} > 0.05) in the y component."
+            " Consider using `forceAction=true` if you'd like to teleport anyway."
+        )
