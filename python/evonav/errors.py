@@ -16,6 +16,11 @@ __all__ = [
     "HouseError",
     "InvalidArgumentError",
     "SimulationError",
+    "SimulatorLostError",
     "StoreError",
     "TaskError",
 ]
+
+
+class SimulatorLostError(SimulationError):
+    """The simulator's process has ended or hangs; the simulator's next `reset` starts another."""

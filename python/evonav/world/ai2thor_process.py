@@ -1,0 +1,196 @@
+"""AI2-THOR's own client, made to notice at once that its process has ended, and to leave nothing behind.
+
+As published, the client waits its whole timeout (100 s) at the end of a pipe, blocks for ever on opening a pipe that
+nobody else opens, and leaves its folder of pipes to the interpreter's end. Imports `ai2thor`: import this only where
+that is there.
+"""
+
+import os
+import select
+import signal
+import sys
+import threading
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ai2thor.controller import Controller
+from ai2thor.fifo_server import FifoServer
+
+from evonav.world import ai2thor_guard
+
+_POLL_S = 0.1
+"""Between two looks at whether the process lives."""
+_EXIT_S = 5.0
+"""In which a killed process has to be gone."""
+_PIPE_BYTES = 1 << 20
+_F_SETPIPE_SZ = 1031  # linux/fcntl.h
+
+
+class ProcessEndedError(Exception):
+    """The process has ended, or hung up."""
+
+    def __init__(self, returncode: int | None) -> None:
+        how = "closed its pipe" if returncode is None else f"exit code {returncode}"
+        if returncode is not None and returncode < 0:
+            with suppress(ValueError):
+                how = f"killed by {signal.Signals(-returncode).name}"
+        super().__init__(how)
+
+
+class PromptFifoServer(FifoServer):  # type: ignore[misc]
+    """The client's FIFO server; raises `ProcessEndedError` within a tenth of a second after its process has ended."""
+
+    def receive(self, timeout: float | None = None) -> Any:  # noqa: ANN401 - the client's event
+        """The next event.
+
+        Raises:
+            ProcessEndedError: There is none to come.
+            TimeoutError: None came in time.
+        """
+        if self.server_pipe is None:
+            # Opened like this, reading waits for the other side, opening does not.
+            descriptor = os.open(self.server_pipe_path, os.O_RDONLY | os.O_NONBLOCK)
+            self.server_pipe = os.fdopen(descriptor, "rb", buffering=0)
+            _widen(descriptor)
+        return super().receive(timeout)
+
+    def stop(self) -> None:
+        """Ends the process and removes the pipes; safe to call twice."""
+        if self.unity_proc is not None and self.unity_proc.poll() is None:
+            with suppress(OSError):
+                os.killpg(self.unity_proc.pid, signal.SIGKILL)
+        super().stop()
+        if self.unity_proc is not None:
+            self.unity_proc.wait(timeout=_EXIT_S)
+        self.tmp_dir.cleanup()
+
+    def _read_with_timeout(self, server_pipe: Any, message_size: int, timeout: float | None) -> bytes:  # noqa: ANN401
+        deadline_s = _deadline_s(timeout)
+        message = bytearray()
+        descriptor = server_pipe.fileno()
+        poll = select.poll()
+        poll.register(descriptor, select.POLLIN)
+        while len(message) < message_size:
+            has_ended = self.unity_proc.poll() is not None  # before looking for what it wrote last
+            if poll.poll(0 if has_ended else _POLL_S * 1e3):
+                part = os.read(descriptor, message_size - len(message))
+                if not part:
+                    self._raise_ended()
+                message += part
+            elif has_ended:
+                self._raise_ended()
+            elif time.monotonic() > deadline_s:
+                raise TimeoutError(f"no answer for {timeout:g} s")
+        return bytes(message)
+
+    def _send_message(self, message_type: Any, body: bytes) -> None:  # noqa: ANN401
+        deadline_s = _deadline_s(self.timeout)
+        if self.client_pipe is None:
+            self.client_pipe = os.fdopen(self._opened_by_both(deadline_s), "wb", buffering=0)
+        descriptor = self.client_pipe.fileno()
+        rest = memoryview(self._create_header(message_type, body) + body + self.eom_header)
+        poll = select.poll()
+        poll.register(descriptor, select.POLLOUT)
+        while rest:
+            if poll.poll(_POLL_S * 1e3):
+                try:
+                    rest = rest[os.write(descriptor, rest) :]
+                except BrokenPipeError:
+                    self._raise_ended()
+            self._check(deadline_s)
+
+    def _opened_by_both(self, deadline_s: float) -> int:
+        """Descriptor of the pipe to the process, once that reads from it."""
+        while True:
+            try:
+                descriptor = os.open(self.client_pipe_path, os.O_WRONLY | os.O_NONBLOCK)
+            except OSError:  # ENXIO: nobody reads yet
+                self._check(deadline_s)
+                time.sleep(0.005)
+            else:
+                _widen(descriptor)
+                return descriptor
+
+    def _check(self, deadline_s: float) -> None:
+        if self.unity_proc.poll() is not None:
+            self._raise_ended()
+        if time.monotonic() > deadline_s:
+            raise TimeoutError(f"does not read what it is sent, for {self.timeout:g} s")
+
+    def _raise_ended(self) -> None:
+        with suppress(Exception):
+            self.unity_proc.wait(timeout=1.0)  # the pipe closes a moment before the process is gone
+        raise ProcessEndedError(self.unity_proc.returncode)
+
+
+class GuardedController(Controller):  # type: ignore[misc]
+    """The client's controller over `PromptFifoServer`; its process ends with this one.
+
+    Whatever is raised while it starts, the process has ended by then.
+    """
+
+    def __init__(self, *, log_dir: Path, uses_gpu: bool, **settings: Any) -> None:  # noqa: ANN401
+        """Starts the process and loads the scene.
+
+        Args:
+            log_dir: Where the process's output goes, as `unity.log`.
+            uses_gpu: Whether the process draws on a GPU; if not, CUDA_VISIBLE_DEVICES is nothing to it.
+            settings: The client's own.
+        """
+        self._own_log_dir = str(log_dir)
+        self._uses_gpu = uses_gpu
+        self.server = None
+        self._build = None
+        try:
+            super().__init__(**settings)
+        except BaseException:
+            self.stop()
+            raise
+
+    @property
+    def log_dir(self) -> str:
+        """Where the process's output goes."""
+        return self._own_log_dir
+
+    def start(self, *args: Any, **settings: Any) -> Any:  # noqa: ANN401
+        """Starts the process; waits for its first event."""
+        if self.server is None:  # the client makes only servers of its own classes itself
+            self.server = PromptFifoServer(
+                width=self.width,
+                height=self.height,
+                timeout=self.server_timeout,
+                depth_format=self.depth_format,
+                add_depth_noise=self.add_depth_noise,
+            )
+        return super().start(*args, **settings)
+
+    def unity_command(self, width: int, height: int, headless: bool) -> list[str]:
+        """The command line, behind `ai2thor_guard`."""
+        if not self._uses_gpu:
+            self.gpu_device = None
+        is_bound = threading.current_thread() is threading.main_thread()  # other threads may end before evonav does
+        guard = [sys.executable, "-S", "-E", ai2thor_guard.__file__, str(os.getpid()), "1" if is_bound else "0"]
+        return [*guard, *super().unity_command(width, height, headless)]
+
+    def stop(self) -> None:
+        """Ends the process and removes its pipes; safe to call twice."""
+        if self.server is not None:
+            self.server.stop()
+            self.server.last_event = None
+        with suppress(AttributeError):  # what has not got as far as having a build has nothing to unlock
+            super().stop()
+        self.last_event = None  # the client's exit hook keeps this object for as long as Python runs
+
+
+def _deadline_s(timeout_s: float | None) -> float:
+    return float("inf") if timeout_s is None else time.monotonic() + timeout_s
+
+
+def _widen(descriptor: int) -> None:
+    """A pipe that holds a whole answer costs fewer turns between the processes."""
+    with suppress(OSError, ImportError):
+        import fcntl
+
+        fcntl.fcntl(descriptor, _F_SETPIPE_SZ, _PIPE_BYTES)
