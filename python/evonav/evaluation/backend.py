@@ -1,7 +1,7 @@
 """What a worker builds for itself, named by import path so that it crosses process borders without pickle."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,14 @@ class Backend:
     """Makes a `Simulator`."""
     perception: str = "evonav.evaluation.backend:ground_truth"
     """Makes a `Perception`."""
+    simulator_options: Mapping[str, Any] = field(default_factory=dict)
+    """Keywords for `simulator`, as JSON."""
+    host_options: Mapping[str, Any] = field(default_factory=dict)
+    """More of them, on this machine's means (GPU, display, timeouts): not part of what makes runs the same."""
+
+    def identity(self) -> dict[str, Any]:
+        """What makes runs the same."""
+        return {key: value for key, value in asdict(self).items() if key != "host_options" and value != {}}
 
     def load_case(self, path: Path) -> EpisodeCase:
         """A task as the evaluator runs it."""
@@ -33,7 +41,7 @@ class Backend:
 
     def make_simulator(self) -> Simulator:
         """A simulator of the worker's own."""
-        simulator: Simulator = _imported(self.simulator)()
+        simulator: Simulator = _imported(self.simulator)(**self.simulator_options, **self.host_options)
         return simulator
 
     def make_perception(self) -> Perception:
@@ -85,6 +93,13 @@ def lenient_simulator() -> Simulator:
     from evonav.world.embedded import EmbeddedSimulator
 
     return EmbeddedSimulator(allow_unknown_assets=True)
+
+
+def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - of `Ai2ThorOptions`
+    """AI2-THOR through its client."""
+    from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator
+
+    return Ai2ThorSimulator(options=Ai2ThorOptions(**options))
 
 
 def ground_truth() -> Perception:

@@ -12,7 +12,7 @@ from evonav._core import __version__
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.evaluation.backend import Backend, check_agent_name
 from evonav.evaluation.metrics import AgentSummary, paired_differences, summarise, summary_json
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, as_errored, as_not_run
+from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome, as_errored, as_not_run
 from evonav.evaluation.records import EndState, ErrorKind, StageRecord
 from evonav.evaluation.store import RunStore, check_same_run, writing
 from evonav.evaluation.workers import EpisodeJob, JobEvent, run_here, run_in_workers
@@ -197,26 +197,32 @@ class _Run:
                 record, plan = event.outcome.record, event.outcome.stage_map
                 if plan is not None:
                     self._store.add_map(plan)
-                if self._add(record, event.outcome.wall_s, event.outcome.cpu_s):
+                if self._add(event.outcome):
                     yield record
             elif event.failure is not None:
                 for record in self._left_behind(event.job, *event.failure):
-                    if self._add(record, 0.0, 0.0):
+                    if self._add(StageOutcome(record, None, 0.0, 0.0)):
                         yield record
 
-    def _add(self, record: StageRecord, wall_s: float, cpu_s: float) -> bool:
+    def _add(self, outcome: StageOutcome) -> bool:
         """Commits a record, unless the same was there: a resumed episode runs its recorded stages again.
 
         An agent that is not deterministic may do otherwise than recorded. Mixing two rollouts in one episode would join
         what never happened, so the newer rollout then replaces the older from that stage on.
         """
+        record = outcome.record
         key = (record.agent, record.task_id, record.stage)
         if key in self._states:
             if self._store.record_text(*key) == record.model_dump_json():
                 return False
             self._store.forget_episode(*key)
             self._states = self._store.states()
-        self._store.add_stage(record, wall_s=wall_s, cpu_s=cpu_s)
+        self._store.add_stage(
+            record,
+            wall_s=outcome.wall_s,
+            cpu_s=outcome.cpu_s,
+            num_simulator_restarts=outcome.num_simulator_restarts,
+        )
         self._states[key] = record.state
         return True
 
@@ -261,7 +267,7 @@ def _claim(store: RunStore, run_dir: Path, tasks: Sequence[TaskFile], config: Ru
         "evonav": __version__,
         "seed": config.seed,
         "protocol": asdict(config.protocol),
-        "backend": asdict(config.backend),
+        "backend": config.backend.identity(),
         "tasks": hashlib.sha256("".join(f"{t.task_id} {t.digest}\n" for t in tasks).encode()).hexdigest(),
         "num_tasks": len(tasks),
     }

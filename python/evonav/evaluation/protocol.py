@@ -113,6 +113,8 @@ class StageOutcome:
     """Of the stage's house; `None` when the stage never got one."""
     wall_s: float
     cpu_s: float
+    num_simulator_restarts: int = 0
+    """How often the simulator's process was lost in this stage; see `evonav.evaluation.workers.run_case`."""
 
 
 def as_errored(record: StageRecord, kind: ErrorKind, message: str) -> StageRecord:

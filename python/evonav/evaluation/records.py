@@ -43,6 +43,8 @@ class ErrorKind(str, Enum):
     """The decision model gave no valid answer."""
     SIMULATION = "simulation"
     """The simulator raised."""
+    SIMULATOR_LOST = "simulator_lost"
+    """The simulator's process ended or hung, every time that the stage was tried."""
     REFERENCE = "reference"
     """There is no path from the effective start to the target, so SPL is undefined."""
     CRASH = "crash"

@@ -16,7 +16,7 @@ from evonav.agents.agent import (
     RoundDiagnostics,
     Stop,
 )
-from evonav.errors import DecisionError, InvalidArgumentError, SimulationError
+from evonav.errors import DecisionError, InvalidArgumentError, SimulationError, SimulatorLostError
 from evonav.evaluation import motion
 from evonav.evaluation.cases import room_at, stage_map
 from evonav.evaluation.metrics import stage_soft_spl, stage_spl
@@ -59,6 +59,8 @@ def _blame(kind: ErrorKind) -> Iterator[None]:
         raise
     except DecisionError as error:
         raise _StageError(ErrorKind.DECISION, str(error)) from error
+    except SimulatorLostError as error:
+        raise _StageError(ErrorKind.SIMULATOR_LOST, str(error)) from error
     except SimulationError as error:
         raise _StageError(ErrorKind.SIMULATION, str(error)) from error
     except Exception as error:

@@ -1,8 +1,9 @@
 """A run on disk: one SQLite file (WAL) whose rows are whole stages.
 
 A finished stage is one transaction: wholly there or not at all. `INSERT` under a primary key makes a stage that is
-reported twice an error instead of a second row. Wall-clock figures sit in `timings`, apart from the records, so that
-records of equal runs are equal to the byte.
+reported twice an error instead of a second row. What is not a function of the run's inputs sits apart from the records,
+so that records of equal runs are equal to the byte: wall-clock figures in `timings`, lost simulator processes in
+`simulator_restarts`.
 """
 
 import json
@@ -45,6 +46,15 @@ CREATE TABLE IF NOT EXISTS timings (
 ) WITHOUT ROWID;
 """
 
+# Later than the first runs of this schema version: made where it is missing. Stages without a restart have no row.
+_RESTARTS_SCHEMA = """
+CREATE TABLE IF NOT EXISTS simulator_restarts (
+    agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
+    num_restarts INTEGER NOT NULL,
+    PRIMARY KEY (agent, task_id, stage)
+) WITHOUT ROWID;
+"""
+
 
 class RunStore:
     """Reads and writes `DIR/records.sqlite`. One process writes; any number read meanwhile."""
@@ -74,6 +84,7 @@ class RunStore:
             self.set_meta("schema_version", SCHEMA_VERSION)
         elif version != SCHEMA_VERSION:
             raise StoreError(f"{self.path}: schema version {version}, this evonav reads {SCHEMA_VERSION}")
+        self._execute(_RESTARTS_SCHEMA, ())
 
     def __enter__(self) -> "RunStore":
         return self
@@ -101,7 +112,7 @@ class RunStore:
         rows = self._db.execute("SELECT agent, task_id, stage, state FROM stages")
         return {(agent, task_id, stage): EndState(state) for agent, task_id, stage, state in rows}
 
-    def add_stage(self, record: StageRecord, *, wall_s: float, cpu_s: float) -> None:
+    def add_stage(self, record: StageRecord, *, wall_s: float, cpu_s: float, num_simulator_restarts: int = 0) -> None:
         """Commits a finished stage.
 
         Raises:
@@ -113,6 +124,8 @@ class RunStore:
             text = record.model_dump_json()
             self._db.execute("INSERT INTO stages VALUES (?, ?, ?, ?, ?)", (*key, record.state.value, text))
             self._db.execute("INSERT INTO timings VALUES (?, ?, ?, ?, ?)", (*key, wall_s, cpu_s))
+            if num_simulator_restarts:
+                self._db.execute("INSERT INTO simulator_restarts VALUES (?, ?, ?, ?)", (*key, num_simulator_restarts))
             self._db.execute("COMMIT")
         except sqlite3.Error as error:
             if self._db.in_transaction:
@@ -129,7 +142,7 @@ class RunStore:
         key = (agent, task_id, from_stage)
         try:
             self._db.execute("BEGIN IMMEDIATE")
-            for table in ("stages", "timings"):
+            for table in ("stages", "timings", "simulator_restarts"):
                 self._db.execute(f"DELETE FROM {table} WHERE agent = ? AND task_id = ? AND stage >= ?", key)  # noqa: S608
             self._db.execute("COMMIT")
         except sqlite3.Error as error:
@@ -187,6 +200,11 @@ class RunStore:
         """Wall and CPU seconds of every recorded stage; not deterministic, hence not in the records."""
         rows = self._db.execute("SELECT agent, task_id, stage, wall_s, cpu_s FROM timings")
         return {(agent, task_id, stage): (wall_s, cpu_s) for agent, task_id, stage, wall_s, cpu_s in rows}
+
+    def simulator_restarts(self) -> dict[tuple[str, str, int], int]:
+        """How often the simulator's process was lost and the stage tried again, of stages where it was."""
+        rows = self._db.execute("SELECT agent, task_id, stage, num_restarts FROM simulator_restarts")
+        return {(agent, task_id, stage): num_restarts for agent, task_id, stage, num_restarts in rows}
 
     def _execute(self, query: str, values: tuple[Any, ...]) -> None:
         try:

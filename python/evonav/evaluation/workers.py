@@ -1,6 +1,10 @@
 """Worker processes: an episode each, contained. A worker that dies or hangs costs its stage, not the run.
 
 Parent and workers exchange JSON only: nothing a worker sends is unpickled.
+
+A simulator's process that is lost costs less than that: the episode runs again from its beginning, with a fresh agent
+and the same seed, in another process of the simulator. That brings a deterministic agent to the state in which it began
+the stage, which no snapshot would do for every agent; of another kind of agent, the newer rollout replaces the older.
 """
 
 import json
@@ -8,16 +12,20 @@ import multiprocessing
 import os
 import signal
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing, suppress
+from dataclasses import asdict, dataclass, replace
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
 from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
-from evonav.evaluation.records import ErrorKind, StageMap, StageRecord
+from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
 from evonav.evaluation.rollout import Episode
+
+MAX_SIMULATOR_RESTARTS = 2
+"""A stage."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +58,27 @@ def run_job(job: EpisodeJob, backend: Backend, protocol: ProtocolConfig) -> Iter
 
 
 def run_case(case: EpisodeCase, job: EpisodeJob, backend: Backend, protocol: ProtocolConfig) -> Iterator[StageOutcome]:
-    """Runs an episode of a loaded task in this process."""
+    """Runs an episode of a loaded task in this process.
+
+    Yields:
+        Outcomes of the stages. After the loss of a simulator's process, those from stage 1 on again.
+    """
+    num_restarts: Counter[int] = Counter()
+    is_whole = False
+    while not is_whole:
+        is_whole = True
+        with closing(_attempt(case, job, backend, protocol)) as outcomes:
+            for outcome in outcomes:
+                record, stage = outcome.record, outcome.record.stage
+                kind = None if record.error is None or record.state is EndState.NOT_RUN else record.error.kind
+                if kind is ErrorKind.SIMULATOR_LOST and num_restarts[stage] < MAX_SIMULATOR_RESTARTS:
+                    num_restarts[stage] += 1
+                    is_whole = False
+                    break
+                yield replace(outcome, num_simulator_restarts=num_restarts[stage])
+
+
+def _attempt(case: EpisodeCase, job: EpisodeJob, backend: Backend, protocol: ProtocolConfig) -> Generator[StageOutcome]:
     simulator = backend.make_simulator()
     try:
         agent = make_agent(job.agent)
@@ -155,6 +183,7 @@ class _Worker:
                 None if plan is None else StageMap.model_validate_json(plan),
                 message["wall_s"],
                 message["cpu_s"],
+                message["num_simulator_restarts"],
             )
             return JobEvent(job, outcome)
         self.job = None
@@ -201,6 +230,7 @@ def _serve(connection: Connection, backend_json: str, protocol_json: str) -> Non
                         "map": None if plan is None else plan.model_dump_json(),
                         "wall_s": outcome.wall_s,
                         "cpu_s": outcome.cpu_s,
+                        "num_simulator_restarts": outcome.num_simulator_restarts,
                     },
                 )
         except BrokenPipeError:

@@ -19,6 +19,8 @@ from evonav.world.simulator import Action, Frame, Intrinsics, OccupancyGrid, Sce
 if TYPE_CHECKING:
     from evonav.world.ai2thor_process import GuardedController
 
+__all__ = ["Ai2ThorOptions", "Ai2ThorSimulator"]
+
 _Position = tuple[float, float, float]
 
 # Unity reports poses in single precision, turned through quaternions. Within this of what was asked, what was asked is
@@ -208,7 +210,9 @@ class Ai2ThorSimulator:
         event = self._do(
             "GetShortestPathToPoint",
             position=self._vector(start_m),
-            **self._vector(target_m),
+            x=target_m[0],
+            y=self._agent_y_m,
+            z=target_m[2],
             allowedError=_SNAP_M,
         )
         if not event.metadata["lastActionSuccess"]:
@@ -241,7 +245,9 @@ class Ai2ThorSimulator:
 
     @property
     def _far_m(self) -> float:
-        return float(self._running.server.camera_far_plane)
+        server = self._running.server
+        assert server is not None  # of a running controller
+        return float(server.camera_far_plane)
 
     @property
     def _running(self) -> "GuardedController":
@@ -337,11 +343,12 @@ class Ai2ThorSimulator:
             raise SimulationError(f"AI2-THOR finds no reachable positions: {event.metadata['errorMessage']}")
         found = event.metadata["actionReturn"]
         points_m = np.array([(p["x"], p["z"]) for p in found], dtype=np.float64).reshape(-1, 2)
-        origin_m = np.array([origin.x_m, origin.z_m])
+        origin_m = np.array([origin.x_m, origin.z_m], dtype=np.float64)
         # On the grid in double precision, whatever they were reported in.
-        cells = np.rint((points_m - origin_m) / grid_m)
+        cells: NDArray[np.float64] = np.rint((points_m - origin_m) / grid_m)
         cells = cells[np.lexsort((cells[:, 0], cells[:, 1]))]
-        return origin_m + cells * grid_m
+        on_grid_m: NDArray[np.float64] = origin_m + cells * grid_m
+        return on_grid_m
 
     def _mapped(self, grid: OccupancyGrid) -> OccupancyGrid:
         """The occupancy on the grid of another, as AI2-THOR has it."""

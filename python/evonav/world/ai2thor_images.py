@@ -12,7 +12,6 @@ from evonav.world.simulator import Frame, SceneObject
 
 _FAR = 1.0 - 1e-6
 """Share of the far plane from which on nothing is there: AI2-THOR draws the background on it."""
-_STRUCTURE = ("Wall", "Floor", "Ceiling")
 
 
 def depth_of(event: Any, far_m: float) -> NDArray[np.float32]:  # noqa: ANN401 - the client's event
@@ -50,12 +49,14 @@ class InstanceDecoder:
         """For the bodies of a house, in instance order."""
         self._instance_of: dict[str, int] = {}
         for index, body in enumerate(objects):
-            self._instance_of.setdefault(body.id, index + 1)  # a ceiling has the id of its floor
+            # A ceiling has the id of its room's floor; our engine names it so, Unity not at all.
+            name = f"Ceiling|{body.id}" if body.kind == "ceiling" else body.id
+            self._instance_of[name] = index + 1
         is_fixed = np.array([body.kind != "object" for body in objects], dtype=bool)
         self._fixed = np.flatnonzero(is_fixed) + 1
         self._centres_m = np.array([body.centre_m for body in objects], dtype=np.float64).reshape(-1, 3)[is_fixed]
         self._halves_m = np.array([body.size_m for body in objects], dtype=np.float64).reshape(-1, 3)[is_fixed] / 2
-        self._colours: dict[str, tuple[int, ...]] | None = None
+        self._names: dict[tuple[int, ...], str] | None = None
         self._keys = np.empty(0, dtype=np.uint32)
         self._instances = np.empty(0, dtype=np.int32)
 
@@ -72,8 +73,8 @@ class InstanceDecoder:
         image = event.instance_segmentation_frame
         if image is None:
             raise SimulationError("AI2-THOR sent no instance image")
-        if event.object_id_to_color != self._colours:
-            self._learn(event.object_id_to_color)
+        if event.color_to_object_id != self._names:
+            self._learn(event.color_to_object_id)
         channels = image.astype(np.uint32)
         keys = channels[..., 0] << 16 | channels[..., 1] << 8 | channels[..., 2]
         at = np.minimum(np.searchsorted(self._keys, keys), max(0, len(self._keys) - 1))
@@ -87,13 +88,13 @@ class InstanceDecoder:
             instances[unnamed] = self._nearest_fixed(unproject(frame.depth_m, frame.pose, frame.intrinsics)[unnamed])
         return instances
 
-    def _learn(self, colours: dict[str, tuple[int, ...]]) -> None:
+    def _learn(self, names: dict[tuple[int, ...], str]) -> None:
         known = {
             red << 16 | green << 8 | blue: self._instance_of[name]
-            for name, (red, green, blue) in colours.items()
+            for (red, green, blue), name in names.items()
             if name in self._instance_of
         }
-        self._colours = dict(colours)
+        self._names = dict(names)
         self._keys = np.array(sorted(known), dtype=np.uint32)
         self._instances = np.array([known[int(key)] for key in self._keys], dtype=np.int32)
 

@@ -19,6 +19,7 @@ from ai2thor.controller import Controller
 from ai2thor.fifo_server import FifoServer
 
 from evonav.world import ai2thor_guard
+from evonav.world.ai2thor_startup import ProcessEndedError
 
 _POLL_S = 0.1
 """Between two looks at whether the process lives."""
@@ -28,19 +29,11 @@ _PIPE_BYTES = 1 << 20
 _F_SETPIPE_SZ = 1031  # linux/fcntl.h
 
 
-class ProcessEndedError(Exception):
-    """The process has ended, or hung up."""
-
-    def __init__(self, returncode: int | None) -> None:
-        how = "closed its pipe" if returncode is None else f"exit code {returncode}"
-        if returncode is not None and returncode < 0:
-            with suppress(ValueError):
-                how = f"killed by {signal.Signals(-returncode).name}"
-        super().__init__(how)
-
-
 class PromptFifoServer(FifoServer):  # type: ignore[misc]
     """The client's FIFO server; raises `ProcessEndedError` within a tenth of a second after its process has ended."""
+
+    server_pipe: Any = None
+    client_pipe: Any = None
 
     def receive(self, timeout: float | None = None) -> Any:  # noqa: ANN401 - the client's event
         """The next event.
@@ -141,7 +134,7 @@ class GuardedController(Controller):  # type: ignore[misc]
         """
         self._own_log_dir = str(log_dir)
         self._uses_gpu = uses_gpu
-        self.server = None
+        self.server: PromptFifoServer | None = None
         self._build = None
         try:
             super().__init__(**settings)

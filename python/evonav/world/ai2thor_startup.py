@@ -3,6 +3,7 @@
 import os
 import shlex
 import shutil
+import signal
 import sys
 import time
 from contextlib import suppress
@@ -68,6 +69,17 @@ class Ai2ThorOptions:
             raise InvalidArgumentError("executable and commit_id: give one, an executable is a build already")
 
 
+class ProcessEndedError(Exception):
+    """The process has ended, or hung up."""
+
+    def __init__(self, returncode: int | None) -> None:
+        how = "closed its pipe" if returncode is None else f"exit code {returncode}"
+        if returncode is not None and returncode < 0:
+            with suppress(ValueError):
+                how = f"killed by {signal.Signals(-returncode).name}"
+        super().__init__(how)
+
+
 class ProcessLog:
     """What the simulator's process prints, in a temporary folder of its own."""
 
@@ -115,9 +127,7 @@ def start_controller(
 
         from evonav.world.ai2thor_process import GuardedController
     except ImportError as error:
-        raise SimulationError(
-            f"AI2-THOR's client cannot be imported ({error}): pip install 'evonav[thor]'"
-        ) from error
+        raise SimulationError(f"AI2-THOR's client cannot be imported ({error}): pip install 'evonav[thor]'") from error
     settings: dict[str, Any] = {
         "scene": scene,
         "width": config.width_px,
@@ -162,10 +172,13 @@ def lost(doing: str, error: BaseException, log_tail: str) -> SimulatorLostError:
 
 
 def _cause(error: BaseException) -> BaseException:
-    """The client wraps what happened into errors that no longer say it."""
-    while (inner := error.__cause__ or error.__context__) is not None:
-        error = inner
-    return error
+    """What happened: the client wraps it into errors that no longer say it."""
+    chain: list[BaseException] = [error]
+    while (inner := chain[-1].__cause__ or chain[-1].__context__) is not None:
+        chain.append(inner)
+    # Of what the client wrapped, the reason is innermost; of our own, what was caught on the way to it is.
+    ours = (ProcessEndedError, TimeoutError)
+    return next((found for found in reversed(chain) if isinstance(found, ours)), chain[-1])
 
 
 def _logged(tail: str) -> str:
@@ -206,8 +219,6 @@ def _explained(error: Exception, options: Ai2ThorOptions, log_tail: str) -> Simu
     """An error of the client's start, in words that help."""
     if isinstance(error, SimulationError):
         return error
-    from evonav.world.ai2thor_process import ProcessEndedError
-
     cause, text = _cause(error), f"{error}"
     if isinstance(cause, ProcessEndedError) or "Unity process has exited" in text:
         advice = _advice(log_tail) if not options.is_own_engine else ""

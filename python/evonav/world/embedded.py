@@ -156,7 +156,7 @@ class EmbeddedSimulator:
     def nearest_reachable_position(self, position_m: _Position) -> _Position:
         """The reachable position nearest on the ground plane."""
         reachable_m = self.reachable_positions()
-        return _nearest(reachable_m, position_m)
+        return nearest_of(reachable_m, position_m)
 
     def is_free(self, position_m: _Position) -> bool:
         """Whether the agent's body fits at the position, and it can walk there from the house's start."""
@@ -259,7 +259,8 @@ def _turned(pose: Pose, angle_rad: float) -> Pose:
     return Pose(pose.x_m, pose.y_m, pose.z_m, pose.yaw_rad + angle_rad, pose.horizon_rad).canonical()
 
 
-def _nearest(reachable_m: NDArray[np.float64], position_m: _Position) -> _Position:
+def nearest_of(reachable_m: NDArray[np.float64], position_m: _Position) -> _Position:
+    """The position nearest to another on the ground plane, the first of equals."""
     if not len(reachable_m):
         raise SimulationError("no position is reachable from where the agent stands")
     squared_m2 = (reachable_m[:, 0] - position_m[0]) ** 2 + (reachable_m[:, 2] - position_m[2]) ** 2
