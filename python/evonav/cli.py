@@ -5,7 +5,7 @@ import signal
 import sys
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -29,7 +29,8 @@ app = typer.Typer(
 )
 
 Agents = Annotated[str, typer.Option(help="Names, comma-separated; see `evonav agents`.")]
-Houses = Annotated[Path | None, typer.Option(help="ProcTHOR JSON, JSONL or JSONL.gz to generate tasks from.")]
+HOUSES = "ProcTHOR JSON, JSONL, JSONL.gz, or procthor-10k:SPLIT"
+Houses = Annotated[Path | None, typer.Option(help=f"{HOUSES} to generate tasks from.")]
 Tasks = Annotated[Path | None, typer.Option(help="Folder of tasks; default: the bundled ones.")]
 Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-room) houses or tasks.")]
 Seed = Annotated[int, typer.Option(min=0, help="Decides everything random.")]
@@ -110,7 +111,7 @@ def strip(
 
 @app.command()
 def generate(
-    houses: Annotated[Path, typer.Option(help="ProcTHOR JSON, JSONL or JSONL.gz.")],
+    houses: Annotated[Path, typer.Option(help=f"{HOUSES}.")],
     out: Annotated[Path, typer.Option(help="Folder for the tasks.")],
     limit: Limit = None,
     seed: Seed = 0,
@@ -124,9 +125,22 @@ def generate(
     typer.echo(f"{len(tasks)} tasks in {out}")
 
 
-@app.command(name="houses")
+class _ListByDefault(typer.core.TyperGroup):
+    """`evonav houses FILE` is `evonav houses list FILE`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 (click's, or that of the copy in typer)
+        if not args or (args[0] not in self.commands and args[0] != "--help"):
+            args = ["list", *args]
+        return super().parse_args(ctx, args)
+
+
+houses_app = typer.Typer(cls=_ListByDefault, help="Lists houses (the default), or fetches published ones.")
+app.add_typer(houses_app, name="houses")
+
+
+@houses_app.command(name="list")
 def list_houses(
-    path: Annotated[Path | None, typer.Argument(help="ProcTHOR JSON, JSONL or JSONL.gz; default: bundled.")] = None,
+    path: Annotated[Path | None, typer.Argument(help=f"{HOUSES}; default: bundled.")] = None,
     limit: Limit = None,
 ) -> None:
     """Lists houses with their rooms and objects."""
@@ -134,6 +148,33 @@ def list_houses(
 
     for name, num_rooms, num_objects in house_facts(path, limit):
         typer.echo(f"{name}\t{num_rooms} rooms\t{num_objects} objects")
+
+
+@houses_app.command(name="fetch")
+def fetch_houses(
+    dataset: Annotated[str, typer.Argument(help="procthor-10k")],
+    revision: Annotated[str | None, typer.Option(help="Commit, tag or branch; default: that for AI2-THOR 5.")] = None,
+    split: Annotated[list[str] | None, typer.Option(help="train, val or test, repeatable; default: all.")] = None,
+    cache: Annotated[
+        Path | None, typer.Option(help="Folder to keep it in; default: $EVONAV_CACHE or ~/.cache/evonav.")
+    ] = None,
+) -> None:
+    """Downloads a published dataset of houses once; verifies its checksums from then on."""
+    from evonav.house.procthor10k import NAME, REVISION, SPLITS
+    from evonav.house.procthor10k_fetch import fetch_procthor10k
+
+    if dataset != NAME:
+        raise typer.BadParameter(f"{dataset}: expected {NAME}")
+    unknown = [name for name in split or () if name not in SPLITS]
+    if unknown:
+        raise typer.BadParameter(f"--split {unknown[0]}: expected {', '.join(SPLITS)}")
+    wanted = [name for name in SPLITS if not split or name in split]
+    with _status(f"Fetching {NAME}") as tell:
+        fetched = fetch_procthor10k(revision or REVISION, wanted, cache=cache, on_progress=tell)
+    for name in wanted:
+        entry = fetched.manifest.splits[name]
+        state = "fetched" if name in fetched.new else "verified"
+        typer.echo(f"{NAME}:{name}\t{entry.num_houses} houses\t{state}\t{fetched.folder / entry.file}")
 
 
 @app.command(name="agents")

@@ -47,16 +47,16 @@ def make_tasks(
         The folders of the tasks, in the order of the houses.
 
     Raises:
-        HouseError: A house is malformed.
+        HouseError: A house is malformed, or a dataset was not fetched.
         StoreError: `out` holds tasks of another source.
         TaskError: No house gives a task; it says why.
     """
     from evonav.generation import Rejections, generate_tasks
-    from evonav.house import load_houses
+    from evonav.house import house_file, load_houses, named_set
     from evonav.tasks import write_task
 
     source = {
-        "houses_sha256": _digest(houses),
+        "houses_sha256": _digest(house_file(houses)),
         "seed": seed,
         "limit": limit,
         "allow_unknown_assets": allow_unknown_assets,
@@ -65,8 +65,14 @@ def make_tasks(
     if done is not None:
         return done
     rejections = Rejections()
+    published = named_set(houses)
     tasks = generate_tasks(
-        load_houses(houses), seed=seed, rejections=rejections, allow_unknown_assets=allow_unknown_assets
+        load_houses(houses),
+        seed=seed,
+        rejections=rejections,
+        dataset="evonav" if published is None else "procthor-10k",
+        split="none" if published is None else published.split,
+        allow_unknown_assets=allow_unknown_assets,
     )
     roots: list[Path] = []
     for task in islice(tasks, limit):

@@ -1,6 +1,16 @@
 """ProcTHOR houses: read from files, or bundled."""
 
 from evonav._core import House, HouseObject, Opening, Room, Wall
-from evonav.house.files import bundled_houses, load_houses
+from evonav.house.files import bundled_houses, house_file, load_houses, named_set
 
-__all__ = ["House", "HouseObject", "Opening", "Room", "Wall", "bundled_houses", "load_houses"]
+__all__ = [
+    "House",
+    "HouseObject",
+    "Opening",
+    "Room",
+    "Wall",
+    "bundled_houses",
+    "house_file",
+    "load_houses",
+    "named_set",
+]

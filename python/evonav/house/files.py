@@ -7,10 +7,13 @@ from collections.abc import Iterator
 from importlib import resources
 from itertools import islice
 from pathlib import Path
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from evonav._core import House
 from evonav.errors import HouseError, InvalidArgumentError
+
+if TYPE_CHECKING:
+    from evonav.house.procthor10k import HouseSet
 
 SUFFIXES = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
 
@@ -20,11 +23,12 @@ def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
 
     Args:
         path: A `.json` file with a house or a list of houses, a `.jsonl` file with a house a line, either with `.gz`;
-            or a directory with such files, taken by name.
+            or a directory with such files, taken by name; or a fetched split, `procthor-10k:val`.
         limit: Stop after so many.
 
     Yields:
-        Each house, checked; its `name` is `file:line`, for lists `file:line[index]`.
+        Each house, checked; its `name` is `file:line`, for lists `file:line[index]`,
+        of a split `procthor-10k:val:line`.
 
     Raises:
         HouseError: A file cannot be read or a house is malformed; it names file, line, object and field.
@@ -33,7 +37,36 @@ def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
     if limit is not None and limit < 0:
         message = f"argument `limit` is {limit}, expected None or at least 0"
         raise InvalidArgumentError(message)
-    return islice(_houses(Path(path)), limit)
+    file = house_file(path)
+    return islice(_houses(file, str(path if named_set(path) else file)), limit)
+
+
+def named_set(path: str | Path) -> "HouseSet | None":
+    """The published split that a `--houses` argument names; None if it is a file or a directory.
+
+    Raises:
+        InvalidArgumentError: It names a dataset that evonav knows, but no split of it.
+    """
+    if not str(path).startswith("procthor-10k") or Path(path).exists():
+        return None
+    from evonav.house.procthor10k import house_set
+
+    return house_set(path)
+
+
+def house_file(path: str | Path) -> Path:
+    """The file or directory that a `--houses` argument means.
+
+    Raises:
+        DatasetError: It is a published split that was not fetched, or is not whole.
+        InvalidArgumentError: As for `named_set`.
+    """
+    named = named_set(path)
+    if named is None:
+        return Path(path)
+    from evonav.house.procthor10k import split_path
+
+    return split_path(named)
 
 
 def bundled_houses(limit: int | None = None) -> Iterator[House]:
@@ -51,21 +84,21 @@ def bundled_houses(limit: int | None = None) -> Iterator[House]:
             yield House(line, name=f"bundled:{number}")
 
 
-def _houses(path: Path) -> Iterator[House]:
+def _houses(path: Path, name: str) -> Iterator[House]:
     if path.is_dir():
         files = sorted(file for file in path.iterdir() if file.name.endswith(SUFFIXES) and file.is_file())
         if not files:
             message = f"{path}: no {', '.join(SUFFIXES)} file in this directory"
             raise HouseError(message)
         for file in files:
-            yield from _houses(file)
+            yield from _houses(file, str(file))
         return
     if not path.name.endswith(SUFFIXES):
         message = f"{path}: expected a directory or a file with one of {', '.join(SUFFIXES)}"
         raise HouseError(message)
     try:
         with _open(path) as text:
-            yield from _lines(path, text) if ".jsonl" in path.suffixes else _document(path, text.read())
+            yield from _lines(name, text) if ".jsonl" in path.suffixes else _document(path, text.read())
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
         message = f"{path}: cannot be read: {error}"
         raise HouseError(message) from error
@@ -75,10 +108,10 @@ def _open(path: Path) -> IO[str]:
     return gzip.open(path, "rt", encoding="utf-8") if path.suffix == ".gz" else path.open(encoding="utf-8")
 
 
-def _lines(path: Path, text: IO[str]) -> Iterator[House]:
+def _lines(name: str, text: IO[str]) -> Iterator[House]:
     for number, line in enumerate(text, start=1):
         if line.strip():
-            yield House(line, name=f"{path}:{number}")
+            yield House(line, name=f"{name}:{number}")
 
 
 def _document(path: Path, text: str) -> Iterator[House]:

@@ -239,7 +239,8 @@ def _path_to_object(engine: Engine, record: dict[str, Any], start_m: Point, allo
     raise motion.invalid_operation(
         f"Target object {object_id} is not visible on navigation path given current agent parameters:"
         f" maxVisibleDistance ({reach_m:g}), gridSize ({settings.gridSize:g}),"
-        f" fieldOfView ({camera.vertical_fov_deg:g}), camera width ({camera.width_px}), camera height ({camera.height_px})"
+        f" fieldOfView ({camera.vertical_fov_deg:g}), camera width ({camera.width_px}),"
+        f" camera height ({camera.height_px})"
     )
 
 

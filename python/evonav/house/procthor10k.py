@@ -1,0 +1,185 @@
+"""ProcTHOR-10k (Deitke et al., NeurIPS 2022): 10,000 + 1,000 + 1,000 houses, on this machine once they were fetched.
+
+`evonav.house.procthor10k_fetch` brings them here; this module knows where they lie and that they are whole.
+"""
+
+import gzip
+import hashlib
+import os
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from evonav.errors import InvalidArgumentError
+from evonav.house.dataset_errors import DatasetCorruptError, DatasetMissingError
+
+Split = Literal["train", "val", "test"]
+
+NAME = "procthor-10k"
+SPLITS: tuple[Split, ...] = ("train", "val", "test")
+SOURCE = "https://github.com/allenai/procthor-10k"
+REVISION = "439193522244720b86d8c81cde2e51e3a4d150cf"
+"""The commit for AI2-THOR 5: the head of `main`, which the dataset's own `main.py` and its maintainers (issue 10 of its
+repository) name for AI2-THOR 5.0 and later."""
+
+MANIFEST_NAME = "manifest.json"
+INSTEAD = (
+    "The bundled houses need none of this (leave `--houses` out), and `--houses FILE` takes any ProcTHOR JSON or JSONL."
+)
+
+
+class SplitFile(BaseModel):
+    """One file of houses, a house a line."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    file: str
+    num_houses: int
+    sha256: str
+
+
+class Manifest(BaseModel):
+    """`manifest.json` beside the files: what they are and where they come from."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    dataset: str
+    source: str
+    revision: str
+    splits: dict[Split, SplitFile]
+
+
+def _published(split: Split, num_houses: int, sha256: str) -> tuple[Split, SplitFile]:
+    return split, SplitFile(file=f"{split}.jsonl.gz", num_houses=num_houses, sha256=sha256)
+
+
+PUBLISHED: Mapping[str, Mapping[Split, SplitFile]] = MappingProxyType(
+    {
+        REVISION: dict(
+            (
+                _published("train", 10_000, "ee3c4aa14b4d8f0895fecfb5fdaca59395427ca1018b2f9aeeedbc61e5824587"),
+                _published("val", 1_000, "d808540514e26b6726cd2790490e669b572eeb94febb5188a2f403591dd21721"),
+                _published("test", 1_000, "9a9fa6f134e76fe87f3fd92c00883651cf9fadf4e9ad4072d6d73be229f001dc"),
+            )
+        )
+    }
+)
+"""Counts that `main.py` and checksums that the git-lfs pointers state, by revision."""
+
+
+class HouseSet(NamedTuple):
+    """A split of the dataset at a revision, as `procthor-10k:SPLIT[@REVISION]` asks for it."""
+
+    split: Split
+    revision: str
+
+
+def house_set(text: str | Path) -> HouseSet | None:
+    """The split that a `--houses` argument names; None if it names something else, such as a file.
+
+    Raises:
+        InvalidArgumentError: It names the dataset, but no split of it.
+    """
+    name, _, rest = str(text).partition(":")
+    if name.partition("@")[0] != NAME:
+        return None
+    split, _, revision = rest.partition("@")
+    for known in SPLITS:
+        if split == known:
+            return HouseSet(known, revision or REVISION)
+    message = f"`{text}`: expected {NAME}:SPLIT or {NAME}:SPLIT@REVISION with SPLIT one of {', '.join(SPLITS)}"
+    raise InvalidArgumentError(message)
+
+
+def cache_folder() -> Path:
+    """Where fetched datasets lie: `$EVONAV_CACHE`, else `$XDG_CACHE_HOME/evonav`, else `~/.cache/evonav`."""
+    if own := os.environ.get("EVONAV_CACHE"):
+        return Path(own)
+    shared = os.environ.get("XDG_CACHE_HOME", "")
+    # The XDG specification has relative paths ignored.
+    return (Path(shared) if Path(shared).is_absolute() else Path.home() / ".cache") / "evonav"
+
+
+def dataset_folder(revision: str = REVISION, cache: Path | None = None) -> Path:
+    """Where the files of a revision lie, once fetched."""
+    return (cache_folder() if cache is None else cache) / "houses" / NAME / revision
+
+
+def split_path(houses: HouseSet, cache: Path | None = None) -> Path:
+    """The file of a split, found whole.
+
+    Raises:
+        DatasetMissingError: The split was not fetched.
+        DatasetCorruptError: The file or its manifest is not as it was fetched.
+    """
+    folder = dataset_folder(houses.revision, cache)
+    manifest = read_manifest(folder)
+    if manifest is None or houses.split not in manifest.splits:
+        at = "" if houses.revision == REVISION else f" --revision {houses.revision}"
+        message = f"{NAME}:{houses.split} is not in {folder}. Fetch it: evonav houses fetch {NAME}{at}. {INSTEAD}"
+        raise DatasetMissingError(message)
+    entry = manifest.splits[houses.split]
+    check_file(folder / entry.file, entry)
+    return folder / entry.file
+
+
+def read_manifest(folder: Path) -> Manifest | None:
+    """The manifest of a folder; None if there is none.
+
+    Raises:
+        DatasetCorruptError: It cannot be read, or contradicts the checksums that were published.
+    """
+    path = folder / MANIFEST_NAME
+    try:
+        manifest = Manifest.model_validate_json(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except (OSError, ValidationError) as error:
+        message = f"{path}: {error}. Remove it and fetch again. {INSTEAD}"
+        raise DatasetCorruptError(message) from error
+    for split, entry in manifest.splits.items():
+        published = PUBLISHED.get(manifest.revision, {}).get(split, entry)
+        if entry != published or manifest.revision != folder.name:
+            message = f"{path}: {split}: {entry.sha256} is not what was published. Remove it and fetch again. {INSTEAD}"
+            raise DatasetCorruptError(message)
+    return manifest
+
+
+def check_file(path: Path, entry: SplitFile) -> None:
+    """Compares a file with its checksum.
+
+    Raises:
+        DatasetCorruptError: It differs, or is not there.
+    """
+    try:
+        with path.open("rb") as file:
+            digest = hashlib.sha256()
+            while chunk := file.read(1 << 20):
+                digest.update(chunk)
+    except OSError as error:
+        message = f"{path}: {error.strerror}. Fetch again: evonav houses fetch {NAME}. {INSTEAD}"
+        raise DatasetCorruptError(message) from error
+    if digest.hexdigest() != entry.sha256:
+        message = (
+            f"{path}: corrupt or truncated: its sha256 is {digest.hexdigest()}, expected {entry.sha256}. "
+            f"Fetch again: evonav houses fetch {NAME}. {INSTEAD}"
+        )
+        raise DatasetCorruptError(message)
+
+
+def count_houses(path: Path) -> int:
+    """Lines of a packed file, all of it unpacked.
+
+    Raises:
+        DatasetCorruptError: It is not whole.
+    """
+    try:
+        with gzip.open(path, "rb") as lines:
+            return sum(1 for line in lines if line.strip())
+    except (OSError, EOFError, zlib.error) as error:
+        message = f"{path}: cannot be unpacked: {error}. {INSTEAD}"
+        raise DatasetCorruptError(message) from error
