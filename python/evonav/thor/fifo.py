@@ -1,0 +1,189 @@
+"""AI2-THOR's FIFO transport: two named pipes that the client makes, messages of typed fields.
+
+Framing, of `ai2thor.fifo_server`: a field is a header `!BI` (type, length) and a body; type 255 with length 0 ends the
+message. The client asks with one ACTION field and is answered with METADATA, or METADATA_PATCH, and images.
+"""
+
+import errno
+import fcntl
+import os
+import select
+import struct
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+Body = bytes | NDArray[Any]
+"""Of a field; an array goes out as it lies in memory."""
+
+MAX_MESSAGE_BYTES = 256 * 2**20
+"""Larger than any house; a longer field is a broken header."""
+
+_HEADER = struct.Struct("!BI")
+_CONNECT_TIMEOUT_S = 10.0
+_WATCH_MS = 500
+# Linux's; a whole event fits, so that engine and client change places once a step.
+_SET_PIPE_SIZE, _PIPE_BYTES = 1031, 2**20
+# Of one `writev`; POSIX grants 16, Linux 1024.
+_MAX_BUFFERS = 256
+
+
+class FieldType(IntEnum):
+    """First byte of a header."""
+
+    METADATA = 1
+    ACTION = 2
+    RGB_IMAGE = 4
+    DEPTH_IMAGE = 5
+    CLASSES_IMAGE = 8
+    IDS_IMAGE = 9
+    THIRD_PARTY_IMAGE = 10
+    METADATA_PATCH = 11
+    THIRD_PARTY_DEPTH = 12
+    THIRD_PARTY_IMAGE_IDS = 14
+    THIRD_PARTY_CLASSES = 15
+    END_OF_MESSAGE = 255
+
+
+Field = tuple[FieldType, Body]
+
+
+class ClientGone(Exception):  # noqa: N818 - how a session ends
+    """Nobody is at the other end any more."""
+
+
+class FramingError(Exception):
+    """The client broke the framing; there is no way to find the next message."""
+
+
+class Fifo:
+    """The engine's ends of both pipes.
+
+    No call outlasts the client by more than a second: a closed pipe wakes every wait, and where something else holds
+    the pipes open (a fork of the client), `is_orphan` tells.
+    """
+
+    def __init__(self, server_pipe: Path, client_pipe: Path, is_orphan: Callable[[], bool]) -> None:
+        """Opens the pipes; the client waits for that.
+
+        Args:
+            server_pipe: Which the engine writes.
+            client_pipe: Which the engine reads.
+            is_orphan: Whether the process that started the engine is gone.
+
+        Raises:
+            ClientGone: Nobody reads the server pipe.
+            OSError: A path is no pipe that can be opened.
+        """
+        self._is_orphan = is_orphan
+        self._pending = bytearray()
+        self._is_sending = False
+        self._out = self._opened_for_writing(server_pipe)
+        with suppress(OSError):
+            fcntl.fcntl(self._out, _SET_PIPE_SIZE, _PIPE_BYTES)
+        self._in = os.open(client_pipe, os.O_RDONLY | os.O_NONBLOCK)
+
+    def receive(self) -> bytes:
+        """The next action, as JSON.
+
+        Raises:
+            ClientGone: There is none.
+            FramingError: The bytes are no message.
+        """
+        body: bytes | None = None
+        while True:
+            kind, num_bytes = _HEADER.unpack(self._read(_HEADER.size, is_start=body is None))
+            if kind == FieldType.END_OF_MESSAGE and num_bytes == 0 and body is not None:
+                return body
+            if kind != FieldType.ACTION or body is not None:
+                raise FramingError(f"field type {kind} of {num_bytes} bytes where an action belongs")
+            if num_bytes > MAX_MESSAGE_BYTES:
+                raise FramingError(f"a message of {num_bytes} bytes; {MAX_MESSAGE_BYTES} are the most")
+            body = self._read(num_bytes)
+
+    def send(self, fields: Iterable[Field]) -> None:
+        """Sends one message.
+
+        Raises:
+            ClientGone: Nobody reads it.
+        """
+        self._is_sending = True
+        buffers: list[memoryview] = []
+        for kind, body in fields:
+            view = memoryview(body).cast("B") if len(body) else memoryview(b"")
+            buffers += [memoryview(_HEADER.pack(kind, len(view))), view]
+        buffers.append(memoryview(_HEADER.pack(FieldType.END_OF_MESSAGE, 0)))
+        self._write(buffers)
+        self._is_sending = False
+
+    def close(self) -> None:
+        """Closes both pipes, and wakes a client that waits for an answer.
+
+        Its reader takes a closed pipe for a slow one and waits for its timeout, 100 s; at an empty message it raises.
+        """
+        if not self._is_sending:
+            with suppress(OSError):
+                os.write(self._out, _HEADER.pack(FieldType.END_OF_MESSAGE, 0))
+        os.close(self._out)
+        os.close(self._in)
+
+    def _opened_for_writing(self, path: Path) -> int:
+        deadline_s = time.monotonic() + _CONNECT_TIMEOUT_S
+        while time.monotonic() < deadline_s:
+            try:
+                # Blocking, it would wait for a client that may be dead.
+                return os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+            except OSError as error:
+                if error.errno != errno.ENXIO:
+                    raise
+            if self._is_orphan():
+                raise ClientGone("the client went before it opened its pipe")
+            time.sleep(0.002)
+        raise ClientGone(f"no client opened {path} within {_CONNECT_TIMEOUT_S:.0f} s")
+
+    def _read(self, num_bytes: int, *, is_start: bool = False) -> bytes:
+        while len(self._pending) < num_bytes:
+            self._wait(self._in, select.POLLIN)
+            try:
+                part = os.read(self._in, max(num_bytes - len(self._pending), 2**16))
+            except BlockingIOError:
+                continue
+            if not part:
+                if is_start and not self._pending:
+                    raise ClientGone("the client closed its pipe")
+                raise FramingError(f"the message ends after {len(self._pending)} of {num_bytes} bytes")
+            self._pending += part
+        taken = bytes(self._pending[:num_bytes])
+        del self._pending[:num_bytes]
+        return taken
+
+    def _write(self, buffers: list[memoryview]) -> None:
+        while buffers:
+            try:
+                num_sent = os.writev(self._out, buffers[:_MAX_BUFFERS])
+            except BlockingIOError:
+                self._wait(self._out, select.POLLOUT)
+                continue
+            except BrokenPipeError as error:
+                raise ClientGone("the client closed its pipe") from error
+            while buffers and num_sent >= len(buffers[0]):
+                num_sent -= len(buffers.pop(0))
+            if num_sent:
+                buffers[0] = buffers[0][num_sent:]
+
+    def _wait(self, file: int, event: int) -> None:
+        """Until `file` is ready; a pipe without a reader is an error on its writing end, whatever we wait for."""
+        poll = select.poll()
+        poll.register(self._out, 0)
+        poll.register(file, event)
+        while True:
+            ready = dict(poll.poll(_WATCH_MS))
+            if ready.get(file, 0) & event or ready.get(self._in, 0) & select.POLLHUP:
+                return
+            if ready or self._is_orphan():
+                raise ClientGone("the client is gone")

@@ -1,0 +1,111 @@
+"""The process `evonav-thor`, which AI2-THOR's client starts in Unity's place."""
+
+import argparse
+import json
+import logging
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Any, NoReturn
+
+from evonav.thor.fifo import ClientGone, Fifo, FramingError
+
+_LOG = logging.getLogger("evonav.thor")
+
+_USAGE = """%(prog)s is started by AI2-THOR's client, not by hand:
+
+    from ai2thor.controller import Controller
+    import evonav.thor
+    controller = Controller(local_executable_path=evonav.thor.executable(), x_display="0", scene=house)
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Serves one client until it goes.
+
+    Args:
+        arguments: Of the command line, as `Controller.unity_command` makes them.
+
+    Returns:
+        Exit status: 0 when the client has gone, 1 when it could not be served, 2 without a client.
+    """
+    parent_pid = os.getppid()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, _stop)
+    # Its output is the client's ~/.ai2thor/log/unity.log, which all its engines share.
+    logging.basicConfig(
+        stream=sys.stderr,
+        level=logging.INFO,
+        format=f"%(asctime)s evonav-thor[{os.getpid()}] %(levelname)s %(message)s",
+    )
+    options = _parser().parse_known_args(arguments)[0]
+    server_pipe = os.environ.get("AI2THOR_FIFO_SERVER_PIPE_PATH")
+    client_pipe = os.environ.get("AI2THOR_FIFO_CLIENT_PIPE_PATH")
+    if not server_pipe or not client_pipe:
+        kind = os.environ.get("AI2THOR_SERVER_TYPE")
+        problem = f"server type {kind} is not served, only FIFO" if kind else "no client started this process"
+        print(f"{_parser().format_usage()}\n{problem}", file=sys.stderr)
+        return 2
+    try:
+        fifo = Fifo(Path(server_pipe), Path(client_pipe), lambda: os.getppid() != parent_pid)
+    except (ClientGone, OSError) as error:
+        _LOG.error("cannot connect: %s", error)
+        return 1
+    try:
+        _serve(fifo, options)
+    except ClientGone as end:
+        _LOG.info("ends: %s", end)
+        return 0
+    except FramingError as error:
+        _LOG.error("ends: %s", error)
+        return 1
+    finally:
+        fifo.close()
+
+
+def _serve(fifo: Fifo, options: argparse.Namespace) -> NoReturn:
+    # Imported with the pipes open: a client whose engine fails before that waits for ever.
+    from evonav.thor.engine import Engine
+    from evonav.thor.event import Emitter
+
+    engine = Engine(width_px=options.width, height_px=options.height)
+    has_camera = not options.nographics and os.environ.get("AI2THOR_SERVER_SIDE_SCREENSHOT") != "False"
+    emitter = Emitter(engine, has_camera=has_camera)
+    _LOG.info("serves process %d, %d x %d", os.getppid(), engine.width_px, engine.height_px)
+    fifo.send(emitter.event({"sequenceId": 0}))
+    while True:
+        message = _decoded(fifo.receive())
+        engine.execute(message)
+        fifo.send(emitter.event(message))
+
+
+def _decoded(body: bytes) -> dict[str, Any]:
+    """A message; one that is none becomes an action without a name, which fails as such."""
+    try:
+        message = json.loads(body)
+    except (ValueError, RecursionError) as error:
+        return {"problem": f"the message is no JSON: {error}"}
+    if not isinstance(message, dict):
+        return {"problem": f"the message is a JSON {type(message).__name__}, not an object"}
+    return message
+
+
+def _parser() -> argparse.ArgumentParser:
+    """Unity's arguments; what the engine has no use for (`-screen-quality`, `-force-device-index`) is let through."""
+    parser = argparse.ArgumentParser("evonav-thor", usage=_USAGE, add_help=False, allow_abbrev=False)
+    parser.add_argument("-screen-width", dest="width", type=int, default=300)
+    parser.add_argument("-screen-height", dest="height", type=int, default=300)
+    parser.add_argument("-nographics", action="store_true")
+    return parser
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    _LOG.info("ends: %s", signal.Signals(number).name)
+    raise SystemExit(128 + number)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
