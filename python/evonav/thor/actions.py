@@ -6,19 +6,28 @@ client turns into a `ValueError`. So does `call`.
 
 import importlib
 import inspect
+import reprlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError, validate_call
+from pydantic import BaseModel, ConfigDict, PydanticUserError, TypeAdapter, ValidationError
 
 # Whose functions register themselves.
-_MODULES = ("engine", "motion", "teleport", "paths")
+_MODULES = ("dialogue", "motion", "teleport", "paths")
 
-# What the client or AI2-THOR's own dispatcher adds to any action.
-_COMMON = frozenset({"action", "sequenceId", "agentId", "renderImage", "physicsSimulationParams", "visibilityDistance"})
+# What any action may carry (`DynamicServerAction.AllowedExtraneousParameters`), and what the client may add to it.
+_COMMON = frozenset(
+    {
+        *("action", "sequenceId", "agentId", "renderImage", "renderObjectImage", "renderClassImage"),
+        *("renderNormalsImage", "renderInstanceSegmentation", "renderSemanticSegmentation"),
+        *("physicsSimulationParams", "visibilityDistance"),
+    }
+)
+# Characters of a value in a message.
+_BRIEF = 200
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -56,12 +65,20 @@ class Vector3(BaseModel):
 @dataclass(slots=True)
 class _Action:
     function: Callable[..., object]
-    names: frozenset[str]
-    """Of parameters."""
-    required: tuple[str, ...]
     is_open: bool
     """Takes any other keyword too."""
-    validated: Callable[..., object] | None = field(default=None)
+    required: tuple[str, ...]
+    types: dict[str, Any]
+    """Of parameters, by name."""
+    adapters: dict[str, TypeAdapter[Any]] = field(default_factory=dict)
+    """Of `types`, made when they are first needed: making them takes longer than most actions."""
+
+    @property
+    def signature(self) -> str:
+        """As AI2-THOR shows it in messages."""
+        return ", ".join(
+            _shown(parameter) for parameter in list(inspect.signature(self.function).parameters.values())[1:]
+        )
 
 
 _ACTIONS: dict[str, _Action] = {}
@@ -71,11 +88,12 @@ def action(*names: str) -> Callable[[Function], Function]:
     """Registers `function(engine, *, parameters as on the wire) -> actionReturn` under AI2-THOR's names for it."""
 
     def register(function: Function) -> Function:
-        parameters = list(inspect.signature(function).parameters.values())[1:]
+        parameters = list(inspect.signature(function, eval_str=True).parameters.values())[1:]
         named = [p for p in parameters if p.kind is not p.VAR_KEYWORD]
         required = tuple(p.name for p in named if p.default is p.empty)
+        types = {p.name: p.annotation for p in named}
         for name in names:
-            _ACTIONS[name] = _Action(function, frozenset(p.name for p in named), required, named != parameters)
+            _ACTIONS[name] = _Action(function, named != parameters, required, types)
         return function
 
     return register
@@ -102,21 +120,18 @@ def call(engine: object, message: Mapping[str, Any]) -> object:
     name = message.get("action")
     found = _served().get(name) if isinstance(name, str) else None
     if found is None:
-        raise ActionError(f"{name} is not an action of this engine", ErrorCode.INVALID_ACTION)
-    arguments = {key: value for key, value in message.items() if key in found.names or key not in _COMMON}
+        problem = message.get("problem") if name is None else None
+        raise ActionError(str(problem or f"Invalid action: {_brief(name)}"), ErrorCode.INVALID_ACTION)
+    arguments = {key: value for key, value in message.items() if key in found.types or key not in _COMMON}
+    unknown = [key for key in arguments if key not in found.types]
+    if unknown and not found.is_open:
+        raise ActionError(_invalid(str(name), found, unknown, list(arguments)), ErrorCode.INVALID_ARGUMENT)
+    values = {key: _converted(str(name), found, key, value) for key, value in arguments.items()}
     missing = [key for key in found.required if key not in arguments]
     if missing:
-        raise ActionError(f"{name} misses arguments: {', '.join(missing)}", ErrorCode.MISSING_ARGUMENTS)
-    unknown = sorted(set(arguments) - found.names)
-    if unknown and not found.is_open:
-        raise ActionError(f"{name} has no arguments {', '.join(unknown)}", ErrorCode.INVALID_ARGUMENT)
-    if found.validated is None:
-        config = ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
-        found.validated = validate_call(config=config)(found.function)
-    try:
-        return found.validated(engine, **arguments)
-    except ValidationError as error:
-        raise ActionError(f"{name}: {_summary(error)}", ErrorCode.INVALID_ARGUMENT) from error
+        message_ = f"action: {name} is missing the following arguments: {','.join(missing)}"
+        raise ActionError(message_, ErrorCode.MISSING_ARGUMENTS)
+    return found.function(engine, **values)
 
 
 @cache
@@ -126,7 +141,52 @@ def _served() -> dict[str, _Action]:
     return _ACTIONS
 
 
-def _summary(error: ValidationError) -> str:
-    return "; ".join(
-        f"{'.'.join(str(part) for part in item['loc'])} = {item['input']!r}: {item['msg']}" for item in error.errors()
+def _converted(name: str, found: _Action, key: str, value: object) -> object:
+    if key not in found.types:
+        return value
+    adapter = found.adapters.get(key)
+    if adapter is None:
+        adapter = found.adapters[key] = _adapter(found.types[key])
+    try:
+        return adapter.validate_python(value)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        place = "".join(f".{part}" for part in first["loc"])
+        message = (
+            f"action: {name} has an invalid argument: {key} (=={_brief(value)})."
+            f" Cannot convert to: {_type_name(found.types[key])}{place and f' ({place[1:]})'}: {first['msg']}"
+        )
+        raise ActionError(message, ErrorCode.INVALID_ARGUMENT) from error
+
+
+def _adapter(annotation: Any) -> TypeAdapter[Any]:  # noqa: ANN401
+    try:
+        return TypeAdapter(annotation, config=ConfigDict(allow_inf_nan=False))
+    except PydanticUserError:
+        # Models have a configuration of their own.
+        return TypeAdapter(annotation)
+
+
+def _invalid(name: str, found: _Action, unknown: list[str], given: list[str]) -> str:
+    """AI2-THOR's words; its users search for them."""
+    quoted = [", ".join(f"'{_brief(key)}'" for key in keys[:20]) for keys in (unknown, given)]
+    return (
+        f'\n\tAction: "{name}" called with invalid argument{"s" if len(unknown) > 1 else ""}: {quoted[0]}'
+        f"\n\tExpected arguments: {found.signature}"
+        f"\n\tYour arguments: {quoted[1]}"
+        f'\n\tValid ways to call "{name}" action:\n\t\t{name}({found.signature})'
     )
+
+
+def _shown(parameter: inspect.Parameter) -> str:
+    default = "" if parameter.default is parameter.empty else f" = {parameter.default}"
+    return f"{_type_name(parameter.annotation)} {parameter.name}{default}"
+
+
+def _type_name(annotation: object) -> str:
+    return annotation.__name__ if isinstance(annotation, type) else str(annotation).rpartition(".")[2]
+
+
+def _brief(value: object) -> str:
+    """A value for a message, at most some hundred characters of it."""
+    return value[:_BRIEF] if isinstance(value, str) else reprlib.repr(value)

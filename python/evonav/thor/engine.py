@@ -3,21 +3,18 @@
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from evonav.errors import EvonavError
 from evonav.thor import actions
-from evonav.thor.actions import ActionError, ErrorCode, action
-from evonav.thor.agent import Agent, body_of
-from evonav.thor.scene import Document, Scene
-from evonav.world.simulator import SimulatorConfig
+from evonav.thor.actions import ActionError, ErrorCode
+from evonav.thor.agent import Agent
+from evonav.thor.scene import Scene
+from evonav.world.simulator import Frame, SimulatorConfig
 
 _LOG = logging.getLogger("evonav.thor")
-
-SCENES = ("Procedural",)
-"""What `GetScenesInBuild` answers: iTHOR's and RoboTHOR's rooms are Unity scenes, which nothing here can draw."""
 
 
 class Settings(BaseModel):
@@ -41,6 +38,20 @@ class Settings(BaseModel):
     renderDepthImage: bool = False
     renderInstanceSegmentation: bool = False
     renderSemanticSegmentation: bool = False
+    fastActionEmit: bool = False
+    """Answer an action that changed nothing with its result alone."""
+
+
+class Camera(Protocol):
+    """A third-party camera. It is immutable: a change is another camera in its place."""
+
+    def metadata(self) -> dict[str, Any]:
+        """AI2-THOR's `ThirdPartyCameraMetadata`."""
+        ...
+
+    def render(self, scene: Scene, *, rgb: bool, instances: bool) -> Frame:
+        """What it sees, in the size of the screen."""
+        ...
 
 
 @dataclass(slots=True)
@@ -63,7 +74,31 @@ class Engine:
     settings: Settings = field(default_factory=Settings)
     scene: Scene = field(default_factory=Scene)
     agent: Agent = field(default_factory=Agent)
+    cameras: list[Camera] = field(default_factory=list)
+    """Third-party cameras, by their ids."""
+    object_filter: frozenset[str] | None = None
+    """Which objects the metadata lists; all without it."""
     last: Result = field(default_factory=Result)
+
+    @property
+    def state(self) -> tuple[object, ...]:
+        """Everything that an event shows, but for the last action: equal states give equal events."""
+        agent = self.agent
+        return (
+            *(self.scene.version, self.width_px, self.height_px, self.settings, self.object_filter),
+            *(agent.x_m, agent.y_m, agent.z_m, agent.yaw_deg, agent.horizon_deg, agent.is_standing, agent.body),
+            *self.cameras,
+        )
+
+    @property
+    def field_of_view_deg(self) -> float:
+        """Of the agent's camera, vertical."""
+        return self.scene.config.vertical_fov_deg
+
+    @property
+    def camera_position_m(self) -> tuple[float, float, float]:
+        """Of the agent's camera."""
+        return (self.agent.x_m, self.agent.camera_height_m, self.agent.z_m)
 
     def execute(self, message: Mapping[str, Any]) -> Result:
         """Does one action. Whatever happens is an answer: a failed action, never an exception."""
@@ -95,59 +130,3 @@ class Engine:
                 grid_m=self.settings.gridSize,
             )
         )
-
-
-@action("Reset")
-def reset(engine: Engine, *, sceneName: str = "Procedural") -> None:
-    """Drops the scene and starts an empty one."""
-    if sceneName not in SCENES:
-        raise ActionError(f"scene {sceneName!r} is not in this build, which holds {', '.join(SCENES)}")
-    engine.scene, engine.agent, engine.settings = Scene(sceneName), Agent(), Settings()
-    engine.configure()
-
-
-@action("GetScenesInBuild")
-def get_scenes_in_build(engine: Engine) -> list[str]:
-    """Names that `Reset` takes."""
-    return list(SCENES)
-
-
-@action("CreateHouse")
-def create_house(engine: Engine, *, house: Document) -> None:
-    """Loads a ProcTHOR house."""
-    engine.scene.load(house)
-    engine.agent.enter(house)
-
-
-def check_settings(settings: Settings) -> None:
-    """What AI2-THOR's `Initialize` asks of its arguments, in its words."""
-    if settings.fieldOfView is not None and (settings.fieldOfView < 0 or settings.fieldOfView >= 180):
-        raise ActionError("fov must be set to (0, 180) noninclusive.")
-    if settings.rotateStepDegrees <= 0:
-        raise ActionError("rotateStepDegrees must be a non-zero, non-negative float")
-    if settings.snapToGrid and settings.rotateStepDegrees % 90 != 0:
-        raise ActionError(
-            f"Invalid values 'rotateStepDegrees': ${settings.rotateStepDegrees:g} and 'snapToGrid':$True. "
-            "'snapToGrid': 'True' is not supported when 'rotateStepDegrees' is different from grid rotation steps of "
-            "0, 90, 180, 270 or 360."
-        )
-    if settings.maxDownwardLookAngle < 0:
-        raise ActionError("maxDownwardLookAngle must be a non-negative float")
-    if settings.maxUpwardLookAngle < 0:
-        raise ActionError("maxUpwardLookAngle must be a non-negative float")
-    if not 0 < settings.gridSize <= 5:
-        raise ActionError("grid size must be in the range (0,5]")
-
-
-@action("Initialize")
-def initialize(engine: Engine, **settings: Any) -> dict[str, float]:  # noqa: ANN401
-    """Sets the settings; any keyword of the client's constructor may come."""
-    try:
-        wanted = Settings(**settings)
-    except ValidationError as error:
-        raise ActionError(f"Initialize: {error}", ErrorCode.INVALID_ARGUMENT) from error
-    check_settings(wanted)
-    engine.agent.body = body_of(wanted.agentMode, wanted.maxUpwardLookAngle, wanted.maxDownwardLookAngle)
-    engine.settings = wanted
-    engine.configure()
-    return {"cameraNearPlane": 0.1, "cameraFarPlane": 20.0}

@@ -115,7 +115,7 @@ class Fifo:
         self._is_sending = True
         buffers: list[memoryview] = []
         for kind, body in fields:
-            view = memoryview(body).cast("B") if len(body) else memoryview(b"")
+            view = memoryview(body if isinstance(body, bytes) else body.data).cast("B")
             buffers += [memoryview(_HEADER.pack(kind, len(view))), view]
         buffers.append(memoryview(_HEADER.pack(FieldType.END_OF_MESSAGE, 0)))
         self._write(buffers)

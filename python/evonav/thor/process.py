@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn
+from typing import Any
 
 from evonav.thor.fifo import ClientGone, Fifo, FramingError
 
@@ -33,15 +33,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit status: 0 when the client has gone, 1 when it could not be served, 2 without a client.
     """
     parent_pid = os.getppid()
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, _stop)
+    try:
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, _stop)
+        return _connect_and_serve(_parser().parse_known_args(arguments)[0], parent_pid)
+    except _Stopped as stop:
+        _LOG.info("ends: %s", signal.Signals(stop.args[0]).name)
+        return 128 + int(stop.args[0])
+
+
+def _connect_and_serve(options: argparse.Namespace, parent_pid: int) -> int:
     # Its output is the client's ~/.ai2thor/log/unity.log, which all its engines share.
     logging.basicConfig(
         stream=sys.stderr,
         level=logging.INFO,
         format=f"%(asctime)s evonav-thor[{os.getpid()}] %(levelname)s %(message)s",
     )
-    options = _parser().parse_known_args(arguments)[0]
     server_pipe = os.environ.get("AI2THOR_FIFO_SERVER_PIPE_PATH")
     client_pipe = os.environ.get("AI2THOR_FIFO_CLIENT_PIPE_PATH")
     if not server_pipe or not client_pipe:
@@ -58,15 +65,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _serve(fifo, options)
     except ClientGone as end:
         _LOG.info("ends: %s", end)
-        return 0
     except FramingError as error:
         _LOG.error("ends: %s", error)
         return 1
     finally:
         fifo.close()
+    return 0
 
 
-def _serve(fifo: Fifo, options: argparse.Namespace) -> NoReturn:
+def _serve(fifo: Fifo, options: argparse.Namespace) -> None:
     # Imported with the pipes open: a client whose engine fails before that waits for ever.
     from evonav.thor.engine import Engine
     from evonav.thor.event import Emitter
@@ -102,9 +109,14 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+class _Stopped(BaseException):
+    """A signal asked the process to end."""
+
+
 def _stop(number: int, frame: FrameType | None) -> None:
-    _LOG.info("ends: %s", signal.Signals(number).name)
-    raise SystemExit(128 + number)
+    # A second one is not to interrupt the ending.
+    signal.signal(number, signal.SIG_IGN)
+    raise _Stopped(number)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """The scene that actions read and change: a ProcTHOR house, and the simulator of it as it now is."""
 
 import json
+from itertools import count
 from typing import Any
 
 from evonav.thor.actions import ActionError
@@ -10,6 +11,8 @@ from evonav.world.simulator import SimulatorConfig
 Document = dict[str, Any]
 """A house as JSON."""
 
+_versions = count(1)
+
 
 class Scene:
     """One house. After `begin_edit` it may be changed; the next use of `simulator` builds that anew."""
@@ -18,8 +21,8 @@ class Scene:
         self.name = name
         self.house: Document | None = None
         self.config = SimulatorConfig()
-        self.version = 0
-        """Grows with every change; what is derived from the house is kept under it."""
+        self.version = next(_versions)
+        """Another after every change, and in every scene; what is derived from the house is kept under it."""
         self._simulator: EmbeddedSimulator | None = None
 
     def load(self, house: Document) -> None:
@@ -30,21 +33,21 @@ class Scene:
         """
         simulator = self._built(house)
         self.house, self._simulator = house, simulator
-        self.version += 1
+        self.version = next(_versions)
 
     def begin_edit(self) -> Document:
         """The house, to be changed in place."""
         if self.house is None:
             raise ActionError(f"scene {self.name} holds no house: call CreateHouse first")
         self._simulator = None
-        self.version += 1
+        self.version = next(_versions)
         return self.house
 
     def configure(self, config: SimulatorConfig) -> None:
         """Sets the agent's camera and body."""
         if config != self.config:
             self.config, self._simulator = config, None
-            self.version += 1
+            self.version = next(_versions)
 
     @property
     def simulator(self) -> EmbeddedSimulator:

@@ -1,0 +1,86 @@
+"""The dialogue around the steps: scenes, sizes, settings, houses, and what the metadata lists."""
+
+from typing import Any
+
+from pydantic import ValidationError
+
+from evonav.thor.actions import ActionError, ErrorCode, action
+from evonav.thor.agent import Agent, body_of
+from evonav.thor.engine import Engine, Settings
+from evonav.thor.scene import Document, Scene
+
+SCENES = ("Procedural",)
+"""What `GetScenesInBuild` answers: iTHOR's and RoboTHOR's rooms are Unity scenes, which nothing here can draw."""
+
+_MAX_PX = 4096
+
+
+@action("Reset")
+def reset(engine: Engine, *, sceneName: str = "Procedural") -> None:
+    """Drops the scene and starts an empty one."""
+    if sceneName not in SCENES:
+        raise ActionError(f"scene {sceneName!r} is not in this build, which holds {', '.join(SCENES)}")
+    engine.scene, engine.agent, engine.settings = Scene(sceneName), Agent(), Settings()
+    engine.cameras, engine.object_filter = [], None
+    engine.configure()
+
+
+@action("GetScenesInBuild")
+def get_scenes_in_build(engine: Engine) -> list[str]:
+    """Names that `Reset` takes."""
+    return list(SCENES)
+
+
+@action("CreateHouse")
+def create_house(engine: Engine, *, house: Document) -> None:
+    """Loads a ProcTHOR house."""
+    engine.scene.load(house)
+    engine.agent.enter(house)
+
+
+def check_settings(settings: Settings) -> None:
+    """What AI2-THOR's `Initialize` asks of its arguments, in its words."""
+    if settings.fieldOfView is not None and (settings.fieldOfView < 0 or settings.fieldOfView >= 180):
+        raise ActionError("fov must be set to (0, 180) noninclusive.")
+    if settings.rotateStepDegrees <= 0:
+        raise ActionError("rotateStepDegrees must be a non-zero, non-negative float")
+    if settings.snapToGrid and settings.rotateStepDegrees % 90 != 0:
+        raise ActionError(
+            f"Invalid values 'rotateStepDegrees': ${settings.rotateStepDegrees:g} and 'snapToGrid':$True. "
+            "'snapToGrid': 'True' is not supported when 'rotateStepDegrees' is different from grid rotation steps of "
+            "0, 90, 180, 270 or 360."
+        )
+    if settings.maxDownwardLookAngle < 0:
+        raise ActionError("maxDownwardLookAngle must be a non-negative float")
+    if settings.maxUpwardLookAngle < 0:
+        raise ActionError("maxUpwardLookAngle must be a non-negative float")
+    if not 0 < settings.gridSize <= 5:
+        raise ActionError("grid size must be in the range (0,5]")
+
+
+@action("Initialize")
+def initialize(engine: Engine, **settings: Any) -> dict[str, float]:  # noqa: ANN401
+    """Sets the settings; any keyword of the client's constructor may come."""
+    try:
+        wanted = Settings(**settings)
+    except ValidationError as error:
+        raise ActionError(f"Initialize: {error}", ErrorCode.INVALID_ARGUMENT) from error
+    check_settings(wanted)
+    engine.agent.body = body_of(wanted.agentMode, wanted.maxUpwardLookAngle, wanted.maxDownwardLookAngle)
+    engine.settings = wanted
+    engine.configure()
+    return {"cameraNearPlane": 0.1, "cameraFarPlane": 20.0}
+
+
+@action("ChangeResolution")
+def change_resolution(engine: Engine, *, x: int, y: int) -> None:
+    """Sets the size of all images."""
+    if not (0 < x <= _MAX_PX and 0 < y <= _MAX_PX):
+        raise ActionError(f"ChangeResolution: {x} x {y} is not between 1 x 1 and {_MAX_PX} x {_MAX_PX}")
+    engine.width_px, engine.height_px = x, y
+    engine.configure()
+
+
+@action("ChangeQuality")
+def change_quality(engine: Engine, *, quality: str) -> None:
+    """Does nothing: there is one quality."""

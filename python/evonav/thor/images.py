@@ -1,0 +1,73 @@
+"""What cameras see, as AI2-THOR sends it: raw bytes, bottom row first."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.thor.colors import Palette
+from evonav.thor.fifo import Field, FieldType
+from evonav.world.simulator import Frame
+
+FAR_M = 20.0
+"""Depth where nothing is within reach of the camera: its far plane."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kinds:
+    """Which images are asked for."""
+
+    rgb: bool
+    depth: bool
+    instances: bool
+    classes: bool
+
+    @property
+    def needs_instances(self) -> bool:
+        """Whether instance ids are to be rendered."""
+        return self.instances or self.classes
+
+
+_AGENT = (FieldType.RGB_IMAGE, FieldType.DEPTH_IMAGE, FieldType.IDS_IMAGE, FieldType.CLASSES_IMAGE)
+_THIRD_PARTY = (
+    *(FieldType.THIRD_PARTY_IMAGE, FieldType.THIRD_PARTY_DEPTH),
+    *(FieldType.THIRD_PARTY_IMAGE_IDS, FieldType.THIRD_PARTY_CLASSES),
+)
+
+
+def encode(frame: Frame, kinds: Kinds, palette: Palette, *, is_third_party: bool = False) -> list[Field]:
+    """The images of one camera, each with its type."""
+    rgb, depth, instances, classes = _THIRD_PARTY if is_third_party else _AGENT
+    fields: list[Field] = []
+    if kinds.rgb and frame.rgb is not None:
+        fields.append((rgb, np.ascontiguousarray(frame.rgb[::-1])))
+    if kinds.depth:
+        fields.append((depth, np.minimum(frame.depth_m[::-1], np.float32(FAR_M))))
+    if kinds.instances and frame.instances is not None:
+        fields.append((instances, _painted(frame.instances, palette.instances_rgba)))
+    if kinds.classes and frame.instances is not None:
+        fields.append((classes, _painted(frame.instances, palette.classes_rgba)))
+    return fields
+
+
+def blank(width_px: int, height_px: int, kinds: Kinds, *, is_third_party: bool = False) -> list[Field]:
+    """The images of a scene without a house."""
+    rgb, depth, instances, classes = _THIRD_PARTY if is_third_party else _AGENT
+    black = np.zeros((height_px, width_px, 4), dtype=np.uint8)
+    black[..., 3] = 255
+    fields: list[Field] = []
+    if kinds.rgb:
+        fields.append((rgb, np.zeros((height_px, width_px, 3), dtype=np.uint8)))
+    if kinds.depth:
+        fields.append((depth, np.full((height_px, width_px), FAR_M, dtype=np.float32)))
+    if kinds.instances:
+        fields.append((instances, black))
+    if kinds.classes:
+        fields.append((classes, black))
+    return fields
+
+
+def _painted(instances: NDArray[np.int32], rgba: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """`(H, W)` pixels of four bytes, bottom row first."""
+    painted: NDArray[np.uint32] = np.take(rgba.view(np.uint32)[:, 0], instances[::-1])
+    return painted

@@ -1,0 +1,216 @@
+"""An event's metadata in msgpack, with the fields of AI2-THOR's `MetadataWrapper` (`AgentManager.cs`).
+
+What depends on the scene only, most of it, is packed once a version of the scene.
+"""
+
+import struct
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import msgpack
+import numpy as np
+from pydantic import BaseModel
+
+from evonav.thor import objects
+from evonav.thor.colors import Palette, palette_of
+from evonav.thor.scene import Scene
+
+if TYPE_CHECKING:
+    from evonav.thor.engine import Engine, Result
+
+Vector = dict[str, float]
+
+# Keys of a record that depend on the agent, packed; a double follows the first.
+_DYNAMIC = ("distance", "visible", "isInteractable")
+_DISTANCE = b"\xa8distance\xcb"
+_NO_YES = (b"\xc2", b"\xc3")
+_SIGHT = {
+    (seen, usable): b"\xa7visible" + _NO_YES[seen] + b"\xaeisInteractable" + _NO_YES[usable]
+    for seen in (False, True)
+    for usable in (False, True)
+}
+_DOUBLE = struct.Struct(">d")
+_MAP16 = struct.Struct(">BH")
+_ARRAY32 = struct.Struct(">BI")
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, BaseModel):
+        return value.model_dump()
+    raise TypeError(f"{type(value).__name__} has no place in metadata")
+
+
+_PACKER = msgpack.Packer(default=_plain, unicode_errors="replace")
+
+
+def _packed(value: object) -> bytes:
+    packed: bytes = _PACKER.pack(value)
+    return packed
+
+
+class MetadataEncoder:
+    """Packs the metadata of one engine's events."""
+
+    def __init__(self) -> None:
+        self._scene_version = -1
+        self._records: list[tuple[str, bytes]] = []
+        self._bounds: dict[str, Any] | None = None
+        self._palette = Palette(-1, [], np.zeros((1, 4), np.uint8), np.zeros((1, 4), np.uint8))
+        self._colors = b""
+
+    def palette(self, scene: Scene) -> Palette:
+        """Colours of the scene as it now is."""
+        if self._palette.version != scene.version:
+            self._palette = palette_of(scene)
+            self._colors = _packed(self._palette.entries)
+        return self._palette
+
+    def event(self, engine: "Engine", *, sequence_id: int, has_colors: bool) -> bytes:
+        """All metadata, packed."""
+        scene = engine.scene
+        self._refresh(scene)
+        colors = b"\xc0"
+        if has_colors:
+            self.palette(scene)
+            colors = self._colors
+        fields = agent_fields(engine) | {"sceneBounds": self._bounds}
+        tail = {"thirdPartyCameras": fields["thirdPartyCameras"], "sequenceId": sequence_id, "activeAgentId": 0}
+        return b"".join(
+            [
+                b"\x84\xa6agents\x91",
+                *(_opened(fields, 2), b"\xa6colors", colors, b"\xa7objects"),
+                *self._objects(engine),
+                *(_packed(part) for pair in tail.items() for part in pair),
+            ]
+        )
+
+    def _objects(self, engine: "Engine") -> list[bytes]:
+        views = objects.views(engine.scene, engine.agent, engine.settings)
+        wanted = engine.object_filter
+        parts = [b""]
+        for (object_id, static), view in zip(self._records, views, strict=True):
+            if wanted is None or object_id in wanted:
+                distance, sight = _DOUBLE.pack(view.distance_m), _SIGHT[view.is_visible, view.is_interactable]
+                parts += (static, _DISTANCE, distance, sight)
+        parts[0] = _ARRAY32.pack(0xDD, (len(parts) - 1) // 4)
+        return parts
+
+    def _refresh(self, scene: Scene) -> None:
+        if self._scene_version == scene.version:
+            return
+        records = objects.static_records(scene)
+        self._records = [(record["objectId"], _static(record)) for record in records]
+        self._bounds = _bounds(scene)
+        self._scene_version = scene.version
+
+
+def patch(result: "Result") -> bytes:
+    """What an action that changed nothing says: AI2-THOR's `MetadataPatch`."""
+    return _packed({**_outcome(result), "agentId": 0})
+
+
+def is_packable(value: object) -> bool:
+    """Whether the value can be sent."""
+    try:
+        _packed(value)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        return False
+    return True
+
+
+def agent_fields(engine: "Engine") -> dict[str, Any]:
+    """`MetadataWrapper` without the objects, the colours and the bounds of the scene."""
+    agent = engine.agent
+    position = vector(agent.x_m, agent.y_m, agent.z_m)
+    rotation = vector(0.0, agent.yaw_deg, 0.0)
+    return {
+        **_outcome(engine.last),
+        "agent": {
+            "name": "agent",
+            "position": position,
+            "rotation": rotation,
+            "cameraHorizon": agent.horizon_deg,
+            "isStanding": agent.is_standing,
+            "inHighFrictionArea": False,
+        },
+        "agentId": 0,
+        "sceneName": engine.scene.name,
+        "isSceneAtRest": True,
+        "screenWidth": engine.width_px,
+        "screenHeight": engine.height_px,
+        "depthFormat": "Meters",
+        "fov": engine.field_of_view_deg,
+        "cameraPosition": vector(*engine.camera_position_m),
+        "cameraOrthSize": -1.0,
+        "thirdPartyCameras": [camera.metadata() for camera in engine.cameras],
+        "collided": False,
+        "collidedObjects": [],
+        "inventoryObjects": [],
+        # Nothing is ever held, and there is no arm.
+        "heldObjectPose": {
+            "position": position,
+            "rotation": rotation,
+            "localPosition": vector(0.0, 0.0, 0.0),
+            "localRotation": vector(0.0, 0.0, 0.0),
+        },
+        "arm": None,
+        "colorBounds": None,
+        "currentTime": 0.0,
+        # Filled by actions that AI2-THOR keeps for its own demos.
+        "flatSurfacesOnGrid": [],
+        "distances": [],
+        "normals": [],
+        "isOpenableGrid": [],
+        "segmentedObjectIds": [],
+        "objectIdsInBox": [],
+        "actionIntReturn": 0,
+        "actionFloatReturn": 0.0,
+        "actionStringsReturn": [],
+        "actionFloatsReturn": [],
+        "actionVector3sReturn": [],
+        "visibleRange": None,
+    }
+
+
+def vector(x: float, y: float, z: float) -> Vector:
+    """Unity's `Vector3`."""
+    return {"x": x, "y": y, "z": z}
+
+
+def _outcome(result: "Result") -> dict[str, Any]:
+    return {
+        "lastAction": result.action,
+        "lastActionSuccess": result.is_success,
+        "errorMessage": result.error_message,
+        "errorCode": result.error_code.value,
+        "actionReturn": result.action_return,
+    }
+
+
+def _static(record: Mapping[str, Any]) -> bytes:
+    return _opened({key: value for key, value in record.items() if key not in _DYNAMIC}, len(_DYNAMIC))
+
+
+def _opened(fields: Mapping[str, Any], num_more: int) -> bytes:
+    """A packed map that `num_more` pairs are to be appended to."""
+    # 16 fields and more have a header of three bytes.
+    packed = _packed(fields)
+    return _MAP16.pack(0xDE, len(fields) + num_more) + packed[3:]
+
+
+def _bounds(scene: Scene) -> dict[str, Any] | None:
+    """AI2-THOR's `SceneBounds`: the box around everything."""
+    bodies = scene.simulator.objects if scene.house is not None else ()
+    if not bodies:
+        return None
+    centres_m = np.array([body.centre_m for body in bodies])
+    halves_m = 0.5 * np.array([body.size_m for body in bodies])
+    low_m, high_m = (centres_m - halves_m).min(axis=0), (centres_m + halves_m).max(axis=0)
+    spans: Sequence[tuple[float, float]] = list(zip(high_m.tolist(), low_m.tolist(), strict=True))
+    return {
+        "cornerPoints": [[x, y, z] for x in spans[0] for y in spans[1] for z in spans[2]],
+        "center": vector(*(0.5 * (low_m + high_m)).tolist()),
+        "size": vector(*(high_m - low_m).tolist()),
+    }
