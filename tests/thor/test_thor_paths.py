@@ -1,0 +1,223 @@
+"""Reachable positions and shortest paths of the engine: the embedded simulator's, in AI2-THOR's order and words."""
+
+import json
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evonav.house import bundled_houses
+from evonav.thor import objects
+from evonav.thor.actions import ErrorCode
+from evonav.thor.engine import Engine
+from evonav.world.embedded import EmbeddedSimulator
+from evonav.world.simulator import SimulatorConfig
+
+Json = dict[str, Any]
+HOUSES: list[Json] = [json.loads(house.to_json()) for house in bundled_houses(3)]
+
+
+def engine_in(house: Json, **initialize: object) -> Engine:
+    engine = Engine()
+    run(engine, "Initialize", **initialize)
+    run(engine, "CreateHouse", house=house)
+    run(engine, "TeleportFull", **house["metadata"]["agent"])
+    return engine
+
+
+def run(engine: Engine, action: str, **arguments: object) -> Any:
+    result = engine.execute({"action": action, "sequenceId": 1, **arguments})
+    assert result.is_success, result
+    return result.action_return
+
+
+def refused(engine: Engine, action: str, **arguments: object) -> str:
+    result = engine.execute({"action": action, "sequenceId": 1, **arguments})
+    assert not result.is_success, result
+    return result.error_message
+
+
+def embedded(engine: Engine, house: Json, **config: float) -> EmbeddedSimulator:
+    simulator = EmbeddedSimulator(SimulatorConfig(**config))
+    simulator.reset(json.dumps(house))
+    assert simulator.teleport(engine.agent.pose)
+    return simulator
+
+
+def points_of(positions: list[Json]) -> list[tuple[float, float]]:
+    return [(p["x"], p["z"]) for p in positions]
+
+
+@pytest.mark.parametrize("house", HOUSES)
+@pytest.mark.parametrize("grid_m", [0.25, 0.1, 0.4])
+def test_reachable_positions_are_the_embedded_simulators(house: Json, grid_m: float) -> None:
+    engine = engine_in(house)
+    positions = run(engine, "GetReachablePositions", **({} if grid_m == 0.25 else {"gridSize": grid_m}))
+    points = points_of(positions)
+    want = embedded(engine, house, grid_m=grid_m).reachable_positions()[:, [0, 2]].tolist()
+    assert sorted(map(list, points)) == sorted(want)
+    assert len(set(points)) == len(points) > 100
+    assert {p["y"] for p in positions} == {engine.agent.y_m}
+
+
+def test_reachable_positions_come_breadth_first_in_ai2thors_order() -> None:
+    engine = engine_in(HOUSES[1])
+    points = points_of(run(engine, "GetReachablePositions"))
+    here = engine.agent.point_m
+    assert points[0] == here
+    cells = [(round((x - here[0]) * 4), round((z - here[1]) * 4)) for x, z in points]
+    can_move = engine.scene.simulator.can_move
+    # By the book: a queue of cells, each of which adds what it reaches first.
+    queue = [(0, 0)]
+    for i, j in queue:
+        for step in ((1, 0), (0, 1), (-1, 0), (0, -1)):
+            cell = (i + step[0], j + step[1])
+            ends = [(here[0] + c[0] * 0.25, here[1] + c[1] * 0.25) for c in ((i, j), cell)]
+            if cell not in queue and can_move(*ends):
+                queue.append(cell)
+    assert cells == queue
+
+
+def test_the_grid_may_turn_with_the_agent() -> None:
+    engine = engine_in(HOUSES[1], snapToGrid=False, rotateStepDegrees=30)
+    run(engine, "Teleport", rotation={"y": 30})
+    points = points_of(run(engine, "GetReachablePositions", directionsRelativeAgent=True))
+    here, yaw_rad = engine.agent.point_m, math.radians(30)
+    for x, z in points:
+        right = ((x - here[0]) * math.cos(yaw_rad) - (z - here[1]) * math.sin(yaw_rad)) * 4
+        ahead = ((x - here[0]) * math.sin(yaw_rad) + (z - here[1]) * math.cos(yaw_rad)) * 4
+        assert abs(right - round(right)) < 1e-9
+        assert abs(ahead - round(ahead)) < 1e-9
+    assert len(points) > 100
+    straight = (here[0] + 0.25 * math.sin(yaw_rad), here[1] + 0.25 * math.cos(yaw_rad))
+    assert (straight in points) == engine.scene.simulator.can_move(here, straight)
+
+
+def test_a_stuck_agent_reaches_its_own_position_only() -> None:
+    engine = engine_in(HOUSES[0])
+    middle = HOUSES[0]["objects"][0]["position"]
+    run(engine, "Teleport", position=middle, forceAction=True)
+    assert points_of(run(engine, "GetReachablePositions")) == [(middle["x"], middle["z"])]
+
+
+def test_too_many_steps() -> None:
+    engine = engine_in(HOUSES[0])
+    num_points = len(run(engine, "GetReachablePositions"))
+    run(engine, "GetReachablePositions", maxStepCount=math.ceil(num_points / 16))
+    message = refused(engine, "GetReachablePositions", maxStepCount=num_points // 16 - 1)
+    assert message == "InvalidOperationException: Too many steps taken in GetReachablePositions."
+
+
+@settings(max_examples=30, deadline=None)
+@given(data=st.data(), house=st.sampled_from(HOUSES))
+def test_corners_are_the_embedded_simulators(data: st.DataObject, house: Json) -> None:
+    engine = engine_in(house)
+    simulator = embedded(engine, house)
+    reachable_m = simulator.reachable_positions().tolist()
+    ends = [data.draw(st.sampled_from(reachable_m)) for _ in range(2)]
+    start, target = ({"x": x, "y": 0.9, "z": z} for x, _, z in ends)
+    path = run(engine, "GetShortestPathToPoint", position=start, target=target)
+    want = simulator.shortest_path(tuple(ends[0]), tuple(ends[1]))
+    assert points_of(path["corners"]) == [(x, z) for x, _, z in want.tolist()]
+    assert path["status"] == "PathComplete"
+    # As the client's helper spells it.
+    assert run(engine, "GetShortestPathToPoint", position=start, **target) == path
+    run(engine, "Teleport", position=start, forceAction=True)
+    assert run(engine, "GetShortestPathToPoint", target=target) == path
+
+
+def test_ends_off_the_free_space() -> None:
+    engine = engine_in(HOUSES[0])
+    corners = run(engine, "GetReachablePositions")
+    here = corners[0]
+    far = here | {"x": here["x"] + 100}
+    assert "No point on NavMesh near targetPosition" in refused(engine, "GetShortestPathToPoint", target=far)
+    assert "No point on NavMesh near startPosition" in refused(
+        engine, "GetShortestPathToPoint", position=far, target=here
+    )
+    # The middle of a wall that is free space's border: one end may be off, both only if allowed.
+    can_move = engine.scene.simulator.can_move
+    edge = next(p for p in corners if not can_move((p["x"], p["z"]), (p["x"] - 0.25, p["z"])))
+    step_m = next(d / 100 for d in range(100) if not can_move(*[(edge["x"] - d / 100, edge["z"])] * 2))
+    inside = edge | {"x": edge["x"] - step_m - 0.05}
+    assert len(run(engine, "GetShortestPathToPoint", position=here, target=inside)["corners"]) > 1
+    message = refused(engine, "GetShortestPathToPoint", position=inside, target=inside)
+    assert "Closest point on NavMesh was too far from the agent" in message
+    run(engine, "GetShortestPathToPoint", position=inside, target=inside, allowedError=0.2)
+    refused(engine, "GetShortestPathToPoint")
+    assert engine.last.error_code is ErrorCode.MISSING_ARGUMENTS
+
+
+def test_the_path_to_an_object_ends_where_it_can_be_seen() -> None:
+    engine = engine_in(HOUSES[1])
+    num_found = 0
+    for thing in HOUSES[1]["objects"]:
+        result = engine.execute({"action": "GetShortestPath", "objectId": thing["id"]})
+        if not result.is_success:
+            assert "is not visible on navigation path given current agent parameters" in result.error_message
+            continue
+        num_found += 1
+        end = result.action_return["corners"][-1]
+        record = next(r for r in objects.static_records(engine.scene) if r["objectId"] == thing["id"])
+        to = record["position"]
+        yaw_deg = math.degrees(math.atan2(to["x"] - end["x"], to["z"] - end["z"]))
+        ground_m = math.hypot(to["x"] - end["x"], to["z"] - end["z"])
+        horizon = math.degrees(math.atan2(1.575 - to["y"], ground_m))
+        looking = engine_in(HOUSES[1])
+        at = {"x": end["x"], "y": 0.9009992, "z": end["z"]}
+        run(looking, "Teleport", position=at, rotation={"y": yaw_deg}, horizon=horizon, forceAction=True)
+        assert thing["id"] in objects.visible_ids(looking.scene, looking.agent, 1.5)
+    assert num_found > 0.8 * len(HOUSES[1]["objects"])
+
+
+def test_objects_by_type() -> None:
+    engine = engine_in(HOUSES[1])
+    records = objects.static_records(engine.scene)
+    by_type: dict[str, list[str]] = {}
+    for record in records:
+        by_type.setdefault(record["objectType"], []).append(record["objectId"])
+    single = next(name for name, ids in by_type.items() if len(ids) == 1 and ids[0] in str(HOUSES[1]["objects"]))
+    several = next(name for name, ids in by_type.items() if len(ids) > 1)
+    assert run(engine, "ObjectTypeToObjectIds", objectType=several) == by_type[several]
+    here = HOUSES[1]["metadata"]["agent"]["position"]
+    by_id = run(engine, "GetShortestPath", objectId=by_type[single][0], position=here, rotation={"y": 90})
+    assert run(engine, "GetShortestPath", objectType=single.lower(), position=here) == by_id
+    assert "cannot disambiguate" in refused(engine, "GetShortestPath", objectType=several)
+    assert "was not found in the scene" in refused(engine, "GetShortestPath", objectType="Submarine")
+    assert "Cannot find sim object with id nothing" in refused(engine, "GetShortestPath", objectId="nothing")
+
+
+def test_the_expert_walks_to_objects() -> None:
+    engine = engine_in(HOUSES[1])
+    num_seen, things = 0, HOUSES[1]["objects"][::2]
+    for thing in things:
+        run(engine, "TeleportFull", **HOUSES[1]["metadata"]["agent"])
+        for _ in range(150):
+            result = engine.execute({"action": "ObjectNavExpertAction", "objectId": thing["id"]})
+            if not result.is_success:
+                break
+            run(engine, str(result.action_return))
+        num_seen += thing["id"] in objects.visible_ids(engine.scene, engine.agent, 1.5)
+    assert num_seen >= 0.9 * len(things)
+
+
+def test_the_expert_walks_to_a_position() -> None:
+    engine = engine_in(HOUSES[1])
+    target = run(engine, "GetReachablePositions")[-1]
+    for _ in range(200):
+        result = engine.execute({"action": "ObjectNavExpertAction", "position": target})
+        if not result.is_success:
+            break
+        run(engine, str(result.action_return))
+    assert engine.agent.point_m == (target["x"], target["z"])
+    refused(engine, "ObjectNavExpertAction")
+    assert engine.last.error_code is ErrorCode.MISSING_ARGUMENTS
+
+
+def test_paths_are_not_drawn() -> None:
+    engine = engine_in(HOUSES[1])
+    run(engine, "VisualizePath", positions=run(engine, "GetReachablePositions")[:3], grid=False)
+    run(engine, "HideVisualizedPath")
+    assert "Path cannot be null or empty" in refused(engine, "VisualizePath", positions=[])
