@@ -365,6 +365,9 @@ class EmbeddedSimulator:
     def bodies(self) -> list[tuple[str, str, str, tuple[float, float, float], tuple[float, float, float]]]:
         """Id, category, kind, centre and size of the box, in instance order."""
 
+    def random_spawn(self, request_json: str) -> tuple[str, list[str]]:
+        """The `HouseDelta` of a `SpawnRequest` (both JSON), and the ids of what found no place."""
+
     def start(self) -> tuple[tuple[float, float, float], float, float]:
         """Position, yaw and horizon."""
 

@@ -110,6 +110,11 @@ impl EmbeddedSimulator {
         &self.scene.bodies
     }
 
+    /// The bodies and their bounds.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
     /// All surfaces.
     pub fn mesh(&self) -> &SceneMesh {
         &self.mesh

@@ -4,7 +4,8 @@ use std::sync::Mutex;
 
 use evonav_core::{
     Error,
-    assets::catalogue::UnknownAssets,
+    assets::catalogue::{Catalogue, UnknownAssets},
+    evolution::{SpawnRequest, random_spawn},
     geometry::{Pose, Vec2, Vec3},
     house::{House, HouseDelta},
     sensors::raster::{FrameBuffer, Want},
@@ -90,6 +91,18 @@ impl PyEmbeddedSimulator {
 
     fn bodies(&self) -> Vec<BodyRecord> {
         self.core.bodies().iter().map(body_record).collect()
+    }
+
+    /// The `HouseDelta` of a `SpawnRequest` (both JSON), and the ids of what found no place.
+    fn random_spawn(&self, py: Python<'_>, request_json: &str) -> PyResult<(String, Vec<String>)> {
+        let (house, scene) = (self.core.house(), self.core.scene());
+        py.detach(|| {
+            let request = SpawnRequest::from_json(request_json)?;
+            let (catalogue, unknown) = (Catalogue::bundled(), UnknownAssets::CategoryDefault);
+            let spawned = random_spawn(house, catalogue, unknown, scene, &request)?;
+            Ok((spawned.delta.to_json(), spawned.unplaced))
+        })
+        .map_err(error::to_py)
     }
 
     /// Position, yaw and horizon.

@@ -44,6 +44,12 @@ impl HouseDelta {
         };
         serde_json::from_str(json).map_err(malformed)
     }
+
+    /// The delta as [`Self::from_json`] reads it.
+    pub fn to_json(&self) -> String {
+        // Numbers and strings alone: writing them cannot fail.
+        serde_json::to_string(self).unwrap_or_default()
+    }
 }
 
 /// An object of the document, taken out of the tree.
