@@ -128,6 +128,9 @@ class HouseObject:
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
 
+def assets() -> list[tuple[str, str, _Vec3]]:
+    """Id, category and box size in metres of every asset of the catalogue, by id."""
+
 # sensors
 
 def visible_cells(

@@ -34,6 +34,8 @@ def get_scenes_in_build(engine: Engine) -> list[str]:
 @action("CreateHouse")
 def create_house(engine: Engine, *, house: Document) -> None:
     """Loads a ProcTHOR house."""
+    # ProcTHOR's own generator asks for houses before they have metadata.
+    house = {"metadata": {}, **house}
     engine.scene.load(house)
     engine.agent.enter(house)
 

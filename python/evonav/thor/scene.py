@@ -43,6 +43,15 @@ class Scene:
         self.version = next(_versions)
         return self.house
 
+    def apply_random_spawn(self, request_json: str) -> list[str]:
+        """Moves objects as the core's `SpawnRequest` says; ids of those that found no place."""
+        simulator = self.simulator
+        delta_json, unplaced = simulator.random_spawn(request_json)
+        self.begin_edit()
+        simulator.apply(delta_json)
+        self.house, self._simulator = json.loads(simulator.house_json), simulator
+        return unplaced
+
     def configure(self, config: SimulatorConfig) -> None:
         """Sets the agent's camera and body."""
         if config != self.config:

@@ -96,6 +96,20 @@ class EmbeddedSimulator:
         delta_json = delta if isinstance(delta, str) else json.dumps(delta)
         return self._enter(self._world.apply(delta_json), pose or self._pose)
 
+    def random_spawn(self, request_json: str) -> tuple[str, list[str]]:
+        """Draws random places for objects, AI2-THOR's `InitialRandomSpawn`; changes nothing.
+
+        Args:
+            request_json: A `SpawnRequest` of the core.
+
+        Returns:
+            The `HouseDelta` to `apply`, as JSON, and ids of the objects that found no place.
+
+        Raises:
+            InvalidArgumentError: It is no such request, or names what the house does not hold.
+        """
+        return self._world.random_spawn(request_json)
+
     @property
     def house_json(self) -> str:
         """The house at hand."""

@@ -2,6 +2,7 @@
 
 use evonav_core::{
     assets::Catalogue,
+    geometry::Vec3,
     house::{self, HouseDelta},
 };
 use pyo3::prelude::*;
@@ -191,11 +192,20 @@ fn object(house: &house::House, object: &house::Object) -> HouseObject {
     }
 }
 
+/// Id, category and size of every asset of the catalogue, by id.
+#[pyfunction]
+fn assets() -> Vec<(String, String, Vec3)> {
+    let catalogue = Catalogue::bundled();
+    let known = catalogue.asset_ids().into_iter().filter_map(|id| catalogue.get(id));
+    known.map(|asset| (asset.id.clone(), asset.category.clone(), asset.size_m)).collect()
+}
+
 /// Adds the classes to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<House>()?;
     module.add_class::<Room>()?;
     module.add_class::<Wall>()?;
     module.add_class::<Opening>()?;
-    module.add_class::<HouseObject>()
+    module.add_class::<HouseObject>()?;
+    module.add_function(wrap_pyfunction!(assets, module)?)
 }

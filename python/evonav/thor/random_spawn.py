@@ -1,0 +1,88 @@
+"""`InitialRandomSpawn`: things that can be carried go to random free places; the core finds them."""
+
+import copy
+import json
+from collections.abc import Iterator
+
+from pydantic import BaseModel, ConfigDict, NonNegativeInt, PositiveInt
+
+from evonav.thor.actions import ActionError, ErrorCode, action
+from evonav.thor.engine import Engine
+from evonav.thor.facts import facts_of
+from evonav.thor.objects import placed_objects
+from evonav.thor.scene import Document
+
+
+class ObjectTypeCount(BaseModel):
+    """How many objects of a type there are to be."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    objectType: str
+    count: NonNegativeInt
+
+
+@action("InitialRandomSpawn")
+def initial_random_spawn(
+    engine: Engine,
+    *,
+    randomSeed: int = 0,
+    forceVisible: bool = False,
+    placeStationary: bool = True,
+    numDuplicatesOfType: list[ObjectTypeCount] | None = None,
+    excludedReceptacles: list[str] | None = None,
+    excludedObjectIds: list[str] | None = None,
+    objectIds: list[str] | None = None,
+    receptacleObjectIds: list[str] | None = None,
+    numPlacementAttempts: PositiveInt = 5,
+    allowFloor: bool = False,
+    allowMoveable: bool = False,
+) -> None:
+    """Puts objects at random places on receptacles: the same seed, the same places.
+
+    `placeStationary` changes nothing, since what is put down here neither rolls nor falls over. Of objects that are
+    named, all must find a place.
+    """
+    if objectIds and excludedObjectIds:
+        raise ActionError("objectIds and excludedObjectIds exclude each other", ErrorCode.INVALID_ARGUMENT)
+    scene = engine.scene
+    copies = [] if numDuplicatesOfType is None else _duplicate(scene.begin_edit(), numDuplicatesOfType)
+    request = {
+        "seed": randomSeed % 2**64,
+        "object_ids": objectIds,
+        "excluded_object_ids": excludedObjectIds or [],
+        "receptacle_ids": receptacleObjectIds,
+        "excluded_receptacles": excludedReceptacles or [],
+        "forces_visible": forceVisible,
+        "allows_floor": allowFloor,
+        "allows_moveable": allowMoveable,
+        "num_attempts": numPlacementAttempts,
+    }
+    dropped = set(copies)
+    try:
+        unplaced = scene.apply_random_spawn(json.dumps(request))
+        dropped.intersection_update(unplaced)
+    finally:
+        if dropped:
+            house = scene.begin_edit()
+            house["objects"] = [entry for entry in house["objects"] if entry["id"] not in dropped]
+    if objectIds and unplaced:
+        raise ActionError(f"no place was found for {', '.join(sorted(unplaced))}")
+
+
+def _duplicate(house: Document, counts: list[ObjectTypeCount]) -> list[str]:
+    """Adds copies of objects of a type until there are so many; ids of the copies, which have no place yet."""
+    by_type: dict[str, list[Document]] = {}
+    for entry, _ in placed_objects(house):
+        by_type.setdefault(facts_of(entry.get("assetId", ""), "").object_type, []).append(entry)
+    copies = [copied for wanted in counts for copied in _copies(by_type.get(wanted.objectType, []), wanted.count)]
+    house["objects"].extend(copies)
+    return [copied["id"] for copied in copies]
+
+
+def _copies(originals: list[Document], count: int) -> Iterator[Document]:
+    for index in range(count - len(originals) if originals else 0):
+        original = originals[index % len(originals)]
+        # AI2-THOR's name for a copy.
+        changes = {"id": f"{original['id']}_copy_{index}", "children": []}
+        yield copy.deepcopy({key: value for key, value in original.items() if key != "children"}) | changes

@@ -1,0 +1,107 @@
+"""Assets put into the scene one by one, their surfaces, and what of physics the generator asks for."""
+
+from typing import Any
+
+import numpy as np
+
+from evonav.thor.actions import ActionError, ErrorCode, Vector3, action
+from evonav.thor.assets import is_known
+from evonav.thor.engine import Engine
+from evonav.thor.objects import placed_objects
+from evonav.thor.scene import Document, Scene
+
+# Half the side of the floor that stands in for the void of AI2-THOR's empty scene.
+_STAGE_HALF_M = 10.0
+_ORIGIN = Vector3()
+
+
+@action("SpawnAsset")
+def spawn_asset(
+    engine: Engine,
+    *,
+    assetId: str,
+    generatedId: str,
+    position: Vector3 = _ORIGIN,
+    rotation: Vector3 = _ORIGIN,
+) -> dict[str, str]:
+    """Puts an asset into the scene: `position` is the middle of its box. Nothing is tested for collision."""
+    if not is_known(assetId):
+        raise ActionError(f"Object '{assetId}' is not contained in asset database", ErrorCode.NONE)
+    house = _house_or_stage(engine.scene)
+    if any(entry["id"] == generatedId for entry, _ in placed_objects(house)):
+        raise ActionError(f"an object {generatedId!r} is in the scene already")
+    house = engine.scene.begin_edit()
+    house["objects"].append(
+        {
+            "id": generatedId,
+            "assetId": assetId,
+            "position": position.model_dump(),
+            "rotation": rotation.model_dump(),
+            "kinematic": False,
+        }
+    )
+    return {"objectId": generatedId}
+
+
+@action("GetInSceneAssetGeometry")
+def get_in_scene_asset_geometry(
+    engine: Engine, *, objectId: str, triangles: bool = False, uv: bool = False, normals: bool = False
+) -> list[dict[str, Any]]:
+    """The surface of an object where it stands: one mesh, clockwise seen from outside as in Unity."""
+    simulator = engine.scene.simulator
+    body = next((index for index, known in enumerate(simulator.objects) if known.id == objectId), None)
+    if body is None:
+        raise ActionError(f"{objectId} is no object of the scene")
+    if uv:
+        raise ActionError("surfaces have no texture coordinates", ErrorCode.INVALID_ARGUMENT)
+    corners_m, bodies, _ = simulator.triangles()
+    faces_m = corners_m[bodies == body]
+    mesh: dict[str, Any] = {"name": objectId}
+    if normals:
+        # A corner belongs to one face, so that its normal is that face's.
+        across = np.cross(faces_m[:, 1] - faces_m[:, 0], faces_m[:, 2] - faces_m[:, 0])
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        vertices_m, faces = faces_m.reshape(-1, 3), np.arange(3 * len(faces_m))
+        mesh["normals"] = _vectors(np.repeat(across, 3, axis=0))
+    else:
+        vertices_m, faces = np.unique(faces_m.reshape(-1, 3), axis=0, return_inverse=True)
+    mesh["vertices"] = _vectors(vertices_m)
+    if triangles:
+        mesh["triangles"] = faces.ravel().tolist()
+    return [mesh]
+
+
+@action("SetRandomSeed")
+def set_random_seed(engine: Engine, *, seed: int) -> None:
+    """Seeds nothing: each random action here has a seed of its own, and no other state is drawn from."""
+
+
+@action("SetObjectFilter")
+def set_object_filter(engine: Engine, *, objectIds: list[str]) -> None:
+    """Metadata lists only these objects from here on."""
+    engine.object_filter = frozenset(objectIds)
+
+
+@action("ResetObjectFilter")
+def reset_object_filter(engine: Engine) -> None:
+    """Metadata lists all objects again."""
+    engine.object_filter = None
+
+
+@action("PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
+def pause_physics(engine: Engine) -> None:
+    """Changes nothing: nothing here moves by itself between two actions."""
+
+
+def _house_or_stage(scene: Scene) -> Document:
+    if scene.house is None:
+        corner = _STAGE_HALF_M
+        outline = [(-corner, -corner), (-corner, corner), (corner, corner), (corner, -corner)]
+        floor = [{"x": x, "y": 0.0, "z": z} for x, z in outline]
+        room = {"id": "room|stage", "roomType": "Stage", "floorPolygon": floor, "floorMaterial": {"name": ""}}
+        scene.load({"metadata": {}, "rooms": [room], "walls": [], "doors": [], "windows": [], "objects": []})
+    return scene.begin_edit()
+
+
+def _vectors(points: np.ndarray[Any, np.dtype[np.float64]]) -> list[dict[str, float]]:
+    return [{"x": x, "y": y, "z": z} for x, y, z in points.tolist()]
