@@ -4,14 +4,14 @@ from typing import Any
 
 import numpy as np
 
+from evonav.errors import EvonavError
 from evonav.thor.actions import ActionError, ErrorCode, Vector3, action
 from evonav.thor.assets import is_known
 from evonav.thor.engine import Engine
-from evonav.thor.objects import placed_objects
 from evonav.thor.scene import Document, Scene
 
 # Half the side of the floor that stands in for the void of AI2-THOR's empty scene.
-_STAGE_HALF_M = 10.0
+_STAGE_HALF_M = 5.0
 _ORIGIN = Vector3()
 
 
@@ -26,20 +26,23 @@ def spawn_asset(
 ) -> dict[str, str]:
     """Puts an asset into the scene: `position` is the middle of its box. Nothing is tested for collision."""
     if not is_known(assetId):
-        raise ActionError(f"Object '{assetId}' is not contained in asset database", ErrorCode.NONE)
-    house = _house_or_stage(engine.scene)
-    if any(entry["id"] == generatedId for entry, _ in placed_objects(house)):
-        raise ActionError(f"an object {generatedId!r} is in the scene already")
-    house = engine.scene.begin_edit()
-    house["objects"].append(
+        raise ActionError(f"Object '{assetId}' is not contained in asset database")
+    entries = _house_or_stage(engine.scene)["objects"]
+    entries.append(
         {
             "id": generatedId,
             "assetId": assetId,
             "position": position.model_dump(),
-            "rotation": rotation.model_dump(),
+            "rotation": {axis: angle % 360.0 for axis, angle in rotation},
             "kinematic": False,
         }
     )
+    try:
+        _ = engine.scene.simulator
+    except EvonavError:
+        entries.pop()
+        engine.scene.begin_edit()
+        raise
     return {"objectId": generatedId}
 
 
@@ -99,7 +102,7 @@ def _house_or_stage(scene: Scene) -> Document:
         outline = [(-corner, -corner), (-corner, corner), (corner, corner), (corner, -corner)]
         floor = [{"x": x, "y": 0.0, "z": z} for x, z in outline]
         room = {"id": "room|stage", "roomType": "Stage", "floorPolygon": floor, "floorMaterial": {"name": ""}}
-        scene.load({"metadata": {}, "rooms": [room], "walls": [], "doors": [], "windows": [], "objects": []})
+        scene.house = {"metadata": {}, "rooms": [room], "walls": [], "doors": [], "windows": [], "objects": []}
     return scene.begin_edit()
 
 
