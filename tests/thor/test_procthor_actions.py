@@ -171,7 +171,7 @@ def test_copies_are_made_until_there_are_so_many(house: Json) -> None:
 def test_a_named_object_that_fits_nowhere_fails_the_action_and_stays(house: Json, table: str) -> None:
     engine = engine_with(house)
     do(engine, "SpawnAsset", assetId="Apple_1", generatedId="apple", position={"y": -20})
-    picture = next(o["id"] for o in house["objects"] if "wall" in o["id"])
+    picture = next(o["id"] for o in house["objects"] if "Painting" in o["assetId"])
     message = refused(
         engine, "InitialRandomSpawn", objectIds=["apple"], receptacleObjectIds=[picture], allowMoveable=True
     )
