@@ -4,14 +4,16 @@ import os
 import signal
 import sys
 from contextlib import ExitStack, contextmanager
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
+    from evonav.evaluation.backend import Backend
     from evonav.evaluation.engine import Progress, RunConfig, TaskFile
     from evonav.evaluation.metrics import AgentSummary
 
@@ -39,6 +41,34 @@ AnyAsset = Annotated[
     bool,
     typer.Option("--allow-unknown-assets", help="Objaverse houses: unknown assets get their category's usual size."),
 ]
+
+
+class SimulatorName(str, Enum):
+    """Which simulator runs the episodes."""
+
+    EMBEDDED = "embedded"
+    AI2THOR = "ai2thor"
+
+
+class Platform(str, Enum):
+    """How Unity draws."""
+
+    CLOUD = "cloud"
+    X11 = "x11"
+
+
+Which = Annotated[SimulatorName, typer.Option(help="Evonav's own, or AI2-THOR through its client (docs/ai2thor.md).")]
+ThorExecutable = Annotated[
+    str | None, typer.Option(help="AI2-THOR: path of a build's executable, or `evonav`: our engine. Default: download.")
+]
+ThorCommit = Annotated[str | None, typer.Option(help="AI2-THOR: build to download. Default: the client's.")]
+ThorPlatform = Annotated[Platform | None, typer.Option(help="AI2-THOR: Vulkan without a display, or an X display.")]
+ThorGpu = Annotated[int | None, typer.Option(min=0, help="AI2-THOR: GPU to draw on.")]
+ThorDisplay = Annotated[str | None, typer.Option(help="AI2-THOR: X display, such as :0. Default: DISPLAY.")]
+ThorTimeout = Annotated[
+    float,
+    typer.Option(min=1.0, help="AI2-THOR: seconds for an answer, three times that to start; then it is restarted."),
+]
 Out = Annotated[Path, typer.Option(help="Folder of the run; an unfinished one is resumed.")]
 
 
@@ -53,12 +83,25 @@ def evaluate(
     workers: Workers = None,
     retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
     allow_unknown_assets: AnyAsset = False,
+    simulator: Which = SimulatorName.EMBEDDED,
+    thor_executable: ThorExecutable = None,
+    thor_commit: ThorCommit = None,
+    thor_platform: ThorPlatform = None,
+    thor_gpu: ThorGpu = None,
+    thor_display: ThorDisplay = None,
+    thor_timeout: ThorTimeout = 100.0,
 ) -> None:
     """Evaluates agents on tasks; run again to resume. Leaves records.sqlite and summary.json in OUT."""
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
     num_workers = _num_workers(workers)
-    config = _config(seed, allow_unknown_assets)
+    build = {
+        "executable": thor_executable,
+        "commit_id": thor_commit,
+        "platform": None if thor_platform is None else thor_platform.value,
+    }
+    host = {"gpu_device": thor_gpu, "x_display": thor_display, "timeout_s": thor_timeout}
+    config = _config(seed, _backend(simulator, allow_unknown_assets, build, host))
     with _tasks(out, houses, tasks, limit, seed, allow_unknown_assets) as task_files:
         summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored)
     _print_table(summaries)
@@ -76,7 +119,7 @@ def demo(
     """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report."""
     num_workers = _num_workers(workers)
     with _tasks(out, None, None, limit, seed, False) as task_files:
-        summaries = _evaluate(out, agents, task_files, _config(seed, False), num_workers, retry_errored=False)
+        summaries = _evaluate(out, agents, task_files, _config(seed), num_workers, retry_errored=False)
     _print_table(summaries)
     _report(out)
     _exit(summaries)
@@ -248,6 +291,8 @@ def _evaluate(
 
     signal.signal(signal.SIGTERM, interrupt)  # what a scheduler sends is to be as good as Ctrl-C
     try:
+        with _status("Starting the simulator"):
+            config.backend.check()
         with _progress() as show:
             return evaluate(
                 [name.strip() for name in agents.split(",") if name.strip()],
@@ -263,12 +308,27 @@ def _evaluate(
         raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
-def _config(seed: int, allow_unknown_assets: bool) -> "RunConfig":
+def _config(seed: int, backend: "Backend | None" = None) -> "RunConfig":
     from evonav.evaluation.backend import Backend
     from evonav.evaluation.engine import RunConfig
 
-    lenient = "evonav.evaluation.backend:lenient_simulator"
-    return RunConfig(seed=seed, backend=Backend(simulator=lenient) if allow_unknown_assets else Backend())
+    return RunConfig(seed=seed, backend=backend or Backend())
+
+
+def _backend(
+    simulator: SimulatorName, allow_unknown_assets: bool, build: "Mapping[str, object]", host: "Mapping[str, object]"
+) -> "Backend":
+    """The simulator of the options; those that were not given are left to it."""
+    from evonav.evaluation.backend import Backend
+
+    module = "evonav.evaluation.backend"
+    given = {key: value for key, value in build.items() if value is not None}
+    if simulator is SimulatorName.AI2THOR:
+        means = {key: value for key, value in host.items() if value is not None}
+        return Backend(simulator=f"{module}:ai2thor_simulator", simulator_options=given, host_options=means)
+    if given or any(host[key] is not None for key in ("gpu_device", "x_display")):
+        raise typer.BadParameter("--thor-... options are for --simulator ai2thor")
+    return Backend(simulator=f"{module}:lenient_simulator") if allow_unknown_assets else Backend()
 
 
 def _exit(summaries: "list[AgentSummary]") -> None:

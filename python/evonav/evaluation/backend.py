@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from evonav.agents.agent import Agent
 from evonav.agents.registry import agent_factory
@@ -13,6 +13,15 @@ from evonav.evaluation.privileged import YARDSTICKS, yardstick
 from evonav.evaluation.protocol import EpisodeCase
 from evonav.evaluation.sensing import Perception
 from evonav.world.simulator import Simulator
+
+
+@runtime_checkable
+class Startable(Protocol):
+    """A simulator with a process that takes its time, and may not come up."""
+
+    def start(self) -> None:
+        """Starts it, without a house."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +52,20 @@ class Backend:
         """A simulator of the worker's own."""
         simulator: Simulator = _imported(self.simulator)(**self.simulator_options, **self.host_options)
         return simulator
+
+    def check(self) -> None:
+        """Starts a simulator and ends it, where that is something that can fail.
+
+        Raises:
+            InvalidArgumentError: Its options make no sense.
+            SimulationError: It does not start; the message says what to do.
+        """
+        simulator = self.make_simulator()
+        try:
+            if isinstance(simulator, Startable):
+                simulator.start()
+        finally:
+            simulator.close()
 
     def make_perception(self) -> Perception:
         """A perception of the worker's own."""

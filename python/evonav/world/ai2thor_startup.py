@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 OWN_ENGINE = "evonav"
 """As an executable: our own engine, installed with evonav as `evonav-thor`."""
 
+START_TIMEOUTS = 3.0
+"""How many timeouts of an answer a start may take."""
+
 _PLAYER_LOG = Path(".config/unity3d/Allen Institute for Artificial Intelligence/AI2-THOR/Player.log")
 _LOG_LINES = 12
 
@@ -39,10 +42,8 @@ class Ai2ThorOptions:
     """As CUDA counts them."""
     x_display: str | None = None
     """Such as `:0`; default: DISPLAY."""
-    start_timeout_s: float = 300.0
-    """For the process to come up."""
     timeout_s: float = 100.0
-    """For one answer; a process that takes longer counts as hanging."""
+    """For one answer, three times that to come up; a process that takes longer counts as hanging."""
 
     @property
     def is_own_engine(self) -> bool:
@@ -55,9 +56,8 @@ class Ai2ThorOptions:
         Raises:
             InvalidArgumentError: They do.
         """
-        for name in ("start_timeout_s", "timeout_s"):
-            if not getattr(self, name) > 0.0:
-                raise InvalidArgumentError(f"{name} = {getattr(self, name)}: must be > 0")
+        if not self.timeout_s > 0.0:
+            raise InvalidArgumentError(f"timeout_s = {self.timeout_s}: must be > 0")
         if self.platform not in (None, "cloud", "x11"):
             raise InvalidArgumentError(f"platform = {self.platform!r}: must be `cloud` or `x11`")
         if self.gpu_device is not None and (self.is_own_engine or self.gpu_device < 0):
@@ -139,7 +139,7 @@ def start_controller(
         "renderDepthImage": True,
         "renderInstanceSegmentation": True,
         "server_timeout": options.timeout_s,
-        "server_start_timeout": options.start_timeout_s,
+        "server_start_timeout": START_TIMEOUTS * options.timeout_s,
         "gpu_device": options.gpu_device,
         "x_display": _x_display(options),
     }
