@@ -1,0 +1,92 @@
+"""A simulator's process that is lost costs time, not results."""
+
+import sqlite3
+
+import pytest
+from test_engine import CONFIG, records, texts
+from toy_house import write_tasks
+
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.records import EndState, ErrorKind
+from evonav.evaluation.store import RunStore
+from evonav.evaluation.workers import MAX_SIMULATOR_RESTARTS
+from evonav.report.run import load_run
+
+AGENT = "random-walk"  # what it does depends on all that it did before
+
+
+@pytest.fixture
+def tasks(tmp_path):
+    write_tasks(tmp_path / "tasks")
+    return task_files(tmp_path / "tasks", 1)
+
+
+def flaky(folder, **options):
+    folder.mkdir()
+    backend = Backend(
+        cases="toy_house:load_case",
+        simulator="flaky_simulator:make",
+        simulator_options=options,
+        host_options={"folder": str(folder)},
+    )
+    return RunConfig(backend=backend, protocol=CONFIG.protocol)
+
+
+def restarts(run_dir):
+    with RunStore(run_dir) as store:
+        return store.simulator_restarts()
+
+
+@pytest.mark.parametrize("num_workers", [0, 1])
+@pytest.mark.parametrize("num_losses", [1, 2])
+@pytest.mark.parametrize("stage", [1, 2])
+def test_a_stage_is_tried_again_from_the_state_in_which_it_began(tasks, tmp_path, num_workers, num_losses, stage):
+    evaluate([AGENT], tasks, tmp_path / "whole", config=CONFIG, num_workers=0)
+    config = flaky(tmp_path / "starts", stage=stage, num_losses=num_losses)
+    (summary,) = evaluate([AGENT], tasks, tmp_path / "run", config=config, num_workers=num_workers)
+    assert not summary.is_incomplete
+    assert texts(tmp_path / "run") == texts(tmp_path / "whole")
+    assert restarts(tmp_path / "run") == {(AGENT, tasks[0].task_id, stage): num_losses}
+    assert restarts(tmp_path / "whole") == {}
+    assert load_run(tmp_path / "run").num_simulator_restarts == num_losses
+    assert len((tmp_path / "starts" / "starts").read_text()) == 1 + num_losses
+
+
+def test_restarts_are_bounded(tasks, tmp_path):
+    config = flaky(tmp_path / "starts", num_losses=100)
+    (summary,) = evaluate([AGENT], tasks, tmp_path / "run", config=config, num_workers=0)
+    assert summary.is_incomplete
+    first, second, third = records(tmp_path / "run", AGENT)
+    assert first.is_scored
+    assert (second.state, second.error.kind) == (EndState.ERRORED, ErrorKind.SIMULATOR_LOST)
+    assert "the process is gone" in second.error.message
+    assert third.state is EndState.NOT_RUN
+    assert restarts(tmp_path / "run") == {(AGENT, tasks[0].task_id, 2): MAX_SIMULATOR_RESTARTS}
+    assert len((tmp_path / "starts" / "starts").read_text()) == 1 + MAX_SIMULATOR_RESTARTS
+
+
+def test_stages_forgotten_are_forgotten_with_their_restarts(tasks, tmp_path):
+    config = flaky(tmp_path / "starts")
+    evaluate([AGENT], tasks, tmp_path / "run", config=config, num_workers=0)
+    with RunStore(tmp_path / "run") as store:
+        store.forget_episode(AGENT, tasks[0].task_id, 3)
+        assert len(store.simulator_restarts()) == 1
+        store.forget_episode(AGENT, tasks[0].task_id, 2)
+        assert store.simulator_restarts() == {}
+
+
+def test_runs_from_before_restarts_were_counted_are_read(tasks, tmp_path):
+    evaluate([AGENT], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+    with sqlite3.connect(tmp_path / "run" / "records.sqlite") as database:
+        database.execute("DROP TABLE simulator_restarts")
+    database.close()
+    assert load_run(tmp_path / "run").num_simulator_restarts == 0
+
+
+def test_means_of_the_machine_do_not_make_another_run(tasks, tmp_path):
+    config = flaky(tmp_path / "starts", num_losses=0)
+    evaluate([AGENT], tasks, tmp_path / "run", config=config, num_workers=0)
+    elsewhere = flaky(tmp_path / "elsewhere", num_losses=0)
+    evaluate([AGENT], tasks, tmp_path / "run", config=elsewhere, num_workers=0)
+    assert not (tmp_path / "elsewhere" / "starts").exists()
