@@ -26,6 +26,7 @@ _COMMON = frozenset(
         *("physicsSimulationParams", "visibilityDistance"),
     }
 )
+_ENVELOPE = frozenset({"action", "sequenceId", "agentId", "renderImage"})
 # Characters of a value in a message.
 _BRIEF = 200
 
@@ -122,7 +123,8 @@ def call(engine: object, message: Mapping[str, Any]) -> object:
     if found is None:
         problem = message.get("problem") if name is None else None
         raise ActionError(str(problem or f"Invalid action: {_brief(name)}"), ErrorCode.INVALID_ACTION)
-    arguments = {key: value for key, value in message.items() if key in found.types or key not in _COMMON}
+    common = _ENVELOPE if found.is_open else _COMMON  # what Initialize sets is there for every action to carry
+    arguments = {key: value for key, value in message.items() if key in found.types or key not in common}
     unknown = [key for key in arguments if key not in found.types]
     if unknown and not found.is_open:
         raise ActionError(_invalid(str(name), found, unknown, list(arguments)), ErrorCode.INVALID_ARGUMENT)
