@@ -400,6 +400,9 @@ class EmbeddedSimulator:
     def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
         """Corners `(N, 3, 3)`, body indices `(N,)` and colours `(N, 3)` of all surfaces."""
 
+def map_spec(house_json: str, *, name: str, cell_m: float) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Shape `(R, C)` and `(x, z)` of the corner of `EmbeddedSimulator.occupancy`'s grid, without its objects."""
+
 # evolution
 
 def generate_task(

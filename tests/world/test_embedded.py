@@ -3,17 +3,19 @@
 import math
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from evonav import _core
 from evonav.errors import HouseError, InvalidArgumentError, SimulationError
 from evonav.house import bundled_houses
 from evonav.world.check import check_simulator
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
-from evonav.world.simulator import Action, Frame, SimulatorConfig
+from evonav.world.simulator import Action, Frame, OccupancyGrid, SimulatorConfig
 
 HOUSES = [house.to_json() for house in bundled_houses(3)]
 SMALL = SimulatorConfig(width_px=64, height_px=48)
@@ -40,6 +42,12 @@ def _ranges(frame: Frame) -> dict[str, Any]:
     height, width = frame.depth_m.shape
     offsets = np.hypot(rows - height / 2, cols - width / 2) / frame.intrinsics.focal_px
     return {"depth_m": (frame.depth_m * np.sqrt(1 + offsets**2)).astype(np.float32)}
+
+
+class MapsItsSurroundings(EmbeddedSimulator):
+    def occupancy(self) -> OccupancyGrid:
+        grid = super().occupancy()
+        return OccupancyGrid(np.roll(grid.cells, 5, axis=0), grid.cell_m, grid.corner_m)
 
 
 class TurnsLeft(EmbeddedSimulator):
@@ -76,6 +84,7 @@ class TeleportsAnywhere(EmbeddedSimulator):
         (_frame(_ranges), "unproject outside the box"),
         (_frame(lambda f: {"instances": None if f.instances is None else f.instances + 1}), "instance ids are not all"),
         (_frame(lambda f: {"rgb": None}), "asked for rgb"),
+        (MapsItsSurroundings, "on blocked cells"),
         (TurnsLeft, "TURN_RIGHT turned by"),
         (WalksThroughWalls, "which is not free"),
         (TeleportsAnywhere, "teleport 100 m outside succeeded"),
@@ -168,3 +177,22 @@ def test_sight_is_blocked_by_walls_and_not_by_the_object_looked_at() -> None:
     point_m = (float(behind[0]), float(behind[1]), float(behind[2]))
     assert not simulator.is_visible(frame.pose.position_m, point_m)
     assert simulator.is_visible(frame.pose.position_m, point_m, [instance])
+
+
+@pytest.mark.parametrize("house_json", HOUSES)
+def test_occupancy_is_what_a_client_that_knows_teleport_and_reachable_positions_finds(house_json: str) -> None:
+    cell_m = SMALL.occupancy_cell_m
+    simulator = EmbeddedSimulator(replace(SMALL, grid_m=cell_m))
+    start = simulator.reset(house_json)
+    (num_rows, num_cols), corner_m = _core.map_spec(house_json, name="house", cell_m=cell_m)
+    cells = np.ones((num_rows, num_cols), np.uint8)
+    rows, cols = np.indices(cells.shape) + 0.5
+    centres_m = np.stack([corner_m[0] + cols * cell_m, corner_m[1] + rows * cell_m], axis=-1).reshape(-1, 2)
+    offsets_m = np.hypot(*(centres_m - [start.x_m, start.z_m]).T)
+    nearest = np.argsort(offsets_m, kind="stable")
+    assert any(simulator.teleport(Pose(x_m, 0.0, z_m, 0.0)) for x_m, z_m in centres_m[nearest].tolist())
+    reached = (simulator.reachable_positions()[:, [0, 2]] - corner_m) // cell_m
+    cells[reached[:, 1].astype(int), reached[:, 0].astype(int)] = 0
+    grid = simulator.occupancy()
+    np.testing.assert_array_equal(grid.cells, cells)
+    assert grid.corner_m == corner_m

@@ -207,7 +207,11 @@ class EmbeddedSimulator:
         return self._world.distances_m((start_m[0], start_m[2]), targets)
 
     def occupancy(self) -> OccupancyGrid:
-        """The oracle occupancy at `config.occupancy_cell_m`; the same grid for all arrangements of a house."""
+        """Cells whose centres the agent's body reaches from the house's start, by straight moves along the grid.
+
+        The same grid for all arrangements of a house. The grid's moves begin at the centre nearest to the start where
+        the body fits.
+        """
         cells, corner_m = self._world.occupancy(self.config.occupancy_cell_m)
         return OccupancyGrid(cells, self.config.occupancy_cell_m, corner_m)
 

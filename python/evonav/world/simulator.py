@@ -73,7 +73,7 @@ class OccupancyGrid:
     """Cells on the ground plane, `[row = z, col = x]`."""
 
     cells: NDArray[np.uint8]
-    """`(R, C)`: 0 free, 1 blocked for the agent's body."""
+    """`(R, C)`: 0 where the agent's body reaches the cell's centre from the house's start, 1 everywhere else."""
     cell_m: float
     corner_m: tuple[float, float]
     """`(x, z)` of the smallest corner of cell (0, 0)."""

@@ -47,7 +47,9 @@ fn bench_navigation(c: &mut Criterion) {
         b.iter(|| navigation.distances_m(black_box(start_m), &reached));
     });
     let spec = navigation.map_spec(0.1).expect("a map");
-    c.bench_function("navigation/occupancy_0.1m", |b| b.iter(|| navigation.occupancy(&spec)));
+    c.bench_function("navigation/occupancy_0.1m", |b| {
+        b.iter(|| navigation.occupancy(&spec, black_box(start_m)));
+    });
 }
 
 criterion_group!(benches, bench_navigation);

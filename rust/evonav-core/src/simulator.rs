@@ -6,6 +6,7 @@ use crate::{
     Error,
     assets::catalogue::{Catalogue, UnknownAssets},
     geometry::{Pose, Vec2, Vec3},
+    grid::GridSpec,
     house::{House, HouseDelta},
     sensors::{
         camera::Camera,
@@ -155,6 +156,16 @@ impl EmbeddedSimulator {
     /// Whether an agent fits at `[x, z]` and can walk there from the house's start.
     pub fn is_reachable(&self, point_m: Vec2) -> bool {
         self.navigation.is_connected(self.start_m, point_m)
+    }
+
+    /// The oracle occupancy: a grid over the house, and its cells ([`Navigation::occupancy`] from
+    /// the house's start).
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if `cell_m` is below 0.01, not finite, or needs too large a grid.
+    pub fn occupancy(&self, cell_m: f64) -> Result<(GridSpec, Vec<u8>), Error> {
+        let spec = self.navigation.map_spec(cell_m)?;
+        Ok((spec, self.navigation.occupancy(&spec, self.start_m)?))
     }
 
     /// Whether nothing is between two points but the bodies in `ignored` (indices).

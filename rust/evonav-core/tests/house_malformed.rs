@@ -114,7 +114,8 @@ fn check_world(house: &House) -> Result<(), TestCaseError> {
             prop_assert!(navigation.is_free(free_m));
         }
         let spec = navigation.map_spec(0.25);
-        prop_assert!(spec.is_ok_and(|spec| navigation.occupancy(&spec).len() < 4_000_000));
+        let cells = spec.and_then(|spec| navigation.occupancy(&spec, corner_m));
+        prop_assert!(cells.is_ok_and(|cells| cells.len() < 4_000_000));
     }
     Ok(())
 }

@@ -3,7 +3,6 @@
 use evonav_core::{
     assets::part::{Part, Primitive},
     geometry::{Aabb, Vec2, Vec3, distance_2d_m, yaw_rotation},
-    grid::GridSpec,
     world::{
         collision::AgentBody,
         navigation::{Navigation, NavigationConfig},
@@ -176,30 +175,40 @@ proptest! {
         prop_assert!((length_m - field_m).abs() < 1e-9);
     }
 
-    /// A cell is blocked if and only if a dense sample of it meets a box.
+    /// The nearest free centre, found by trying all, and whatever moves between centres join to it,
+    /// found by asking all pairs of neighbours until nothing changes.
     #[test]
-    fn occupancy_is_what_stands_in_a_cell(boxes in arb_boxes()) {
+    fn occupancy_is_what_moves_between_centres_join_to_the_start(
+        boxes in arb_boxes(), start_m in [-0.3..5.3, -0.3..5.3],
+    ) {
         let nav = navigation(&boxes);
-        let spec = GridSpec { rows: 20, cols: 20, cell_m: 0.25, corner_m: [0.0, 0.0] };
-        let cells = nav.occupancy(&spec);
-        for (i, &cell) in cells.iter().enumerate() {
-            let corner = [(i % 20) as f64 * 0.25, (i / 20) as f64 * 0.25];
-            let mut samples = (0..26 * 26).map(|k| {
-                [corner[0] + f64::from(k % 26) * 0.01, corner[1] + f64::from(k / 26) * 0.01]
+        let spec = nav.map_spec(0.1).unwrap();
+        let cells = nav.occupancy(&spec, start_m).unwrap();
+        let centre_of = |i: usize| spec.centre_m([i / spec.cols, i % spec.cols]);
+        let is_free: Vec<bool> =
+            (0..spec.len()).map(|i| clearance_naive(&boxes, centre_of(i)) > 0.0).collect();
+        let seed = (0..spec.len())
+            .filter(|&i| is_free[i] && distance_2d_m(centre_of(i), start_m) <= 0.5)
+            .min_by(|&a, &b| {
+                let distance_m = |i| distance_2d_m(centre_of(i), start_m);
+                distance_m(a).total_cmp(&distance_m(b))
             });
-            let is_met = |grow_m: f64| {
-                samples.clone().any(|p| boxes.iter().any(|b| distance_naive(b, p) <= grow_m))
-            };
-            if cell == 0 {
-                let is_inside_one = samples.any(|p| {
-                    let is_inner = (0..2).all(|i| (p[i] - corner[i] - 0.125).abs() < 0.1249);
-                    is_inner && boxes.iter().any(|b| distance_naive(b, p) == 0.0)
-                });
-                prop_assert!(!is_inside_one);
-            } else {
-                prop_assert!(is_met(0.0075));
+        let mut expected = vec![1; spec.len()];
+        if let Some(seed) = seed {
+            expected[seed] = 0;
+        }
+        let mut has_changed = seed.is_some();
+        while has_changed {
+            has_changed = false;
+            for i in (0..spec.len()).filter(|&i| is_free[i]) {
+                // Free centres are inside of the room, so all four neighbours are on the grid.
+                let is_joined = |j: usize| expected[j] == 0 && nav.try_move(centre_of(i), centre_of(j));
+                if expected[i] == 1 && [i - 1, i + 1, i - spec.cols, i + spec.cols].into_iter().any(is_joined) {
+                    (expected[i], has_changed) = (0, true);
+                }
             }
         }
+        prop_assert_eq!(cells, expected);
     }
 }
 

@@ -12,7 +12,8 @@ use evonav_core::{
     simulator::{EmbeddedSimulator, SimulatorConfig},
     world::{
         collision::AgentBody,
-        scene::{Body, BodyKind, OrientedBox},
+        navigation,
+        scene::{Body, BodyKind, OrientedBox, Scene},
     },
 };
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2};
@@ -30,6 +31,9 @@ type Images<'py> = (
 /// Corners, bodies and colours of triangles.
 type Triangles<'py> =
     (Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray2<u8>>);
+
+/// Rows and columns, and `(x, z)` of the corner.
+type MapSpec = ((usize, usize), Vec2);
 
 /// Id, category, kind, centre and size of a body.
 type BodyRecord = (String, String, &'static str, Vec3, Vec3);
@@ -199,9 +203,7 @@ impl PyEmbeddedSimulator {
         py: Python<'py>,
         cell_m: f64,
     ) -> PyResult<(Bound<'py, PyArray2<u8>>, Vec2)> {
-        let navigation = self.core.navigation();
-        let spec = navigation.map_spec(cell_m).map_err(error::to_py)?;
-        let cells = py.detach(|| navigation.occupancy(&spec));
+        let (spec, cells) = py.detach(|| self.core.occupancy(cell_m)).map_err(error::to_py)?;
         Ok((arrays::image_of(py, cells, [spec.rows, spec.cols])?, spec.corner_m))
     }
 
@@ -228,10 +230,22 @@ fn body_record(body: &Body) -> BodyRecord {
     (body.id.clone(), body.category.clone(), kind, aabb.centre_m, aabb.half_m.map(|h| 2.0 * h))
 }
 
-/// Adds the class to the module.
+/// Shape and corner of the oracle occupancy's grid.
+#[pyfunction]
+#[pyo3(signature = (house_json, *, name, cell_m))]
+fn map_spec(py: Python<'_>, house_json: &str, name: &str, cell_m: f64) -> PyResult<MapSpec> {
+    let spec = py.detach(|| {
+        let house = House::from_json(name, house_json)?;
+        navigation::map_spec(&Scene::build_empty(&house, Catalogue::bundled()), cell_m)
+    });
+    spec.map(|spec| ((spec.rows, spec.cols), spec.corner_m)).map_err(error::to_py)
+}
+
+/// Adds class and function to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     // Images are freed as often as they are made. Having seen one block of this size freed, glibc
     // keeps that much memory instead of returning it, and getting it back costs a third of a frame.
     drop(std::hint::black_box(vec![0_u8; 1 << 24]));
-    module.add_class::<PyEmbeddedSimulator>()
+    module.add_class::<PyEmbeddedSimulator>()?;
+    module.add_function(wrap_pyfunction!(map_spec, module)?)
 }

@@ -148,14 +148,20 @@ impl Scene {
         catalogue: &Catalogue,
         unknown: UnknownAssets,
     ) -> Result<Self, Error> {
-        let mut bodies = structure(house, catalogue);
-        let first_object = bodies.len();
-        let bounds = bodies.iter().fold(Aabb::EMPTY, |bounds, body| bounds.union(body.aabb));
+        let mut scene = Self::build_empty(house, catalogue);
         for object in &house.objects {
-            let body = placed(house, object, catalogue, unknown, &bodies[first_object..])?;
-            bodies.push(body);
+            let before = &scene.bodies[scene.first_object..];
+            let body = placed(house, object, catalogue, unknown, before)?;
+            scene.bodies.push(body);
         }
-        Ok(Self { bodies, first_object, bounds })
+        Ok(scene)
+    }
+
+    /// The house without its objects.
+    pub fn build_empty(house: &House, catalogue: &Catalogue) -> Self {
+        let bodies = structure(house, catalogue);
+        let bounds = bodies.iter().fold(Aabb::EMPTY, |bounds, body| bounds.union(body.aabb));
+        Self { first_object: bodies.len(), bodies, bounds }
     }
 
     /// This scene after some objects moved: equal to [`Scene::build`] of the new house.
