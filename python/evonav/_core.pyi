@@ -358,6 +358,7 @@ class EmbeddedSimulator:
         name: str,
         image_px: tuple[int, int],
         vertical_fov_rad: float,
+        clip_m: tuple[float, float],
         camera_height_m: float,
         agent_radius_m: float,
         agent_height_m: float,
@@ -378,6 +379,22 @@ class EmbeddedSimulator:
         self, position_m: tuple[float, float, float], yaw_rad: float, horizon_rad: float, *, rgb: bool, instances: bool
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None, NDArray[np.int32] | None]:
         """Depth `(H, W)`, colours `(H, W, 3)` and instances `(H, W)`."""
+
+    def render_camera(
+        self,
+        *,
+        image_px: tuple[int, int],
+        vertical_fov_rad: float,
+        clip_m: tuple[float, float],
+        position_m: tuple[float, float, float],
+        yaw_rad: float,
+        horizon_rad: float,
+        roll_rad: float,
+        half_height_m: float | None,
+        rgb: bool,
+        instances: bool,
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None, NDArray[np.int32] | None]:
+        """As `render`; orthographic if `half_height_m` is given."""
 
     def is_free(self, point_m: tuple[float, float]) -> bool: ...
     def is_reachable(self, point_m: tuple[float, float]) -> bool: ...

@@ -1,11 +1,45 @@
 """The pinhole camera of frames and views: AI2-THOR's, pixel centres at half-integers, planar depth."""
 
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
+
+
+@dataclass(frozen=True, slots=True)
+class CameraView:
+    """What a camera of one's own draws, wherever it hangs: AI2-THOR's third-party cameras."""
+
+    pose: Pose
+    """Of the optical centre; any horizon, also straight down (`pi / 2`)."""
+    width_px: int = 300
+    height_px: int = 300
+    vertical_fov_rad: float = math.pi / 2
+    """From the upper to the lower border; not used by an orthographic view."""
+    near_m: float = 0.1
+    far_m: float = 20.0
+    """Planar depths between which surfaces are drawn."""
+    roll_rad: float = 0.0
+    """Turn about the optical axis before all others, as Unity's z rotation: the image's right side goes up."""
+    orthographic_half_height_m: float | None = None
+    """Half of the image's height in the world (Unity's `orthographicSize`) for an orthographic view."""
+
+
+class Images(NamedTuple):
+    """What a camera sees."""
+
+    depth_m: NDArray[np.float32]
+    """`(H, W)` planar z in metres, `inf` where nothing is."""
+    rgb: NDArray[np.uint8] | None
+    """`(H, W, 3)`, when asked for."""
+    instances: NDArray[np.int32] | None
+    """`(H, W)`, 0 where nothing is, else 1 + index of the body, when asked for."""
 
 
 def unproject(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intrinsics) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.errors import SimulationError
+from evonav.world.camera import CameraView, Images
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Frame, Intrinsics, OccupancyGrid, SceneObject, SimulatorConfig
 
@@ -71,6 +72,7 @@ class EmbeddedSimulator:
             name=name,
             image_px=(self.config.width_px, self.config.height_px),
             vertical_fov_rad=self.intrinsics.vertical_fov_rad,
+            clip_m=(self.config.near_m, self.config.far_m),
             camera_height_m=self.config.camera_height_m,
             agent_radius_m=self.config.agent_radius_m,
             agent_height_m=self.config.agent_height_m,
@@ -161,6 +163,28 @@ class EmbeddedSimulator:
         )
         camera = Pose(at.x_m, self.config.camera_height_m, at.z_m, at.yaw_rad, at.horizon_rad)
         return Frame(camera, self.intrinsics, depth_m, colours, ids)
+
+    def render_camera(self, view: CameraView, *, rgb: bool = True, instances: bool = True) -> Images:
+        """What a camera of one's own sees; ceilings are seen from below only, so views from above look into the house.
+
+        Angles are taken as they are.
+
+        Raises:
+            InvalidArgumentError: A number of the view is not finite or out of range.
+        """
+        images = self._world.render_camera(
+            image_px=(view.width_px, view.height_px),
+            vertical_fov_rad=view.vertical_fov_rad,
+            clip_m=(view.near_m, view.far_m),
+            position_m=view.pose.position_m,
+            yaw_rad=view.pose.yaw_rad,
+            horizon_rad=view.pose.horizon_rad,
+            roll_rad=view.roll_rad,
+            half_height_m=view.orthographic_half_height_m,
+            rgb=rgb,
+            instances=instances,
+        )
+        return Images(*images)
 
     def reachable_positions(self) -> NDArray[np.float64]:
         """`(N, 3)` positions of the square grid through the agent that it can reach along that grid."""

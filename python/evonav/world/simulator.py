@@ -41,6 +41,9 @@ class SimulatorConfig:
     width_px: int = 300
     height_px: int = 300
     vertical_fov_deg: float = 90.0
+    near_m: float = 0.1
+    far_m: float = 20.0
+    """Planar depths between which surfaces are seen: beyond, depth is `inf`, the instance 0, the colour the sky's."""
     camera_height_m: float = 1.575
     move_m: float = 0.25
     turn_deg: float = 15.0
@@ -60,7 +63,7 @@ class Frame:
     """The camera's own: `y_m` is the height of its optical centre (`config.camera_height_m`), not the agent's."""
     intrinsics: Intrinsics
     depth_m: NDArray[np.float32]
-    """`(H, W)`, planar z in metres, `inf` where nothing is."""
+    """`(H, W)`, planar z in metres, `inf` where nothing is between `config.near_m` and `config.far_m`."""
     rgb: NDArray[np.uint8] | None = None
     """`(H, W, 3)`, when asked for."""
     instances: NDArray[np.int32] | None = None

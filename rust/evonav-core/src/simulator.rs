@@ -9,8 +9,8 @@ use crate::{
     grid::GridSpec,
     house::{House, HouseDelta},
     sensors::{
-        camera::Camera,
-        raster::{FrameBuffer, Want, render},
+        camera::{Camera, View},
+        raster::{FrameBuffer, Want, render_view},
         raycast3d::RayCaster,
     },
     world::{
@@ -34,6 +34,8 @@ pub struct SimulatorConfig {
     pub image_px: [usize; 2],
     /// Field of view from the upper to the lower border.
     pub vertical_fov_rad: f64,
+    /// Planar depths `[near, far]` between which surfaces are drawn.
+    pub clip_m: [f64; 2],
     /// Optical centre over the floor.
     pub camera_height_m: f64,
     /// What collides.
@@ -92,7 +94,7 @@ impl EmbeddedSimulator {
         let start_m = start_of(&house, &scene, &navigation)?;
         let simulator =
             Self { house, config, scene, mesh, navigation, start_m, rays: OnceLock::new() };
-        simulator.camera(&simulator.start()).check()?;
+        simulator.view(&simulator.start()).check()?;
         Ok(simulator)
     }
 
@@ -145,12 +147,17 @@ impl EmbeddedSimulator {
         Camera::at(pose, image_px, vertical_fov_rad, camera_height_m)
     }
 
-    /// What the agent sees from `pose`.
+    /// What the camera of an agent at `pose` draws.
+    pub fn view(&self, pose: &Pose) -> View {
+        View { clip_m: self.config.clip_m, ..View::from(self.camera(pose)) }
+    }
+
+    /// What any camera sees, the agent's ([`Self::view`]) or another.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the pose is not finite.
-    pub fn render(&self, pose: &Pose, want: Want, out: &mut FrameBuffer) -> Result<(), Error> {
-        render(&self.mesh, &self.camera(pose), want, out)
+    /// [`Error::InvalidArgument`] as [`View::check`].
+    pub fn render(&self, view: &View, want: Want, out: &mut FrameBuffer) -> Result<(), Error> {
+        render_view(&self.mesh, view, want, out)
     }
 
     /// Whether an agent fits at `[x, z]` and can walk there from the house's start.

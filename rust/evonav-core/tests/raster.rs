@@ -2,10 +2,10 @@
 
 use evonav_core::{
     assets::part::{Part, Primitive},
-    geometry::{Aabb, Vec3, euler_rotation_deg},
+    geometry::{Aabb, Vec3, add, euler_rotation_deg, rotate},
     sensors::{
-        camera::Camera,
-        raster::{FrameBuffer, NEAR_M, Want, render},
+        camera::{CLIP_M, Camera, View},
+        raster::{FrameBuffer, Want, render, render_view},
         raycast3d::RayCaster,
     },
     world::{
@@ -48,7 +48,7 @@ fn intersect(triangle: &Triangle, origin_m: Vec3, direction: Vec3) -> Option<(f6
     Some((distance, depth_inside))
 }
 
-/// Nearest front face along a ray: `(distance, body)`. Triangles grown (or, negative, shrunk) by
+/// Nearest front face along a ray from `least` on: `(distance, body)`. Triangles grown (or, negative, shrunk) by
 /// `margin` of their size.
 fn cast_naive(
     triangles: &[Triangle],
@@ -129,6 +129,36 @@ fn camera() -> impl Strategy<Value = Camera> {
     )
 }
 
+/// AI2-THOR's agent camera, and others with clip planes within the scene, rolled, orthographic.
+fn view() -> impl Strategy<Value = View> {
+    let own = (0.01..2.0_f64, 0.1..4.0_f64, -3.2..3.2_f64, proptest::option::of(0.05..4.0_f64));
+    (camera(), proptest::option::of(own)).prop_map(|(camera, own)| {
+        own.map_or(View::from(camera), |(near_m, reach_m, roll_rad, half_height_m)| View {
+            camera,
+            clip_m: [near_m, near_m + reach_m],
+            roll_rad,
+            half_height_m,
+        })
+    })
+}
+
+/// Origin and direction of the look through a pixel: lengths along it are planar depths.
+fn look_through(view: &View, image_px: [f64; 2]) -> (Vec3, Vec3) {
+    let Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad } =
+        view.camera;
+    let half_m = view.half_height_m.unwrap_or((vertical_fov_rad / 2.0).tan());
+    let metres =
+        |px: f64, size_px: usize| (px - size_px as f64 / 2.0) * half_m / (height_px as f64 / 2.0);
+    let (right, up) = (metres(image_px[0], width_px), -metres(image_px[1], height_px));
+    // Unity's rotation takes the camera's own right, up and forward to the world.
+    let angles_deg = [horizon_rad, yaw_rad, view.roll_rad].map(f64::to_degrees);
+    let to_world = |v: Vec3| rotate(&euler_rotation_deg(angles_deg), v);
+    match view.half_height_m {
+        Some(_) => (add(position_m, to_world([right, up, 0.0])), to_world([0.0, 0.0, 1.0])),
+        None => (position_m, to_world([right, up, 1.0])),
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
@@ -137,23 +167,24 @@ proptest! {
     #[test]
     fn images_lie_between_shrunk_and_grown_scenes(
         parts in vec(part(), 0..12),
-        camera in camera(),
+        view in view(),
     ) {
         const HAIR: f64 = 1e-7;
+        let View { camera, clip_m: [near_m, far_m], .. } = view;
         let mesh = SceneMesh::build(&scene_of(&parts));
         let triangles: Vec<Triangle> = mesh.triangles().collect();
         let mut frame = FrameBuffer::default();
-        render(&mesh, &camera, Want { rgb: false, instances: true }, &mut frame).unwrap();
+        render_view(&mesh, &view, Want { rgb: false, instances: true }, &mut frame).unwrap();
         for index in 0..camera.width_px * camera.height_px {
             let (row, col) = (index / camera.width_px, index % camera.width_px);
-            let ray = camera.ray([col as f64 + 0.5, row as f64 + 0.5]);
-            let nearest = |least, margin| {
-                cast_naive(&triangles, camera.position_m, ray, least, margin)
+            let (origin_m, ray) = look_through(&view, [col as f64 + 0.5, row as f64 + 0.5]);
+            let slack = |depth: f64| 1e-6 * depth.max(1.0) * (1.0 + 10.0 * depth);
+            let nearest = |least, margin, most| {
+                cast_naive(&triangles, origin_m, ray, least, margin).filter(|hit| hit.0 < most)
             };
-            let (grown, shrunk) =
-                (nearest(NEAR_M - HAIR, HAIR), nearest(NEAR_M + HAIR, -HAIR));
+            let grown = nearest(near_m - HAIR, HAIR, far_m + slack(far_m));
+            let shrunk = nearest(near_m + HAIR, -HAIR, far_m - slack(far_m));
             let got = f64::from(frame.depth_m[index]);
-            let slack = |depth: f64| 1e-6 * depth * (1.0 + 10.0 * depth);
             match grown {
                 Some((depth, _)) => prop_assert!(got >= depth - slack(depth), "{got} {depth}"),
                 None => prop_assert!(got.is_infinite(), "{got} where nothing is"),
@@ -167,8 +198,7 @@ proptest! {
                 // Another body at the same depth within rounding may win.
                 let others: Vec<Triangle> =
                     triangles.iter().filter(|t| t.body != near.1).copied().collect();
-                let second =
-                    cast_naive(&others, camera.position_m, ray, near.0 - slack(near.0), HAIR);
+                let second = cast_naive(&others, origin_m, ray, near.0 - slack(near.0), HAIR);
                 if second.is_none_or(|s| s.0 > near.0 + 2.0 * slack(near.0)) {
                     prop_assert_eq!(frame.instances[index], near.1 as i32 + 1);
                 }
@@ -179,11 +209,11 @@ proptest! {
 
     /// Asking for more images changes none of them.
     #[test]
-    fn wants_do_not_change_images(parts in vec(part(), 0..12), camera in camera()) {
+    fn wants_do_not_change_images(parts in vec(part(), 0..12), view in view()) {
         let mesh = SceneMesh::build(&scene_of(&parts));
         let mut frames = [false, true].map(|rgb| {
             let mut frame = FrameBuffer::default();
-            render(&mesh, &camera, Want { rgb, instances: true }, &mut frame).unwrap();
+            render_view(&mesh, &view, Want { rgb, instances: true }, &mut frame).unwrap();
             frame
         });
         prop_assert_eq!(&frames[0].depth_m, &frames[1].depth_m);
@@ -191,7 +221,7 @@ proptest! {
         prop_assert_eq!(frames[1].rgb.len(), 3 * frames[1].depth_m.len());
         // A used buffer gives what a new one gives.
         let [depth_only, full] = &mut frames;
-        render(&mesh, &camera, Want { rgb: true, instances: false }, depth_only).unwrap();
+        render_view(&mesh, &view, Want { rgb: true, instances: false }, depth_only).unwrap();
         prop_assert_eq!(&depth_only.rgb, &full.rgb);
         prop_assert!(depth_only.instances.is_empty());
     }
@@ -309,4 +339,77 @@ fn colours_show_corners_and_sky() {
     // The walls meet at x = 2, z = 3.
     let corner = (150.5 + 150.5 * 1.5 / 3.0) as usize;
     assert!(u32::from(at(corner)[0]) * 10 < u32::from(at(corner - 30)[0]) * 8);
+}
+
+/// A wall 20 m away is seen, one a hair farther is sky; so is what the near plane cuts off.
+#[test]
+fn surfaces_are_drawn_between_the_clip_planes() {
+    let slab = |z: f64| Part {
+        primitive: Primitive::Cuboid { half_m: [100.0, 100.0, 0.05] },
+        centre_m: [0.0, 0.0, z + 0.05],
+        rotation: euler_rotation_deg([0.0; 3]),
+        colour: [200, 40, 40],
+    };
+    let camera = Camera {
+        width_px: 9,
+        height_px: 7,
+        vertical_fov_rad: 1.5,
+        position_m: [0.0; 3],
+        yaw_rad: 0.0,
+        horizon_rad: 0.0,
+    };
+    let [near_m, far_m] = CLIP_M;
+    for half_height_m in [None, Some(2.0)] {
+        let view = View { half_height_m, ..View::from(camera) };
+        let mut frame = FrameBuffer::default();
+        let want = Want { rgb: true, instances: true };
+        for (z, is_seen) in [
+            (near_m - 1e-3, false),
+            (near_m + 1e-3, true),
+            (far_m - 1e-3, true),
+            (far_m + 1e-3, false),
+        ] {
+            let mesh = SceneMesh::build(&scene_of(&[slab(z)]));
+            render_view(&mesh, &view, want, &mut frame).unwrap();
+            assert!(frame.depth_m.iter().all(|d| d.is_finite() == is_seen), "{z}");
+            assert!(frame.instances.iter().all(|&id| id == i32::from(is_seen)), "{z}");
+            let is_sky = |pixel: &[u8]| pixel == [204, 222, 236];
+            assert!(frame.rgb.chunks_exact(3).all(|pixel| is_sky(pixel) != is_seen), "{z}");
+            let is_close = |d: f32| (f64::from(d) - z).abs() < 1e-4;
+            assert!(!is_seen || frame.depth_m.iter().all(|&d| is_close(d)), "{z}");
+        }
+    }
+    for clip_m in [[0.0, 1.0], [2.0, 1.0], [1.0, f64::NAN], [f64::NAN, 1.0], [0.1, f64::INFINITY]] {
+        assert!(View { clip_m, ..View::from(camera) }.check().is_err(), "{clip_m:?}");
+    }
+}
+
+/// AI2-THOR's ceilings have one side: seen from below, looked through from above.
+#[test]
+fn ceilings_are_seen_from_below_only() {
+    let slab = |y: f64| Part {
+        primitive: Primitive::Cuboid { half_m: [10.0, 0.01, 10.0] },
+        centre_m: [0.0, y, 0.0],
+        rotation: euler_rotation_deg([0.0; 3]),
+        colour: [200, 40, 40],
+    };
+    let mut scene = scene_of(&[slab(0.0), slab(2.5)]);
+    scene.bodies[1].kind = BodyKind::Ceiling;
+    let mesh = SceneMesh::build(&scene);
+    let middle = |y: f64, horizon_rad: f64| {
+        let camera = Camera {
+            width_px: 3,
+            height_px: 3,
+            vertical_fov_rad: 1.0,
+            position_m: [0.0, y, 0.0],
+            yaw_rad: 0.0,
+            horizon_rad,
+        };
+        let mut frame = FrameBuffer::default();
+        render(&mesh, &camera, Want { rgb: false, instances: true }, &mut frame).unwrap();
+        frame.instances[4]
+    };
+    assert_eq!(middle(1.0, -1.5), 2);
+    assert_eq!(middle(1.0, 1.5), 1);
+    assert_eq!(middle(6.0, std::f64::consts::FRAC_PI_2), 1);
 }

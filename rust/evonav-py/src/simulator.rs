@@ -8,7 +8,10 @@ use evonav_core::{
     evolution::{SpawnRequest, random_spawn},
     geometry::{Pose, Vec2, Vec3},
     house::{House, HouseDelta},
-    sensors::raster::{FrameBuffer, Want},
+    sensors::{
+        camera::{Camera, View},
+        raster::{FrameBuffer, Want},
+    },
     simulator::{EmbeddedSimulator, SimulatorConfig},
     world::{
         collision::AgentBody,
@@ -55,8 +58,8 @@ impl From<EmbeddedSimulator> for PyEmbeddedSimulator {
 impl PyEmbeddedSimulator {
     #[new]
     #[pyo3(signature = (
-        house_json, *, name, image_px, vertical_fov_rad, camera_height_m, agent_radius_m,
-        agent_height_m, allow_unknown_assets
+        house_json, *, name, image_px, vertical_fov_rad, clip_m, camera_height_m,
+        agent_radius_m, agent_height_m, allow_unknown_assets
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword-only in Python")]
     fn new(
@@ -65,6 +68,7 @@ impl PyEmbeddedSimulator {
         name: &str,
         image_px: [usize; 2],
         vertical_fov_rad: f64,
+        clip_m: [f64; 2],
         camera_height_m: f64,
         agent_radius_m: f64,
         agent_height_m: f64,
@@ -76,7 +80,7 @@ impl PyEmbeddedSimulator {
         };
         let agent = AgentBody { radius_m: agent_radius_m, height_m: agent_height_m };
         let config =
-            SimulatorConfig { image_px, vertical_fov_rad, camera_height_m, agent, unknown };
+            SimulatorConfig { image_px, vertical_fov_rad, clip_m, camera_height_m, agent, unknown };
         py.detach(|| EmbeddedSimulator::new(House::from_json(name, house_json)?, config))
             .map(Self::from)
             .map_err(error::to_py)
@@ -126,21 +130,33 @@ impl PyEmbeddedSimulator {
         instances: bool,
     ) -> PyResult<Images<'py>> {
         let pose = Pose { position_m, yaw_rad, horizon_rad };
-        let [width, height] = self.core.image_px();
-        let (depth, colours, ids) = py
-            .detach(|| {
-                let mut spare = FrameBuffer::default();
-                let mut kept = self.buffer.try_lock().ok();
-                let buffer = kept.as_deref_mut().unwrap_or(&mut spare);
-                self.core.render(&pose, Want { rgb, instances }, buffer)?;
-                Ok(buffer.take())
-            })
-            .map_err(error::to_py)?;
-        let shape = [height, width];
-        let depth = arrays::image_of(py, depth, shape)?;
-        let colours = rgb.then(|| arrays::image_of(py, colours, [height, width, 3])).transpose()?;
-        let ids = instances.then(|| arrays::image_of(py, ids, shape)).transpose()?;
-        Ok((depth, colours, ids))
+        self.images(py, &self.core.view(&pose), Want { rgb, instances })
+    }
+
+    #[pyo3(signature = (
+        *, image_px, vertical_fov_rad, clip_m, position_m, yaw_rad, horizon_rad, roll_rad,
+        half_height_m, rgb, instances
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword-only in Python")]
+    fn render_camera<'py>(
+        &self,
+        py: Python<'py>,
+        image_px: [usize; 2],
+        vertical_fov_rad: f64,
+        clip_m: [f64; 2],
+        position_m: Vec3,
+        yaw_rad: f64,
+        horizon_rad: f64,
+        roll_rad: f64,
+        half_height_m: Option<f64>,
+        rgb: bool,
+        instances: bool,
+    ) -> PyResult<Images<'py>> {
+        let [width_px, height_px] = image_px;
+        let camera =
+            Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad };
+        let view = View { camera, clip_m, roll_rad, half_height_m };
+        self.images(py, &view, Want { rgb, instances })
     }
 
     fn is_free(&self, point_m: Vec2) -> bool {
@@ -214,6 +230,26 @@ impl PyEmbeddedSimulator {
         let colours = triangles.iter().map(|t| t.colour).collect();
         let corners_m = arrays::image_of(py, corners_m.into_flattened(), [bodies.len(), 3, 3])?;
         Ok((corners_m, bodies.into_pyarray(py), arrays::rows_of(py, colours)?))
+    }
+}
+
+impl PyEmbeddedSimulator {
+    fn images<'py>(&self, py: Python<'py>, view: &View, want: Want) -> PyResult<Images<'py>> {
+        let (depth, colours, ids) = py
+            .detach(|| {
+                let mut spare = FrameBuffer::default();
+                let mut kept = self.buffer.try_lock().ok();
+                let buffer = kept.as_deref_mut().unwrap_or(&mut spare);
+                self.core.render(view, want, buffer)?;
+                Ok(buffer.take())
+            })
+            .map_err(error::to_py)?;
+        let shape @ [height, width] = [view.camera.height_px, view.camera.width_px];
+        let depth = arrays::image_of(py, depth, shape)?;
+        let of_colours = || arrays::image_of(py, colours, [height, width, 3]);
+        let colours = want.rgb.then(of_colours).transpose()?;
+        let ids = want.instances.then(|| arrays::image_of(py, ids, shape)).transpose()?;
+        Ok((depth, colours, ids))
     }
 }
 

@@ -147,3 +147,62 @@ impl Camera {
         std::array::from_fn(|i| (0..3).map(|j| axes[j][i] * local[j]).sum())
     }
 }
+
+/// AI2-THOR's clip planes ("cameraNearPlane", "cameraFarPlane" of its `Initialize`).
+pub const CLIP_M: [f64; 2] = [0.1, 20.0];
+
+/// What a renderer draws: a camera, and what Unity's cameras have besides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Size, place and direction; its field of view is not used by an orthographic view.
+    pub camera: Camera,
+    /// Planar depths `[near, far]` between which surfaces are drawn.
+    pub clip_m: Vec2,
+    /// Turn about the optical axis, before all others: Unity's z rotation, which turns the image's
+    /// right side up.
+    pub roll_rad: f64,
+    /// Half of the image's height in the world for an orthographic view (Unity's
+    /// `orthographicSize`); `None` for a perspective one.
+    pub half_height_m: Option<f64>,
+}
+
+impl From<Camera> for View {
+    fn from(camera: Camera) -> Self {
+        Self { camera, clip_m: CLIP_M, roll_rad: 0.0, half_height_m: None }
+    }
+}
+
+impl View {
+    /// Checks that an image can be formed.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] as [`Camera::check`], or if the clip planes are not finite,
+    /// rising and at least 0.1 mm away, the roll not finite, or the half height not positive.
+    pub fn check(&self) -> Result<(), Error> {
+        self.camera.check()?;
+        let [near_m, far_m] = self.clip_m;
+        Error::require("near_m", near_m, "0.0001 or more, below far_m", |v| {
+            v >= 1e-4 && v < far_m
+        })?;
+        Error::require("far_m", far_m, "at most 1e6", |v| v <= 1e6)?;
+        Error::require("roll_rad", self.roll_rad, "finite", f64::is_finite)?;
+        let is_half_height = |v: f64| (1e-3..=1e6).contains(&v);
+        Error::require(
+            "half_height_m",
+            self.half_height_m.unwrap_or(1.0),
+            "0.001 to 1e6",
+            is_half_height,
+        )
+    }
+
+    /// Rows are the image's right, down and forward axes in the world frame.
+    pub fn axes(&self) -> Mat3 {
+        let [right, down, forward] = self.camera.camera_from_world();
+        let (sin, cos) = self.roll_rad.sin_cos();
+        [
+            std::array::from_fn(|i| cos * right[i] - sin * down[i]),
+            std::array::from_fn(|i| sin * right[i] + cos * down[i]),
+            forward,
+        ]
+    }
+}

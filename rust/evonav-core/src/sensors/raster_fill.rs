@@ -1,4 +1,4 @@
-//! The inner loops of the rasteriser: convex polygons into a buffer of inverse depths.
+//! The inner loops of the rasteriser: convex polygons into a buffer of what is nearest.
 
 use std::ops::Range;
 
@@ -8,12 +8,13 @@ use crate::geometry::{Vec2, Vec3};
 pub(super) const LANES: usize = 8;
 const LANE_INDEX: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
-/// Inverse depth (0: nothing drawn) and a tag a pixel; rows are padded to whole blocks.
+/// Nearness (inverse depth in perspective views) and a tag (0: nothing drawn) a pixel; rows are
+/// padded to whole blocks.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Canvas {
     pub width_px: usize,
     pub height_px: usize,
-    pub inverse_depth: Vec<[f32; LANES]>,
+    pub nearness: Vec<[f32; LANES]>,
     pub tags: Vec<[u32; LANES]>,
     /// First pixel of the polygon at hand, and the one after its last, by row.
     left: Vec<u32>,
@@ -21,11 +22,12 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    pub fn clear(&mut self, width_px: usize, height_px: usize) {
+    /// Empties the canvas: what is no nearer than `empty` will not be drawn.
+    pub fn clear(&mut self, width_px: usize, height_px: usize, empty: f32) {
         (self.width_px, self.height_px) = (width_px, height_px);
         let num_blocks = self.blocks_per_row() * height_px;
-        self.inverse_depth.clear();
-        self.inverse_depth.resize(num_blocks, [0.0; LANES]);
+        self.nearness.clear();
+        self.nearness.resize(num_blocks, [empty; LANES]);
         self.tags.clear();
         self.tags.resize(num_blocks, [0; LANES]);
         self.left.resize(height_px, 0);
@@ -41,13 +43,13 @@ impl Canvas {
         row * self.blocks_per_row()..(row + 1) * self.blocks_per_row()
     }
 
-    /// Inverse depths of a row, its padding included.
+    /// Nearness of a row, its padding included.
     pub fn row(&self, row: usize) -> &[f32] {
-        self.inverse_depth[self.row_blocks(row)].as_flattened()
+        self.nearness[self.row_blocks(row)].as_flattened()
     }
 
     /// Draws a convex polygon that runs clockwise on the screen, where it is nearer than what is
-    /// there. `plane` gives the inverse depth at `[u, v]`: `plane . [u, v, 1]`.
+    /// there. `plane` gives the nearness, which is positive, at `[u, v]`: `plane . [u, v, 1]`.
     ///
     /// A pixel is covered when its centre is inside; a centre on an edge belongs to the polygon
     /// to the right of or below that edge, so that neighbours neither overlap nor leave a gap.
@@ -71,7 +73,7 @@ impl Canvas {
                 tag,
             };
             let blocks = row * blocks_per_row + blocks.start..row * blocks_per_row + blocks.end;
-            span.draw(&mut self.inverse_depth[blocks.clone()], &mut self.tags[blocks]);
+            span.draw(&mut self.nearness[blocks.clone()], &mut self.tags[blocks]);
         }
     }
 
@@ -132,11 +134,11 @@ struct Span {
 }
 
 impl Span {
-    fn draw(&self, inverse_depth: &mut [[f32; LANES]], tags: &mut [[u32; LANES]]) {
+    fn draw(&self, nearness: &mut [[f32; LANES]], tags: &mut [[u32; LANES]]) {
         let in_block = LANE_INDEX.map(|lane| lane * self.step);
         let block_step = LANES as f32 * self.step;
-        let last = inverse_depth.len().saturating_sub(1);
-        for (block, (stored, tags)) in inverse_depth.iter_mut().zip(tags).enumerate() {
+        let last = nearness.len().saturating_sub(1);
+        for (block, (stored, tags)) in nearness.iter_mut().zip(tags).enumerate() {
             let base = self.start + block as f32 * block_step;
             let candidate = in_block.map(|offset| base + offset);
             // Where only some pixels of a block are covered, the others get what is never nearer.

@@ -8,7 +8,7 @@
 use crate::{
     geometry::Vec3,
     sensors::{
-        camera::Camera,
+        raster::Optics,
         raster_fill::{Canvas, LANES},
     },
     world::mesh::{Face, dot},
@@ -33,12 +33,13 @@ const SKY: [f32; 3] =
 #[derive(Debug, Clone, Copy)]
 struct LitFace {
     rgb: [f32; 3],
-    /// Distance of its plane from the camera.
-    height_m: f32,
+    /// Distance of its plane from the camera; in orthographic views the cosine between its normal
+    /// and the look at it.
+    facing: f32,
 }
 
 impl LitFace {
-    const SKY: Self = Self { rgb: SKY, height_m: 0.0 };
+    const SKY: Self = Self { rgb: SKY, facing: 0.0 };
 }
 
 /// Colours of the faces in view, and one row's working memory.
@@ -46,9 +47,9 @@ impl LitFace {
 pub(super) struct Shader {
     /// By face tag; 0 is the background.
     faces: Vec<LitFace>,
-    /// Of the camera that `shortness` was made for.
+    /// Of the view that `shortness` was made for.
     size_px: [usize; 2],
-    focal_px: f32,
+    optics: Option<Optics>,
     /// 1 over the length of each pixel's ray at depth 1.
     shortness: Vec<[f32; LANES]>,
     /// The row at hand with its ends continued.
@@ -57,33 +58,35 @@ pub(super) struct Shader {
 }
 
 impl Shader {
-    pub fn begin(&mut self, num_faces: usize, camera: &Camera) {
+    pub fn begin(&mut self, num_faces: usize, size_px: [usize; 2], optics: Optics) {
         self.faces.resize(num_faces + 1, LitFace::SKY);
-        let (size_px, focal_px) = ([camera.width_px, camera.height_px], camera.focal_px() as f32);
-        if (size_px, focal_px) == (self.size_px, self.focal_px) {
+        if (size_px, Some(optics)) == (self.size_px, self.optics) {
             return;
         }
-        (self.size_px, self.focal_px) = (size_px, focal_px);
+        (self.size_px, self.optics) = (size_px, Some(optics));
         let [width, height] = size_px.map(|side| side as f32);
-        let shortness = |row: usize, block: usize| {
+        let shortness = |focal_px: f32, row: usize, block: usize| {
             std::array::from_fn(|lane| {
                 let right = ((block * LANES + lane) as f32 + 0.5 - width / 2.0) / focal_px;
                 let down = (row as f32 + 0.5 - height / 2.0) / focal_px;
                 1.0 / (1.0 + right * right + down * down).sqrt()
             })
         };
-        let blocks = 0..camera.width_px.div_ceil(LANES);
-        let rows = (0..camera.height_px).flat_map(|row| blocks.clone().map(move |b| (row, b)));
-        self.shortness = rows.map(|(row, block)| shortness(row, block)).collect();
+        self.shortness.clear();
+        if let Optics::Perspective { focal_px } = optics {
+            let blocks = 0..size_px[0].div_ceil(LANES);
+            let rows = (0..size_px[1]).flat_map(|row| blocks.clone().map(move |b| (row, b)));
+            self.shortness.extend(rows.map(|(row, block)| shortness(focal_px as f32, row, block)));
+        }
     }
 
-    /// Lights a face that the camera, `height_m` above its plane, may see.
-    pub fn light(&mut self, index: usize, face: &Face, height_m: f64) {
+    /// Lights a face that may be seen; `facing` as [`LitFace::facing`].
+    pub fn light(&mut self, index: usize, face: &Face, facing: f64) {
         let from_above = 0.5 + 0.5 * face.normal[1];
         let from_side = dot(face.normal, SIDE);
         let light = (0.80 + 0.22 * from_above + 0.09 * from_side) as f32;
         let rgb = face.colour.map(|c| BLACK + f32::from(c) * (light - BLACK / 255.0));
-        self.faces[index + 1] = LitFace { rgb, height_m: height_m as f32 };
+        self.faces[index + 1] = LitFace { rgb, facing: facing as f32 };
     }
 
     /// Fills `rgb` from a drawn canvas.
@@ -101,7 +104,13 @@ impl Shader {
         self.light.resize(canvas.blocks_per_row() * LANES, 1.0);
         self.pad(canvas.row(row), canvas.width_px, corner_px);
         for (reach_px, is_line) in [(corner_px, false), (1, true)] {
-            let scale = self.focal_px / reach_px as f32;
+            // In perspective views a bend counts relative to depth, as a pixel's width grows with it.
+            let (scale_px, relative) = match self.optics {
+                Some(Optics::Orthographic { pixels_per_m }) => (pixels_per_m, [0.0, 1.0]),
+                Some(Optics::Perspective { focal_px }) => (focal_px, [1.0, 1e-6]),
+                None => (0.0, [0.0, 1.0]),
+            };
+            let bend = Bend { scale: scale_px as f32 / reach_px as f32, relative };
             let centre = canvas.row(row);
             let has_both = row >= reach_px && row + reach_px < canvas.height_px;
             let (above, below) = match has_both {
@@ -114,8 +123,8 @@ impl Shader {
             let neighbours = [left, right, above, below].map(|row| &row[..width]);
             let (light, centre) = (&mut self.light[..width], &centre[..width]);
             match is_line {
-                true => darken_row(light, centre, neighbours, scale, line_shade),
-                false => darken_row(light, centre, neighbours, scale, corner_shade),
+                true => darken_row(light, centre, neighbours, bend, line_shade),
+                false => darken_row(light, centre, neighbours, bend, corner_shade),
             }
         }
     }
@@ -137,11 +146,16 @@ impl Shader {
         let (whole, rest) = pixels.as_chunks_mut::<{ 3 * LANES }>();
         let mut whole = whole.iter_mut();
         let tags = &canvas.tags[blocks.clone()];
-        let depths = canvas.inverse_depth[blocks.clone()].iter().zip(&self.shortness[blocks]);
-        for ((tags, (depths, shortness)), lights) in
-            tags.iter().zip(depths).zip(self.light.as_chunks().0)
-        {
-            let facing = std::array::from_fn(|lane| depths[lane] * shortness[lane]);
+        let nearness = &canvas.nearness[blocks.clone()];
+        let shortness = self.shortness.get(blocks).unwrap_or_default();
+        let lights = self.light.as_chunks().0;
+        for (index, (tags, lights)) in tags.iter().zip(lights).enumerate() {
+            let facing = match shortness.get(index) {
+                Some(shortness) => {
+                    std::array::from_fn(|lane| nearness[index][lane] * shortness[lane])
+                }
+                None => [1.0; LANES],
+            };
             let rgb = self.colours(tags, &facing, lights);
             match whole.next() {
                 Some(pixels) => pixels.copy_from_slice(rgb.as_flattened()),
@@ -151,7 +165,8 @@ impl Shader {
     }
 
     /// Colours of a block. `facing` is inverse depth over the length of the ray at depth 1: times
-    /// the camera's distance from a plane, the cosine between its normal and the look at it.
+    /// the camera's distance from a plane, the cosine between its normal and the look at it. In
+    /// orthographic views, where faces hold that cosine, it is 1.
     fn colours(
         &self,
         tags: &[u32; LANES],
@@ -159,7 +174,7 @@ impl Shader {
         lights: &[f32; LANES],
     ) -> [[u8; 3]; LANES] {
         let lit = |face: &LitFace, lane: usize| {
-            lights[lane] * (1.0 - LAMP_SHARE + LAMP_SHARE * face.height_m * facing[lane])
+            lights[lane] * (1.0 - LAMP_SHARE + LAMP_SHARE * face.facing * facing[lane])
         };
         // Most blocks lie within one face.
         if tags.iter().all(|&tag| tag == tags[0]) {
@@ -181,6 +196,14 @@ fn to_byte(value: f32) -> u32 {
     (value.min(255.0) + 8_388_608.0).to_bits()
 }
 
+/// How much nearer the surroundings are becomes a bend: divided by `relative . [nearness, 1]`,
+/// times `scale`.
+#[derive(Clone, Copy)]
+struct Bend {
+    scale: f32,
+    relative: [f32; 2],
+}
+
 /// Takes from `light` what `shade` makes of the bend of each pixel's surroundings.
 ///
 /// Inverse depth is linear on a plane: the bend is how much nearer the surroundings are than a
@@ -190,12 +213,12 @@ fn darken_row(
     light: &mut [f32],
     centre: &[f32],
     [left, right, above, below]: [&[f32]; 4],
-    scale: f32,
+    Bend { scale, relative: [slope, offset] }: Bend,
     shade: impl Fn(f32) -> f32,
 ) {
     for i in 0..light.len() {
         let around = 0.25 * (left[i] + right[i] + above[i] + below[i]);
-        let bend = (around - centre[i]) / (centre[i] + 1e-6) * scale;
+        let bend = (around - centre[i]) / (slope * centre[i] + offset) * scale;
         light[i] *= 1.0 - shade(bend);
     }
 }

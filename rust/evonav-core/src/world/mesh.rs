@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::{
     assets::part::{Part, Primitive},
     geometry::{Aabb, Vec3, add, rotate, sub},
-    world::scene::Scene,
+    world::scene::{BodyKind, Scene},
 };
 
 /// Meridians of an ellipsoid; a multiple of 4, so that its box is exact.
@@ -73,10 +73,12 @@ impl SceneMesh {
     /// O(parts); about 0.2 ms for a house of a hundred objects.
     pub fn build(scene: &Scene) -> Self {
         let mut mesh = Self { num_bodies: scene.bodies.len(), ..Self::default() };
-        for (body, part) in
-            scene.bodies.iter().enumerate().flat_map(|(i, b)| b.parts.iter().map(move |p| (i, p)))
-        {
-            mesh.push(part, body as u32);
+        for (index, body) in scene.bodies.iter().enumerate() {
+            // As AI2-THOR's, ceilings have one side: from above one looks into the house.
+            let is_shown = |normal: Vec3| body.kind != BodyKind::Ceiling || normal[1] < 0.0;
+            for part in &body.parts {
+                mesh.push(part, index as u32, is_shown);
+            }
         }
         mesh
     }
@@ -112,13 +114,13 @@ impl SceneMesh {
         &self.corners[first..first + face.num_corners as usize]
     }
 
-    fn push(&mut self, part: &Part, body: u32) {
+    fn push(&mut self, part: &Part, body: u32, is_shown: impl Fn(Vec3) -> bool) {
         let (first_vertex, first_face) = (self.vertices_m.len(), self.faces.len());
         let (vertices_m, polygons) = outline(&part.primitive);
         let to_world = |v: &Vec3| add(part.centre_m, rotate(&part.rotation, *v));
         self.vertices_m.extend(vertices_m.iter().map(to_world));
         for polygon in polygons {
-            self.push_polygon(&polygon, first_vertex, body, part.colour);
+            self.push_polygon(&polygon, first_vertex, body, part.colour, &is_shown);
         }
         if self.faces.len() == first_face {
             self.vertices_m.truncate(first_vertex);
@@ -134,10 +136,17 @@ impl SceneMesh {
 
     /// Adds a polygon, in two halves where its four corners do not lie in a plane (the sides of a
     /// frustum whose ends are ellipses of different shapes).
-    fn push_polygon(&mut self, polygon: &[u32], first_vertex: usize, body: u32, colour: [u8; 3]) {
+    fn push_polygon(
+        &mut self,
+        polygon: &[u32],
+        first_vertex: usize,
+        body: u32,
+        colour: [u8; 3],
+        is_shown: &impl Fn(Vec3) -> bool,
+    ) {
         let at = |i: u32| self.vertices_m[first_vertex + i as usize];
         let (normal, area_m2) = newell(polygon.iter().map(|&i| at(i)));
-        if !area_m2.is_finite() || area_m2 <= LEAST_AREA_M2 {
+        if !area_m2.is_finite() || area_m2 <= LEAST_AREA_M2 || !is_shown(normal) {
             return;
         }
         let offset_m =
@@ -148,7 +157,9 @@ impl SceneMesh {
             let (half, _) = newell([at(a), at(b), at(c)].into_iter());
             let bulges = dot(half, sub(at(d), at(a))) <= 0.0;
             let halves = if bulges { [[a, b, c], [a, c, d]] } else { [[b, c, d], [b, d, a]] };
-            halves.iter().for_each(|half| self.push_polygon(half, first_vertex, body, colour));
+            for half in &halves {
+                self.push_polygon(half, first_vertex, body, colour, is_shown);
+            }
             return;
         }
         self.faces.push(Face {
