@@ -18,15 +18,17 @@ _LOG = logging.getLogger("evonav.thor")
 class Emitter:
     """Makes the events of one engine. What has not changed since the last event is not made again."""
 
-    def __init__(self, engine: Engine, *, has_camera: bool = True) -> None:
+    def __init__(self, engine: Engine, *, has_camera: bool = True, has_patches: bool = True) -> None:
         """Emits for an engine.
 
         Args:
             engine: Whose events.
             has_camera: False for a client that asked for no graphics.
+            has_patches: Whether the transport knows messages that only say what has changed.
         """
         self._engine = engine
         self._has_camera = has_camera
+        self._has_patches = has_patches
         self._metadata = MetadataEncoder()
         self._sequence_id = -1
         self._state: object = None
@@ -52,7 +54,7 @@ class Emitter:
         engine = self._engine
         kinds = self._kinds(message)
         state = (engine.state, kinds)
-        if engine.settings.fastActionEmit and state == self._state:
+        if self._has_patches and engine.settings.fastActionEmit and state == self._state:
             return [(FieldType.METADATA_PATCH, patch(engine.last))]
         if state != self._state:
             self._images = self._rendered(kinds) if kinds else []

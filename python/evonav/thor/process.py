@@ -6,12 +6,15 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from evonav.thor.fifo import ClientGone, Fifo, FramingError
+
+if TYPE_CHECKING:
+    from evonav.thor.wsgi import Wsgi
 
 _LOG = logging.getLogger("evonav.thor")
 
@@ -49,44 +52,60 @@ def _connect_and_serve(options: argparse.Namespace, parent_pid: int) -> int:
         level=logging.INFO,
         format=f"%(asctime)s evonav-thor[{os.getpid()}] %(levelname)s %(message)s",
     )
-    server_pipe = os.environ.get("AI2THOR_FIFO_SERVER_PIPE_PATH")
-    client_pipe = os.environ.get("AI2THOR_FIFO_CLIENT_PIPE_PATH")
-    if not server_pipe or not client_pipe:
-        kind = os.environ.get("AI2THOR_SERVER_TYPE")
-        problem = f"server type {kind} is not served, only FIFO" if kind else "no client started this process"
-        print(f"{_parser().format_usage()}\n{problem}", file=sys.stderr)
-        return 2
     try:
-        fifo = Fifo(Path(server_pipe), Path(client_pipe), lambda: os.getppid() != parent_pid)
-    except (ClientGone, OSError) as error:
+        transport = _transport(lambda: os.getppid() != parent_pid)
+    except _NoClientError as error:
+        print(f"{_parser().format_usage()}\n{error}", file=sys.stderr)
+        return 2
+    except (ClientGone, OSError, ValueError) as error:
         _LOG.error("cannot connect: %s", error)
         return 1
     try:
-        _serve(fifo, options)
+        _serve(transport, options)
     except ClientGone as end:
         _LOG.info("ends: %s", end)
     except FramingError as error:
         _LOG.error("ends: %s", error)
         return 1
     finally:
-        fifo.close()
+        transport.close()
     return 0
 
 
-def _serve(fifo: Fifo, options: argparse.Namespace) -> None:
+class _NoClientError(Exception):
+    """The environment names no client."""
+
+
+def _transport(is_orphan: Callable[[], bool]) -> "Fifo | Wsgi":
+    """What the client's environment asks for."""
+    variables = {name.removeprefix("AI2THOR_"): value for name, value in os.environ.items()}
+    kind = variables.get("SERVER_TYPE")
+    try:
+        if kind == "WSGI":
+            from evonav.thor.wsgi import Wsgi
+
+            return Wsgi(variables["HOST"], int(variables["PORT"]), variables["CLIENT_TOKEN"], is_orphan)
+        server_pipe, client_pipe = variables["FIFO_SERVER_PIPE_PATH"], variables["FIFO_CLIENT_PIPE_PATH"]
+    except KeyError as error:
+        served = f"server type {kind} without AI2THOR_{error.args[0]}" if kind else "no client started this process"
+        raise _NoClientError(served) from error
+    return Fifo(Path(server_pipe), Path(client_pipe), is_orphan)
+
+
+def _serve(transport: "Fifo | Wsgi", options: argparse.Namespace) -> None:
     # Imported with the pipes open: a client whose engine fails before that waits for ever.
     from evonav.thor.engine import Engine
     from evonav.thor.event import Emitter
 
     engine = Engine(width_px=options.width, height_px=options.height)
     has_camera = not options.nographics and os.environ.get("AI2THOR_SERVER_SIDE_SCREENSHOT") != "False"
-    emitter = Emitter(engine, has_camera=has_camera)
+    emitter = Emitter(engine, has_camera=has_camera, has_patches=isinstance(transport, Fifo))
     _LOG.info("serves process %d, %d x %d", os.getppid(), engine.width_px, engine.height_px)
-    fifo.send(emitter.event({"sequenceId": 0}))
+    transport.send(emitter.event({"sequenceId": 0}))
     while True:
-        message = _decoded(fifo.receive())
+        message = _decoded(transport.receive())
         engine.execute(message)
-        fifo.send(emitter.event(message))
+        transport.send(emitter.event(message))
 
 
 def _decoded(body: bytes) -> dict[str, Any]:
