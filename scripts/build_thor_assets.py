@@ -91,8 +91,7 @@ def row(asset: Json, own: list[Json], alike: list[Json]) -> Json:
     if materials is not None:
         entry["materials"] = list(materials)
         entry["mass_kg"] = round(statistics.median(r["mass"] for r in seen if r["salientMaterials"]), 4)
-    if {"pickupable", "moveable"} & set(flags):
-        entry["size_m"] = [round(asset["boundingBox"][axis], 4) for axis in "xyz"]
+    entry["size_m"] = [round(asset["boundingBox"][axis], 4) for axis in "xyz"]
     pivots_m = [pivot_m(record) for record in own if is_level(record)]
     if pivots_m:
         entry["pivot_m"] = [round(statistics.median(axis), 4) for axis in zip(*pivots_m, strict=True)]

@@ -3,13 +3,15 @@
 import gzip
 import json
 import os
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from evonav.house import bundled_houses
-from evonav.thor import objects
+from evonav.thor import edits, objects
 from evonav.thor.engine import Engine
 
 Json = dict[str, Any]
@@ -29,6 +31,7 @@ def engine_of(house: Json) -> Engine:
     return engine
 
 
+@cache
 def rows(path: Path) -> list[Json]:
     return [json.loads(line) for line in gzip.decompress(path.read_bytes()).splitlines()]
 
@@ -44,3 +47,55 @@ def test_records_have_the_fields_of_recorded_ones() -> None:
     scene = engine_of(house).scene
     fields = set(recorded_cubes()[0])
     assert all(set(record) == fields for record in objects.static_records(scene))
+
+
+@needs_recorded
+def test_boxes_list_their_corners_as_recorded_ones() -> None:
+    rotated = 0
+    for record in recorded_cubes():
+        box = record["axisAlignedBoundingBox"]
+        ours = objects.aligned_box(list(box["center"].values()), list(box["size"].values()))
+        np.testing.assert_allclose(ours["cornerPoints"], box["cornerPoints"], atol=1e-6)
+        corners_m = record["objectOrientedBoundingBox"]["cornerPoints"]
+        size_m = [float(np.linalg.norm(np.subtract(corners_m[0], corners_m[i]))) for i in (1, 4, 3)]
+        centre_m = tuple(np.mean(corners_m, axis=0).tolist())
+        ours_m = objects.oriented_corners(centre_m, (size_m[0], size_m[1], size_m[2]), record["rotation"])
+        np.testing.assert_allclose(ours_m, corners_m, atol=2e-5)
+        rotated += abs((record["rotation"]["y"] + 45) % 90 - 45) > 1
+    assert rotated > 20
+
+
+@needs_recorded
+def test_things_belong_to_the_receptacles_that_recorded_cubes_belong_to() -> None:
+    """The receptacle under a thing, and `Floor` for all that begins lower than its trigger box ends."""
+    houses = rows(RECORDED / "val.jsonl.gz")
+    agreed = total = 0
+    for index in sorted({episode["scene"] for episode in rows(RECORDED / "procthor-attr-onav-locobot-val.jsonl.gz")}):
+        scene = engine_of(houses[index]).scene
+        reach_m = houses[index]["proceduralParameters"]["receptacleHeight"]
+        receptacles = [r for r in objects.static_records(scene) if r["receptacle"] and r["objectType"] != "Floor"]
+        boxes = [r["axisAlignedBoundingBox"] for r in receptacles]
+        centres_m, sizes_m = (np.array([list(box[key].values()) for box in boxes]) for key in ("center", "size"))
+        for cube in cubes_of(index):
+            parents = [parent.split("___")[0] for parent in cube["parentReceptacles"]]
+            corners_m = np.array(cube["axisAlignedBoundingBox"]["cornerPoints"])
+            bottom_m = corners_m[:, 1].min()
+            assert ("Floor" in parents) == (bottom_m < reach_m)
+            found = edits.holder_of(
+                bottom_m, corners_m.mean(axis=0), centres_m - 0.5 * sizes_m, centres_m + 0.5 * sizes_m
+            )
+            agreed += found is not None and receptacles[found]["objectId"] == parents[0]
+            total += 1
+    assert total > 300
+    print(f"receptacles agree for {agreed} of {total} cubes")
+    assert agreed >= 0.98 * total
+
+
+def cubes_of(index: int) -> list[Json]:
+    episodes = rows(RECORDED / "procthor-attr-onav-locobot-val.jsonl.gz")
+    return [
+        cube
+        for episode in episodes
+        if episode["scene"] == index
+        for cube in episode["targetObjectConfig"]["positions"].values()
+    ]

@@ -16,7 +16,10 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, PydanticUserError, TypeAdapter, ValidationError
 
 # Whose functions register themselves.
-_MODULES = ("dialogue", "motion", "teleport", "paths", "assets", "random_spawn", "spawn")
+_MODULES = (
+    *("dialogue", "motion", "teleport", "paths", "assets", "random_spawn", "spawn"),
+    *("frame_actions", "object_actions", "states"),
+)
 
 # What any action may carry (`DynamicServerAction.AllowedExtraneousParameters`), and what the client may add to it.
 _COMMON = frozenset(

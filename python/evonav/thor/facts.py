@@ -22,7 +22,7 @@ class AssetFacts:
     materials: tuple[str, ...] | None = None
     """`salientMaterials`; records that give them give the mass."""
     size_m: _Vec3 | None = None
-    """Of what can be moved."""
+    """Of its box."""
     pivot_m: _Vec3 = field(default=(0.0, 0.0, 0.0))
     """`position`, seen from the middle of the box in the asset's own frame."""
 

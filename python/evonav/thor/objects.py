@@ -15,6 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.thor.actions import ActionError
 from evonav.thor.agent import Agent
 from evonav.thor.facts import AssetFacts, facts_of
 from evonav.thor.scene import Scene
@@ -58,12 +59,12 @@ def static_records(scene: Scene) -> list[Record]:
 
     Do not change them: they are kept until the scene changes.
     """
-    return _table(scene).records
+    return table_of(scene).records
 
 
 def views(scene: Scene, agent: Agent, settings: Any) -> list[View]:  # noqa: ANN401
     """What the agent makes of each of `static_records`, in the same order."""
-    table = _table(scene)
+    table = table_of(scene)
     distances_m = np.linalg.norm(table.positions_m - (agent.x_m, agent.y_m, agent.z_m), axis=1).tolist()
     seen = visible_ids(scene, agent, float(settings.visibilityDistance))
     return [
@@ -72,7 +73,17 @@ def views(scene: Scene, agent: Agent, settings: Any) -> list[View]:  # noqa: ANN
     ]
 
 
-class _Table(NamedTuple):
+def records(scene: Scene, agent: Agent, settings: Any) -> list[Record]:  # noqa: ANN401
+    """All fields of all objects."""
+    return [
+        {**record, "distance": view.distance_m, "visible": view.is_visible, "isInteractable": view.is_interactable}
+        for record, view in zip(static_records(scene), views(scene, agent, settings), strict=True)
+    ]
+
+
+class Table(NamedTuple):
+    """All records, and what goes with them."""
+
     version: int
     records: list[Record]
     positions_m: NDArray[np.float64]
@@ -81,17 +92,46 @@ class _Table(NamedTuple):
     """Instance id in images, by object id."""
 
 
-_tables: WeakKeyDictionary[Scene, _Table] = WeakKeyDictionary()
+_tables: WeakKeyDictionary[Scene, Table] = WeakKeyDictionary()
 
 
-def _table(scene: Scene) -> _Table:
+def table_of(scene: Scene) -> Table:
+    """The records of a scene as it now is."""
     table = _tables.get(scene)
     if table is None or table.version != scene.version:
         table = _tables[scene] = _build(scene)
     return table
 
 
-def _build(scene: Scene) -> _Table:
+def record_of(scene: Scene, object_id: str) -> Record:
+    """An object's static record.
+
+    Raises:
+        ActionError: There is no such object.
+    """
+    for record in static_records(scene):
+        if record["objectId"] == object_id:
+            return record
+    raise ActionError(f"objectId: {object_id} is not the objectId on any object in the scene!")
+
+
+def own_size_m(scene: Scene, entry: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Edges of a house object's box along its own axes."""
+    record = record_of(scene, entry["id"])
+    facts = facts_of(str(entry.get("assetId", "")), record["objectType"])
+    return np.array(facts.size_m or list(record["axisAlignedBoundingBox"]["size"].values()))
+
+
+def bounds_m(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Least and greatest corner of the box around the building."""
+    bodies = [body for body in scene.simulator.objects if body.kind != "object"]
+    half_m = [0.5 * np.array(body.size_m) for body in bodies]
+    low = np.min([body.centre_m - half for body, half in zip(bodies, half_m, strict=True)], axis=0)
+    high = np.max([body.centre_m + half for body, half in zip(bodies, half_m, strict=True)], axis=0)
+    return tuple(low.tolist()), tuple(high.tolist())
+
+
+def _build(scene: Scene) -> Table:
     house = scene.house or {}
     bodies: dict[str, tuple[int, SceneObject]] = {}
     if scene.house is not None:
@@ -116,7 +156,7 @@ def _build(scene: Scene) -> _Table:
         records += _structure_records(house, floor_id, {key: body for key, (_, body) in bodies.items()})
     _relate(records, parents)
     positions_m = np.array([list(record["position"].values()) for record in records], dtype=np.float64).reshape(-1, 3)
-    return _Table(scene.version, records, positions_m, {key: instance for key, (instance, _) in bodies.items()})
+    return Table(scene.version, records, positions_m, {key: instance for key, (instance, _) in bodies.items()})
 
 
 def placed_objects(house: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str | None]]:
@@ -145,11 +185,11 @@ def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
     rotation = {axis: float(entry["rotation"][axis]) % 360.0 for axis in "xyz"}
     centre_m = (float(entry["position"]["x"]), body.centre_m[1], float(entry["position"]["z"]))
     record = _record(entry, body.category, facts, centre_m, rotation)
-    record["axisAlignedBoundingBox"] = _aligned_box(body.centre_m, body.size_m)
+    record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
     if facts.is_movable:
         is_upright = rotation["x"] % 180 == 0 and rotation["z"] % 180 == 0
         size_m, turn = (facts.size_m, rotation) if facts.size_m and is_upright else (body.size_m, None)
-        record["objectOrientedBoundingBox"] = {"cornerPoints": _oriented_corners(centre_m, size_m, turn)}
+        record["objectOrientedBoundingBox"] = {"cornerPoints": oriented_corners(centre_m, size_m, turn)}
     return record
 
 
@@ -158,7 +198,7 @@ def _opening_record(entry: Mapping[str, Any], body: SceneObject, house: Mapping[
     wall = next((wall for wall in house["walls"] if wall["id"] == entry.get("wall0")), None)
     yaw_deg = (_wall_yaw_deg(wall) + 180.0) % 360.0 if wall else 0.0
     record = _record(entry, body.category, facts, body.centre_m, {"x": 0.0, "y": yaw_deg, "z": 0.0})
-    record["axisAlignedBoundingBox"] = _aligned_box(body.centre_m, body.size_m)
+    record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
     return record
 
 
@@ -169,18 +209,18 @@ def _structure_records(house: Mapping[str, Any], floor_id: str, bodies: Mapping[
     level = {"x": 0.0, "y": 0.0, "z": 0.0}
     floor = AssetFacts("Floor", frozenset({"receptacle"}))
     record = _record({"id": floor_id}, "Floor", floor, (0.0, 0.0, 0.0), level)
-    record["axisAlignedBoundingBox"] = _aligned_box(tuple((0.5 * (low + high)).tolist()), tuple((high - low).tolist()))
+    record["axisAlignedBoundingBox"] = aligned_box(tuple((0.5 * (low + high)).tolist()), tuple((high - low).tolist()))
     yield record
     for room in rooms:
         record = _record({"id": room.id}, "Floor", AssetFacts("Floor"), (0.0, 0.0, 0.0), level)
-        record["axisAlignedBoundingBox"] = _aligned_box(room.centre_m, room.size_m)
+        record["axisAlignedBoundingBox"] = aligned_box(room.centre_m, room.size_m)
         yield record
     for wall in house.get("walls", ()):
         if not wall.get("empty"):
             body = bodies[wall["id"]]
             turn = {"x": 0.0, "y": _wall_yaw_deg(wall), "z": 0.0}
             record = _record(wall, "Wall", AssetFacts("Wall"), body.centre_m, turn)
-            record["axisAlignedBoundingBox"] = _aligned_box(body.centre_m, body.size_m)
+            record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
             yield record
 
 
@@ -238,7 +278,8 @@ def rotation_of(euler_deg: Mapping[str, float]) -> NDArray[np.float64]:
     return turned
 
 
-def _aligned_box(centre_m: Sequence[float], size_m: Sequence[float]) -> Record:
+def aligned_box(centre_m: Sequence[float], size_m: Sequence[float]) -> Record:
+    """`axisAlignedBoundingBox`."""
     spans = [(centre + 0.5 * size, centre - 0.5 * size) for centre, size in zip(centre_m, size_m, strict=True)]
     return {
         "cornerPoints": [[x, y, z] for x in spans[0] for y in spans[1] for z in spans[2]],
@@ -251,7 +292,8 @@ def _aligned_box(centre_m: Sequence[float], size_m: Sequence[float]) -> Record:
 _ORIENTED = [(x, y, z) for y in (-0.5, 0.5) for x, z in ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))]
 
 
-def _oriented_corners(centre_m: _Vec3, size_m: _Vec3, rotation: Mapping[str, float] | None) -> list[list[float]]:
+def oriented_corners(centre_m: _Vec3, size_m: _Vec3, rotation: Mapping[str, float] | None) -> list[list[float]]:
+    """`cornerPoints` of `objectOrientedBoundingBox`."""
     own_m = np.multiply(_ORIENTED, size_m)
     turned_m = own_m @ rotation_of(rotation).T if rotation else own_m
     corners_m: list[list[float]] = (turned_m + centre_m).tolist()
@@ -283,26 +325,43 @@ def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
 
     Near enough on the ground plane, and some visibility point of it is in the picture with nothing before it.
     """
-    table = _table(scene)
+    table = table_of(scene)
     if scene.house is None:
         return set()
     simulator = scene.simulator
     half_height = math.tan(0.5 * simulator.intrinsics.vertical_fov_rad)
     half_width = half_height * simulator.intrinsics.width_px / simulator.intrinsics.height_px
-    eye_m = np.array([agent.x_m, simulator.config.camera_height_m, agent.z_m])
-    seen = rotation_of({"x": agent.horizon_deg, "y": agent.yaw_deg, "z": 0.0})
+    eye = eye_m(scene, agent)
+    world_from_camera = looking(agent)
     ids = set()
     for record in table.records:
         instance = table.instances.get(record["objectId"])
         box = record["axisAlignedBoundingBox"]
         centre_m, size_m = (np.array(list(box[key].values())) for key in ("center", "size"))
-        gap_m = np.maximum(np.abs(eye_m - centre_m) - 0.5 * size_m, 0.0)
+        gap_m = np.maximum(np.abs(eye - centre_m) - 0.5 * size_m, 0.0)
         if instance is None or math.hypot(gap_m[0], gap_m[2]) > distance_m:
             continue
         points_m = centre_m + _POINTS * size_m
-        right, up, ahead = ((points_m - eye_m) @ seen).T
+        right, up, ahead = ((points_m - eye) @ world_from_camera).T
         is_framed = (ahead > 0) & (np.abs(right) < half_width * ahead) & (np.abs(up) < half_height * ahead)
-        eye = (float(eye_m[0]), float(eye_m[1]), float(eye_m[2]))
         if any(simulator.is_visible(eye, (x, y, z), (instance,)) for x, y, z in points_m[is_framed].tolist()):
             ids.add(record["objectId"])
     return ids
+
+
+def eye_m(scene: Scene, agent: Agent) -> _Vec3:
+    """Where the agent's camera is."""
+    height_m = scene.simulator.config.camera_height_m if agent.is_standing else agent.y_m
+    return (agent.x_m, height_m, agent.z_m)
+
+
+def looking(agent: Agent) -> NDArray[np.float64]:
+    """`world_from_camera`, `(3, 3)`: right, up and ahead as columns."""
+    return rotation_of({"x": agent.horizon_deg, "y": agent.yaw_deg, "z": 0.0})
+
+
+def object_of_body(scene: Scene, body: int) -> str | None:
+    """Id of the object that a body of the simulator is; none of a ceiling."""
+    instances = table_of(scene).instances
+    found = scene.simulator.objects[body].id
+    return found if instances.get(found) == body + 1 else None

@@ -23,6 +23,8 @@ class Scene:
         self.config = SimulatorConfig()
         self.version = next(_versions)
         """Another after every change, and in every scene; what is derived from the house is kept under it."""
+        self.disabled: dict[str, Document] = {}
+        """Objects that were taken out, by id."""
         self._simulator: EmbeddedSimulator | None = None
 
     def load(self, house: Document) -> None:
@@ -32,7 +34,7 @@ class Scene:
             HouseError: It is malformed; the house at hand stays.
         """
         simulator = self._built(house)
-        self.house, self._simulator = house, simulator
+        self.house, self._simulator, self.disabled = house, simulator, {}
         self.version = next(_versions)
 
     def begin_edit(self) -> Document:
@@ -51,6 +53,10 @@ class Scene:
         simulator.apply(delta_json)
         self.house, self._simulator = json.loads(simulator.house_json), simulator
         return unplaced
+
+    def note_relations(self) -> None:
+        """Says that what stands on what in the house has changed, and nothing that the simulator shows."""
+        self.version = next(_versions)
 
     def configure(self, config: SimulatorConfig) -> None:
         """Sets the agent's camera and body."""

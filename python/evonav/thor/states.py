@@ -1,0 +1,151 @@
+"""Actions that change the state of objects: the records show it, the pictures only of doors.
+
+The shape of furniture is one block, so an open fridge is drawn closed.
+"""
+
+from typing import Any
+
+from evonav.thor import edits, frame_actions, objects
+from evonav.thor.actions import ActionError, action
+from evonav.thor.engine import Engine
+from evonav.thor.scene import Scene
+
+
+@action("OpenObject")
+def open_object(
+    engine: Engine,
+    *,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    openness: float = 1.0,
+    **unused: Any,  # noqa: ANN401
+) -> None:
+    """Opens an object so far, 0 to 1."""
+    record = _target(engine, objectId, x, y, forceAction)
+    if not 0 <= openness <= 1:
+        raise ActionError("openness must be in [0.0:1.0]")
+    _require(record, "openable", f"{record['objectId']} is not an Openable object")
+    _set(engine.scene, record["objectId"], "openness", openness)
+
+
+@action("CloseObject")
+def close_object(
+    engine: Engine,
+    *,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+    **unused: Any,  # noqa: ANN401
+) -> None:
+    """Closes an object."""
+    open_object(engine, objectId=objectId, x=x, y=y, forceAction=forceAction, openness=0.0)
+
+
+@action("ToggleObjectOn")
+def toggle_object_on(
+    engine: Engine,
+    *,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+) -> None:
+    """Switches an object on."""
+    _toggle(engine, _target(engine, objectId, x, y, forceAction), is_on=True)
+
+
+@action("ToggleObjectOff")
+def toggle_object_off(
+    engine: Engine,
+    *,
+    objectId: str | None = None,
+    x: float | None = None,
+    y: float | None = None,
+    forceAction: bool = False,
+) -> None:
+    """Switches an object off."""
+    _toggle(engine, _target(engine, objectId, x, y, forceAction), is_on=False)
+
+
+@action("DirtyObject")
+def dirty_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
+    """Makes an object dirty."""
+    _flip(engine, _target(engine, objectId, None, None, forceAction), "isDirty", "dirtyable", "CanBeDirty", value=True)
+
+
+@action("CleanObject")
+def clean_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
+    """Makes an object clean."""
+    _flip(engine, _target(engine, objectId, None, None, forceAction), "isDirty", "dirtyable", "CanBeDirty", value=False)
+
+
+@action("CookObject")
+def cook_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
+    """Cooks an object."""
+    _flip(engine, _target(engine, objectId, None, None, forceAction), "isCooked", "cookable", "CanBeCooked", value=True)
+
+
+@action("FillObjectWithLiquid")
+def fill_object_with_liquid(
+    engine: Engine, *, objectId: str, fillLiquid: str = "water", forceAction: bool = False
+) -> None:
+    """Fills an object with water, coffee or wine."""
+    if fillLiquid not in ("water", "coffee", "wine"):
+        raise ActionError(f"{fillLiquid} is not a valid Liquid Type")
+    record = _target(engine, objectId, None, None, forceAction)
+    _flip(engine, record, "isFilledWithLiquid", "canFillWithLiquid", "CanBeFilled", value=True)
+    _set(engine.scene, objectId, "fillLiquid", fillLiquid)
+
+
+@action("EmptyLiquidFromObject")
+def empty_liquid_from_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
+    """Empties an object."""
+    record = _target(engine, objectId, None, None, forceAction)
+    _flip(engine, record, "isFilledWithLiquid", "canFillWithLiquid", "CanBeFilled", value=False)
+
+
+def _target(engine: Engine, object_id: str | None, x: float | None, y: float | None, is_forced: bool) -> objects.Record:
+    """The object that an action is about, by id or by its place in the picture."""
+    if object_id is None:
+        if x is None or y is None:
+            raise ActionError("objectId, or x and y, must be given")
+        object_id, _ = frame_actions.object_at(engine, x, y)
+    record = objects.record_of(engine.scene, object_id)
+    if not is_forced:
+        seen = objects.visible_ids(engine.scene, engine.agent, engine.settings.visibilityDistance)
+        if object_id not in seen:
+            raise ActionError("Target object not found within the specified visibility.")
+    return record
+
+
+def _require(record: objects.Record, flag: str, message: str) -> None:
+    if not record[flag]:
+        raise ActionError(message)
+
+
+def _toggle(engine: Engine, record: objects.Record, *, is_on: bool) -> None:
+    _require(record, "toggleable", f"{record['objectId']} is not toggleable")
+    if record["isToggled"] == is_on:
+        way = "on" if is_on else "off"
+        raise ActionError(f"can't toggle object {way} if it's already {way}!")
+    _set(engine.scene, record["objectId"], "isOn", is_on)
+
+
+def _flip(engine: Engine, record: objects.Record, state: str, flag: str, name: str, *, value: bool) -> None:
+    _require(record, flag, f"{record['objectId']} does not have {name} property!")
+    if record[state] == value:
+        raise ActionError(f"{record['objectId']} already has {state} {value}")
+    _set(engine.scene, record["objectId"], state, value)
+
+
+def _set(scene: Scene, object_id: str, key: str, value: object) -> None:
+    """Writes into the house file, from which records and pictures come."""
+    record = objects.record_of(scene, object_id)
+    with edits.edited(scene) as house:
+        entries = [entry for entry, _ in objects.placed_objects(house)] + [*house.get("doors", ())]
+        for entry in entries:
+            if entry["id"] == record["objectId"]:
+                entry[key] = value

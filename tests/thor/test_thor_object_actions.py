@@ -1,0 +1,242 @@
+"""Actions that move, remove and query objects, in bundled houses."""
+
+import json
+import math
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evonav.house import bundled_houses
+from evonav.thor import objects
+from evonav.thor.engine import Engine
+
+Json = dict[str, Any]
+
+
+def engine_of(number: int) -> Engine:
+    engine = Engine()
+    engine.configure()
+    house = json.loads(next(islice(bundled_houses(), number, None)).to_json())
+    assert engine.execute({"action": "CreateHouse", "house": house}).is_success
+    start = engine.scene.simulator.pose
+    engine.agent.x_m, engine.agent.z_m = start.x_m, start.z_m
+    return engine
+
+
+@pytest.fixture
+def engine() -> Engine:
+    return engine_of(2)
+
+
+def records(engine: Engine) -> dict[str, Json]:
+    return {record["objectId"]: record for record in objects.static_records(engine.scene)}
+
+
+def do(engine: Engine, action: str, **arguments: Any) -> Any:
+    result = engine.execute({"action": action, **arguments})
+    assert result.is_success, result.error_message
+    return result.action_return
+
+
+def fail(engine: Engine, action: str, **arguments: Any) -> str:
+    result = engine.execute({"action": action, **arguments})
+    assert not result.is_success
+    return result.error_message
+
+
+def movable(engine: Engine) -> list[Json]:
+    return [record for record in records(engine).values() if record["pickupable"] or record["moveable"]]
+
+
+def poses(chosen: list[Json]) -> list[Json]:
+    return [{"objectName": r["name"], "position": r["position"], "rotation": r["rotation"]} for r in chosen]
+
+
+def corners_m(record: Json) -> Any:
+    return np.array(record["axisAlignedBoundingBox"]["cornerPoints"])
+
+
+@pytest.mark.parametrize("is_stationary", [True, False])
+def test_poses_that_are_set_to_what_they_are_change_nothing(engine: Engine, is_stationary: bool) -> None:
+    before = records(engine)
+    do(engine, "SetObjectPoses", objectPoses=poses(movable(engine)), placeStationary=is_stationary)
+    after = records(engine)
+    assert set(after) == set(before)
+    for object_id, record in before.items():
+        np.testing.assert_allclose(corners_m(after[object_id]), corners_m(record), atol=1e-3, err_msg=object_id)
+    lost = [
+        i for i, r in before.items() if set(r["parentReceptacles"] or ()) - set(after[i]["parentReceptacles"] or ())
+    ]
+    assert len(lost) <= 2
+
+
+def test_what_can_be_moved_and_is_not_named_goes(engine: Engine) -> None:
+    kept, *others = movable(engine)
+    do(engine, "SetObjectPoses", objectPoses=poses([kept]))
+    left = records(engine)
+    assert kept["objectId"] in left
+    assert not {record["objectId"] for record in others} & set(left)
+    assert [r["objectId"] for r in left.values() if r["moveable"] or r["pickupable"]] == [kept["objectId"]]
+
+
+def test_a_pose_is_that_of_the_pivot_and_copies_get_names_of_their_own(engine: Engine) -> None:
+    lamp = next(record for record in movable(engine) if record["objectType"] == "FloorLamp")
+    target = {"x": lamp["position"]["x"] + 0.5, "y": 1.0, "z": lamp["position"]["z"]}
+    pose = {"objectName": lamp["name"], "position": target, "rotation": {"x": 0, "y": 40, "z": 0}}
+    do(engine, "SetObjectPoses", objectPoses=[*poses([lamp]), pose])
+    copy = records(engine)[f"{lamp['objectId']}_copy_1"]
+    assert copy["name"] == f"{lamp['name']}_copy_1"
+    assert copy["position"] == pytest.approx(target)
+    assert copy["rotation"]["y"] == 40
+    assert records(engine)[lamp["objectId"]]["position"] == pytest.approx(lamp["position"])
+
+
+def test_a_name_that_is_not_there_fails_and_the_rest_is_done(engine: Engine) -> None:
+    chosen = poses(movable(engine)[:1])
+    message = fail(engine, "SetObjectPoses", objectPoses=[*chosen, {"objectName": "Ghost"}])
+    assert message == "No Pickupable or Moveable object of name Ghost found in scene."
+    assert len(movable(engine)) == 1
+
+
+def test_a_thing_is_put_on_the_surface_under_a_point(engine: Engine) -> None:
+    table = next(r for r in records(engine).values() if r["objectType"] == "Dresser" and r["receptacleObjectIds"])
+    small = table["receptacleObjectIds"][0]
+    do(engine, "RemoveFromScene", objectIds=table["receptacleObjectIds"][1:])
+    box = table["axisAlignedBoundingBox"]
+    top_m = box["center"]["y"] + 0.5 * box["size"]["y"]
+    point = {**box["center"], "y": 2.0}
+    do(engine, "PlaceObjectAtPoint", objectId=small, position=point)
+    record = records(engine)[small]
+    assert corners_m(record)[:, 1].min() == pytest.approx(top_m, abs=1e-6)
+    assert (record["axisAlignedBoundingBox"]["center"]["x"]) == pytest.approx(point["x"])
+    assert record["parentReceptacles"] == [table["objectId"]]
+    do(engine, "PlaceObjectAtPoint", objectId=small, position=point, forceKinematic=True)
+    assert corners_m(records(engine)[small])[:, 1].min() == pytest.approx(top_m + 0.005, abs=1e-6)
+
+
+def test_a_thing_is_not_put_where_another_is(engine: Engine) -> None:
+    lamp = next(record for record in movable(engine) if record["objectType"] == "FloorLamp")
+    dresser = next(record for record in records(engine).values() if record["objectType"] == "Dresser")
+    point = {**dresser["axisAlignedBoundingBox"]["center"]}
+    point["x"] -= 0.5 * dresser["axisAlignedBoundingBox"]["size"]["x"] + 0.02
+    before = records(engine)
+    message = fail(engine, "PlaceObjectAtPoint", objectId=lamp["objectId"], position={**point, "y": 0.5})
+    assert "Spawn area not clear" in message
+    assert records(engine) == before
+
+
+def test_points_off_the_scene_are_named(engine: Engine) -> None:
+    small = movable(engine)[0]["objectId"]
+    message = fail(engine, "PlaceObjectAtPoint", objectId=small, position={"x": 99.0, "y": 1.0, "z": 0.0})
+    assert message.startswith("Position coordinate ((99.0, 1.0, 0.0)) is not within scene bounds")
+
+
+def test_what_stood_on_what_goes_falls_and_comes_back_with_nothing_on_it(engine: Engine) -> None:
+    before = records(engine)
+    table = next(r for r in before.values() if r["objectType"] == "Dresser" and r["receptacleObjectIds"])
+    do(engine, "DisableObject", objectId=table["objectId"])
+    after = records(engine)
+    assert table["objectId"] not in after
+    for object_id in table["receptacleObjectIds"]:
+        assert corners_m(after[object_id])[:, 1].min() < corners_m(before[object_id])[:, 1].min() - 0.2
+        assert "Floor" in after[object_id]["parentReceptacles"]
+    do(engine, "EnableObject", objectId=table["objectId"])
+    back = records(engine)[table["objectId"]]
+    np.testing.assert_allclose(corners_m(back), corners_m(table), atol=1e-6)
+
+
+def test_the_building_stays(engine: Engine) -> None:
+    wall = next(record for record in records(engine).values() if record["objectType"] == "Wall")
+    assert "part of the building" in fail(engine, "DisableObject", objectId=wall["objectId"])
+
+
+@pytest.mark.parametrize("action", ["DisableObject", "RemoveFromScene", "EnableObject", "OpenObject", "Contains"])
+def test_unknown_ids_are_named(engine: Engine, action: str) -> None:
+    assert fail(engine, action, objectId="Ghost") == "objectId: Ghost is not the objectId on any object in the scene!"
+
+
+@pytest.mark.parametrize("number", [0, 2])
+def test_the_object_at_a_pixel_is_the_one_of_the_instance_image(number: int) -> None:
+    """And its point has the pixel's depth. Pixels next to an outline may be either side's."""
+    engine = engine_of(number)
+    engine.agent.horizon_deg = 20.0
+    agreed = total = 0
+    for yaw_deg in (0.0, 75.0, 200.0):
+        engine.agent.yaw_deg = yaw_deg
+        frame = engine.scene.simulator.render(engine.agent.pose, rgb=False)
+        assert frame.instances is not None
+        bodies = engine.scene.simulator.objects
+        for row in range(5, 300, 30):
+            for col in range(5, 300, 30):
+                around = frame.instances[row - 1 : row + 2, col - 1 : col + 2]
+                body = bodies[int(frame.instances[row, col]) - 1]
+                if (around != around[1, 1]).any() or around[1, 1] == 0 or body.kind == "ceiling":
+                    continue
+                x, y = (col + 0.5) / 300, (row + 0.5) / 300
+                total += 1
+                agreed += do(engine, "GetObjectInFrame", x=x, y=y) == body.id
+                point = do(engine, "GetCoordinateFromRaycast", x=x, y=y)
+                offset_m = np.subtract(list(point.values()), objects.eye_m(engine.scene, engine.agent))
+                depth_m = offset_m @ objects.looking(engine.agent)[:, 2]
+                assert depth_m == pytest.approx(float(frame.depth_m[row, col]), rel=2e-3, abs=2e-3)
+    assert total > 100
+    assert agreed == total
+
+
+def test_points_of_the_picture_and_of_the_world_are_each_others(engine: Engine) -> None:
+    engine.agent.yaw_deg, engine.agent.horizon_deg = 33.0, 12.0
+    point = do(engine, "GetCoordinateFromRaycast", x=0.3, y=0.8)
+    back = do(engine, "WorldToViewportPoint", position=point)
+    assert (back["x"], back["y"]) == pytest.approx((0.3, 0.8))
+    assert "x/y must be in [0:1]" in fail(engine, "GetObjectInFrame", x=1.5, y=0.5)
+
+
+def test_states_show_in_records(engine: Engine) -> None:
+    def one(flag: str) -> Json:
+        return next(record for record in records(engine).values() if record[flag])
+
+    fridge, lamp = one("openable"), next(r for r in records(engine).values() if r["objectType"] == "FloorLamp")
+    do(engine, "OpenObject", objectId=fridge["objectId"], openness=0.6, forceAction=True)
+    opened = records(engine)[fridge["objectId"]]
+    assert (opened["isOpen"], opened["openness"]) == (True, 0.6)
+    do(engine, "CloseObject", objectId=fridge["objectId"], forceAction=True)
+    assert not records(engine)[fridge["objectId"]]["isOpen"]
+    is_on = lamp["isToggled"]
+    first, then = ("ToggleObjectOff", "ToggleObjectOn") if is_on else ("ToggleObjectOn", "ToggleObjectOff")
+    do(engine, first, objectId=lamp["objectId"], forceAction=True)
+    assert records(engine)[lamp["objectId"]]["isToggled"] != is_on
+    assert "already" in fail(engine, first, objectId=lamp["objectId"], forceAction=True)
+    do(engine, then, objectId=lamp["objectId"], forceAction=True)
+    assert records(engine)[lamp["objectId"]] == lamp
+
+
+def test_states_that_an_object_has_not_are_refused(engine: Engine) -> None:
+    dresser = next(record for record in records(engine).values() if record["objectType"] == "Dresser")["objectId"]
+    assert fail(engine, "OpenObject", objectId=dresser, forceAction=True) == f"{dresser} is not an Openable object"
+    assert fail(engine, "ToggleObjectOn", objectId=dresser, forceAction=True) == f"{dresser} is not toggleable"
+    far = fail(engine, "OpenObject", objectId=dresser)
+    assert far == "Target object not found within the specified visibility."
+
+
+def test_a_house_file_says_what_is_open_on_and_dirty() -> None:
+    engine = engine_of(2)
+    house = engine.scene.house
+    assert house is not None
+    entries = {entry["id"]: entry for entry, _ in objects.placed_objects(house)}
+    book = next(r["objectId"] for r in records(engine).values() if r["objectType"] == "Book")
+    lamp = next(r["objectId"] for r in records(engine).values() if r["objectType"] == "FloorLamp")
+    entries[book]["openness"], entries[lamp]["isOn"] = 0.25, False
+    do(engine, "CreateHouse", house=house)
+    assert records(engine)[book]["openness"] == 0.25
+    assert not records(engine)[lamp]["isToggled"]
+
+
+def test_a_door_is_drawn_as_open_as_it_is(engine: Engine) -> None:
+    door = next(record for record in records(engine).values() if record["objectType"] == "Doorway" and record["isOpen"])
+    size_m = np.ptp(corners_m(door), axis=0)
+    do(engine, "CloseObject", objectId=door["objectId"], forceAction=True)
+    closed_m = np.ptp(corners_m(records(engine)[door["objectId"]]), axis=0)
+    assert min(closed_m[0], closed_m[2]) < min(size_m[0], size_m[2]) - 0.3
+    assert math.isclose(closed_m[1], size_m[1], abs_tol=1e-6)
