@@ -42,6 +42,8 @@ FLAGS = {
     "isColdSource": "isColdSource",
 }
 PRIMARY = {"CanPickup": "pickupable", "Moveable": "moveable"}
+# Whose shelves are objects of their own in AI2-THOR, and receptacles; here they are one with their furniture.
+SHELVED = "ShelvingUnit"
 # States that some assets start with.
 STATES = ("isOpen", "isToggled", "isFilledWithLiquid")
 LEVEL_DEG = 0.5
@@ -81,6 +83,8 @@ def records(node: Any) -> Iterator[Json]:  # noqa: ANN401
 def row(asset: Json, own: list[Json], alike: list[Json]) -> Json:
     """Facts of an asset, from its own records or else those of its type."""
     properties = {*asset.get("secondaryProperties", ()), asset.get("primaryProperty")}
+    if asset["objectType"] == SHELVED:
+        properties.add("Receptacle")
     flags = [flag for key, flag in {**PRIMARY, **FLAGS}.items() if key in properties]
     seen = own or alike
     entry: Json = {"id": asset["assetId"], "type": asset["objectType"], "flags": flags}

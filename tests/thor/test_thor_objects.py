@@ -3,6 +3,8 @@
 import gzip
 import json
 import os
+import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -50,6 +52,13 @@ def test_records_have_the_fields_of_recorded_ones() -> None:
 
 
 @needs_recorded
+def test_the_script_reproduces_the_bundled_facts(tmp_path: Path) -> None:
+    out = tmp_path / "assets.json"
+    subprocess.run([sys.executable, ROOT / "scripts" / "build_thor_assets.py", SHARED, "--out", out], check=True)
+    assert out.read_bytes() == (ROOT / "python" / "evonav" / "thor" / "data" / "assets.json").read_bytes()
+
+
+@needs_recorded
 def test_boxes_list_their_corners_as_recorded_ones() -> None:
     rotated = 0
     for record in recorded_cubes():
@@ -88,7 +97,7 @@ def test_things_belong_to_the_receptacles_that_recorded_cubes_belong_to() -> Non
             total += 1
     assert total > 300
     print(f"receptacles agree for {agreed} of {total} cubes")
-    assert agreed >= 0.98 * total
+    assert agreed >= 0.99 * total
 
 
 def cubes_of(index: int) -> list[Json]:

@@ -163,11 +163,14 @@ def holder_of(
         high_m: `(N, 3)` greatest corners.
 
     Returns:
-        An index; of nested receptacles that of the smallest: the plate, not the table under it.
+        An index; rather one whose top the thing is on than one that it is in (a chair pushed under a table reaches
+        above it), and of several the smallest: the plate, not the table under it.
     """
     ground_m = centre_m[[0, 2]]
     is_over = ((low_m[:, (0, 2)] <= ground_m) & (ground_m <= high_m[:, (0, 2)])).all(axis=1)
     is_over &= (low_m[:, 1] + _LEAST_SHELF_M < bottom_m) & (bottom_m <= high_m[:, 1] + _REACH_M)
+    is_on_top = is_over & (bottom_m >= high_m[:, 1] - _REACH_M)
+    is_over = is_on_top if is_on_top.any() else is_over
     volumes_m3 = np.where(is_over, (high_m - low_m).prod(axis=1), np.inf)
     return int(volumes_m3.argmin()) if is_over.any() else None
 

@@ -74,7 +74,7 @@ def get_visible_objects(
     if visibilityScheme is not None and visibilityScheme.lower() not in ("collider", "distance"):
         raise ActionError(f"Visibility scheme {visibilityScheme} is not implemented. Must be 'distance' or 'collider'.")
     seen = _visible(engine, maxDistance)
-    eye_m = objects.eye_m(engine.scene, engine.agent)
+    eye_m = objects.eye_m(engine.agent)
     near = [
         (math.dist(eye_m, record["position"].values()), record["objectId"])
         for record in objects.static_records(engine.scene)
@@ -100,7 +100,7 @@ def contains(engine: Engine, *, objectId: str) -> list[str]:
 def world_to_viewport_point(engine: Engine, *, position: Vector3) -> dict[str, float]:
     """Where a point of the world is in the picture, from its upper left corner, with its depth as z."""
     half_width, half_height = _half_extents(engine)
-    offset_m = np.subtract((position.x, position.y, position.z), objects.eye_m(engine.scene, engine.agent))
+    offset_m = np.subtract((position.x, position.y, position.z), objects.eye_m(engine.agent))
     right_m, up_m, ahead_m = (offset_m @ objects.looking(engine.agent)).tolist()
     if ahead_m == 0:
         raise ActionError("Point not in viewport.")
@@ -132,7 +132,7 @@ def _ray(engine: Engine, x: float, y: float) -> tuple[_Vec3, _Vec3]:
     half_width, half_height = _half_extents(engine)
     own = np.array([(2 * x - 1) * half_width, (1 - 2 * y) * half_height, 1.0])
     right, up, ahead = (objects.looking(engine.agent) @ own).tolist()
-    return objects.eye_m(engine.scene, engine.agent), (right, up, ahead)
+    return objects.eye_m(engine.agent), (right, up, ahead)
 
 
 def _half_extents(engine: Engine) -> tuple[float, float]:

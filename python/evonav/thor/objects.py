@@ -331,7 +331,7 @@ def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
     simulator = scene.simulator
     half_height = math.tan(0.5 * simulator.intrinsics.vertical_fov_rad)
     half_width = half_height * simulator.intrinsics.width_px / simulator.intrinsics.height_px
-    eye = eye_m(scene, agent)
+    eye = eye_m(agent)
     world_from_camera = looking(agent)
     ids = set()
     for record in table.records:
@@ -349,10 +349,9 @@ def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
     return ids
 
 
-def eye_m(scene: Scene, agent: Agent) -> _Vec3:
+def eye_m(agent: Agent) -> _Vec3:
     """Where the agent's camera is."""
-    height_m = scene.simulator.config.camera_height_m if agent.is_standing else agent.y_m
-    return (agent.x_m, height_m, agent.z_m)
+    return (agent.x_m, agent.camera_height_m, agent.z_m)
 
 
 def looking(agent: Agent) -> NDArray[np.float64]:
