@@ -125,11 +125,11 @@ def call(engine: object, message: Mapping[str, Any]) -> object:
     found = _served().get(name) if isinstance(name, str) else None
     if found is None:
         problem = message.get("problem") if name is None else None
-        raise ActionError(str(problem or f"Invalid action: {_brief(name)}"), ErrorCode.INVALID_ACTION)
+        raise ActionError(str(problem or f"Invalid action: {brief(name)}"), ErrorCode.INVALID_ACTION)
     common = _ENVELOPE if found.is_open else _COMMON  # what Initialize sets is there for every action to carry
     arguments = {key: value for key, value in message.items() if key in found.types or key not in common}
-    unknown = [key for key in arguments if key not in found.types]
-    if unknown and not found.is_open:
+    unknown = [key for key in arguments if key not in found.types and not (found.is_open and key != "engine")]
+    if unknown:
         raise ActionError(_invalid(str(name), found, unknown, list(arguments)), ErrorCode.INVALID_ARGUMENT)
     values = {key: _converted(str(name), found, key, value) for key, value in arguments.items()}
     missing = [key for key in found.required if key not in arguments]
@@ -158,7 +158,7 @@ def _converted(name: str, found: _Action, key: str, value: object) -> object:
         first = error.errors(include_url=False, include_context=False)[0]
         place = "".join(f".{part}" for part in first["loc"])
         message = (
-            f"action: {name} has an invalid argument: {key} (=={_brief(value)})."
+            f"action: {name} has an invalid argument: {key} (=={brief(value)})."
             f" Cannot convert to: {_type_name(found.types[key])}{place and f' ({place[1:]})'}: {first['msg']}"
         )
         raise ActionError(message, ErrorCode.INVALID_ARGUMENT) from error
@@ -174,7 +174,7 @@ def _adapter(annotation: Any) -> TypeAdapter[Any]:  # noqa: ANN401
 
 def _invalid(name: str, found: _Action, unknown: list[str], given: list[str]) -> str:
     """AI2-THOR's words; its users search for them."""
-    quoted = [", ".join(f"'{_brief(key)}'" for key in keys[:20]) for keys in (unknown, given)]
+    quoted = [", ".join(f"'{brief(key)}'" for key in keys[:20]) for keys in (unknown, given)]
     return (
         f'\n\tAction: "{name}" called with invalid argument{"s" if len(unknown) > 1 else ""}: {quoted[0]}'
         f"\n\tExpected arguments: {found.signature}"
@@ -192,6 +192,6 @@ def _type_name(annotation: object) -> str:
     return annotation.__name__ if isinstance(annotation, type) else str(annotation).rpartition(".")[2]
 
 
-def _brief(value: object) -> str:
+def brief(value: object) -> str:
     """A value for a message, at most some hundred characters of it."""
     return value[:_BRIEF] if isinstance(value, str) else reprlib.repr(value)

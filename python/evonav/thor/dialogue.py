@@ -1,18 +1,29 @@
 """The dialogue around the steps: scenes, sizes, settings, houses, and what the metadata lists."""
 
+import reprlib
 from typing import Any
 
 from pydantic import ValidationError
 
+from evonav.thor import objects
 from evonav.thor.actions import ActionError, ErrorCode, action
 from evonav.thor.agent import Agent, body_of
 from evonav.thor.engine import Engine, Settings
+from evonav.thor.images import FAR_M
+from evonav.thor.metadata import Vector, scene_bounds, vector
 from evonav.thor.scene import Document, Scene
 
 SCENES = ("Procedural",)
 """What `GetScenesInBuild` answers: iTHOR's and RoboTHOR's rooms are Unity scenes, which nothing here can draw."""
 
+NEAR_M = 0.1
+"""The camera's near plane."""
+
 _MAX_PX = 4096
+_MAX_TIME_STEP_S = 0.05
+_MIN_GRID_M = 0.01
+# AI2-THOR renders these; a client that asked for them and got none would fail far from here.
+_MISSING_IMAGES = ("renderNormalsImage", "renderFlowImage")
 
 
 @action("Reset")
@@ -33,15 +44,25 @@ def get_scenes_in_build(engine: Engine) -> list[str]:
 
 @action("CreateHouse")
 def create_house(engine: Engine, *, house: Document) -> None:
-    """Loads a ProcTHOR house."""
+    """Loads a ProcTHOR house; the scene stays as it is when that cannot be done."""
+    scene = Scene(engine.scene.name)
+    scene.configure(engine.scene.config)
     # ProcTHOR's own generator asks for houses before they have metadata.
     house = {"metadata": {}, **house}
-    engine.scene.load(house)
+    scene.load(house)
+    # What the next event shows: a house that cannot be described is not taken.
+    objects.static_records(scene)
     engine.agent.enter(house)
+    engine.scene = scene
 
 
 def check_settings(settings: Settings) -> None:
     """What AI2-THOR's `Initialize` asks of its arguments, in its words."""
+    if settings.agentCount != 1:
+        raise ActionError(f"agentCount {settings.agentCount}: this engine has one agent")
+    for name in _MISSING_IMAGES:
+        if (settings.model_extra or {}).get(name):
+            raise ActionError(f"{name} is not supported by this engine")
     if settings.fieldOfView is not None and (settings.fieldOfView < 0 or settings.fieldOfView >= 180):
         raise ActionError("fov must be set to (0, 180) noninclusive.")
     if settings.rotateStepDegrees <= 0:
@@ -58,20 +79,25 @@ def check_settings(settings: Settings) -> None:
         raise ActionError("maxUpwardLookAngle must be a non-negative float")
     if not 0 < settings.gridSize <= 5:
         raise ActionError("grid size must be in the range (0,5]")
+    if settings.gridSize < _MIN_GRID_M:
+        raise ActionError(f"gridSize {settings.gridSize:g}: this engine's grids are {_MIN_GRID_M:g} m and coarser")
 
 
 @action("Initialize")
 def initialize(engine: Engine, **settings: Any) -> dict[str, float]:  # noqa: ANN401
     """Sets the settings; any keyword of the client's constructor may come."""
     try:
-        wanted = Settings(**settings)
+        wanted = Settings.model_validate(settings)
     except ValidationError as error:
-        raise ActionError(f"Initialize: {error}", ErrorCode.INVALID_ARGUMENT) from error
+        first = error.errors(include_url=False)[0]
+        name, value = first["loc"][0], reprlib.repr(first["input"])
+        problem = f"action: Initialize has an invalid argument: {name} (=={value}). {first['msg']}"
+        raise ActionError(problem, ErrorCode.INVALID_ARGUMENT) from error
     check_settings(wanted)
     engine.agent.body = body_of(wanted.agentMode, wanted.maxUpwardLookAngle, wanted.maxDownwardLookAngle)
     engine.settings = wanted
     engine.configure()
-    return {"cameraNearPlane": 0.1, "cameraFarPlane": 20.0}
+    return {"cameraNearPlane": NEAR_M, "cameraFarPlane": FAR_M}
 
 
 @action("ChangeResolution")
@@ -86,3 +112,42 @@ def change_resolution(engine: Engine, *, x: int, y: int) -> None:
 @action("ChangeQuality")
 def change_quality(engine: Engine, *, quality: str) -> None:
     """Does nothing: there is one quality."""
+
+
+@action("SetObjectFilter")
+def set_object_filter(engine: Engine, *, objectIds: list[str]) -> None:
+    """Lists only these objects in the metadata; unknown ids do not matter."""
+    engine.object_filter = frozenset(objectIds)
+
+
+@action("ResetObjectFilter")
+def reset_object_filter(engine: Engine) -> None:
+    """Lists all objects again."""
+    engine.object_filter = None
+
+
+@action("GetSceneBounds")
+def get_scene_bounds(engine: Engine) -> list[Vector]:
+    """The smallest and the largest corner of the box around everything."""
+    bounds = scene_bounds(engine.scene)
+    if bounds is None:
+        raise ActionError(f"scene {engine.scene.name} holds no house: call CreateHouse first")
+    return [vector(*bounds["cornerPoints"][corner]) for corner in (-1, 0)]
+
+
+@action("PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
+def pause_physics(engine: Engine, **_: object) -> None:
+    """Does nothing: everything is at rest, always."""
+
+
+@action("AdvancePhysicsStep")
+def advance_physics_step(
+    engine: Engine, *, timeStep: float = 0.02, simSeconds: float | None = None, allowAutoSimulation: bool = False
+) -> None:
+    """Does nothing: everything is at rest, always."""
+    if not 0.0 < timeStep <= _MAX_TIME_STEP_S:
+        raise ActionError(
+            "Please use a timeStep between 0.01f and 0.05f. Larger timeSteps produce inconsistent results."
+        )
+    if simSeconds is not None and simSeconds < 0.0:
+        raise ActionError(f"simSeconds must be non-negative! You gave: {simSeconds:g}.")

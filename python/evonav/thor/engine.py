@@ -1,6 +1,7 @@
 """The engine: does the client's actions one after another and says what the scene then looks like."""
 
 import logging
+import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -15,6 +16,9 @@ from evonav.thor.scene import Scene
 from evonav.world.simulator import Frame, SimulatorConfig
 
 _LOG = logging.getLogger("evonav.thor")
+# Characters of an error message.
+_MAX_MESSAGE = 4000
+_logged: set[tuple[str, int | None]] = set()
 
 
 class Settings(BaseModel):
@@ -23,6 +27,7 @@ class Settings(BaseModel):
     model_config = ConfigDict(extra="allow", allow_inf_nan=False, frozen=True)
 
     agentMode: str = "default"
+    agentCount: int = 1
     gridSize: float = 0.25
     snapToGrid: bool = True
     rotateStepDegrees: float = 90.0
@@ -102,16 +107,19 @@ class Engine:
 
     def execute(self, message: Mapping[str, Any]) -> Result:
         """Does one action. Whatever happens is an answer: a failed action, never an exception."""
-        name = str(message.get("action", ""))
+        name = actions.brief(message.get("action", ""))
         try:
+            if message.get("agentId", 0) != 0:
+                raise ActionError(f"agentId {actions.brief(message['agentId'])}: this engine has one agent, 0")
             self.last = Result(name, action_return=actions.call(self, message))
         except ActionError as error:
-            self.last = Result(name, False, str(error), error.code)
+            self.last = Result(name, False, _short(str(error)), error.code)
         except EvonavError as error:
-            self.last = Result(name, False, str(error))
+            self.last = Result(name, False, _short(str(error)))
         except Exception as error:
-            _LOG.exception("action %s", name)
-            self.last = Result(name, False, f"{name} failed inside the engine: {type(error).__name__}: {error}")
+            problem = f"{name} failed inside the engine: {type(error).__name__}: {error}"
+            log_once(error, problem)
+            self.last = Result(name, False, _short(problem))
         return self.last
 
     def configure(self) -> None:
@@ -130,3 +138,15 @@ class Engine:
                 grid_m=self.settings.gridSize,
             )
         )
+
+
+def log_once(error: Exception, problem: str) -> None:
+    """Logs an error of the engine itself with its traceback, the first time that it comes from its line."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    if (place.filename, place.lineno) not in _logged:
+        _logged.add((place.filename, place.lineno))
+        _LOG.error("%s", _short(problem), exc_info=error)
+
+
+def _short(message: str) -> str:
+    return message if len(message) <= _MAX_MESSAGE else message[:_MAX_MESSAGE] + " ..."

@@ -1,18 +1,15 @@
 """Events: what the engine answers to an action, as fields of one message."""
 
-import logging
 from collections.abc import Mapping
 from typing import Any
 
 from evonav.errors import EvonavError
 from evonav.thor import images
-from evonav.thor.engine import Engine, Result
+from evonav.thor.engine import Engine, Result, log_once
 from evonav.thor.fifo import Field, FieldType
 from evonav.thor.images import Kinds
 from evonav.thor.metadata import MetadataEncoder, patch
 from evonav.thor.scene import Scene
-
-_LOG = logging.getLogger("evonav.thor")
 
 
 class Emitter:
@@ -42,9 +39,9 @@ class Emitter:
             return self._event(message)
         except Exception as error:
             # The house of a scene that cannot be described: the client gets to know, and may load another.
+            problem = f"the engine cannot show the scene: {type(error).__name__}: {error}"
             if not isinstance(error, EvonavError):
-                _LOG.exception("event after %s", self._engine.last.action)
-            problem = f"the engine cannot describe the scene: {type(error).__name__}: {error}"
+                log_once(error, problem)
             self._engine.scene = Scene(self._engine.scene.name)
             self._engine.cameras.clear()
             self._engine.last = Result(self._engine.last.action, False, problem)

@@ -75,12 +75,13 @@ class MetadataEncoder:
         if has_colors:
             self.palette(scene)
             colors = self._colors
+        action_return = _packed_return(engine.last)
         fields = agent_fields(engine) | {"sceneBounds": self._bounds}
         tail = {"thirdPartyCameras": fields["thirdPartyCameras"], "sequenceId": sequence_id, "activeAgentId": 0}
         return b"".join(
             [
                 b"\x84\xa6agents\x91",
-                *(_opened(fields, 2), b"\xa6colors", colors, b"\xa7objects"),
+                *(_opened(fields, 3), b"\xacactionReturn", action_return, b"\xa6colors", colors, b"\xa7objects"),
                 *self._objects(engine),
                 *(_packed(part) for pair in tail.items() for part in pair),
             ]
@@ -102,22 +103,14 @@ class MetadataEncoder:
             return
         records = objects.static_records(scene)
         self._records = [(record["objectId"], _static(record)) for record in records]
-        self._bounds = _bounds(scene)
+        self._bounds = scene_bounds(scene)
         self._scene_version = scene.version
 
 
 def patch(result: "Result") -> bytes:
     """What an action that changed nothing says: AI2-THOR's `MetadataPatch`."""
-    return _packed({**_outcome(result), "agentId": 0})
-
-
-def is_packable(value: object) -> bool:
-    """Whether the value can be sent."""
-    try:
-        _packed(value)
-    except (TypeError, ValueError, OverflowError, RecursionError):
-        return False
-    return True
+    action_return = _packed_return(result)
+    return _opened({**_outcome(result), "agentId": 0}, 1) + b"\xacactionReturn" + action_return
 
 
 def agent_fields(engine: "Engine") -> dict[str, Any]:
@@ -185,8 +178,17 @@ def _outcome(result: "Result") -> dict[str, Any]:
         "lastActionSuccess": result.is_success,
         "errorMessage": result.error_message,
         "errorCode": result.error_code.value,
-        "actionReturn": result.action_return,
     }
+
+
+def _packed_return(result: "Result") -> bytes:
+    """What the action returned; the action fails if that cannot be sent."""
+    try:
+        return _packed(result.action_return)
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
+        result.is_success, result.action_return = False, None
+        result.error_message = f"{result.action} returned what cannot be sent: {error}"
+        return b"\xc0"
 
 
 def _static(record: Mapping[str, Any]) -> bytes:
@@ -195,12 +197,12 @@ def _static(record: Mapping[str, Any]) -> bytes:
 
 def _opened(fields: Mapping[str, Any], num_more: int) -> bytes:
     """A packed map that `num_more` pairs are to be appended to."""
-    # 16 fields and more have a header of three bytes.
-    packed = _packed(fields)
-    return _MAP16.pack(0xDE, len(fields) + num_more) + packed[3:]
+    # Maps of 16 pairs and more have a header of three bytes, smaller ones of one.
+    packed = memoryview(_packed(fields))[3 if len(fields) > 15 else 1 :]
+    return _MAP16.pack(0xDE, len(fields) + num_more) + packed
 
 
-def _bounds(scene: Scene) -> dict[str, Any] | None:
+def scene_bounds(scene: Scene) -> dict[str, Any] | None:
     """AI2-THOR's `SceneBounds`: the box around everything."""
     bodies = scene.simulator.objects if scene.house is not None else ()
     if not bodies:
