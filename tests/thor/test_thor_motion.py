@@ -4,6 +4,7 @@ import json
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -187,6 +188,28 @@ def test_crouching_lowers_the_camera() -> None:
     assert engine.agent.is_standing
 
 
+@pytest.mark.parametrize("how", ["standing", "crouching", "lifted"])
+def test_pictures_are_taken_from_the_cameras_height(how: str) -> None:
+    house = HOUSES[0]
+    engine = engine_in(house)
+    height_m = 1.575
+    if how == "crouching":
+        done(engine, "Crouch")
+        height_m -= 0.675
+    elif how == "lifted":
+        at = house["metadata"]["agent"]["position"] | {"y": 0.9009992 + 0.25}
+        done(engine, "Teleport", position=at, forceAction=True)
+        height_m += 0.25
+    low = EmbeddedSimulator(SimulatorConfig(camera_height_m=height_m))
+    low.reset(json.dumps(house))
+    want, got = low.render(engine.agent.pose), engine.view(rgb=True, instances=True)
+    assert got.pose.y_m == pytest.approx(height_m)
+    assert np.abs(got.depth_m - want.depth_m)[np.isfinite(want.depth_m)].max() < 1e-3
+    assert got.instances is not None
+    assert want.instances is not None
+    assert (got.instances != want.instances).mean() < 1e-3
+
+
 def test_teleport_keeps_what_it_is_not_given() -> None:
     engine = engine_in(HOUSES[0])
     before = engine.agent.pose
@@ -259,8 +282,10 @@ def test_the_locobot_is_low_narrow_and_rolls() -> None:
 
 
 def test_the_locobots_motion_is_noisy_and_repeats() -> None:
-    def walk() -> list[Pose]:
+    def walk(seed: int | None = None) -> list[Pose]:
         engine = engine_in(HOUSES[0], agentMode="locobot", snapToGrid=False)
+        if seed is not None:
+            done(engine, "SetRandomSeed", seed=seed)
         poses = [engine.agent.pose]
         for name in ("MoveBack", "RotateLeft", "RotateRight") * 30:
             run(engine, name)
@@ -269,6 +294,8 @@ def test_the_locobots_motion_is_noisy_and_repeats() -> None:
 
     poses = walk()
     assert poses == walk()
+    assert poses != walk(seed=1)
+    assert walk(seed=1) == walk(seed=1)
     turns_deg = [math.degrees(b.yaw_rad - a.yaw_rad) for a, b in zip(poses[1::3], poses[2::3], strict=False)]
     errors_deg = [math.remainder(turn + 90, 360) for turn in turns_deg]
     assert 0.2 < (sum(e * e for e in errors_deg) / len(errors_deg)) ** 0.5 < 1.0

@@ -110,6 +110,7 @@ def test_recorded_locobot_starts(start_controller: StartController) -> None:
         position = episode["agentPose"]["position"]
         starts[episode["scene"]].add((position["x"], position["z"]))
     controller = start_controller(scene=houses[0], agentMode="locobot")
+    assert controller.last_event.metadata["agent"]["isStanding"] is None
     num_taken = num_reached = 0
     for scene, points in starts.items():
         controller.reset(scene=houses[scene], agentMode="locobot")

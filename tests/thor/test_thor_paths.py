@@ -199,8 +199,10 @@ def test_the_expert_walks_to_objects() -> None:
             if not result.is_success:
                 break
             run(engine, str(result.action_return))
+        assert result.error_message == "", "AI2-THOR's way to say that nothing is left to do"
         num_seen += thing["id"] in objects.visible_ids(engine.scene, engine.agent, 1.5)
-    assert num_seen >= 0.9 * len(things)
+    # The expert stops when it is there and a part of the object is in the picture, even behind something else.
+    assert num_seen >= 0.8 * len(things)
 
 
 def test_the_expert_walks_to_a_position() -> None:

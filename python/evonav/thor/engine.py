@@ -3,7 +3,7 @@
 import logging
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from pydantic import BaseModel, ConfigDict
@@ -13,6 +13,7 @@ from evonav.thor import actions
 from evonav.thor.actions import ActionError, ErrorCode
 from evonav.thor.agent import Agent
 from evonav.thor.scene import Scene
+from evonav.world.camera import CameraView
 from evonav.world.simulator import Frame, SimulatorConfig
 
 _LOG = logging.getLogger("evonav.thor")
@@ -104,6 +105,15 @@ class Engine:
     def camera_position_m(self) -> tuple[float, float, float]:
         """Of the agent's camera."""
         return (self.agent.x_m, self.agent.camera_height_m, self.agent.z_m)
+
+    def view(self, *, rgb: bool, instances: bool) -> Frame:
+        """What the agent's camera sees, from where crouching or a forced teleport has brought it."""
+        simulator, pose = self.scene.simulator, self.agent.pose
+        if self.agent.camera_height_m == simulator.config.camera_height_m:
+            return simulator.render(pose, rgb=rgb, instances=instances)
+        camera, intrinsics = replace(pose, y_m=self.agent.camera_height_m), simulator.intrinsics
+        seen = CameraView(camera, intrinsics.width_px, intrinsics.height_px, intrinsics.vertical_fov_rad)
+        return Frame(camera, intrinsics, *simulator.render_camera(seen, rgb=rgb, instances=instances))
 
     def execute(self, message: Mapping[str, Any]) -> Result:
         """Does one action. Whatever happens is an answer: a failed action, never an exception."""

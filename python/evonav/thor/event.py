@@ -82,7 +82,7 @@ class Emitter:
                 fields += images.blank(*size, kinds, is_third_party=True)
             return fields
         palette = self._metadata.palette(engine.scene)
-        frame = engine.scene.simulator.render(engine.agent.pose, rgb=kinds.rgb, instances=kinds.needs_instances)
+        frame = engine.view(rgb=kinds.rgb, instances=kinds.needs_instances)
         fields = images.encode(frame, kinds, palette)
         for camera in engine.cameras:
             frame = camera.render(engine.scene, rgb=kinds.rgb, instances=kinds.needs_instances)

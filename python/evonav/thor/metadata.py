@@ -125,7 +125,7 @@ def agent_fields(engine: "Engine") -> dict[str, Any]:
             "position": position,
             "rotation": rotation,
             "cameraHorizon": agent.horizon_deg,
-            "isStanding": agent.is_standing,
+            "isStanding": None if agent.is_locobot else agent.is_standing,
             "inHighFrictionArea": False,
         },
         "agentId": 0,

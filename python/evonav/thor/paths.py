@@ -5,14 +5,17 @@ space of evonav's navigation answers.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from evonav.thor import motion, objects
 from evonav.thor.actions import ActionError, Vector3, action
 from evonav.thor.agent import Agent
 from evonav.thor.engine import Engine
+from evonav.world.camera import project
 
 Point = tuple[float, float]
 """`(x, z)`."""
@@ -142,13 +145,12 @@ def object_nav_expert_action(
     position: Vector3 | None = None,
 ) -> str:
     """The next action on the way to an object, until it is in the picture, or to a position."""
-    agent, here_m = engine.agent, engine.agent.point_m
+    here_m = engine.agent.point_m
     step_deg = engine.settings.rotateStepDegrees
-    is_seen: Callable[[Agent], bool] = lambda _: True  # noqa: E731
+    record = None
     if objectId or objectType:
         record = _object(engine, objectType, objectId)
         corners_m = _path_to_object(engine, record, here_m, _ALLOWED_ERROR_M)
-        is_seen = lambda looking: record["objectId"] in _seen(engine, looking, engine.settings.visibilityDistance)  # noqa: E731
     elif position is not None:
         corners_m = _path(engine, here_m, (position.x, position.z), _ALLOWED_ERROR_M)
     else:
@@ -158,20 +160,21 @@ def object_nav_expert_action(
         raise ActionError("Invalid rotate step degrees for agent, must divide 360 without a remainder.")
     turns = range(-(num_turns // 2), num_turns // 2 + (1 if num_turns % 2 == 0 else 0) + 1)
     if len(corners_m) <= 1 or math.dist(corners_m[0], corners_m[-1]) < 1e-6:
-        return _look_action(agent, turns, step_deg, is_seen)
+        return _look_action(engine, turns, step_deg, record)
     return _walk_action(engine, turns, step_deg, corners_m[1])
 
 
-def _look_action(agent: Agent, turns: range, step_deg: float, is_seen: Callable[[Agent], bool]) -> str:
+def _look_action(engine: Engine, turns: range, step_deg: float, record: dict[str, Any] | None) -> str:
     """The first action of the fewest turns and looks that bring the object into the picture."""
-    if is_seen(agent):
+    agent = engine.agent
+    if record is None or _is_framed(engine, agent, record):
         raise ActionError("")  # AI2-THOR's way to say that nothing is left to do.
     level = int(agent.horizon_deg / 30.0)
     ways = [
         (abs(turn) + abs(look - level), turn, look - level)
         for turn in turns
         for look in range(-1, 3)
-        if is_seen(replace(agent, yaw_deg=agent.yaw_deg + turn * step_deg, horizon_deg=30.0 * look))
+        if _is_framed(engine, replace(agent, yaw_deg=agent.yaw_deg + turn * step_deg, horizon_deg=30.0 * look), record)
     ]
     _, turn, look = min(ways, key=lambda way: way[0], default=(0, 0, 0))
     if turn:
@@ -179,6 +182,16 @@ def _look_action(agent: Agent, turns: range, step_deg: float, is_seen: Callable[
     if look:
         return "LookUp" if look < 0 else "LookDown"
     raise ActionError("Object doesn't seem visible from any rotation/horizon.")
+
+
+def _is_framed(engine: Engine, agent: Agent, record: dict[str, Any]) -> bool:
+    """Whether a corner of an object's box, or its centre, is within the picture, whatever stands before it."""
+    box, intrinsics = record["axisAlignedBoundingBox"], engine.scene.simulator.intrinsics
+    points_m = np.array([list(box["center"].values()), *box["cornerPoints"]], dtype=np.float64)
+    camera = replace(agent.pose, y_m=agent.camera_height_m)
+    col, row, _ = project(points_m, camera, intrinsics).T
+    is_inside = (col > 0) & (col < intrinsics.width_px) & (row > 0) & (row < intrinsics.height_px)
+    return bool(is_inside.any())
 
 
 def _walk_action(engine: Engine, turns: range, step_deg: float, corner_m: Point) -> str:

@@ -76,7 +76,8 @@ def get_in_scene_asset_geometry(
 
 @action("SetRandomSeed")
 def set_random_seed(engine: Engine, *, seed: int) -> None:
-    """Seeds nothing: each random action here has a seed of its own, and no other state is drawn from."""
+    """Seeds the noise of the LoCoBot's motion; other random actions have seeds of their own."""
+    engine.agent.noise = np.random.default_rng(abs(seed))
 
 
 @action("SetObjectFilter")
