@@ -1,6 +1,5 @@
 """What does not start says why, and leaves nothing behind."""
 
-import os
 import socket
 import stat
 import subprocess
@@ -213,10 +212,10 @@ def test_nothing_is_left_of_starts_that_failed(script: Script, tmp_path: Path, m
     temporary.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(temporary))
     failure(Ai2ThorOptions(script("exit 1")))  # what is opened once for all is open now
-    before = len(os.listdir("/proc/self/fd"))
+    before = len(list(Path("/proc/self/fd").iterdir()))
     for _ in range(3):
         failure(Ai2ThorOptions(script("exit 1")))
-    assert len(os.listdir("/proc/self/fd")) <= before
+    assert len(list(Path("/proc/self/fd").iterdir())) <= before
     assert not list(temporary.iterdir())
 
 
