@@ -88,6 +88,8 @@ class MetadataEncoder:
         )
 
     def _objects(self, engine: "Engine") -> list[bytes]:
+        if engine.object_filter == frozenset():
+            return [_ARRAY32.pack(0xDD, 0)]
         views = objects.views(engine.scene, engine.agent, engine.settings)
         wanted = engine.object_filter
         parts = [b""]

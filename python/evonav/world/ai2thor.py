@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav import _core
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
 from evonav.world.ai2thor_images import InstanceDecoder, depth_of, rgb_of
 from evonav.world.ai2thor_startup import Ai2ThorOptions, ProcessLog, lost, start_controller
@@ -117,6 +118,8 @@ class Ai2ThorSimulator:
         self._objects = tuple(_with_boxes(self._reading.objects, event.metadata["objects"]))
         self._decoder = InstanceDecoder(self._objects)
         self._is_loaded = True
+        # Nothing moves from here on but the agent: events need not list every object, most of what they cost.
+        self._do("SetObjectFilter", objectIds=[])
         self._enter(own_start)
         self._start = self._pose
         if pose is not None:
@@ -226,7 +229,7 @@ class Ai2ThorSimulator:
         The grid is entered at the centre nearest to the house's start where the agent fits.
         """
         if self._occupancy is None:
-            self._occupancy = self._mapped(self._reading.occupancy())
+            self._occupancy = self._mapped()
         return self._occupancy
 
     def close(self) -> None:
@@ -350,15 +353,16 @@ class Ai2ThorSimulator:
         on_grid_m: NDArray[np.float64] = origin_m + cells * grid_m
         return on_grid_m
 
-    def _mapped(self, grid: OccupancyGrid) -> OccupancyGrid:
-        """The occupancy on the grid of another, as AI2-THOR has it."""
-        cells = np.ones_like(grid.cells)
+    def _mapped(self) -> OccupancyGrid:
+        cell_m = self.config.occupancy_cell_m
+        shape, corner_m = _core.map_spec(self._reading.house_json, name="house", cell_m=cell_m)
+        grid = OccupancyGrid(np.ones(shape, dtype=np.uint8), cell_m, corner_m)
         if (seed := next((pose for pose in self._seeds(grid) if self._try_place(pose)), None)) is not None:
-            free_m = self._reachable(seed, grid.cell_m)
-            cols, rows = np.floor((free_m - grid.corner_m) / grid.cell_m).astype(int).T
-            is_in = (rows >= 0) & (cols >= 0) & (rows < cells.shape[0]) & (cols < cells.shape[1])
-            cells[rows[is_in], cols[is_in]] = 0
-        return OccupancyGrid(cells, grid.cell_m, grid.corner_m)
+            free_m = self._reachable(seed, cell_m)
+            cols, rows = np.floor((free_m - corner_m) / cell_m).astype(int).T
+            is_in = (rows >= 0) & (cols >= 0) & (rows < shape[0]) & (cols < shape[1])
+            grid.cells[rows[is_in], cols[is_in]] = 0
+        return grid
 
     def _seeds(self, grid: OccupancyGrid) -> Iterator[Pose]:
         """Centres of cells by the house's start, the nearest first, of equals by row and column."""

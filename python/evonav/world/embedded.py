@@ -126,7 +126,10 @@ class EmbeddedSimulator:
     def objects(self) -> Sequence[SceneObject]:
         """Bodies in instance order (instance id = index + 1)."""
         if self._objects is None:
-            self._objects = tuple(SceneObject(*record) for record in self._world.bodies())
+            self._objects = tuple(
+                SceneObject(body_id, category, kind, (x_m, y_m, z_m), (width_m, height_m, depth_m))
+                for body_id, category, kind, (x_m, y_m, z_m), (width_m, height_m, depth_m) in self._world.bodies()
+            )
         return self._objects
 
     def step(self, action: Action) -> bool:
