@@ -372,6 +372,9 @@ class EmbeddedSimulator:
     def random_spawn(self, request_json: str) -> tuple[str, list[str]]:
         """The `HouseDelta` of a `SpawnRequest` (both JSON), and the ids of what found no place."""
 
+    def settled(self) -> str:
+        """The `HouseDelta` (JSON) that brings down what hangs in the air."""
+
     def start(self) -> tuple[tuple[float, float, float], float, float]:
         """Position, yaw and horizon."""
 

@@ -60,7 +60,8 @@ def initial_random_spawn(
     }
     dropped = set(copies)
     try:
-        unplaced = scene.apply_random_spawn(json.dumps(request))
+        delta_json, unplaced = scene.simulator.random_spawn(json.dumps(request))
+        scene.apply(delta_json)
         dropped.intersection_update(unplaced)
     finally:
         if dropped:

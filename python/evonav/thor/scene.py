@@ -45,14 +45,12 @@ class Scene:
         self.version = next(_versions)
         return self.house
 
-    def apply_random_spawn(self, request_json: str) -> list[str]:
-        """Moves objects as the core's `SpawnRequest` says; ids of those that found no place."""
+    def apply(self, delta_json: str) -> None:
+        """Moves objects as a `HouseDelta` says; only they are built again."""
         simulator = self.simulator
-        delta_json, unplaced = simulator.random_spawn(request_json)
         self.begin_edit()
         simulator.apply(delta_json)
         self.house, self._simulator = json.loads(simulator.house_json), simulator
-        return unplaced
 
     def note_relations(self) -> None:
         """Says that what stands on what in the house has changed, and nothing that the simulator shows."""

@@ -1,5 +1,6 @@
 """Assets put into the scene one by one, their surfaces, and what of physics the generator asks for."""
 
+import json
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from evonav.thor.scene import Document, Scene
 # Half the side of the floor that stands in for the void of AI2-THOR's empty scene.
 _STAGE_HALF_M = 5.0
 _ORIGIN = Vector3()
+_LONGEST_STEP_S = 0.05
 
 
 @action("SpawnAsset")
@@ -90,6 +92,18 @@ def set_object_filter(engine: Engine, *, objectIds: list[str]) -> None:
 def reset_object_filter(engine: Engine) -> None:
     """Metadata lists all objects again."""
     engine.object_filter = None
+
+
+@action("AdvancePhysicsStep")
+def advance_physics_step(
+    engine: Engine, *, timeStep: float = 0.02, simSeconds: float | None = None, allowAutoSimulation: bool = False
+) -> None:
+    """Brings down what hangs in the air, at once and for good: there is no time in which it falls."""
+    if timeStep <= 0 or timeStep > _LONGEST_STEP_S:
+        raise ActionError(f"timeStep must be positive and at most {_LONGEST_STEP_S} s, it is {timeStep}")
+    delta_json = engine.scene.simulator.settled()
+    if json.loads(delta_json)["moves"]:
+        engine.scene.apply(delta_json)
 
 
 @action("PausePhysicsAutoSim", "UnpausePhysicsAutoSim")

@@ -112,6 +112,10 @@ class EmbeddedSimulator:
         """
         return self._world.random_spawn(request_json)
 
+    def settled(self) -> str:
+        """The `HouseDelta` (JSON) that brings down what hangs in the air; empty moves where nothing does."""
+        return self._world.settled()
+
     @property
     def house_json(self) -> str:
         """The house at hand."""

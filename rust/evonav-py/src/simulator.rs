@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use evonav_core::{
     Error,
     assets::catalogue::{Catalogue, UnknownAssets},
-    evolution::{SpawnRequest, random_spawn},
+    evolution::{SpawnRequest, random_spawn, settled},
     geometry::{Pose, Vec2, Vec3},
     house::{House, HouseDelta},
     sensors::{
@@ -111,6 +111,14 @@ impl PyEmbeddedSimulator {
             Ok((spawned.delta.to_json(), spawned.unplaced))
         })
         .map_err(error::to_py)
+    }
+
+    /// The `HouseDelta` (JSON) that brings down what hangs in the air.
+    fn settled(&self, py: Python<'_>) -> PyResult<String> {
+        let (house, scene) = (self.core.house(), self.core.scene());
+        py.detach(|| settled(house, Catalogue::bundled(), UnknownAssets::CategoryDefault, scene))
+            .map(|delta| delta.to_json())
+            .map_err(error::to_py)
     }
 
     /// Position, yaw and horizon.

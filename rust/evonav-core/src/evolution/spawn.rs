@@ -162,10 +162,10 @@ fn receptacles_of(
     let own = layout.with_supported(index);
     let can_bear = |&other: &usize| {
         let asset = &layout.items[other].asset;
-        !own.contains(&other)
-            && !asset.surfaces_m.is_empty()
-            && !request.excluded_receptacles.contains(&asset.category)
-            && !(request.forces_visible && asset.is_openable)
+        let is_barred = own.contains(&other)
+            || request.excluded_receptacles.contains(&asset.category)
+            || (request.forces_visible && asset.is_openable);
+        !is_barred && !asset.surfaces_m.is_empty()
     };
     let fits_category = |&other: &usize| {
         let asset = &layout.items[other].asset;
