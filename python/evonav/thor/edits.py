@@ -69,7 +69,7 @@ def detach(house: Entry, object_id: str) -> Entry:
 
     entry = taken(house["objects"])
     if entry is None:
-        raise ActionError(f"objectId: {object_id} is not the objectId on any object in the scene!")
+        raise ActionError(f"ArgumentException: objectId: {object_id} is not the objectId on any object in the scene!")
     return entry
 
 

@@ -7,7 +7,9 @@ import numpy as np
 from evonav.thor import objects
 from evonav.thor.actions import ActionError, Vector3, action
 from evonav.thor.engine import Engine
+from evonav.thor.motion import invalid_operation
 from evonav.thor.surfaces import Hit, surfaces_of
+from evonav.thor.teleport import out_of_range
 
 _Vec3 = tuple[float, float, float]
 
@@ -27,11 +29,11 @@ def object_at(engine: Engine, x: float, y: float) -> tuple[str, Hit]:
         ActionError: The point is outside, or shows nothing that AI2-THOR lists.
     """
     if not (0 <= x <= 1 and 0 <= y <= 1):
-        raise ActionError("x/y must be in [0:1]")
+        raise out_of_range("x/y must be in [0:1]")
     hit = surfaces_of(engine.scene).cast(*_ray(engine, x, y))
     found = objects.object_of_body(engine.scene, hit.body) if hit else None
     if hit is None or found is None:
-        raise ActionError(f"no sim objects found at ({x:g},{y:g})")
+        raise invalid_operation(f"no sim objects found at ({x:g},{y:g})")
     return found, hit
 
 
@@ -40,7 +42,7 @@ def get_object_in_frame(engine: Engine, *, x: float, y: float, checkVisible: boo
     """Id of the object at a point of the picture, counted from its upper left corner, 0 to 1."""
     object_id, _ = object_at(engine, x, y)
     if checkVisible and object_id not in _visible(engine):
-        raise ActionError(f"target hit ({object_id}) at ({x:g}, {y:g}) is not currently Visible to Agent")
+        raise invalid_operation(f"target hit ({object_id}) at ({x:g}, {y:g}) is not currently Visible to Agent")
     return object_id
 
 
@@ -48,7 +50,7 @@ def get_object_in_frame(engine: Engine, *, x: float, y: float, checkVisible: boo
 def get_coordinate_from_raycast(engine: Engine, *, x: float, y: float) -> dict[str, float]:
     """Where the ray through a point of the picture ends; the origin if nowhere."""
     if not (0 <= x <= 1 and 0 <= y <= 1):
-        raise ActionError(f"x and y must be in [0:1] not (x={x:g}, y={y:g}).")
+        raise out_of_range(f"x and y must be in [0:1] not (x={x:g}, y={y:g}).")
     hit = surfaces_of(engine.scene).cast(*_ray(engine, x, y))
     return _vector(hit.point_m if hit else (0.0, 0.0, 0.0))
 
@@ -72,7 +74,10 @@ def get_visible_objects(
 ) -> list[str]:
     """Ids of visible objects, nearest to the camera first; both of AI2-THOR's schemes are one here."""
     if visibilityScheme is not None and visibilityScheme.lower() not in ("collider", "distance"):
-        raise ActionError(f"Visibility scheme {visibilityScheme} is not implemented. Must be 'distance' or 'collider'.")
+        raise ActionError(
+            f"NotImplementedException: Visibility scheme {visibilityScheme} is not implemented. "
+            "Must be 'distance' or 'collider'."
+        )
     seen = _visible(engine, maxDistance)
     eye_m = objects.eye_m(engine.agent)
     near = [
@@ -103,10 +108,10 @@ def world_to_viewport_point(engine: Engine, *, position: Vector3) -> dict[str, f
     offset_m = np.subtract((position.x, position.y, position.z), objects.eye_m(engine.agent))
     right_m, up_m, ahead_m = (offset_m @ objects.looking(engine.agent)).tolist()
     if ahead_m == 0:
-        raise ActionError("Point not in viewport.")
+        raise invalid_operation("Point not in viewport.")
     x, y = 0.5 + 0.5 * right_m / (ahead_m * half_width), 0.5 - 0.5 * up_m / (ahead_m * half_height)
     if not (0 <= x <= 1 and 0 <= y <= 1):
-        raise ActionError("Point not in viewport.")
+        raise invalid_operation("Point not in viewport.")
     return {"x": x, "y": y, "z": ahead_m}
 
 

@@ -16,9 +16,12 @@ from evonav.thor.actions import ActionError, Vector3, action
 from evonav.thor.engine import Engine
 from evonav.thor.scene import Scene
 from evonav.thor.surfaces import fresh_surfaces
+from evonav.thor.teleport import out_of_range
 
 # AI2-THOR places things this much over a surface, and lets them fall.
 _CLEARANCE_M = 0.005
+# What only touches is not in the way.
+_TOUCH_M = 0.001
 
 
 class ObjectPose(BaseModel):
@@ -96,6 +99,39 @@ def place_object_at_point(
     return _place_at(scene, objectId, points[-1], rotation, forceKinematic)
 
 
+@action("TeleportObject")
+def teleport_object(
+    engine: Engine,
+    *,
+    objectId: str,
+    position: Vector3,
+    rotation: Vector3 | None = None,
+    forceAction: bool = False,
+    forceKinematic: bool = False,
+    **unused: Any,  # noqa: ANN401
+) -> None:
+    """Sets an object's pose; from there it falls, unless `forceKinematic`. It may not touch another, unless forced."""
+    scene = engine.scene
+    record = objects.record_of(scene, objectId)
+    edits.settle(scene)
+    entry = edits.entry_of(scene, objectId)
+    turn = rotation or Vector3(**record["rotation"])
+    with edits.edited(scene):
+        _put_pivot(entry, record["objectType"], position, turn)
+        if not forceAction:
+            axes = objects.rotation_of(entry["rotation"])
+            struck = (
+                fresh_surfaces(scene)
+                .without(_bodies_of(scene, entry))
+                .bodies_in_box(edits.centre_of(entry), 0.5 * objects.own_size_m(scene, entry) - _TOUCH_M, axes)
+            )
+            if struck:
+                raise ActionError(f"{scene.simulator.objects[struck[0]].id} is in the way.")
+    if not forceKinematic:
+        edits.drop(scene, [objectId])
+    edits.relate(scene, [objectId])
+
+
 @action("DisableObject")
 def disable_object(engine: Engine, *, objectId: str) -> None:
     """Takes an object out of the scene until `EnableObject`; what stood on it falls."""
@@ -132,7 +168,7 @@ def enable_object(engine: Engine, *, objectId: str) -> None:
     edits.relate(scene, [objectId])
 
 
-@action("MakeAllObjectsMoveable", "MakeAllObjectsStationary", "PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
+@action("MakeAllObjectsMoveable", "MakeAllObjectsStationary")
 def change_physics(engine: Engine) -> None:
     """Nothing to do where everything is at rest."""
 
@@ -153,19 +189,17 @@ def _place_at(scene: Scene, object_id: str, point: Vector3, rotation: Vector3 | 
     edits.settle(scene)
     entry = edits.entry_of(scene, object_id)
     turn = {"x": rotation.x, "y": rotation.y, "z": rotation.z} if rotation else entry["rotation"]
-    table = objects.table_of(scene)
-    index = table.instances[object_id] - 1
     size_m = objects.own_size_m(scene, entry)
     axes = objects.rotation_of(turn)
     reach_m = 0.5 * np.abs(axes) @ size_m
     low, high = objects.bounds_m(scene)
     if not all(lo <= value <= hi for lo, value, hi in zip(low, (point.x, point.y, point.z), high, strict=True)):
-        raise ActionError(f"Position coordinate ({_text(point)}) is not within scene bounds ({low}, {high})")
+        raise out_of_range(f"Position coordinate ({_text(point)}) is not within scene bounds ({low}, {high})")
     surfaces = fresh_surfaces(scene)
-    along = {index, *(table.instances[child["id"]] - 1 for child, _ in objects.placed_objects({"objects": [entry]}))}
-    surfaces = surfaces.without(along)
+    surfaces = surfaces.without(_bodies_of(scene, entry))
     under_m = surfaces.height_under_m(np.array([[point.x, point.z]]), point.y)
-    centre_m = np.array([point.x, under_m + _CLEARANCE_M + reach_m[1], point.z])
+    pivot_m = axes @ edits.facts(entry, objects.record_of(scene, object_id)["objectType"]).pivot_m
+    centre_m = np.array([point.x - pivot_m[0], under_m + _CLEARANCE_M + reach_m[1], point.z - pivot_m[2]])
     struck = surfaces.bodies_in_box(centre_m, 0.5 * size_m, axes)
     if struck:
         name = scene.simulator.objects[struck[0]].id
@@ -175,6 +209,12 @@ def _place_at(scene: Scene, object_id: str, point: Vector3, rotation: Vector3 | 
     with edits.edited(scene):
         edits.put(entry, centre_m.tolist(), turn)
     edits.relate(scene, [object_id])
+
+
+def _bodies_of(scene: Scene, entry: dict[str, Any]) -> set[int]:
+    """Indices of an object's body and of those of all that stands on it."""
+    instances = objects.table_of(scene).instances
+    return {instances[part["id"]] - 1 for part, _ in objects.placed_objects({"objects": [entry]})}
 
 
 def _text(vector: Vector3) -> str:

@@ -112,7 +112,7 @@ def record_of(scene: Scene, object_id: str) -> Record:
     for record in static_records(scene):
         if record["objectId"] == object_id:
             return record
-    raise ActionError(f"objectId: {object_id} is not the objectId on any object in the scene!")
+    raise ActionError(f"ArgumentException: objectId: {object_id} is not the objectId on any object in the scene!")
 
 
 def own_size_m(scene: Scene, entry: Mapping[str, Any]) -> NDArray[np.float64]:

@@ -117,7 +117,7 @@ def _target(engine: Engine, object_id: str | None, x: float | None, y: float | N
     if not is_forced:
         seen = objects.visible_ids(engine.scene, engine.agent, engine.settings.visibilityDistance)
         if object_id not in seen:
-            raise ActionError("Target object not found within the specified visibility.")
+            raise ActionError("NullReferenceException: Target object not found within the specified visibility.")
     return record
 
 

@@ -16,7 +16,7 @@ _FALL_M = 2 * 9.81
 """How far AI2-THOR's agent falls where there is no floor: one step of its doubled gravity."""
 
 
-def _out_of_range(message: str) -> ActionError:
+def out_of_range(message: str) -> ActionError:
     """What AI2-THOR says of an `ArgumentOutOfRangeException`, whose one argument is a parameter's name."""
     reason = f"Specified argument was out of the range of valid values.\nParameter name: {message}"
     return ActionError(f"ArgumentOutOfRangeException: {reason}")
@@ -98,18 +98,18 @@ def _check_pose(engine: Engine, at: Vector3, rotation: Vector3, horizon_deg: flo
     body, point_m, place = engine.agent.body, (at.x, at.z), vector_text((at.x, at.y, at.z), 6)
     if max(abs(rotation.x), abs(rotation.z)) >= 1e-2:
         given = vector_text((rotation.x, rotation.y, rotation.z), 6)
-        raise _out_of_range(
+        raise out_of_range(
             "No agents currently can change in pitch or roll. So, you must set rotation(x=0, y=yaw, z=0)."
             f" You gave {given}."
         )
     if not -body.max_upward_deg <= horizon_deg <= body.max_downward_deg:
         limits = f"[{-body.max_upward_deg:g}:{body.max_downward_deg:g}]"
-        raise _out_of_range(f"Each horizon must be in {limits}. You gave {horizon_deg:g}.")
+        raise out_of_range(f"Each horizon must be in {limits}. You gave {horizon_deg:g}.")
     if not is_within_bounds(engine, point_m):
-        raise _out_of_range(f"Teleport position {place} out of scene bounds! Ignore this by setting forceAction=true.")
+        raise out_of_range(f"Teleport position {place} out of scene bounds! Ignore this by setting forceAction=true.")
     if math.dist(snapped(engine, point_m), point_m) > 1e-5:
         grid = f"{engine.settings.gridSize:g}"
-        raise _out_of_range(f"Teleport position {place} is not on the grid of size {grid}.")
+        raise out_of_range(f"Teleport position {place} is not on the grid of size {grid}.")
     simulator = engine.scene.simulator
     blocker = simulator.blocker(point_m, point_m)
     if blocker is not None:
