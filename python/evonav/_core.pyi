@@ -399,6 +399,21 @@ class EmbeddedSimulator:
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None, NDArray[np.int32] | None]:
         """As `render`; orthographic if `half_height_m` is given."""
 
+    def visible_bodies(
+        self,
+        *,
+        image_px: tuple[int, int],
+        vertical_fov_rad: float,
+        position_m: tuple[float, float, float],
+        yaw_rad: float,
+        horizon_rad: float,
+        roll_rad: float,
+        half_height_m: float | None,
+        agent_m: tuple[float, float],
+        max_distance_m: float,
+    ) -> list[int]:
+        """Indices of the bodies that AI2-THOR calls visible, rising."""
+
     def is_free(self, point_m: tuple[float, float]) -> bool: ...
     def is_reachable(self, point_m: tuple[float, float]) -> bool: ...
     def can_move(self, from_m: tuple[float, float], to_m: tuple[float, float]) -> bool: ...

@@ -193,6 +193,37 @@ class EmbeddedSimulator:
         )
         return Images(*images)
 
+    def visible_objects(
+        self, view: CameraView, *, max_distance_m: float = 1.5, agent_m: tuple[float, float] | None = None
+    ) -> list[int]:
+        """What AI2-THOR calls visible (`visibilityScheme` "Collider", its default).
+
+        Something of the body is near the agent on the ground plane, and one of its visibility points, a grid over its
+        surfaces, is inside the picture with nothing else before it. Clip planes do not count.
+
+        Args:
+            view: Of the agent's camera, or of another.
+            max_distance_m: AI2-THOR's `visibilityDistance`.
+            agent_m: `(x, z)` of the agent; by default below the camera.
+
+        Returns:
+            Indices into `objects` (instance id - 1), rising; never ceilings.
+
+        Raises:
+            InvalidArgumentError: A number is not finite or out of range.
+        """
+        return self._world.visible_bodies(
+            image_px=(view.width_px, view.height_px),
+            vertical_fov_rad=view.vertical_fov_rad,
+            position_m=view.pose.position_m,
+            yaw_rad=view.pose.yaw_rad,
+            horizon_rad=view.pose.horizon_rad,
+            roll_rad=view.roll_rad,
+            half_height_m=view.orthographic_half_height_m,
+            agent_m=agent_m or (view.pose.x_m, view.pose.z_m),
+            max_distance_m=max_distance_m,
+        )
+
     def reachable_positions(self) -> NDArray[np.float64]:
         """`(N, 3)` positions of the square grid through the agent that it can reach along that grid."""
         points_m = self._world.reachable_positions((self._pose.x_m, self._pose.z_m), self.config.grid_m)

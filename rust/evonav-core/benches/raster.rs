@@ -8,9 +8,10 @@ use evonav_core::{
     geometry::Pose,
     house::House,
     sensors::{
-        camera::Camera,
+        camera::{Camera, View},
         raster::{FrameBuffer, Want, render},
         raycast3d::RayCaster,
+        visibility::visible_bodies,
     },
     world::{mesh::SceneMesh, scene::Scene},
 };
@@ -64,6 +65,15 @@ fn bench_raster(c: &mut Criterion) {
                 let ray = camera.ray([f64::from(i) * 3.0, f64::from(i) * 2.0 + 50.0]);
                 black_box(caster.cast(&mesh, camera.position_m, ray, 100.0));
             }
+        });
+    });
+    // What AI2-THOR's metadata asks for at every step.
+    let mut next = cameras.iter().cycle();
+    c.bench_function("visibility/visible_bodies_1.5m", |b| {
+        b.iter(|| {
+            let camera = next.next().expect("a cycle");
+            let [x, _, z] = camera.position_m;
+            visible_bodies(&scene, &mesh, &caster, &View::from(*camera), [x, z], 1.5)
         });
     });
     c.bench_function("mesh/build", |b| b.iter(|| SceneMesh::build(black_box(&scene))));

@@ -12,6 +12,7 @@ use crate::{
         camera::{Camera, View},
         raster::{FrameBuffer, Want, render_view},
         raycast3d::RayCaster,
+        visibility::visible_bodies,
     },
     world::{
         collision::AgentBody,
@@ -177,8 +178,24 @@ impl EmbeddedSimulator {
 
     /// Whether nothing is between two points but the bodies in `ignored` (indices).
     pub fn is_visible(&self, from_m: Vec3, to_m: Vec3, ignored: &[usize]) -> bool {
-        let rays = self.rays.get_or_init(|| RayCaster::build(&self.mesh));
-        rays.is_visible(&self.mesh, from_m, to_m, |body| ignored.contains(&body))
+        self.rays().is_visible(&self.mesh, from_m, to_m, |body| ignored.contains(&body))
+    }
+
+    /// Indices of the bodies that AI2-THOR would call visible to an agent at `agent_m`.
+    ///
+    /// # Errors
+    /// As [`visible_bodies`].
+    pub fn visible_bodies(
+        &self,
+        view: &View,
+        agent_m: Vec2,
+        max_distance_m: f64,
+    ) -> Result<Vec<usize>, Error> {
+        visible_bodies(&self.scene, &self.mesh, self.rays(), view, agent_m, max_distance_m)
+    }
+
+    fn rays(&self) -> &RayCaster {
+        self.rays.get_or_init(|| RayCaster::build(&self.mesh))
     }
 }
 

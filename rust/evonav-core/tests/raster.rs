@@ -1,12 +1,14 @@
-//! The rasteriser and the ray caster against a ray tracer that tries every triangle.
+//! The rasteriser, the ray caster and what rests on it against a ray tracer that tries every
+//! triangle.
 
 use evonav_core::{
-    assets::part::{Part, Primitive},
+    assets::part::{Part, Primitive, aabb_of},
     geometry::{Aabb, Vec3, add, euler_rotation_deg, rotate},
     sensors::{
         camera::{CLIP_M, Camera, View},
         raster::{FrameBuffer, Want, render, render_view},
         raycast3d::RayCaster,
+        visibility::{visibility_points, visible_bodies},
     },
     world::{
         mesh::{SceneMesh, Triangle},
@@ -75,7 +77,7 @@ fn scene_of(parts: &[Part]) -> Scene {
             category: "Box".to_owned(),
             kind: BodyKind::Object,
             parts: vec![*part],
-            aabb: Aabb::EMPTY,
+            aabb: aabb_of(&[*part]),
             oriented: OrientedBox::of_aabb(&Aabb::EMPTY),
         })
         .collect();
@@ -263,6 +265,79 @@ proptest! {
         prop_assert!((u - image_px[0]).abs() < 1e-8);
         prop_assert!((v - image_px[1]).abs() < 1e-8);
         prop_assert!((z - depth_m).abs() < 1e-9);
+    }
+}
+
+/// Whether a triangle's shadow on the ground comes within `reach_m` of a point: its sides and its
+/// inside, each tried with a formula of its own.
+fn is_shadow_near(triangle: &Triangle, axis_m: [f64; 2], reach_m: f64) -> bool {
+    let [a, b, c] = triangle.vertices_m.map(|v| [v[0] - axis_m[0], v[2] - axis_m[1]]);
+    let turn = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
+    let turns = [turn(a, b), turn(b, c), turn(c, a)];
+    let is_inside = turns.iter().all(|t| *t > 0.0) || turns.iter().all(|t| *t < 0.0);
+    let is_side_near = |p: [f64; 2], q: [f64; 2]| {
+        (0..=1000).any(|k| {
+            let t = f64::from(k) / 1000.0;
+            (p[0] + t * (q[0] - p[0])).hypot(p[1] + t * (q[1] - p[1])) <= reach_m
+        })
+    };
+    is_inside || is_side_near(a, b) || is_side_near(b, c) || is_side_near(c, a)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    /// Every triangle tried for every point; a hair's breadth may go either way.
+    #[test]
+    fn visible_bodies_have_a_point_in_the_picture_that_a_ray_meets_first(
+        parts in vec(part(), 1..10),
+        view in view(),
+        reach_m in 0.1..4.0_f64,
+    ) {
+        const HAIR: f64 = 1e-7;
+        let scene = scene_of(&parts);
+        let mesh = SceneMesh::build(&scene);
+        let rays = RayCaster::build(&mesh);
+        let triangles: Vec<Triangle> = mesh.triangles().collect();
+        let eye_m = view.camera.position_m;
+        let axis_m = [eye_m[0], eye_m[2]];
+        let got = visible_bodies(&scene, &mesh, &rays, &view, axis_m, reach_m).unwrap();
+        let half_m = (view.camera.vertical_fov_rad / 2.0).tan();
+        let aspect = view.camera.width_px as f64 / view.camera.height_px as f64;
+        let angles_deg = [view.camera.horizon_rad, view.camera.yaw_rad, view.roll_rad].map(f64::to_degrees);
+        let to_world = euler_rotation_deg(angles_deg);
+        let to_camera: [Vec3; 3] = std::array::from_fn(|i| std::array::from_fn(|j| to_world[j][i]));
+        // How far inside of the picture's nearest border, as a share of its half height.
+        let margin = |point_m: Vec3| {
+            let [x, y, z] = rotate(&to_camera, sub(point_m, eye_m));
+            let half_m = view.half_height_m.unwrap_or(half_m * z);
+            if z > 0.0 { (aspect - x.abs() / half_m).min(1.0 - y.abs() / half_m) } else { -1.0 }
+        };
+        for body in 0..scene.bodies.len() as u32 {
+            let is_own = |t: &&Triangle| t.body == body;
+            let is_near = |slack_m: f64| {
+                triangles.iter().filter(is_own).any(|t| is_shadow_near(t, axis_m, reach_m + slack_m))
+            };
+            let is_met = |slack: f64| {
+                visibility_points(&mesh, body as usize).into_iter().any(|point_m| {
+                    let direction = sub(point_m, eye_m);
+                    let most = 1.0 + 0.5 / dot(direction, direction).sqrt() + slack;
+                    let (own, others): (Vec<Triangle>, Vec<Triangle>) =
+                        triangles.iter().copied().partition(|t| t.body == body);
+                    let own = cast_naive(&own, eye_m, direction, -slack, slack);
+                    let others = cast_naive(&others, eye_m, direction, slack, -slack);
+                    margin(point_m) > -slack
+                        && own.is_some_and(|own| {
+                            own.0 < most && others.is_none_or(|other| other.0 > own.0 - slack)
+                        })
+                })
+            };
+            if got.contains(&(body as usize)) {
+                prop_assert!(is_near(0.01) && is_met(HAIR), "{body} is not visible");
+            } else {
+                prop_assert!(!(is_near(-0.01) && is_met(-HAIR)), "{body} is visible");
+            }
+        }
     }
 }
 

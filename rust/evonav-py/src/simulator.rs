@@ -167,6 +167,33 @@ impl PyEmbeddedSimulator {
         self.images(py, &view, Want { rgb, instances })
     }
 
+    /// Indices of the bodies that AI2-THOR calls visible.
+    #[pyo3(signature = (
+        *, image_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad, roll_rad, half_height_m,
+        agent_m, max_distance_m
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword-only in Python")]
+    fn visible_bodies(
+        &self,
+        py: Python<'_>,
+        image_px: [usize; 2],
+        vertical_fov_rad: f64,
+        position_m: Vec3,
+        yaw_rad: f64,
+        horizon_rad: f64,
+        roll_rad: f64,
+        half_height_m: Option<f64>,
+        agent_m: Vec2,
+        max_distance_m: f64,
+    ) -> PyResult<Vec<usize>> {
+        let [width_px, height_px] = image_px;
+        let camera =
+            Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad };
+        let view = View { roll_rad, half_height_m, ..View::from(camera) };
+        py.detach(|| self.core.visible_bodies(&view, agent_m, max_distance_m))
+            .map_err(error::to_py)
+    }
+
     fn is_free(&self, point_m: Vec2) -> bool {
         self.core.navigation().is_free(point_m)
     }

@@ -205,4 +205,15 @@ impl View {
             forward,
         ]
     }
+    /// Whether a point is in front of the camera and inside the image's borders; the clip planes
+    /// do not count.
+    pub fn frames(&self, point_m: Vec3) -> bool {
+        let [x, y, z] = rotate(&self.axes(), sub(point_m, self.camera.position_m));
+        let [half_width_px, half_height_px] = self.camera.centre_px();
+        let scale_px = match self.half_height_m {
+            None => self.camera.focal_px() / z,
+            Some(half_m) => half_height_px / half_m,
+        };
+        z > 0.0 && (scale_px * x).abs() < half_width_px && (scale_px * y).abs() < half_height_px
+    }
 }

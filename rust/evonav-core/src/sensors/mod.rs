@@ -8,3 +8,4 @@ mod raster_shade;
 pub mod raycast;
 pub mod raycast3d;
 pub mod unproject;
+pub mod visibility;
