@@ -190,8 +190,7 @@ impl PyEmbeddedSimulator {
         let camera =
             Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad };
         let view = View { roll_rad, half_height_m, ..View::from(camera) };
-        py.detach(|| self.core.visible_bodies(&view, agent_m, max_distance_m))
-            .map_err(error::to_py)
+        py.detach(|| self.core.visible_bodies(&view, agent_m, max_distance_m)).map_err(error::to_py)
     }
 
     fn is_free(&self, point_m: Vec2) -> bool {
