@@ -1,17 +1,14 @@
 """Whatever a client sends, the engine answers: a failed action at worst."""
 
 import copy
-import json
 import math
 from typing import Any
 
 import msgpack
-import pytest
-from hypothesis import HealthCheck, example, given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from evonav.thor import actions
-from evonav.thor.actions import ErrorCode
 from evonav.thor.engine import Engine
 from evonav.thor.event import Emitter
 
@@ -28,7 +25,9 @@ vectors = st.one_of(
     st.fixed_dictionaries({"x": st.floats(0, 10), "y": st.just(0.9), "z": st.floats(0, 10)}),
     st.dictionaries(st.sampled_from("xyzw"), numbers),
 )
-texts = st.one_of(st.text(max_size=20), st.sampled_from(["2|0", "", "Fridge", "default", "locobot", "\ud800", "x" * 9999]))
+texts = st.one_of(
+    st.text(max_size=20), st.sampled_from(["2|0", "", "Fridge", "default", "locobot", "\ud800", "x" * 9999])
+)
 scalars = st.one_of(st.none(), st.booleans(), numbers, texts)
 values = st.recursive(
     st.one_of(scalars, vectors),

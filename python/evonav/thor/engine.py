@@ -13,7 +13,7 @@ from evonav.thor import actions
 from evonav.thor.actions import ActionError, ErrorCode
 from evonav.thor.agent import Agent
 from evonav.thor.scene import Scene
-from evonav.world.camera import CameraView
+from evonav.world.camera import CameraView, Images
 from evonav.world.simulator import Frame, SimulatorConfig
 
 _LOG = logging.getLogger("evonav.thor")
@@ -55,7 +55,7 @@ class Camera(Protocol):
         """AI2-THOR's `ThirdPartyCameraMetadata`."""
         ...
 
-    def render(self, scene: Scene, *, rgb: bool, instances: bool) -> Frame:
+    def render(self, scene: Scene, *, rgb: bool, instances: bool) -> Images:
         """What it sees, in the size of the screen."""
         ...
 

@@ -85,6 +85,6 @@ class Emitter:
         frame = engine.view(rgb=kinds.rgb, instances=kinds.needs_instances)
         fields = images.encode(frame, kinds, palette)
         for camera in engine.cameras:
-            frame = camera.render(engine.scene, rgb=kinds.rgb, instances=kinds.needs_instances)
-            fields += images.encode(frame, kinds, palette, is_third_party=True)
+            seen = camera.render(engine.scene, rgb=kinds.rgb, instances=kinds.needs_instances)
+            fields += images.encode(seen, kinds, palette, is_third_party=True)
         return fields

@@ -25,7 +25,9 @@ MAX_MESSAGE_BYTES = 256 * 2**20
 """Larger than any house; a longer field is a broken header."""
 
 _HEADER = struct.Struct("!BI")
-_CONNECT_TIMEOUT_S = 10.0
+# The client opens its end as soon as it has started the process. Who has not by then is dead, even where the engine was
+# adopted too early to notice.
+_CONNECT_TIMEOUT_S = 5.0
 _WATCH_MS = 500
 # Linux's; a whole event fits, so that engine and client change places once a step.
 _SET_PIPE_SIZE, _PIPE_BYTES = 1031, 2**20

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from evonav.thor.colors import Palette
 from evonav.thor.fifo import Field, FieldType
+from evonav.world.camera import Images
 from evonav.world.simulator import Frame
 
 FAR_M = 20.0
@@ -35,7 +36,7 @@ _THIRD_PARTY = (
 )
 
 
-def encode(frame: Frame, kinds: Kinds, palette: Palette, *, is_third_party: bool = False) -> list[Field]:
+def encode(frame: Frame | Images, kinds: Kinds, palette: Palette, *, is_third_party: bool = False) -> list[Field]:
     """The images of one camera, each with its type."""
     rgb, depth, instances, classes = _THIRD_PARTY if is_third_party else _AGENT
     fields: list[Field] = []
