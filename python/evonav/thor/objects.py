@@ -19,6 +19,8 @@ from evonav.thor.actions import ActionError
 from evonav.thor.agent import Agent
 from evonav.thor.facts import AssetFacts, facts_of
 from evonav.thor.scene import Scene
+from evonav.world.camera import CameraView
+from evonav.world.pose import Pose
 from evonav.world.simulator import SceneObject
 
 Record = dict[str, Any]
@@ -90,6 +92,8 @@ class Table(NamedTuple):
     """`(N, 3)`."""
     instances: dict[str, int]
     """Instance id in images, by object id."""
+    by_body: dict[int, str]
+    """Object ids by index of the body."""
 
 
 _tables: WeakKeyDictionary[Scene, Table] = WeakKeyDictionary()
@@ -156,7 +160,9 @@ def _build(scene: Scene) -> Table:
         records += _structure_records(house, floor_id, {key: body for key, (_, body) in bodies.items()})
     _relate(records, parents)
     positions_m = np.array([list(record["position"].values()) for record in records], dtype=np.float64).reshape(-1, 3)
-    return Table(scene.version, records, positions_m, {key: instance for key, (instance, _) in bodies.items()})
+    instances = {key: instance for key, (instance, _) in bodies.items()}
+    by_body = {instance - 1: key for key, instance in instances.items()}
+    return Table(scene.version, records, positions_m, instances, by_body)
 
 
 def placed_objects(house: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str | None]]:
@@ -315,38 +321,16 @@ def _wall_yaw_deg(wall: Mapping[str, Any]) -> float:
     return math.degrees(math.atan2(-z_m, x_m)) % 360.0
 
 
-# Visibility points: middles of faces, of edges and of the box, and corners, all a little inside.
-_INSIDE = 0.96
-_POINTS = _INSIDE * 0.5 * np.array([(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1)], dtype=float)
-
-
 def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
-    """Objects that AI2-THOR calls visible.
-
-    Near enough on the ground plane, and some visibility point of it is in the picture with nothing before it.
-    """
-    table = table_of(scene)
+    """Objects that AI2-THOR calls visible, as `EmbeddedSimulator.visible_objects` says."""
     if scene.house is None:
         return set()
-    simulator = scene.simulator
-    half_height = math.tan(0.5 * simulator.intrinsics.vertical_fov_rad)
-    half_width = half_height * simulator.intrinsics.width_px / simulator.intrinsics.height_px
-    eye = eye_m(agent)
-    world_from_camera = looking(agent)
-    ids = set()
-    for record in table.records:
-        instance = table.instances.get(record["objectId"])
-        box = record["axisAlignedBoundingBox"]
-        centre_m, size_m = (np.array(list(box[key].values())) for key in ("center", "size"))
-        gap_m = np.maximum(np.abs(eye - centre_m) - 0.5 * size_m, 0.0)
-        if instance is None or math.hypot(gap_m[0], gap_m[2]) > distance_m:
-            continue
-        points_m = centre_m + _POINTS * size_m
-        right, up, ahead = ((points_m - eye) @ world_from_camera).T
-        is_framed = (ahead > 0) & (np.abs(right) < half_width * ahead) & (np.abs(up) < half_height * ahead)
-        if any(simulator.is_visible(eye, (x, y, z), (instance,)) for x, y, z in points_m[is_framed].tolist()):
-            ids.add(record["objectId"])
-    return ids
+    simulator, camera = scene.simulator, scene.simulator.intrinsics
+    x_m, height_m, z_m = eye_m(agent)
+    pose = Pose(x_m, height_m, z_m, agent.yaw_rad, math.radians(agent.horizon_deg))
+    view = CameraView(pose, camera.width_px, camera.height_px, camera.vertical_fov_rad)
+    by_body = table_of(scene).by_body
+    return {by_body[body] for body in simulator.visible_objects(view, max_distance_m=distance_m)}
 
 
 def eye_m(agent: Agent) -> _Vec3:
@@ -361,6 +345,4 @@ def looking(agent: Agent) -> NDArray[np.float64]:
 
 def object_of_body(scene: Scene, body: int) -> str | None:
     """Id of the object that a body of the simulator is; none of a ceiling."""
-    instances = table_of(scene).instances
-    found = scene.simulator.objects[body].id
-    return found if instances.get(found) == body + 1 else None
+    return table_of(scene).by_body.get(body)
