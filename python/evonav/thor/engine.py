@@ -56,7 +56,7 @@ class Camera(Protocol):
         ...
 
     def render(self, scene: Scene, *, rgb: bool, instances: bool) -> Images:
-        """What it sees, in the size of the screen."""
+        """What it sees, in the size of the screen; depth ends at its own far plane."""
         ...
 
 

@@ -39,11 +39,12 @@ _THIRD_PARTY = (
 def encode(frame: Frame | Images, kinds: Kinds, palette: Palette, *, is_third_party: bool = False) -> list[Field]:
     """The images of one camera, each with its type."""
     rgb, depth, instances, classes = _THIRD_PARTY if is_third_party else _AGENT
+    far_m = np.inf if is_third_party else FAR_M  # a third-party camera has its own
     fields: list[Field] = []
     if kinds.rgb and frame.rgb is not None:
         fields.append((rgb, np.ascontiguousarray(frame.rgb[::-1])))
     if kinds.depth:
-        fields.append((depth, np.minimum(frame.depth_m[::-1], np.float32(FAR_M))))
+        fields.append((depth, np.minimum(frame.depth_m[::-1], np.float32(far_m))))
     if kinds.instances and frame.instances is not None:
         fields.append((instances, _painted(frame.instances, palette.instances_rgba)))
     if kinds.classes and frame.instances is not None:
