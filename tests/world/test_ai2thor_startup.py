@@ -15,12 +15,6 @@ from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator
 from evonav.world.simulator import SimulatorConfig
 
 pytest.importorskip("ai2thor", reason="the thor dependency group (ai2thor) is not installed")
-# The client hands its log file to the process and leaves closing it to the garbage collector.
-pytestmark = [
-    pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning"),
-    pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
-]
-
 Script = Callable[[str], str]
 
 
@@ -79,7 +73,7 @@ def build(home: Path, platform: str, commit: str = "abc") -> None:
 
 def test_a_process_that_ends_at_once_is_told_with_its_log(script: Script) -> None:
     began_s = time.monotonic()
-    with pytest.raises(SimulatorLostError, match=r"(?s)ended at once \(exit code 7\).*cannot find the moon"):
+    with pytest.raises(SimulatorLostError, match=r"(?s)ended with exit code 7 while starting.*cannot find the moon"):
         Ai2ThorSimulator(options=Ai2ThorOptions(script("echo cannot find the moon >&2; exit 7"))).start()
     assert time.monotonic() - began_s < 5.0
     assert "SIGSEGV" in failure(Ai2ThorOptions(script("kill -SEGV $$")))
@@ -127,9 +121,10 @@ def test_a_display_is_asked_for_where_one_is_needed(script: Script) -> None:
     assert "no X display" in failure(Ai2ThorOptions(platform="x11"))
     assert "no X display" in failure(Ai2ThorOptions(script("exit 0"), platform="x11"))
     # A build given by path may draw without one, so it is started.
-    assert "ended at once" in failure(Ai2ThorOptions(script("exit 0")))
+    assert "while starting" in failure(Ai2ThorOptions(script("exit 0")))
 
 
+@pytest.mark.filterwarnings("ignore:unclosed <socket:ResourceWarning")
 def test_a_display_that_is_not_there(tmp_path: Path) -> None:
     build(tmp_path / "home", "Linux64")
     message = failure(Ai2ThorOptions(commit_id="abc", platform="x11", x_display=":97"))
@@ -156,7 +151,7 @@ def test_unity_that_ends_for_want_of_a_gpu(tmp_path: Path, monkeypatch: pytest.M
     build(tmp_path / "home", "CloudRendering")
     monkeypatch.setattr("ctypes.util.find_library", lambda name: "libvulkan.so.1")
     message = failure(Ai2ThorOptions(platform="cloud", commit_id="abc"))
-    assert "ended at once" in message
+    assert "while starting" in message
     assert "no Vulkan device" in message
     assert "vulkaninfo" in message
 

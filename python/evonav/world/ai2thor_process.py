@@ -8,12 +8,14 @@ that is there.
 import os
 import select
 import signal
+import struct
+import subprocess
 import sys
 import threading
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from ai2thor.controller import Controller
 from ai2thor.fifo_server import FifoServer
@@ -47,7 +49,10 @@ class PromptFifoServer(FifoServer):  # type: ignore[misc]
             descriptor = os.open(self.server_pipe_path, os.O_RDONLY | os.O_NONBLOCK)
             self.server_pipe = os.fdopen(descriptor, "rb", buffering=0)
             _widen(descriptor)
-        return super().receive(timeout)
+        try:
+            return super().receive(timeout)
+        except (ValueError, KeyError, struct.error) as error:  # our engine says goodbye with an empty message
+            self._raise_ended(f"broke the protocol: {error}")
 
     def stop(self) -> None:
         """Ends the process and removes the pipes; safe to call twice."""
@@ -112,10 +117,12 @@ class PromptFifoServer(FifoServer):  # type: ignore[misc]
         if time.monotonic() > deadline_s:
             raise TimeoutError(f"does not read what it is sent, for {self.timeout:g} s")
 
-    def _raise_ended(self) -> None:
-        with suppress(Exception):
+    def _raise_ended(self, otherwise: str | None = None) -> NoReturn:
+        with suppress(subprocess.TimeoutExpired):
             self.unity_proc.wait(timeout=1.0)  # the pipe closes a moment before the process is gone
-        raise ProcessEndedError(self.unity_proc.returncode)
+        if self.unity_proc.returncode is None and otherwise is not None:
+            raise ProcessEndedError(otherwise)
+        raise ProcessEndedError.of(self.unity_proc.returncode)
 
 
 class GuardedController(Controller):  # type: ignore[misc]

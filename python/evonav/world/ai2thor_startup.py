@@ -1,6 +1,7 @@
 """Starts AI2-THOR, and says what to do where that fails."""
 
 import os
+import re
 import shlex
 import shutil
 import signal
@@ -70,21 +71,24 @@ class Ai2ThorOptions:
 
 
 class ProcessEndedError(Exception):
-    """The process has ended, or hung up."""
+    """The process has ended, or speaks nonsense; the message continues `AI2-THOR's process`."""
 
-    def __init__(self, returncode: int | None) -> None:
-        how = "closed its pipe" if returncode is None else f"exit code {returncode}"
-        if returncode is not None and returncode < 0:
+    @staticmethod
+    def of(returncode: int | None) -> "ProcessEndedError":
+        """For an exit status; `None` if the process lives on without its pipe."""
+        if returncode is None:
+            return ProcessEndedError("hung up")
+        if returncode < 0:
             with suppress(ValueError):
-                how = f"killed by {signal.Signals(-returncode).name}"
-        super().__init__(how)
+                return ProcessEndedError(f"was killed by {signal.Signals(-returncode).name}")
+        return ProcessEndedError(f"ended with exit code {returncode}")
 
 
 class ProcessLog:
     """What the simulator's process prints, in a temporary folder of its own."""
 
     def __init__(self) -> None:
-        self._temporary = TemporaryDirectory(prefix="evonav-ai2thor-")
+        self._temporary = TemporaryDirectory(prefix="evonav.ai2thor-")
         self._begin_s = time.time()
         self.folder = Path(self._temporary.name)
 
@@ -167,7 +171,7 @@ def lost(doing: str, error: BaseException, log_tail: str) -> SimulatorLostError:
         log_tail: Of the process.
     """
     cause = _cause(error)
-    how = f"hangs ({cause})" if isinstance(cause, TimeoutError) else f"ended ({cause})"
+    how = f"hangs ({cause})" if isinstance(cause, TimeoutError) else str(cause)
     return SimulatorLostError(f"AI2-THOR's process {how}, {doing}{_logged(log_tail)}")
 
 
@@ -220,9 +224,11 @@ def _explained(error: Exception, options: Ai2ThorOptions, log_tail: str) -> Simu
     if isinstance(error, SimulationError):
         return error
     cause, text = _cause(error), f"{error}"
-    if isinstance(cause, ProcessEndedError) or "Unity process has exited" in text:
+    if (told := re.search(r"Unity process has exited.*returncode=(-?\d+)", text, re.DOTALL)) is not None:
+        cause = ProcessEndedError.of(int(told[1]))  # of CloudRendering, the client looks itself
+    if isinstance(cause, ProcessEndedError):
         advice = _advice(log_tail) if not options.is_own_engine else ""
-        return SimulatorLostError(f"AI2-THOR's process ended at once ({_short(cause)}){_logged(log_tail)}{advice}")
+        return SimulatorLostError(f"AI2-THOR's process {cause} while starting{_logged(log_tail)}{advice}")
     if isinstance(cause, TimeoutError):
         return SimulatorLostError(
             f"AI2-THOR did not come up ({cause}): raise --thor-timeout if the machine is slow{_logged(log_tail)}"
