@@ -260,3 +260,36 @@ def test_a_door_is_drawn_as_open_as_it_is(engine: Engine) -> None:
     closed_m = np.ptp(corners_m(records(engine)[door["objectId"]]), axis=0)
     assert min(closed_m[0], closed_m[2]) < min(size_m[0], size_m[2]) - 0.3
     assert math.isclose(closed_m[1], size_m[1], abs_tol=1e-6)
+
+
+def test_an_object_is_visible_from_its_interactable_poses_and_from_no_others(engine: Engine) -> None:
+    target = next(record for record in records(engine).values() if record["objectType"] == "FloorLamp")["objectId"]
+    positions = do(engine, "GetReachablePositions")[::6]
+    found = do(engine, "GetInteractablePoses", objectId=target, positions=positions, standings=[True])
+    assert found
+    chosen = {(pose["x"], pose["z"], pose["rotation"], pose["horizon"]) for pose in found}
+    is_seen = set()
+    for position in positions:
+        for yaw_deg in (0.0, 90.0, 180.0, 270.0):
+            for horizon_deg in (-30.0, 0.0, 30.0, 60.0):
+                engine.agent.x_m, engine.agent.z_m = position["x"], position["z"]
+                engine.agent.yaw_deg, engine.agent.horizon_deg = yaw_deg, horizon_deg
+                if target in do(engine, "GetVisibleObjects"):
+                    is_seen.add((position["x"], position["z"], yaw_deg, horizon_deg))
+    assert chosen == is_seen
+    first = do(engine, "GetInteractablePoses", objectId=target, positions=positions, standings=[True], maxPoses=3)
+    assert len(first) == 3
+    older = do(engine, "PositionsFromWhichItemIsInteractable", objectId=target, positions=positions)
+    assert set(older) == {"x", "y", "z", "rotation", "standing", "horizon"}
+    assert older["standing"].count(1.0) == len(found)
+
+
+def test_things_can_be_put_at_spawn_coordinates(engine: Engine) -> None:
+    table = next(r for r in records(engine).values() if r["objectType"] == "Dresser" and r["receptacleObjectIds"])
+    small, *rest = table["receptacleObjectIds"]
+    points = do(engine, "GetSpawnCoordinatesAboveReceptacle", objectId=table["objectId"], anywhere=True)
+    assert 50 < len(points) <= 400
+    do(engine, "PlaceObjectAtPoint", objectId=small, positions=points)
+    assert records(engine)[small]["parentReceptacles"] == [table["objectId"]]
+    assert set(rest) <= set(do(engine, "Contains", objectId=table["objectId"]))
+    assert "not found within" in fail(engine, "GetSpawnCoordinatesAboveReceptacle", objectId=table["objectId"])

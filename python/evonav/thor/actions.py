@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, PydanticUserError, TypeAdapter, Vali
 # Whose functions register themselves.
 _MODULES = (
     *("dialogue", "motion", "teleport", "paths", "assets", "random_spawn", "spawn"),
-    *("frame_actions", "object_actions", "states", "cameras"),
+    *("frame_actions", "interactable", "object_actions", "states", "cameras"),
 )
 
 # What any action may carry (`DynamicServerAction.AllowedExtraneousParameters`), and what the client may add to it.

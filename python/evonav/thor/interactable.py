@@ -1,0 +1,134 @@
+"""Actions that ask from where an object can be used, and where on it something can be put."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from evonav.thor import objects, paths
+from evonav.thor.actions import ActionError, Vector3, action
+from evonav.thor.engine import Engine
+from evonav.thor.motion import invalid_operation
+from evonav.thor.surfaces import surfaces_of
+from evonav.thor.teleport import out_of_range
+
+Pose = dict[str, float | bool]
+
+_HORIZONS_DEG = (-30.0, 0.0, 30.0, 60.0)
+# A receptacle's surface is looked at on a grid of so many points a side.
+_POINTS_A_SIDE = 20
+_NO_LIMIT = 2**31 - 1
+
+
+@action("GetInteractablePoses")
+def get_interactable_poses(
+    engine: Engine,
+    *,
+    objectId: str,
+    positions: list[Vector3] | None = None,
+    rotations: list[float] | None = None,
+    horizons: list[float] | None = None,
+    standings: list[bool] | None = None,
+    maxDistance: float | None = None,
+    maxPoses: int = _NO_LIMIT,
+) -> list[Pose]:
+    """Poses, as `TeleportFull` takes them, from which an object is visible.
+
+    Visible as the metadata says it: where AI2-THOR asks for a visibility point within the distance, here something of
+    the object has to be.
+    """
+    agent, settings, step_deg = engine.agent, engine.settings, engine.settings.rotateStepDegrees
+    if rotations is not None and 360 % step_deg != 0:
+        raise invalid_operation(
+            f"360 % rotateStepDegrees (360 % {step_deg:g} != 0) must be 0, unless 'rotations: float[]' is overwritten."
+        )
+    if maxPoses <= 0:
+        raise out_of_range("maxPoses must be > 0.")
+    if maxDistance is not None and maxDistance <= 0:
+        raise out_of_range("maxDistance must be >= 0 meters from the object.")
+    record = objects.record_of(engine.scene, objectId)
+    reach_m = settings.visibilityDistance if maxDistance is None else maxDistance
+    up_deg, down_deg = agent.body.max_upward_deg, agent.body.max_downward_deg
+    if horizons is not None and not all(-up_deg <= horizon <= down_deg for horizon in horizons):
+        raise ActionError(f"ArgumentException: Each horizon must be in [{-up_deg:g}:{down_deg:g}]")
+    if positions is None:
+        positions = [Vector3(**position) for position in paths.get_reachable_positions(engine)]
+    offset_deg = round(agent.yaw_deg % step_deg)
+    yaws_deg = [offset_deg + i * step_deg for i in range(round(360 / step_deg))] if rotations is None else rotations
+    chosen = (_HORIZONS_DEG if horizons is None else horizons, [False, True] if standings is None else standings)
+    if not (positions and yaws_deg and chosen[0] and chosen[1]):
+        raise invalid_operation("Every degree of freedom must have at least 1 valid value.")
+    near = _near(record, positions, reach_m + settings.gridSize)
+    poses: list[Pose] = []
+    for horizon_deg in chosen[0]:
+        for is_standing in chosen[1]:
+            for yaw_deg in yaws_deg:
+                there = replace(agent, horizon_deg=horizon_deg, is_standing=is_standing, yaw_deg=yaw_deg % 360.0)
+                for position in near:
+                    there.x_m, there.y_m, there.z_m = position.x, position.y, position.z
+                    if objectId in objects.visible_ids(engine.scene, there, reach_m):
+                        place = {"x": position.x, "y": position.y, "z": position.z}
+                        pose = {"rotation": yaw_deg, "standing": is_standing, "horizon": horizon_deg}
+                        poses.append({**place, **pose})
+                        if len(poses) >= maxPoses:
+                            return poses
+    return poses
+
+
+@action("PositionsFromWhichItemIsInteractable")
+def positions_from_which_item_is_interactable(
+    engine: Engine, *, objectId: str, horizon: float = 30.0, positions: list[Vector3] | None = None
+) -> dict[str, list[float]]:
+    """`GetInteractablePoses` in AI2-THOR's older form: a list a coordinate, horizons in steps."""
+    if horizon <= 0:
+        raise out_of_range("horizon must be > 0.")
+    up_deg, down_deg = engine.agent.body.max_upward_deg, engine.agent.body.max_downward_deg
+    horizons = np.arange(-up_deg, down_deg + 1e-6, horizon).tolist()
+    poses = get_interactable_poses(engine, objectId=objectId, positions=positions, horizons=horizons)
+    return {key: [float(pose[key]) for pose in poses] for key in ("x", "y", "z", "rotation", "standing", "horizon")}
+
+
+@action("GetSpawnCoordinatesAboveReceptacle")
+def get_spawn_coordinates_above_receptacle(
+    engine: Engine, *, objectId: str, anywhere: bool = False
+) -> list[dict[str, float]]:
+    """Points over the upper side of a receptacle where nothing stands, for `PlaceObjectAtPoint`.
+
+    At the height of the receptacle's box: AI2-THOR's are at that of its trigger box, which evonav does not know.
+    """
+    scene = engine.scene
+    record = objects.record_of(scene, objectId)
+    if not anywhere and objectId not in objects.visible_ids(scene, engine.agent, engine.settings.visibilityDistance):
+        raise ActionError("NullReferenceException: Target object not found within the specified visibility.")
+    box, body = record["axisAlignedBoundingBox"], objects.table_of(scene).instances.get(objectId, 0) - 1
+    spans = [
+        box["center"][axis] + box["size"][axis] * ((np.arange(_POINTS_A_SIDE) + 0.5) / _POINTS_A_SIDE - 0.5)
+        for axis in "xz"
+    ]
+    top_m = box["center"]["y"] + 0.5 * box["size"]["y"]
+    surfaces, points = surfaces_of(scene), []
+    for x_m in spans[0].tolist():
+        for z_m in spans[1].tolist():
+            hit = surfaces.cast((x_m, top_m + 1.0, z_m), (0.0, -1.0, 0.0))
+            if hit is not None and hit.body == body and (anywhere or _is_reached(engine, (x_m, top_m, z_m), body)):
+                points.append({"x": x_m, "y": top_m, "z": z_m})
+    return points
+
+
+def _near(record: objects.Record, positions: Sequence[Vector3], reach_m: float) -> list[Vector3]:
+    """Positions from which the object may be within reach."""
+    size_m = list(record["axisAlignedBoundingBox"]["size"].values())
+    pivot = record["position"]
+    limit_m = reach_m + math.hypot(*size_m)
+    return [p for p in positions if math.dist((p.x, p.y, p.z), pivot.values()) <= limit_m]
+
+
+def _is_reached(engine: Engine, point_m: tuple[float, float, float], body: int) -> bool:
+    """Whether a point is in the picture, near, and not hidden."""
+    eye_m, intrinsics = objects.eye_m(engine.agent), engine.scene.simulator.intrinsics
+    right_m, up_m, ahead_m = (np.subtract(point_m, eye_m) @ objects.looking(engine.agent)).tolist()
+    half = math.tan(0.5 * intrinsics.vertical_fov_rad) * ahead_m
+    is_framed = ahead_m > 0 and abs(up_m) < half and abs(right_m) < half * intrinsics.width_px / intrinsics.height_px
+    is_near = math.hypot(point_m[0] - eye_m[0], point_m[2] - eye_m[2]) <= engine.settings.visibilityDistance
+    return is_framed and is_near and engine.scene.simulator.is_visible(eye_m, point_m, (body + 1,))
