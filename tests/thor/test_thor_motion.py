@@ -156,6 +156,8 @@ def test_turns() -> None:
     assert "Cannot rotate by 0 degrees" in refused(engine, "RotateLeft", degrees=0)
     done(engine, "Rotate", rotation={"y": 45})
     assert engine.agent.yaw_deg == 45.0
+    done(engine, "Rotate", rotation={"y": -1e-5})
+    assert engine.agent.yaw_deg == 0.0
 
 
 def test_looks_stop_at_their_limits() -> None:
@@ -170,6 +172,7 @@ def test_looks_stop_at_their_limits() -> None:
     for _ in range(3):
         done(engine, "LookUp")
     assert refused(engine, "LookUp") == "can't look up beyond 30 degrees above the forward horizon"
+    refused(engine, "LookUp", degrees=0.1)
     assert "multiple of 0.1f" in refused(engine, "LookDown", degrees=0.15)
     assert "positive degree value" in refused(engine, "LookDown", degrees=-10)
     wide = engine_in(HOUSES[0], maxDownwardLookAngle=80, maxUpwardLookAngle=70)
@@ -298,7 +301,10 @@ def test_the_locobots_motion_is_noisy_and_repeats() -> None:
     assert walk(seed=1) == walk(seed=1)
     turns_deg = [math.degrees(b.yaw_rad - a.yaw_rad) for a, b in zip(poses[1::3], poses[2::3], strict=False)]
     errors_deg = [math.remainder(turn + 90, 360) for turn in turns_deg]
-    assert 0.2 < (sum(e * e for e in errors_deg) / len(errors_deg)) ** 0.5 < 1.0
+    assert 0.3 < np.std(errors_deg) < 0.7
+    moved = [(a, b) for a, b in zip(poses[0::3], poses[1::3], strict=False) if a.position_m != b.position_m]
+    assert 0.15 < np.std([math.degrees(math.remainder(b.yaw_rad - a.yaw_rad, math.tau)) for a, b in moved]) < 0.4
+    assert 0.002 < np.std([math.dist(a.position_m, b.position_m) for a, b in moved]) < 0.01
 
 
 @pytest.mark.parametrize("mode", ["arm", "stretch", "drone", "ballerina"])

@@ -104,9 +104,9 @@ def test_a_stuck_agent_reaches_its_own_position_only() -> None:
 
 def test_too_many_steps() -> None:
     engine = engine_in(HOUSES[0])
-    num_points = len(run(engine, "GetReachablePositions"))
-    run(engine, "GetReachablePositions", maxStepCount=math.ceil(num_points / 16))
-    message = refused(engine, "GetReachablePositions", maxStepCount=num_points // 16 - 1)
+    num_points = len(run(engine, "GetReachablePositions", gridSize=0.5))
+    run(engine, "GetReachablePositions", gridSize=0.5, maxStepCount=math.ceil(num_points / 4))
+    message = refused(engine, "GetReachablePositions", gridSize=0.5, maxStepCount=math.ceil(num_points / 4) - 1)
     assert message == "InvalidOperationException: Too many steps taken in GetReachablePositions."
 
 
@@ -146,6 +146,14 @@ def test_ends_off_the_free_space() -> None:
     message = refused(engine, "GetShortestPathToPoint", position=inside, target=inside)
     assert "Closest point on NavMesh was too far from the agent" in message
     run(engine, "GetShortestPathToPoint", position=inside, target=inside, allowedError=0.2)
+    deep = next(
+        body.centre_m
+        for body in engine.scene.simulator.objects
+        if body.kind == "object" and body.centre_m[1] < 0.9 and 0.3 < min(body.size_m[0], body.size_m[2]) < 0.6
+    )
+    target = {"x": deep[0], "y": 0.9, "z": deep[2]}
+    assert "No point on NavMesh near targetPosition" in refused(engine, "GetShortestPathToPoint", target=target)
+    run(engine, "GetShortestPathToPoint", target=target, allowedError=0.5)
     refused(engine, "GetShortestPathToPoint")
     assert engine.last.error_code is ErrorCode.MISSING_ARGUMENTS
 
@@ -203,6 +211,26 @@ def test_the_expert_walks_to_objects() -> None:
         num_seen += thing["id"] in objects.visible_ids(engine.scene, engine.agent, 1.5)
     # The expert stops when it is there and a part of the object is in the picture, even behind something else.
     assert num_seen >= 0.8 * len(things)
+
+
+@pytest.mark.parametrize(("horizon", "look"), [(-30, "LookDown"), (60, "LookUp")])
+def test_the_expert_looks_for_what_it_stands_before(horizon: float, look: str) -> None:
+    engine = engine_in(HOUSES[1])
+    looks = set()
+    for thing in HOUSES[1]["objects"]:
+        result = engine.execute({"action": "GetShortestPath", "objectId": thing["id"]})
+        if not result.is_success:
+            continue
+        end = result.action_return["corners"][-1]
+        run(engine, "Teleport", position={"x": end["x"], "y": 0.9, "z": end["z"]}, horizon=horizon)
+        for _ in range(8):
+            result = engine.execute({"action": "ObjectNavExpertAction", "objectId": thing["id"]})
+            if not result.is_success:
+                break
+            looks.add(result.action_return)
+            run(engine, result.action_return)
+        assert result.error_message == ""
+    assert look in looks
 
 
 def test_the_expert_walks_to_a_position() -> None:
