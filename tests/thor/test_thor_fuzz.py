@@ -75,7 +75,7 @@ def _arguments(name: str) -> st.SearchStrategy[JsonObject]:
 _NAMES = [name for name in actions.action_names() if name not in {"ChangeResolution"}]
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.data())
 def test_any_arguments_are_answered(house: JsonObject, data: st.DataObject) -> None:
     engine, emitter = _fresh(house)
@@ -84,3 +84,55 @@ def test_any_arguments_are_answered(house: JsonObject, data: st.DataObject) -> N
         message = {**data.draw(_arguments(name)), "action": name}
         agent = _settle(engine, emitter, message)
         assert "inside the engine" not in agent["errorMessage"], (message, agent["errorMessage"])
+
+
+def _places(document: Any, path: tuple[Any, ...] = ()) -> dict[tuple[Any, ...], list[tuple[Any, ...]]]:
+    """Paths of all values, by their path without indices: rare fields are to come as often as common ones."""
+    found: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}
+    inner = document.items() if isinstance(document, dict) else enumerate(document) if isinstance(document, list) else ()
+    for key, value in inner:
+        own = (*path, key)
+        found.setdefault(tuple("#" if isinstance(part, int) else part for part in own), []).append(own)
+        for kind, paths in _places(value, own).items():
+            found.setdefault(kind, []).extend(paths)
+    return found
+
+
+_ODD = [None, True, 0, -1, 1e5, 1e9, -1e300, math.nan, math.inf, "", "2|0", "\ud800", [], {}, [[]], [1], {"x": 1}, 10**30]
+
+
+def _changed(data: st.DataObject, house: JsonObject) -> JsonObject:
+    """The house with one value gone, doubled, or another."""
+    document = copy.deepcopy(house)
+    places = _places(document)
+    path = data.draw(st.sampled_from(places[data.draw(st.sampled_from(sorted(places, key=str)))]))
+    holder = document
+    for key in path[:-1]:
+        holder = holder[key]
+    how = data.draw(st.sampled_from(["gone", "twice", "scaled", "odd", "odd", "odd"]))
+    value = holder[path[-1]]
+    if how == "gone":
+        del holder[path[-1]]
+    elif how == "twice" and isinstance(holder, list):
+        holder.append(copy.deepcopy(value))
+    elif how == "scaled" and isinstance(value, int | float):
+        holder[path[-1]] = value * data.draw(st.sampled_from([-1, 1000, 1e-6]))
+    else:
+        holder[path[-1]] = data.draw(st.sampled_from(_ODD))
+    return document
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.data())
+def test_any_house_is_taken_whole_or_refused(house: JsonObject, data: st.DataObject) -> None:
+    engine, emitter = _fresh(house)
+    changed = _changed(data, house)
+    version, agent = engine.scene.version, engine.agent.pose
+    settled = _settle(engine, emitter, {"action": "CreateHouse", "house": changed})
+    assert "inside the engine" not in settled["errorMessage"]
+    if not settled["lastActionSuccess"]:
+        assert (engine.scene.version, engine.agent.pose) == (version, agent), "the old scene stays"
+    for message in ({"action": "GetReachablePositions"}, {"action": "RotateRight"}, {"action": "MoveAhead"}):
+        settled = _settle(engine, emitter, message)
+        assert "cannot show" not in settled["errorMessage"]
+        assert "inside the engine" not in settled["errorMessage"]

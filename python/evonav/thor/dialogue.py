@@ -50,8 +50,11 @@ def create_house(engine: Engine, *, house: Document) -> None:
     # ProcTHOR's own generator asks for houses before they have metadata.
     house = {"metadata": {}, **house}
     scene.load(house)
-    # What the next event shows: a house that cannot be described is not taken.
-    objects.static_records(scene)
+    try:
+        # What the next event shows: a house that cannot be described is not taken.
+        objects.static_records(scene)
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        raise ActionError(f"CreateHouse: the house cannot be described: {type(error).__name__}: {error}") from error
     engine.agent.enter(house)
     engine.scene = scene
 
