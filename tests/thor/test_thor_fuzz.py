@@ -89,7 +89,9 @@ def test_any_arguments_are_answered(house: JsonObject, data: st.DataObject) -> N
 def _places(document: Any, path: tuple[Any, ...] = ()) -> dict[tuple[Any, ...], list[tuple[Any, ...]]]:
     """Paths of all values, by their path without indices: rare fields are to come as often as common ones."""
     found: dict[tuple[Any, ...], list[tuple[Any, ...]]] = {}
-    inner = document.items() if isinstance(document, dict) else enumerate(document) if isinstance(document, list) else ()
+    inner = (
+        document.items() if isinstance(document, dict) else enumerate(document) if isinstance(document, list) else ()
+    )
     for key, value in inner:
         own = (*path, key)
         found.setdefault(tuple("#" if isinstance(part, int) else part for part in own), []).append(own)
@@ -98,7 +100,26 @@ def _places(document: Any, path: tuple[Any, ...] = ()) -> dict[tuple[Any, ...], 
     return found
 
 
-_ODD = [None, True, 0, -1, 1e5, 1e9, -1e300, math.nan, math.inf, "", "2|0", "\ud800", [], {}, [[]], [1], {"x": 1}, 10**30]
+_ODD = [
+    None,
+    True,
+    0,
+    -1,
+    1e5,
+    1e9,
+    -1e300,
+    math.nan,
+    math.inf,
+    "",
+    "2|0",
+    "\ud800",
+    [],
+    {},
+    [[]],
+    [1],
+    {"x": 1},
+    10**30,
+]
 
 
 def _changed(data: st.DataObject, house: JsonObject) -> JsonObject:

@@ -1,6 +1,7 @@
 """The dialogue around the steps: scenes, sizes, settings, houses, and what the metadata lists."""
 
 import reprlib
+from dataclasses import replace
 from typing import Any
 
 from pydantic import ValidationError
@@ -50,13 +51,14 @@ def create_house(engine: Engine, *, house: Document) -> None:
     # ProcTHOR's own generator asks for houses before they have metadata.
     house = {"metadata": {}, **house}
     scene.load(house)
+    agent = replace(engine.agent)
     try:
         # What the next event shows: a house that cannot be described is not taken.
         objects.static_records(scene)
+        agent.enter(house)
     except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
         raise ActionError(f"CreateHouse: the house cannot be described: {type(error).__name__}: {error}") from error
-    engine.agent.enter(house)
-    engine.scene = scene
+    engine.scene, engine.agent = scene, agent
 
 
 def check_settings(settings: Settings) -> None:
