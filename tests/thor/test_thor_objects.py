@@ -15,6 +15,7 @@ import pytest
 from evonav.house import bundled_houses
 from evonav.thor import edits, objects
 from evonav.thor.engine import Engine
+from evonav.thor.facts import facts_of
 
 Json = dict[str, Any]
 
@@ -56,6 +57,52 @@ def test_the_script_reproduces_the_bundled_facts(tmp_path: Path) -> None:
     out = tmp_path / "assets.json"
     subprocess.run([sys.executable, ROOT / "scripts" / "build_thor_assets.py", SHARED, "--out", out], check=True)
     assert out.read_bytes() == (ROOT / "python" / "evonav" / "thor" / "data" / "assets.json").read_bytes()
+
+
+@needs_recorded
+def test_facts_agree_with_what_ai2thor_recorded_of_all_its_rooms() -> None:
+    """8,715 records of iTHOR and RoboTHOR; positions follow from the boxes' middles, by the pivots, at any yaw."""
+    packed = (SHARED / "procthor-databases" / "ai2thor-object-metadata.json.gz").read_bytes()
+    flags = agreed = pivots = 0
+    off_m = []
+    for record in records_in(json.loads(gzip.decompress(packed))):
+        facts = facts_of(record["assetId"], record["objectType"])
+        if not facts.size_m:
+            continue
+        ours = [flag in facts.flags for flag in objects.FLAGS]
+        flags += len(ours)
+        agreed += sum(a == record[flag] for a, flag in zip(ours, objects.FLAGS, strict=True))
+        assert facts.mass_kg == pytest.approx(record["mass"], abs=1e-3)
+        assert list(facts.materials or ()) == (record["salientMaterials"] or [])
+        rotation = record["rotation"]
+        if facts.pivot_m != (0.0, 0.0, 0.0) and abs((rotation["x"] + 180) % 360 - 180) < 0.5 > abs(
+            (rotation["z"] + 180) % 360 - 180
+        ):
+            centre_m = list(record["axisAlignedBoundingBox"]["center"].values())
+            pivot_m = np.add(centre_m, objects.rotation_of(rotation) @ facts.pivot_m)
+            off_m.append(float(np.abs(pivot_m - list(record["position"].values())).max()))
+            pivots += 1
+    print(f"{agreed} of {flags} flags agree; pivots of {pivots} records: median {np.median(off_m):.5f} m")
+    assert flags > 50_000
+    assert agreed >= 0.99 * flags
+    assert pivots > 3_000
+    assert (np.quantile(off_m, [0.5, 0.9]) <= [1e-3, 1e-2]).all()
+
+
+def records_in(node: Any) -> list[Json]:
+    if isinstance(node, dict) and "objectId" in node:
+        return [node]
+    children = node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
+    return [record for child in children for record in records_in(child)]
+
+
+def test_what_lies_in_a_fridge_is_cold() -> None:
+    house = json.loads(list(bundled_houses(3))[2].to_json())
+    records = {record["objectId"]: record for record in objects.static_records(engine_of(house).scene)}
+    fridge = next(record for record in records.values() if record["objectType"] == "Fridge")
+    assert fridge["receptacleObjectIds"]
+    cold = {object_id for object_id, record in records.items() if record["temperature"] == "Cold"}
+    assert cold == set(fridge["receptacleObjectIds"])
 
 
 @needs_recorded

@@ -1,6 +1,5 @@
 """Changes of a scene's objects: what moves, what goes, and where things then rest."""
 
-import copy
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -31,7 +30,7 @@ _REACH_M = 0.05
 def edited(scene: Scene) -> Iterator[Entry]:
     """The house, to be changed; as it was, should what becomes of it be no house."""
     house = scene.begin_edit()
-    before, disabled = copy.deepcopy(house.get("objects", [])), dict(scene.disabled)
+    before, disabled = _copied(house.get("objects") or []), dict(scene.disabled)
     try:
         yield house
         _ = scene.simulator
@@ -55,22 +54,30 @@ def entry_of(scene: Scene, object_id: str) -> Entry:
     raise ActionError(f"{object_id} ({record['objectType']}) is part of the building, which stays as it is")
 
 
-def detach(house: Entry, object_id: str) -> Entry:
-    """Takes an entry out of the house file, with what stands on it."""
+def _copied(entries: Sequence[Entry]) -> list[Entry]:
+    """Entries of which poses and children may be changed."""
+    return [
+        {
+            **e,
+            "position": {**e["position"]},
+            "rotation": {**e["rotation"]},
+            "children": _copied(e.get("children") or []),
+        }
+        for e in entries
+    ]
 
-    def taken(entries: list[Entry]) -> Entry | None:
-        for index, entry in enumerate(entries):
-            if entry["id"] == object_id:
-                return entries.pop(index)
-            found = taken(entry.get("children") or [])
-            if found is not None:
-                return found
-        return None
 
-    entry = taken(house["objects"])
-    if entry is None:
-        raise ActionError(f"ArgumentException: objectId: {object_id} is not the objectId on any object in the scene!")
-    return entry
+def holders_of(house: Entry) -> dict[str, list[Entry]]:
+    """The list in the house file that holds each entry, by id."""
+    lists = [house.setdefault("objects", [])]
+    lists += [entry["children"] for entry, _ in objects.placed_objects(house) if entry.get("children")]
+    return {entry["id"]: entries for entries in lists for entry in entries}
+
+
+def detach(holders: Mapping[str, list[Entry]], object_id: str) -> Entry:
+    """Takes an entry, with what stands on it, out of the list that holds it."""
+    entries = holders[object_id]
+    return entries.pop(next(index for index, entry in enumerate(entries) if entry["id"] == object_id))
 
 
 def facts(entry: Mapping[str, Any], object_type: str) -> AssetFacts:
@@ -135,7 +142,7 @@ def rest_height_m(
 def relate(scene: Scene, object_ids: Sequence[str]) -> None:
     """Puts entries under the receptacles on which they now are."""
     house, moved = scene.house or {}, set(object_ids)
-    records = {record["objectId"]: record for record in objects.static_records(scene)}
+    records, holders = {record["objectId"]: record for record in objects.static_records(scene)}, holders_of(house)
     placed = [entry for entry, _ in objects.placed_objects(house)]
     receptacles = [entry for entry in placed if records[entry["id"]]["receptacle"]]
     low, high = (np.array([_corner_m(records[e["id"]], side) for e in receptacles]).reshape(-1, 3) for side in (-1, 1))
@@ -145,9 +152,10 @@ def relate(scene: Scene, object_ids: Sequence[str]) -> None:
             others = [i for i, receptacle in enumerate(receptacles) if receptacle["id"] not in own]
             bottom_m = _corner_m(records[entry["id"]], -1)[1]
             found = holder_of(bottom_m, centre_of(entry), low[others], high[others])
-            taken = detach(house, entry["id"])
-            holder = house if found is None else receptacles[others[found]]
-            holder.setdefault("objects" if holder is house else "children", []).append(taken)
+            taken = detach(holders, entry["id"])
+            target = house["objects"] if found is None else receptacles[others[found]].setdefault("children", [])
+            target.append(taken)
+            holders[entry["id"]] = target
     scene.note_relations()
 
 

@@ -49,7 +49,8 @@ def set_object_poses(engine: Engine, *, objectPoses: list[ObjectPose], placeStat
     }
     types = {record["objectId"]: record["objectType"] for record in objects.static_records(scene)}
     with edits.edited(scene) as house:
-        loose = {object_id: edits.detach(house, object_id) for object_id in _outermost_last(house, movable.values())}
+        holders = edits.holders_of(house)
+        loose = {object_id: edits.detach(holders, object_id) for object_id in _outermost_last(house, movable.values())}
         placed: list[str] = []
         for index, pose in enumerate(objectPoses):
             object_id = movable.get(pose.objectName)
@@ -229,7 +230,7 @@ def _remove(scene: Scene, object_ids: Sequence[str]) -> None:
     fallen: list[str] = []
     with edits.edited(scene) as house:
         for object_id in object_ids:
-            entry = edits.detach(house, object_id)
+            entry = edits.detach(edits.holders_of(house), object_id)
             children = entry.pop("children", None) or []
             fallen += [child["id"] for child, _ in objects.placed_objects({"objects": children})]
             house["objects"] += children

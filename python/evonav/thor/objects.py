@@ -7,8 +7,8 @@ lists parts of furniture (drawers `id___0`), which evonav does not know: their f
 """
 
 import math
-from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -20,6 +20,7 @@ from evonav.thor.agent import Agent
 from evonav.thor.facts import AssetFacts, facts_of
 from evonav.thor.scene import Scene
 from evonav.world.camera import CameraView
+from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import SceneObject
 
@@ -28,10 +29,11 @@ _Vec3 = tuple[float, float, float]
 
 FLOOR_ID = "Floor"
 
-_FLAGS = (
+FLAGS = (
     *("receptacle", "toggleable", "breakable", "canFillWithLiquid", "dirtyable", "canBeUsedUp", "cookable"),
     *("isHeatSource", "isColdSource", "sliceable", "openable", "pickupable", "moveable"),
 )
+"""What an asset can do."""
 # State, the flag it needs, and the house file's key for it.
 _STATES = (
     ("isToggled", "toggleable", "isOn"),
@@ -87,6 +89,8 @@ class Table(NamedTuple):
     """All records, and what goes with them."""
 
     version: int
+    simulator: EmbeddedSimulator | None
+    """Of which it was made."""
     records: list[Record]
     positions_m: NDArray[np.float64]
     """`(N, 3)`."""
@@ -103,7 +107,12 @@ def table_of(scene: Scene) -> Table:
     """The records of a scene as it now is."""
     table = _tables.get(scene)
     if table is None or table.version != scene.version:
-        table = _tables[scene] = _build(scene)
+        simulator = None if scene.house is None else scene.simulator
+        if table is None or table.simulator is not simulator:
+            table = _build(scene.house or {}, simulator)
+        records = [dict(record) for record in table.records]
+        _relate(scene.house or {}, records)
+        table = _tables[scene] = table._replace(version=scene.version, records=records)
     return table
 
 
@@ -135,34 +144,21 @@ def bounds_m(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
     return tuple(low.tolist()), tuple(high.tolist())
 
 
-def _build(scene: Scene) -> Table:
-    house = scene.house or {}
-    bodies: dict[str, tuple[int, SceneObject]] = {}
-    if scene.house is not None:
-        for index, body in enumerate(scene.simulator.objects):
-            if body.kind != "ceiling":
-                bodies[body.id] = (index + 1, body)
-    records: list[Record] = []
-    parents: dict[str, list[str]] = defaultdict(list)
-    for entry, parent_id in placed_objects(house):
-        _, body = bodies[entry["id"]]
-        records.append(_object_record(entry, body))
-        if parent_id is not None:
-            parents[entry["id"]].append(parent_id)
-    reach_m = _floor_reach_m(house)
-    floor_id = house.get("id") or FLOOR_ID
-    for record in records:
-        if _bottom_m(record) < reach_m:
-            parents[record["objectId"]].append(floor_id)
+def _build(house: Mapping[str, Any], simulator: EmbeddedSimulator | None) -> Table:
+    """Records of all objects, which do not yet say what holds them."""
+    found = [
+        (index, body) for index, body in enumerate(simulator.objects if simulator else ()) if body.kind != "ceiling"
+    ]
+    bodies = {body.id: body for _, body in found}
+    records = [_object_record(entry, bodies[entry["id"]]) for entry, _ in placed_objects(house)]
     openings = [*house.get("doors", ()), *house.get("windows", ())]
-    records += [_opening_record(entry, bodies[entry["id"]][1], house) for entry in openings]
+    records += [_opening_record(entry, bodies[entry["id"]], house) for entry in openings]
     if house:
-        records += _structure_records(house, floor_id, {key: body for key, (_, body) in bodies.items()})
-    _relate(records, parents)
+        records += _structure_records(house, bodies)
     positions_m = np.array([list(record["position"].values()) for record in records], dtype=np.float64).reshape(-1, 3)
-    instances = {key: instance for key, (instance, _) in bodies.items()}
-    by_body = {instance - 1: key for key, instance in instances.items()}
-    return Table(scene.version, records, positions_m, instances, by_body)
+    by_body = {index: body.id for index, body in found}
+    instances = {object_id: index + 1 for index, object_id in by_body.items()}
+    return Table(-1, simulator, records, positions_m, instances, by_body)
 
 
 def placed_objects(house: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str | None]]:
@@ -176,14 +172,23 @@ def placed_objects(house: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], s
     yield from walk(house.get("objects") or (), None)
 
 
-def _relate(records: list[Record], parents: Mapping[str, list[str]]) -> None:
-    """Fills in `parentReceptacles` and `receptacleObjectIds`; only receptacles hold anything."""
-    receptacles = {record["objectId"]: record["receptacleObjectIds"] for record in records if record["receptacle"]}
+def _relate(house: Mapping[str, Any], records: list[Record]) -> None:
+    """Fills in what holds what: receptacles, and the floor for all that begins lower than its trigger box ends."""
+    holders = {entry["id"]: parent_id for entry, parent_id in placed_objects(house)}
+    receptacles = {record["objectId"]: record for record in records if record["receptacle"]}
+    for record in receptacles.values():
+        record["receptacleObjectIds"] = []
+    reach_m, floor = _floor_reach_m(house), _floor_id(house)
     for record in records:
-        known = [parent_id for parent_id in parents.get(record["objectId"], ()) if parent_id in receptacles]
-        record["parentReceptacles"] = known or None
-        for parent_id in known:
-            receptacles[parent_id].append(record["objectId"])
+        if record["objectId"] not in holders:
+            continue
+        parents = [holders[record["objectId"]], floor if _bottom_m(record) < reach_m else None]
+        known = [receptacles[parent_id] for parent_id in parents if parent_id in receptacles]
+        record["parentReceptacles"] = [parent["objectId"] for parent in known] or None
+        for parent in known:
+            parent["receptacleObjectIds"].append(record["objectId"])
+        if any(parent["isColdSource"] for parent in known):
+            record["temperature"] = "Cold"
 
 
 def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
@@ -208,13 +213,13 @@ def _opening_record(entry: Mapping[str, Any], body: SceneObject, house: Mapping[
     return record
 
 
-def _structure_records(house: Mapping[str, Any], floor_id: str, bodies: Mapping[str, SceneObject]) -> Iterator[Record]:
+def _structure_records(house: Mapping[str, Any], bodies: Mapping[str, SceneObject]) -> Iterator[Record]:
     rooms = [bodies[room["id"]] for room in house.get("rooms", ())]
     low = np.min([np.subtract(room.centre_m, np.multiply(room.size_m, 0.5)) for room in rooms], axis=0)
     high = np.max([np.add(room.centre_m, np.multiply(room.size_m, 0.5)) for room in rooms], axis=0)
     level = {"x": 0.0, "y": 0.0, "z": 0.0}
     floor = AssetFacts("Floor", frozenset({"receptacle"}))
-    record = _record({"id": floor_id}, "Floor", floor, (0.0, 0.0, 0.0), level)
+    record = _record({"id": _floor_id(house)}, "Floor", floor, (0.0, 0.0, 0.0), level)
     record["axisAlignedBoundingBox"] = aligned_box(tuple((0.5 * (low + high)).tolist()), tuple((high - low).tolist()))
     yield record
     for room in rooms:
@@ -250,7 +255,7 @@ def _record(
         "rotation": rotation,
         "visible": False,
         "isInteractable": False,
-        **{flag: flag in facts.flags for flag in _FLAGS},
+        **{flag: flag in facts.flags for flag in FLAGS},
         **states,
         "fillLiquid": entry.get("fillLiquid") if states["isFilledWithLiquid"] else None,
         "temperature": str(entry.get("temperature", "RoomTemp")),
@@ -273,14 +278,20 @@ def _record(
 
 
 def rotation_of(euler_deg: Mapping[str, float]) -> NDArray[np.float64]:
-    """Unity's rotation `(3, 3)` of Euler angles: about z, then x, then y."""
+    """Unity's rotation `(3, 3)` of Euler angles: about z, then x, then y. Do not change it."""
+    return _rotation(float(euler_deg["x"]), float(euler_deg["y"]), float(euler_deg["z"]))
+
+
+@lru_cache(4096)
+def _rotation(x_deg: float, y_deg: float, z_deg: float) -> NDArray[np.float64]:
     (sx, cx), (sy, cy), (sz, cz) = (
-        (math.sin(angle), math.cos(angle)) for angle in (math.radians(euler_deg[axis]) for axis in "xyz")
+        (math.sin(angle), math.cos(angle)) for angle in map(math.radians, (x_deg, y_deg, z_deg))
     )
     about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
     about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
     turned: NDArray[np.float64] = about_y @ about_x @ about_z
+    turned.flags.writeable = False
     return turned
 
 
@@ -309,6 +320,10 @@ def oriented_corners(centre_m: _Vec3, size_m: _Vec3, rotation: Mapping[str, floa
 def _bottom_m(record: Record) -> float:
     box = record["axisAlignedBoundingBox"]
     return float(box["center"]["y"] - 0.5 * box["size"]["y"])
+
+
+def _floor_id(house: Mapping[str, Any]) -> str:
+    return str(house.get("id") or FLOOR_ID)
 
 
 def _floor_reach_m(house: Mapping[str, Any]) -> float:
