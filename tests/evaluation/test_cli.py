@@ -73,3 +73,38 @@ def test_importing_is_quick():
     code = "import evonav, evonav.cli, sys; print([m for m in sys.modules if m.startswith(('pydantic', 'evonav.ev'))])"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed.strip() == "[]"
+
+
+def test_evaluates_through_the_client_of_ai2thor(tmp_path, monkeypatch):
+    pytest.importorskip("ai2thor", reason="the thor dependency group (ai2thor) is not installed")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    options = ("--simulator", "ai2thor", "--thor-executable", "evonav", "--agents", "shortest-path", "--limit", 2)
+    out = tmp_path / "run"
+    done = run("evaluate", *options, "--workers", 2, "--out", out)
+    assert done.exit_code == 0, done.output
+    assert json.loads((out / "summary.json").read_text())["agents"]["shortest-path"]["sr"] == 1.0
+    # Timeouts may change, the simulator may not.
+    assert run("evaluate", *options, "--thor-timeout", 50, "--out", out).exit_code == 0
+    other = run("evaluate", "--agents", "shortest-path", "--limit", 2, "--out", out)
+    assert "another configuration" in str(other.exception)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (("--simulator", "ai2thor", "--thor-executable", "OUT/none"), 1, "no such executable"),
+        (("--simulator", "ai2thor", "--thor-executable", "evonav", "--thor-gpu", "0"), 1, "gpu_device = 0"),
+        (("--thor-executable", "evonav"), 2, "--simulator ai2thor"),
+    ],
+)
+def test_a_simulator_that_does_not_start_is_told_before_the_run(
+    monkeypatch, capsys, tmp_path, arguments, status, words
+):
+    pytest.importorskip("ai2thor", reason="the thor dependency group (ai2thor) is not installed")
+    given = (word.replace("OUT", str(tmp_path)) for word in arguments)
+    monkeypatch.setattr(sys, "argv", ["evonav", "evaluate", "--out", str(tmp_path / "run"), *given])
+    with pytest.raises(SystemExit) as exit_:
+        main()
+    assert exit_.value.code == status
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()

@@ -1,11 +1,14 @@
 """What does not start says why, and leaves nothing behind."""
 
+import os
+import signal
 import socket
 import stat
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -151,7 +154,7 @@ def test_unity_that_ends_for_want_of_a_gpu(tmp_path: Path, monkeypatch: pytest.M
     build(tmp_path / "home", "CloudRendering")
     monkeypatch.setattr("ctypes.util.find_library", lambda name: "libvulkan.so.1")
     message = failure(Ai2ThorOptions(platform="cloud", commit_id="abc"))
-    assert "while starting" in message
+    assert "ended with exit code 3 while starting" in message
     assert "no Vulkan device" in message
     assert "vulkaninfo" in message
 
@@ -212,6 +215,35 @@ def test_nothing_is_left_of_starts_that_failed(script: Script, tmp_path: Path, m
         failure(Ai2ThorOptions(script("exit 1")))
     assert len(list(Path("/proc/self/fd").iterdir())) <= before
     assert not list(temporary.iterdir())
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_the_process_ends_with_evonav_whatever_ends_that(script: Script, tmp_path: Path, number: int) -> None:
+    """A process that, unlike our engine, does not look whether anybody is left."""
+    pid_file = tmp_path / "pid"
+    program = (
+        "import sys\n"
+        "from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator\n"
+        "Ai2ThorSimulator(options=Ai2ThorOptions(sys.argv[1])).start()\n"
+    )
+    executable = script(f"trap '' TERM INT HUP; echo $$ > '{pid_file}'; while :; do sleep 0.1; done")
+    with subprocess.Popen([sys.executable, "-c", program, executable], stderr=subprocess.DEVNULL) as evonav:
+        _wait_until(lambda: pid_file.is_file() and pid_file.read_text().endswith("\n"))
+        pid = int(pid_file.read_text())
+        evonav.send_signal(number)
+        evonav.wait(10.0)
+    try:
+        _wait_until(lambda: not _is_alive(pid))
+    finally:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+
+
+def _wait_until(is_met: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 15.0
+    while not is_met():
+        assert time.monotonic() < deadline_s
+        time.sleep(0.02)
 
 
 def _is_alive(pid: int) -> bool:

@@ -211,6 +211,7 @@ class _Worker:
 def _serve(connection: Connection, backend_json: str, protocol_json: str) -> None:
     """A worker's life: jobs in, stages out, until the parent hangs up."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt means
+    signal.signal(signal.SIGTERM, _end)
     backend = Backend(**json.loads(backend_json))
     protocol = ProtocolConfig(**json.loads(protocol_json))
     while True:
@@ -239,6 +240,11 @@ def _serve(connection: Connection, backend_json: str, protocol_json: str) -> Non
             failure = (ErrorKind.HARNESS.value, f"{type(error).__name__}: {error}")
         with suppress(BrokenPipeError):
             _send(connection, {"kind": "end", "failure": failure})
+
+
+def _end(number: int, _: object) -> None:
+    """Leaves by way of every `finally`: a simulator may have a process and files of its own."""
+    raise SystemExit(128 + number)
 
 
 def _send(connection: Connection, message: dict[str, object]) -> None:
