@@ -4,13 +4,14 @@
     python objectnav_ai2thor.py house.json --executable "$(which evonav-thor)"    # on evonav's engine
 
 `house.json` is a ProcTHOR house, or `.jsonl[.gz]` with one a line. An episode starts at a random reachable position and
-asks for an object of a random type; the agent is AI2-THOR's own expert, or walks at random. It succeeds if the agent
-stops with such an object visible within 1.5 m. Prints a line of JSON per episode, then success rate and SPL.
+asks for an object of a random type. The agent is AI2-THOR's own expert, walks the shortest path, or walks at random; it
+succeeds if it stops with such an object visible within 1.5 m. Prints a line of JSON per episode, then the rates.
 """
 
 import argparse
 import gzip
 import json
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,14 +41,41 @@ def visible_targets(event: Event, object_type: str) -> list[dict[str, Any]]:
     return sorted(seen, key=lambda entry: entry["distance"])
 
 
-def next_action(controller: Controller, agent: str, target: dict[str, Any], rng: np.random.Generator) -> str | None:
+def next_action(
+    controller: Controller,
+    agent: str,
+    target: dict[str, Any],
+    corners: list[dict[str, float]],
+    rng: np.random.Generator,
+) -> dict[str, Any] | None:
     """What the agent does next; None to stop."""
     if visible_targets(controller.last_event, target["objectType"]):
         return None
     if agent == "random":
-        return str(rng.choice(["MoveAhead", "MoveAhead", "MoveAhead", "RotateRight", "RotateLeft"]))
+        return {"action": str(rng.choice(["MoveAhead", "MoveAhead", "MoveAhead", "RotateRight", "RotateLeft"]))}
+    if agent == "path":
+        return along_path(controller.last_event, target, corners)
     event = controller.step("ObjectNavExpertAction", objectId=target["objectId"])
-    return event.metadata["actionReturn"] if event.metadata["lastActionSuccess"] else None
+    return {"action": event.metadata["actionReturn"]} if event.metadata["lastActionSuccess"] else None
+
+
+def along_path(event: Event, target: dict[str, Any], corners: list[dict[str, float]]) -> dict[str, Any] | None:
+    """Turns to the next corner of the shortest path and walks there; at the last one, turns to the target."""
+    agent = event.metadata["agent"]
+    here = agent["position"]
+    while corners and math.hypot(corners[0]["x"] - here["x"], corners[0]["z"] - here["z"]) < 1e-3:
+        corners.pop(0)
+    aim = corners[0] if corners else target["axisAlignedBoundingBox"]["center"]
+    right, up, ahead = aim["x"] - here["x"], aim["y"] - event.metadata["cameraPosition"]["y"], aim["z"] - here["z"]
+    turn = (math.degrees(math.atan2(right, ahead)) - agent["rotation"]["y"] + 180) % 360 - 180
+    if abs(turn) > 0.01:
+        return {"action": "RotateRight" if turn > 0 else "RotateLeft", "degrees": abs(turn)}
+    if corners:
+        return {"action": "MoveAhead", "moveMagnitude": min(0.25, math.hypot(right, ahead))}
+    look = -math.degrees(math.atan2(up, math.hypot(right, ahead))) - agent["cameraHorizon"]
+    if abs(look) < 15:
+        return None
+    return {"action": "LookDown" if look > 0 else "LookUp"}
 
 
 def nearest_of_type(
@@ -104,12 +132,13 @@ def run_episode(
     object_type = target["objectType"]
 
     path = [controller.last_event.metadata["agent"]["position"]]
+    corners = list(shortest_path)
     num_steps, num_failed = 0, 0
     while num_steps < MAX_STEPS:
-        action = next_action(controller, agent, target, rng)
+        action = next_action(controller, agent, target, corners, rng)
         if action is None:
             break
-        event = controller.step(action)
+        event = controller.step(**action)
         num_steps += 1
         num_failed += not event.metadata["lastActionSuccess"]
         path.append(event.metadata["agent"]["position"])
@@ -132,7 +161,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("houses", type=Path)
     parser.add_argument("--executable", help="instead of the Unity build that the client downloads")
-    parser.add_argument("--agent", choices=("expert", "random"), default="expert")
+    parser.add_argument("--agent", choices=("expert", "path", "random"), default="expert")
     parser.add_argument("--episodes", type=int, default=10)
     parser.add_argument("--max-houses", type=int, default=3)
     parser.add_argument("--seed", type=int, default=0)

@@ -55,6 +55,17 @@ def test_the_expert_finds_what_it_looks_for(houses, tmp_path) -> None:
     assert summary["spl"] == pytest.approx(sum(episode["spl"] for episode in episodes) / 3)
 
 
+def test_the_shortest_path_is_walked_as_it_was_told(houses, tmp_path) -> None:
+    *episodes, summary = run(houses, tmp_path, "--agent", "path", "--episodes", "3", "--seed", "1")
+    assert len(episodes) == 3
+    for episode in episodes:
+        assert episode["success"], episode
+        assert episode["failed_actions"] == 0
+        assert episode["spl"] == pytest.approx(1.0, abs=1e-3)
+        assert episode["path_length"] <= episode["shortest_path_length"] + 1e-3
+    assert summary["spl"] == pytest.approx(1.0, abs=1e-3)
+
+
 def test_runs_repeat(houses, tmp_path) -> None:
     options = ("--agent", "random", "--episodes", "2", "--seed", "3")
     assert run(houses, tmp_path, *options) == run(houses, tmp_path, *options)
