@@ -155,3 +155,23 @@ def cubes_of(index: int) -> list[Json]:
         if episode["scene"] == index
         for cube in episode["targetObjectConfig"]["positions"].values()
     ]
+
+
+@needs_recorded
+def test_doors_and_windows_are_in_their_walls() -> None:
+    """Position and turn follow from the wall; our body of a window, which has no leaf, has its middle there too."""
+    num_windows = 0
+    for house in rows(SHARED / "ram81-procthor-100k-history" / "uniform-hard-val-75.jsonl.gz")[:3]:
+        records = {record["objectId"]: record for record in objects.static_records(engine_of(house).scene)}
+        for entry in house["windows"]:
+            record, wall = records[entry["id"]], records[entry["wall0"]]
+            middle_m = record["axisAlignedBoundingBox"]["center"]
+            assert list(record["position"].values()) == pytest.approx(list(middle_m.values()), abs=0.06)
+            assert (record["rotation"]["y"] - wall["rotation"]["y"]) % 360 == pytest.approx(180)
+            num_windows += 1
+        for entry in house["doors"]:
+            assert records[entry["id"]]["objectType"] in ("Doorway", "Doorframe")
+            assert records[entry["id"]]["openness"] == pytest.approx(
+                entry["openness"] if records[entry["id"]]["openable"] else 0.0
+            )
+    assert num_windows > 5

@@ -65,6 +65,7 @@ def set_object_poses(engine: Engine, *, objectPoses: list[ObjectPose], placeStat
                 entry["name"], entry["id"] = f"{pose.objectName}_copy_{index}", f"{object_id}_copy_{index}"
             _put_pivot(entry, types[object_id], pose.position, pose.rotation)
             house["objects"].append(entry)
+            scene.disabled.pop(entry["id"], None)
             placed.append(entry["id"])
         for object_id in set(loose) - set(placed):
             house["objects"] += loose[object_id].pop("children", None) or []

@@ -205,10 +205,18 @@ def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
 
 
 def _opening_record(entry: Mapping[str, Any], body: SceneObject, house: Mapping[str, Any]) -> Record:
+    """A door or window: AI2-THOR puts the middle of the closed one at `assetPosition` along `wall0`."""
     facts = facts_of(str(entry.get("assetId", "")), body.category)
     wall = next((wall for wall in house["walls"] if wall["id"] == entry.get("wall0")), None)
-    yaw_deg = (_wall_yaw_deg(wall) + 180.0) % 360.0 if wall else 0.0
-    record = _record(entry, body.category, facts, body.centre_m, {"x": 0.0, "y": yaw_deg, "z": 0.0})
+    centre_m, yaw_deg = body.centre_m, 0.0
+    if wall is not None:
+        yaw_deg = (_wall_yaw_deg(wall) + 180.0) % 360.0
+        if "assetPosition" in entry:
+            start, along_m, up_m = _wall_ends(wall)[0], *(float(entry["assetPosition"][axis]) for axis in "xy")
+            yaw_rad = math.radians(_wall_yaw_deg(wall))
+            x_m, y_m, z_m = (float(start[axis]) for axis in "xyz")
+            centre_m = (x_m + along_m * math.cos(yaw_rad), y_m + up_m, z_m - along_m * math.sin(yaw_rad))
+    record = _record(entry, body.category, facts, centre_m, {"x": 0.0, "y": yaw_deg, "z": 0.0})
     record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
     return record
 
@@ -330,10 +338,15 @@ def _floor_reach_m(house: Mapping[str, Any]) -> float:
     return float((house.get("proceduralParameters") or {}).get("receptacleHeight", _FLOOR_REACH_M))
 
 
-def _wall_yaw_deg(wall: Mapping[str, Any]) -> float:
+def _wall_ends(wall: Mapping[str, Any]) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+    """The two lower corners, in the file's order."""
     corners = sorted(wall["polygon"], key=lambda corner: float(corner["y"]))
-    x_m, z_m = (float(corners[1][axis]) - float(corners[0][axis]) for axis in "xz")
-    return math.degrees(math.atan2(-z_m, x_m)) % 360.0
+    return corners[0], corners[1]
+
+
+def _wall_yaw_deg(wall: Mapping[str, Any]) -> float:
+    start, end = _wall_ends(wall)
+    return math.degrees(math.atan2(float(start["z"]) - float(end["z"]), float(end["x"]) - float(start["x"]))) % 360.0
 
 
 def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
