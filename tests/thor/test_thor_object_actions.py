@@ -144,6 +144,27 @@ def test_an_object_is_teleported_where_nothing_is_and_falls(engine: Engine) -> N
     do(engine, "TeleportObject", objectId=lamp["objectId"], position={**inside, "y": 1.0}, forceAction=True)
 
 
+def test_furniture_takes_along_what_stands_on_it(engine: Engine) -> None:
+    before = records(engine)
+    table = next(r for r in before.values() if r["objectType"] == "Dresser" and r["receptacleObjectIds"])
+    target = {**table["position"], "x": table["position"]["x"] + 3.0}
+    turned = {**table["rotation"], "y": table["rotation"]["y"] + 90}
+    arguments = {"position": target, "rotation": turned, "forceAction": True, "forceKinematic": True}
+    do(engine, "TeleportObject", objectId=table["objectId"], **arguments)
+    after = records(engine)
+    assert after[table["objectId"]]["receptacleObjectIds"] == table["receptacleObjectIds"]
+
+    def seen_from_table(all_records: dict[str, Json], object_id: str) -> Any:
+        middles_m = [
+            list(all_records[i]["axisAlignedBoundingBox"]["center"].values()) for i in (object_id, table["objectId"])
+        ]
+        return np.subtract(*middles_m) @ objects.rotation_of(all_records[table["objectId"]]["rotation"])
+
+    for object_id in table["receptacleObjectIds"]:
+        np.testing.assert_allclose(seen_from_table(after, object_id), seen_from_table(before, object_id), atol=1e-6)
+        assert (after[object_id]["rotation"]["y"] - before[object_id]["rotation"]["y"]) % 360 == pytest.approx(90)
+
+
 def test_points_off_the_scene_are_named(engine: Engine) -> None:
     small = movable(engine)[0]["objectId"]
     message = fail(engine, "PlaceObjectAtPoint", objectId=small, position={"x": 99.0, "y": 1.0, "z": 0.0})
