@@ -260,6 +260,11 @@ def test_missing_and_wrong_arguments_have_codes() -> None:
     assert engine.last.error_code is ErrorCode.MISSING_ARGUMENTS
     refused(engine, "MoveAhead", moveMagnitude="far")
     assert engine.last.error_code is ErrorCode.INVALID_ARGUMENT
+    refused(engine, "MoveAhead", moveMagnitde=0.5)
+    assert engine.last.error_code is ErrorCode.INVALID_ARGUMENT
+    done(engine, "MoveBack", forceAction=True, manualInteract=False, speed=2)
+    refused(engine, "RotateLeft", speed="fast")
+    assert engine.last.error_code is ErrorCode.INVALID_ARGUMENT
     refused(engine, "MoveRelative", z=1)
     assert engine.last.error_code is ErrorCode.INVALID_ACTION
 

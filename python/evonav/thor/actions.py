@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cache
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, PydanticUserError, TypeAdapter, ValidationError
@@ -74,30 +75,36 @@ class _Action:
     required: tuple[str, ...]
     types: dict[str, Any]
     """Of parameters, by name."""
+    unused: frozenset[str]
+    """Those of `types` that the function is not given."""
     adapters: dict[str, TypeAdapter[Any]] = field(default_factory=dict)
     """Of `types`, made when they are first needed: making them takes longer than most actions."""
 
     @property
     def signature(self) -> str:
         """As AI2-THOR shows it in messages."""
-        return ", ".join(
-            _shown(parameter) for parameter in list(inspect.signature(self.function).parameters.values())[1:]
-        )
+        used = [_shown(parameter) for parameter in list(inspect.signature(self.function).parameters.values())[1:]]
+        return ", ".join(used + [f"{_type_name(self.types[name])} {name}" for name in sorted(self.unused)])
 
 
 _ACTIONS: dict[str, _Action] = {}
 
 
-def action(*names: str) -> Callable[[Function], Function]:
-    """Registers `function(engine, *, parameters as on the wire) -> actionReturn` under AI2-THOR's names for it."""
+def action(*names: str, unused: Mapping[str, type] = MappingProxyType({})) -> Callable[[Function], Function]:
+    """Registers `function(engine, *, parameters as on the wire) -> actionReturn` under AI2-THOR's names for it.
+
+    Args:
+        names: Of the action.
+        unused: Types of AI2-THOR's parameters that make no difference here, by name.
+    """
 
     def register(function: Function) -> Function:
         parameters = list(inspect.signature(function, eval_str=True).parameters.values())[1:]
         named = [p for p in parameters if p.kind is not p.VAR_KEYWORD]
         required = tuple(p.name for p in named if p.default is p.empty)
-        types = {p.name: p.annotation for p in named}
+        types = {p.name: p.annotation for p in named} | dict(unused)
         for name in names:
-            _ACTIONS[name] = _Action(function, named != parameters, required, types)
+            _ACTIONS[name] = _Action(function, named != parameters, required, types, frozenset(unused))
         return function
 
     return register
@@ -136,7 +143,7 @@ def call(engine: object, message: Mapping[str, Any]) -> object:
     if missing:
         message_ = f"action: {name} is missing the following arguments: {','.join(missing)}"
         raise ActionError(message_, ErrorCode.MISSING_ARGUMENTS)
-    return found.function(engine, **values)
+    return found.function(engine, **{key: value for key, value in values.items() if key not in found.unused})
 
 
 @cache

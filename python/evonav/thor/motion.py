@@ -5,10 +5,23 @@ messages these are; where those throw, the message starts with the exception's n
 """
 
 import math
+from collections.abc import Callable
 
 from evonav.thor.actions import ActionError, ErrorCode, Vector3, action
 from evonav.thor.agent import canonical_deg, canonical_yaw_deg
 from evonav.thor.engine import Engine
+
+# AI2-THOR's parameters about what the agent holds, about other agents, and about the way that arms move.
+_UNUSED_IN_TURNS = {
+    **dict.fromkeys(("forceAction", "manualInteract", "returnToStart", "disableRendering", "waitForFixedUpdate"), bool),
+    **dict.fromkeys(("speed", "fixedDeltaTime"), float),
+}
+_UNUSED_IN_MOVES = {
+    **dict.fromkeys(
+        ("forceAction", "manualInteract", "returnToStart", "disableRendering", "allowAgentsToIntersect"), bool
+    ),
+    **dict.fromkeys(("speed", "fixedDeltaTime"), float),
+}
 
 
 def invalid_operation(message: str) -> ActionError:
@@ -23,67 +36,33 @@ def missing_arguments(name: str, *arguments: str) -> ActionError:
 
 
 @action("Pass", "Done", "NoOp", "Stop")
-def pass_(engine: Engine, **_: object) -> None:
+def pass_(engine: Engine) -> None:
     """Does nothing."""
 
 
-@action("MoveAhead")
-def move_ahead(
-    engine: Engine,
-    *,
-    moveMagnitude: float | None = None,
-    objectId: str | None = None,
-    maxAgentsDistance: float = -1.0,
-    noise: float = 0.0,
-    **_: object,
-) -> None:
-    """A step along the heading."""
-    _move_relative(engine, (0.0, 1.0), moveMagnitude, noise, (objectId, maxAgentsDistance))
+def _mover(right: float, ahead: float) -> Callable[..., None]:
+    """A step in one direction of the agent."""
+
+    def move(
+        engine: Engine,
+        *,
+        moveMagnitude: float | None = None,
+        objectId: str | None = None,
+        maxAgentsDistance: float = -1.0,
+        noise: float = 0.0,
+    ) -> None:
+        _move_relative(engine, (right, ahead), moveMagnitude, noise, (objectId, maxAgentsDistance))
+
+    return move
 
 
-@action("MoveBack")
-def move_back(
-    engine: Engine,
-    *,
-    moveMagnitude: float | None = None,
-    objectId: str | None = None,
-    maxAgentsDistance: float = -1.0,
-    noise: float = 0.0,
-    **_: object,
-) -> None:
-    """A step backwards."""
-    _move_relative(engine, (0.0, -1.0), moveMagnitude, noise, (objectId, maxAgentsDistance))
+action("MoveAhead", unused=_UNUSED_IN_MOVES)(_mover(0.0, 1.0))
+action("MoveBack", unused=_UNUSED_IN_MOVES)(_mover(0.0, -1.0))
+action("MoveRight", unused=_UNUSED_IN_MOVES)(_mover(1.0, 0.0))
+action("MoveLeft", unused=_UNUSED_IN_MOVES)(_mover(-1.0, 0.0))
 
 
-@action("MoveRight")
-def move_right(
-    engine: Engine,
-    *,
-    moveMagnitude: float | None = None,
-    objectId: str | None = None,
-    maxAgentsDistance: float = -1.0,
-    noise: float = 0.0,
-    **_: object,
-) -> None:
-    """A step to the right; the LoCoBot has no wheels for that."""
-    _move_relative(engine, (1.0, 0.0), moveMagnitude, noise, (objectId, maxAgentsDistance))
-
-
-@action("MoveLeft")
-def move_left(
-    engine: Engine,
-    *,
-    moveMagnitude: float | None = None,
-    objectId: str | None = None,
-    maxAgentsDistance: float = -1.0,
-    noise: float = 0.0,
-    **_: object,
-) -> None:
-    """A step to the left."""
-    _move_relative(engine, (-1.0, 0.0), moveMagnitude, noise, (objectId, maxAgentsDistance))
-
-
-@action("MoveRelative")
+@action("MoveRelative", unused={"forceAction": bool})
 def move_relative(
     engine: Engine,
     *,
@@ -91,7 +70,6 @@ def move_relative(
     x: float = 0.0,
     z: float = 0.0,
     noise: float = 0.0,
-    **_: object,
 ) -> None:
     """A LoCoBot's step of `moveMagnitude * |(x, z)|`, `z` along the heading."""
     if not engine.agent.is_locobot:
@@ -208,20 +186,20 @@ def vector_text(vector: tuple[float, float, float], digits: int) -> str:
     return "(" + ", ".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in vector) + ")"
 
 
-@action("RotateRight")
-def rotate_right(engine: Engine, *, degrees: float | None = None, **_: object) -> None:
+@action("RotateRight", unused=_UNUSED_IN_TURNS)
+def rotate_right(engine: Engine, *, degrees: float | None = None) -> None:
     """Turns clockwise seen from above."""
     _turn(engine, degrees, 1.0)
 
 
-@action("RotateLeft")
-def rotate_left(engine: Engine, *, degrees: float | None = None, **_: object) -> None:
+@action("RotateLeft", unused=_UNUSED_IN_TURNS)
+def rotate_left(engine: Engine, *, degrees: float | None = None) -> None:
     """Turns counter-clockwise seen from above."""
     _turn(engine, degrees, -1.0)
 
 
-@action("Rotate")
-def rotate(engine: Engine, *, rotation: Vector3, noise: float = 0.0, manualInteract: bool = False) -> None:
+@action("Rotate", unused={"manualInteract": bool})
+def rotate(engine: Engine, *, rotation: Vector3, noise: float = 0.0) -> None:
     """Sets the yaw; turns a LoCoBot by it."""
     agent = engine.agent
     base_deg = agent.yaw_deg + noise + _noise_of_turn_deg(engine) if engine.agent.is_locobot else 0.0
