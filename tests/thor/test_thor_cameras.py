@@ -176,6 +176,23 @@ def test_a_camera_where_the_agents_is_sees_the_same(controller) -> None:
     np.testing.assert_array_equal(event.third_party_instance_segmentation_frames[0], event.instance_segmentation_frame)
 
 
+def test_the_agents_camera_can_be_lent_to_the_map_view(controller, house) -> None:
+    camera = map_view(controller)
+    before = controller.step("AddThirdPartyCamera", **camera, raise_for_failure=True)
+    assert before.metadata["cameraOrthSize"] == -1
+    event = controller.step("ToggleMapView", raise_for_failure=True)
+    np.testing.assert_array_equal(event.frame, before.third_party_camera_frames[0])
+    np.testing.assert_array_equal(event.depth_frame, before.third_party_depth_frames[0])
+    assert event.metadata["cameraPosition"] == camera["position"]
+    assert event.metadata["cameraOrthSize"] == camera["orthographicSize"]
+    assert event.metadata["agent"] == before.metadata["agent"]
+    event = controller.step("ToggleMapView")
+    np.testing.assert_array_equal(event.frame, before.frame)
+    assert event.metadata["cameraPosition"] == before.metadata["cameraPosition"]
+    controller.step("ToggleMapView")
+    assert controller.reset(scene=house).metadata["cameraOrthSize"] == -1
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

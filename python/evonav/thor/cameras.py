@@ -189,6 +189,20 @@ def update_third_party_camera(
     )
 
 
+@action("ToggleMapView")
+def toggle_map_view(engine: Engine) -> None:
+    """Lets the agent's images show the whole house from above, or again what the agent sees (deprecated there too)."""
+    if engine.map_view is not None:
+        engine.map_view = None
+        return
+    seen = get_map_view_camera_properties(engine)
+    at, size_m = seen["position"], seen["orthographicSize"]
+    position_m = (at["x"], at["y"], at["z"])
+    fov_deg = engine.field_of_view_deg
+    engine.map_view = ThirdPartyCamera(-1, position_m, (90.0, 0.0, 0.0), fov_deg, NEAR_M, FAR_M, True, size_m, None)
+    engine.map_view_size_m = size_m
+
+
 @action("GetMapViewCameraProperties")
 def get_map_view_camera_properties(engine: Engine) -> dict[str, Any]:
     """What to add a camera with that sees the whole house from above."""

@@ -34,6 +34,7 @@ def reset(engine: Engine, *, sceneName: str = "Procedural") -> None:
         raise ActionError(f"scene {sceneName!r} is not in this build, which holds {', '.join(SCENES)}")
     engine.scene, engine.agent, engine.settings = Scene(sceneName), Agent(), Settings()
     engine.cameras, engine.object_filter = [], None
+    engine.map_view, engine.map_view_size_m = None, -1.0
     engine.configure()
 
 

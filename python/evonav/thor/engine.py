@@ -82,6 +82,10 @@ class Engine:
     agent: Agent = field(default_factory=Agent)
     cameras: list[Camera] = field(default_factory=list)
     """Third-party cameras, by their ids."""
+    map_view: Camera | None = None
+    """What `ToggleMapView` puts in place of the agent's camera."""
+    map_view_size_m: float = -1.0
+    """Half the height of the last map view."""
     object_filter: frozenset[str] | None = None
     """Which objects the metadata lists; all without it."""
     last: Result = field(default_factory=Result)
@@ -93,6 +97,7 @@ class Engine:
         return (
             *(self.scene.version, self.width_px, self.height_px, self.settings, self.object_filter),
             *(agent.x_m, agent.y_m, agent.z_m, agent.yaw_deg, agent.horizon_deg, agent.is_standing, agent.body),
+            *(self.map_view, self.map_view_size_m),
             *self.cameras,
         )
 
@@ -104,10 +109,15 @@ class Engine:
     @property
     def camera_position_m(self) -> tuple[float, float, float]:
         """Of the agent's camera."""
+        if self.map_view is not None:
+            at = self.map_view.metadata()["position"]
+            return (at["x"], at["y"], at["z"])
         return (self.agent.x_m, self.agent.camera_height_m, self.agent.z_m)
 
-    def view(self, *, rgb: bool, instances: bool) -> Frame:
-        """What the agent's camera sees, from where crouching or a forced teleport has brought it."""
+    def view(self, *, rgb: bool, instances: bool) -> Frame | Images:
+        """What the agent's camera sees, from where crouching, a forced teleport or the map view has brought it."""
+        if self.map_view is not None:
+            return self.map_view.render(self.scene, rgb=rgb, instances=instances)
         simulator, pose = self.scene.simulator, self.agent.pose
         if self.agent.camera_height_m == simulator.config.camera_height_m:
             return simulator.render(pose, rgb=rgb, instances=instances)

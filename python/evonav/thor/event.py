@@ -44,6 +44,7 @@ class Emitter:
                 log_once(error, problem)
             self._engine.scene = Scene(self._engine.scene.name)
             self._engine.cameras.clear()
+            self._engine.map_view = None
             self._engine.last = Result(self._engine.last.action, False, problem)
             return self._event(message)
 

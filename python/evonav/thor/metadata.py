@@ -138,7 +138,7 @@ def agent_fields(engine: "Engine") -> dict[str, Any]:
         "depthFormat": "Meters",
         "fov": engine.field_of_view_deg,
         "cameraPosition": vector(*engine.camera_position_m),
-        "cameraOrthSize": -1.0,
+        "cameraOrthSize": engine.map_view_size_m,
         "thirdPartyCameras": [camera.metadata() for camera in engine.cameras],
         "collided": False,
         "collidedObjects": [],
