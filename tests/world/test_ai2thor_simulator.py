@@ -4,8 +4,11 @@ import json
 import math
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -227,6 +230,55 @@ def test_an_evaluation_outlives_its_simulators_process(tmp_path: Path) -> None:
         assert one.simulator_restarts() == {}
         assert list(other.simulator_restarts().values()) == [1]
         assert [stage for _, _, stage in other.simulator_restarts()] == [2]
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_nothing_outlives_an_evaluation_that_is_killed(tmp_path: Path, number: int) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    command = ["-m", "evonav", "evaluate", "--simulator", "ai2thor", "--thor-executable", "evonav", "--limit", "1"]
+    evonav = subprocess.Popen(
+        [sys.executable, *command, "--agents", "ftu", "--workers", "1", "--out", str(tmp_path / "run")],
+        env=os.environ | {"TMPDIR": str(temporary)},
+        stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+    )
+    engines: set[int] = set()
+    try:
+        deadline_s = time.monotonic() + 60.0
+        while not (tmp_path / "run" / "records.sqlite").exists() or not engines:
+            assert time.monotonic() < deadline_s
+            engines = {pid for pid in _descendants(evonav.pid) if "evonav-thor" in _command(pid)}
+            time.sleep(0.05)
+        family = _descendants(evonav.pid)
+        evonav.send_signal(number)
+        evonav.wait(10.0)
+        deadline_s = time.monotonic() + 10.0
+        while any(is_alive(pid) for pid in family):
+            assert time.monotonic() < deadline_s
+            time.sleep(0.05)
+        assert not list(temporary.iterdir())
+    finally:
+        evonav.kill()
+        evonav.wait()
+        for pid in engines:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+
+
+def _descendants(pid: int) -> set[int]:
+    found: set[int] = set()
+    for path in Path(f"/proc/{pid}/task").glob("*/children"):
+        with suppress(OSError):
+            for child in map(int, path.read_text().split()):
+                found |= {child} | _descendants(child)
+    return found
+
+
+def _command(pid: int) -> str:
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    return ""
 
 
 class KilledOnce(Ai2ThorSimulator):

@@ -11,6 +11,7 @@ import json
 import multiprocessing
 import os
 import signal
+import threading
 import time
 from collections import Counter
 from collections.abc import Generator, Iterator, Sequence
@@ -212,6 +213,7 @@ def _serve(connection: Connection, backend_json: str, protocol_json: str) -> Non
     """A worker's life: jobs in, stages out, until the parent hangs up."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt means
     signal.signal(signal.SIGTERM, _end)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     backend = Backend(**json.loads(backend_json))
     protocol = ProtocolConfig(**json.loads(protocol_json))
     while True:
@@ -245,6 +247,14 @@ def _serve(connection: Connection, backend_json: str, protocol_json: str) -> Non
 def _end(number: int, _: object) -> None:
     """Leaves by way of every `finally`: a simulator may have a process and files of its own."""
     raise SystemExit(128 + number)
+
+
+def _end_with_parent() -> None:
+    """Ends this worker when its parent was killed: it would find out only at the end of its stage."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _send(connection: Connection, message: dict[str, object]) -> None:

@@ -33,6 +33,8 @@ _SNAP_M = 0.5
 """How far ends of paths, and the seed of the occupancy, may be moved to where the agent fits; as the embedded
 simulator's."""
 _NUM_START_TRIALS = 50
+_AGENT_Y_M = 0.9009992
+"""Where AI2-THOR has the middle of its agent; with force it takes any height, and the camera along."""
 
 _BODY = {"camera_height_m": 1.575, "agent_radius_m": 0.2, "agent_height_m": 1.8}
 """Of AI2-THOR's default agent, which evonav evaluates."""
@@ -74,7 +76,6 @@ class Ai2ThorSimulator:
         self._objects: tuple[SceneObject, ...] = ()
         self._decoder = InstanceDecoder(())
         self._occupancy: OccupancyGrid | None = None
-        self._agent_y_m = 0.9009992
         self._start = self._pose = self._placed = Pose(0.0, self._body_y_m, 0.0, 0.0)
         # `_pose` is where the agent is for evonav, `_placed` where AI2-THOR has it: renders elsewhere move only that.
 
@@ -114,7 +115,6 @@ class Ai2ThorSimulator:
                 raise self._failed("CreateHouse", error) from error
         if not event.metadata["lastActionSuccess"]:
             raise SimulationError(f"AI2-THOR does not load the house: {event.metadata['errorMessage']}")
-        self._agent_y_m = float(event.metadata["agent"]["position"]["y"])
         self._objects = tuple(_with_boxes(self._reading.objects, event.metadata["objects"]))
         self._decoder = InstanceDecoder(self._objects)
         self._is_loaded = True
@@ -214,7 +214,7 @@ class Ai2ThorSimulator:
             "GetShortestPathToPoint",
             position=self._vector(start_m),
             x=target_m[0],
-            y=self._agent_y_m,
+            y=_AGENT_Y_M,
             z=target_m[2],
             allowedError=_SNAP_M,
         )
@@ -379,7 +379,7 @@ class Ai2ThorSimulator:
 
     def _vector(self, position_m: _Position) -> dict[str, float]:
         """On the wire the agent's height is AI2-THOR's own, whatever ours."""
-        return {"x": position_m[0], "y": self._agent_y_m, "z": position_m[2]}
+        return {"x": position_m[0], "y": _AGENT_Y_M, "z": position_m[2]}
 
 
 def _with_boxes(bodies: Sequence[SceneObject], records: Sequence[dict[str, Any]]) -> Iterator[SceneObject]:
