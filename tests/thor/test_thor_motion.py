@@ -285,8 +285,11 @@ def test_the_locobot_is_low_narrow_and_rolls() -> None:
     done(engine, "LookDown")
     assert refused(engine, "LookDown") == "can't look down beyond 30 degrees below the forward horizon"
     assert refused(engine, "LookUp", degrees=10) == "Must have degrees == 0 for now."
-    refused(engine, "TeleportFull", **HOUSES[0]["metadata"]["agent"])
-    assert engine.last.error_code is ErrorCode.INVALID_ARGUMENT
+    for name in ("TeleportFull", "Teleport"):
+        refused(engine, name, **HOUSES[0]["metadata"]["agent"])
+        assert engine.last.error_code is ErrorCode.INVALID_ARGUMENT
+    refused(engine, "Crouch")
+    assert engine.last.error_code is ErrorCode.INVALID_ACTION
 
 
 def test_the_locobots_motion_is_noisy_and_repeats() -> None:
@@ -350,6 +353,13 @@ def test_a_house_may_say_where_the_agent_starts() -> None:
         15.0,
         False,
     )
+
+
+def test_a_house_with_a_broken_start_is_refused() -> None:
+    engine = Engine()
+    house = HOUSES[0] | {"metadata": {"agentPoses": {"default": {"position": "here"}}}}
+    assert "metadata.agentPoses" in refused(engine, "CreateHouse", house=house)
+    assert engine.scene.house is None
 
 
 def test_actions_that_do_nothing() -> None:

@@ -102,6 +102,11 @@ def test_a_stuck_agent_reaches_its_own_position_only() -> None:
     assert points_of(run(engine, "GetReachablePositions")) == [(middle["x"], middle["z"])]
 
 
+@pytest.mark.parametrize("grid_m", [1e-9, -0.25])
+def test_grids_of_no_use_are_refused(grid_m: float) -> None:
+    assert "gridSize" in refused(engine_in(HOUSES[0]), "GetReachablePositions", gridSize=grid_m)
+
+
 def test_too_many_steps() -> None:
     engine = engine_in(HOUSES[0])
     num_points = len(run(engine, "GetReachablePositions", gridSize=0.5))

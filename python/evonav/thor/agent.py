@@ -6,8 +6,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from evonav.thor.actions import ActionError
+from evonav.thor.actions import ActionError, Vector3
 from evonav.world.pose import Pose
 
 BODY_Y_M = 0.9009992
@@ -71,6 +72,34 @@ def canonical_yaw_deg(yaw_deg: float) -> float:
     return wrapped_deg if wrapped_deg < 360.0 else 0.0
 
 
+class HousePose(BaseModel):
+    """What a house says of an agent mode's start."""
+
+    model_config = ConfigDict(allow_inf_nan=False)
+
+    position: Vector3 | None = None
+    rotation: Vector3 | None = None
+    horizon: float = 0.0
+    standing: bool | None = None
+
+
+_POSES = TypeAdapter(dict[str, HousePose])
+
+
+def house_poses(house: Mapping[str, Any]) -> dict[str, HousePose]:
+    """`metadata.agentPoses` of a house, by agent mode.
+
+    Raises:
+        ActionError: They are malformed.
+    """
+    metadata = house.get("metadata")
+    poses = metadata.get("agentPoses") if isinstance(metadata, dict) else None
+    try:
+        return _POSES.validate_python(poses or {})
+    except ValidationError as error:
+        raise ActionError(f"CreateHouse: metadata.agentPoses: {error}") from error
+
+
 @dataclass(slots=True)
 class Agent:
     """Where the agent stands and looks."""
@@ -116,13 +145,13 @@ class Agent:
 
         So does `setAgentPose` of AI2-THOR's `ProceduralTools`; `metadata.agent` is for the caller to teleport to.
         """
-        pose = ((house.get("metadata") or {}).get("agentPoses") or {}).get(self.body.mode)
+        pose = house_poses(house).get(self.body.mode)
         if pose is None:
             return
-        position, rotation = pose.get("position"), pose.get("rotation")
-        if position is not None:
-            self.x_m, self.y_m, self.z_m = float(position["x"]), BODY_Y_M, float(position["z"])
-        if rotation is not None:
-            self.yaw_deg = canonical_yaw_deg(float(rotation["y"]))
-        self.horizon_deg = canonical_deg(float(pose.get("horizon") or 0.0))
-        self.is_standing = bool(pose.get("standing", self.is_standing))
+        if pose.position is not None:
+            self.x_m, self.y_m, self.z_m = pose.position.x, BODY_Y_M, pose.position.z
+        if pose.rotation is not None:
+            self.yaw_deg = canonical_yaw_deg(pose.rotation.y)
+        self.horizon_deg = canonical_deg(pose.horizon)
+        if pose.standing is not None and not self.is_locobot:
+            self.is_standing = pose.standing

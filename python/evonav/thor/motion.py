@@ -271,6 +271,7 @@ def _look_step_deg(engine: Engine, name: str, degrees: float) -> float:
 @action("Stand")
 def stand(engine: Engine) -> None:
     """Raises the camera again."""
+    _check_can_crouch(engine, "Stand")
     if engine.agent.is_standing:
         raise ActionError("Already standing.")
     engine.agent.is_standing = True
@@ -279,6 +280,12 @@ def stand(engine: Engine) -> None:
 @action("Crouch")
 def crouch(engine: Engine) -> None:
     """Lowers the camera; the body stays as it is, as in AI2-THOR."""
+    _check_can_crouch(engine, "Crouch")
     if not engine.agent.is_standing:
         raise ActionError("Already crouching.")
     engine.agent.is_standing = False
+
+
+def _check_can_crouch(engine: Engine, name: str) -> None:
+    if engine.agent.is_locobot:
+        raise ActionError(f"Invalid action: {name}", ErrorCode.INVALID_ACTION)

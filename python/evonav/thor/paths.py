@@ -27,6 +27,7 @@ _SAMPLE_M = 0.2
 _ALLOWED_ERROR_M = 1e-4
 """How far one end of a path may be moved without a complaint, unless told."""
 _MAX_STEPS = 10_000
+_MIN_GRID_M = 0.01
 _OFFSETS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 """Steps `(right, ahead)` on the grid, in AI2-THOR's order."""
 
@@ -41,6 +42,8 @@ def get_reachable_positions(
 ) -> list[dict[str, float]]:
     """Positions of a grid through the agent that straight steps along the grid lead to, nearest first."""
     grid_m = gridSize or engine.settings.gridSize
+    if grid_m < _MIN_GRID_M:
+        raise ActionError(f"GetReachablePositions: gridSize {grid_m:g} is less than {_MIN_GRID_M:g} m")
     limit = math.floor((_MAX_STEPS if maxStepCount is None else maxStepCount) / (grid_m * grid_m))
     y_m, positions = engine.agent.y_m, []
     for x_m, z_m in _walk(engine, engine.agent.point_m, grid_m, directionsRelativeAgent):

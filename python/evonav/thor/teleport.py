@@ -37,6 +37,7 @@ def teleport(
 ) -> None:
     """Changes what is given of the pose."""
     agent = engine.agent
+    _check_standing(engine, "Teleport", standing)
     at = _position_of("Teleport", position, (x, y, z)) or Vector3(x=agent.x_m, y=agent.y_m, z=agent.z_m)
     turned = Vector3(y=agent.yaw_deg) if rotation is None else rotation
     is_standing = agent.is_standing if standing is None else standing
@@ -59,14 +60,17 @@ def teleport_full(
     """Sets the whole pose; a LoCoBot's has no `standing`, the default agent's must have it."""
     at = _position_of("TeleportFull", position, (x, y, z))
     missing = ["position"] if at is None else []
-    if engine.agent.is_locobot:
-        if standing is not None:
-            raise ActionError("TeleportFull of a locobot has no argument standing", ErrorCode.INVALID_ARGUMENT)
-    elif standing is None:
+    _check_standing(engine, "TeleportFull", standing)
+    if standing is None and not engine.agent.is_locobot:
         missing.append("standing")
     if at is None or missing:
         raise missing_arguments("TeleportFull", *missing)
     _teleport(engine, at, rotation, horizon, standing is not False, forceAction)
+
+
+def _check_standing(engine: Engine, name: str, standing: bool | None) -> None:
+    if engine.agent.is_locobot and standing is not None:
+        raise ActionError(f"{name} of a locobot has no argument standing", ErrorCode.INVALID_ARGUMENT)
 
 
 def _position_of(
@@ -105,18 +109,19 @@ def _check_pose(engine: Engine, at: Vector3, rotation: Vector3, horizon_deg: flo
     if not -body.max_upward_deg <= horizon_deg <= body.max_downward_deg:
         limits = f"[{-body.max_upward_deg:g}:{body.max_downward_deg:g}]"
         raise out_of_range(f"Each horizon must be in {limits}. You gave {horizon_deg:g}.")
-    if not is_within_bounds(engine, point_m):
+    simulator = engine.scene.simulator
+    is_free = simulator.can_move(point_m, point_m)
+    if not is_free and not is_within_bounds(engine, point_m):
         raise out_of_range(f"Teleport position {place} out of scene bounds! Ignore this by setting forceAction=true.")
     if math.dist(snapped(engine, point_m), point_m) > 1e-5:
         grid = f"{engine.settings.gridSize:g}"
         raise out_of_range(f"Teleport position {place} is not on the grid of size {grid}.")
-    simulator = engine.scene.simulator
     blocker = simulator.blocker(point_m, point_m)
     if blocker is not None:
         raise invalid_operation(f"Collided with: {blocker.id}.")
     if at.y < BODY_Y_M - _GROUND_M:
         raise invalid_operation("Collided with: Floor.")
-    fallen_m = at.y - BODY_Y_M if simulator.can_move(point_m, point_m) else _FALL_M
+    fallen_m = at.y - BODY_Y_M if is_free else _FALL_M
     if fallen_m > _GROUND_M:
         raise invalid_operation(
             "After teleporting and adjusting agent position to floor, there was too large a change"
