@@ -33,7 +33,13 @@ class ObjectPose(BaseModel):
 
 
 @action("SetObjectPoses")
-def set_object_poses(engine: Engine, *, objectPoses: list[ObjectPose], placeStationary: bool = True) -> None:
+def set_object_poses(
+    engine: Engine,
+    *,
+    objectPoses: list[ObjectPose],
+    placeStationary: bool = True,
+    **unused: Any,  # noqa: ANN401
+) -> None:
     """Sets the poses of all that can be moved; what can be moved and is not named goes.
 
     An object that is named again is copied. With `placeStationary=False` things fall to what is under them.
@@ -67,9 +73,10 @@ def set_object_poses(engine: Engine, *, objectPoses: list[ObjectPose], placeStat
             house["objects"].append(entry)
             scene.disabled.pop(entry["id"], None)
             placed.append(entry["id"])
-        for object_id in set(loose) - set(placed):
-            house["objects"] += loose[object_id].pop("children", None) or []
-            scene.disabled[object_id] = loose[object_id]
+        for object_id, entry in loose.items():
+            if object_id not in placed:
+                house["objects"] += entry.pop("children", None) or []
+                scene.disabled[object_id] = entry
     if not placeStationary:
         edits.drop(scene, placed)
     edits.relate(scene, placed)
@@ -130,7 +137,7 @@ def teleport_object(
             if struck:
                 raise ActionError(f"{scene.simulator.objects[struck[0]].id} is in the way.")
     if not forceKinematic:
-        edits.drop(scene, [objectId])
+        edits.drop(scene, [part["id"] for part, _ in objects.placed_objects({"objects": [entry]})])
     edits.relate(scene, [objectId])
 
 

@@ -198,8 +198,7 @@ def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
     record = _record(entry, body.category, facts, centre_m, rotation)
     record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
     if facts.is_movable:
-        is_upright = rotation["x"] % 180 == 0 and rotation["z"] % 180 == 0
-        size_m, turn = (facts.size_m, rotation) if facts.size_m and is_upright else (body.size_m, None)
+        size_m, turn = (facts.size_m, rotation) if facts.size_m else (body.size_m, None)
         record["objectOrientedBoundingBox"] = {"cornerPoints": oriented_corners(centre_m, size_m, turn)}
     return record
 
