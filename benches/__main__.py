@@ -6,7 +6,7 @@ import sys
 
 from benches.table import write_section
 
-SECTIONS = {"memory": "Memory", "navigation": "Navigation", "rendering": "Rendering"}
+SECTIONS = {"memory": "Memory", "navigation": "Navigation", "rendering": "Rendering", "thor": "AI2-THOR engine"}
 """Module by title. A module has `NOTES` (Markdown) and `run() -> list[Row]`."""
 
 
