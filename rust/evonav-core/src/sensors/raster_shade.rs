@@ -50,7 +50,7 @@ pub(super) struct Shader {
     /// Of the view that `shortness` was made for.
     size_px: [usize; 2],
     optics: Option<Optics>,
-    /// 1 over the length of each pixel's ray at depth 1.
+    /// 1 over the length of each pixel's ray at depth 1; 1 in orthographic views.
     shortness: Vec<[f32; LANES]>,
     /// The row at hand with its ends continued.
     padded: Vec<f32>,
@@ -72,12 +72,14 @@ impl Shader {
                 1.0 / (1.0 + right * right + down * down).sqrt()
             })
         };
+        let blocks = 0..size_px[0].div_ceil(LANES);
+        let pixels = (0..size_px[1]).flat_map(|row| blocks.clone().map(move |b| (row, b)));
+        let of_block = |(row, block)| match optics {
+            Optics::Perspective { focal_px } => shortness(focal_px as f32, row, block),
+            Optics::Orthographic { .. } => [1.0; LANES],
+        };
         self.shortness.clear();
-        if let Optics::Perspective { focal_px } = optics {
-            let blocks = 0..size_px[0].div_ceil(LANES);
-            let rows = (0..size_px[1]).flat_map(|row| blocks.clone().map(move |b| (row, b)));
-            self.shortness.extend(rows.map(|(row, block)| shortness(focal_px as f32, row, block)));
-        }
+        self.shortness.extend(pixels.map(of_block));
     }
 
     /// Lights a face that may be seen; `facing` as [`LitFace::facing`].
@@ -146,15 +148,14 @@ impl Shader {
         let (whole, rest) = pixels.as_chunks_mut::<{ 3 * LANES }>();
         let mut whole = whole.iter_mut();
         let tags = &canvas.tags[blocks.clone()];
-        let nearness = &canvas.nearness[blocks.clone()];
-        let shortness = self.shortness.get(blocks).unwrap_or_default();
-        let lights = self.light.as_chunks().0;
-        for (index, (tags, lights)) in tags.iter().zip(lights).enumerate() {
-            let facing = match shortness.get(index) {
-                Some(shortness) => {
-                    std::array::from_fn(|lane| nearness[index][lane] * shortness[lane])
-                }
-                None => [1.0; LANES],
+        let is_orthographic = matches!(self.optics, Some(Optics::Orthographic { .. }));
+        let depths = canvas.nearness[blocks.clone()].iter().zip(&self.shortness[blocks]);
+        for ((tags, (nearness, shortness)), lights) in
+            tags.iter().zip(depths).zip(self.light.as_chunks().0)
+        {
+            let facing = match is_orthographic {
+                true => *shortness,
+                false => std::array::from_fn(|lane| nearness[lane] * shortness[lane]),
             };
             let rgb = self.colours(tags, &facing, lights);
             match whole.next() {
