@@ -50,7 +50,10 @@ pub(super) struct Shader {
     /// Of the view that `shortness` was made for.
     size_px: [usize; 2],
     optics: Option<Optics>,
-    /// 1 over the length of each pixel's ray at depth 1; 1 in orthographic views.
+    is_orthographic: bool,
+    /// Pixels per metre, in perspective views at depth 1.
+    scale_px: f32,
+    /// 1 over the length of each pixel's ray at depth 1; not used in orthographic views.
     shortness: Vec<[f32; LANES]>,
     /// The row at hand with its ends continued.
     padded: Vec<f32>,
@@ -64,22 +67,22 @@ impl Shader {
             return;
         }
         (self.size_px, self.optics) = (size_px, Some(optics));
-        let [width, height] = size_px.map(|side| side as f32);
-        let shortness = |focal_px: f32, row: usize, block: usize| {
+        (self.is_orthographic, self.scale_px) = match optics {
+            Optics::Perspective { focal_px } => (false, focal_px as f32),
+            Optics::Orthographic { pixels_per_m } => (true, pixels_per_m as f32),
+        };
+        let (scale_px, [width, height]) = (self.scale_px, size_px.map(|side| side as f32));
+        let shortness = |row: usize, block: usize| {
             std::array::from_fn(|lane| {
-                let right = ((block * LANES + lane) as f32 + 0.5 - width / 2.0) / focal_px;
-                let down = (row as f32 + 0.5 - height / 2.0) / focal_px;
+                let right = ((block * LANES + lane) as f32 + 0.5 - width / 2.0) / scale_px;
+                let down = (row as f32 + 0.5 - height / 2.0) / scale_px;
                 1.0 / (1.0 + right * right + down * down).sqrt()
             })
         };
         let blocks = 0..size_px[0].div_ceil(LANES);
         let pixels = (0..size_px[1]).flat_map(|row| blocks.clone().map(move |b| (row, b)));
-        let of_block = |(row, block)| match optics {
-            Optics::Perspective { focal_px } => shortness(focal_px as f32, row, block),
-            Optics::Orthographic { .. } => [1.0; LANES],
-        };
         self.shortness.clear();
-        self.shortness.extend(pixels.map(of_block));
+        self.shortness.extend(pixels.map(|(row, block)| shortness(row, block)));
     }
 
     /// Lights a face that may be seen; `facing` as [`LitFace::facing`].
@@ -95,7 +98,10 @@ impl Shader {
     pub fn shade(&mut self, canvas: &Canvas, rgb: &mut [u8]) {
         for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
             self.darken(canvas, row);
-            self.paint(canvas, row, pixels);
+            match self.is_orthographic {
+                true => self.paint::<true>(canvas, row, pixels),
+                false => self.paint::<false>(canvas, row, pixels),
+            }
         }
     }
 
@@ -106,13 +112,7 @@ impl Shader {
         self.light.resize(canvas.blocks_per_row() * LANES, 1.0);
         self.pad(canvas.row(row), canvas.width_px, corner_px);
         for (reach_px, is_line) in [(corner_px, false), (1, true)] {
-            // In perspective views a bend counts relative to depth, as a pixel's width grows with it.
-            let (scale_px, relative) = match self.optics {
-                Some(Optics::Orthographic { pixels_per_m }) => (pixels_per_m, [0.0, 1.0]),
-                Some(Optics::Perspective { focal_px }) => (focal_px, [1.0, 1e-6]),
-                None => (0.0, [0.0, 1.0]),
-            };
-            let bend = Bend { scale: scale_px as f32 / reach_px as f32, relative };
+            let scale = self.scale_px / reach_px as f32;
             let centre = canvas.row(row);
             let has_both = row >= reach_px && row + reach_px < canvas.height_px;
             let (above, below) = match has_both {
@@ -124,9 +124,22 @@ impl Shader {
             let width = canvas.width_px;
             let neighbours = [left, right, above, below].map(|row| &row[..width]);
             let (light, centre) = (&mut self.light[..width], &centre[..width]);
-            match is_line {
-                true => darken_row(light, centre, neighbours, bend, line_shade),
-                false => darken_row(light, centre, neighbours, bend, corner_shade),
+            // In perspective views a bend counts relative to depth, as a pixel's width grows with it.
+            let in_perspective = |nearness: f32| nearness + 1e-6;
+            let orthographic = |_: f32| 1.0;
+            match (is_line, self.is_orthographic) {
+                (true, false) => {
+                    darken_row(light, centre, neighbours, scale, in_perspective, line_shade)
+                }
+                (false, false) => {
+                    darken_row(light, centre, neighbours, scale, in_perspective, corner_shade)
+                }
+                (true, true) => {
+                    darken_row(light, centre, neighbours, scale, orthographic, line_shade)
+                }
+                (false, true) => {
+                    darken_row(light, centre, neighbours, scale, orthographic, corner_shade)
+                }
             }
         }
     }
@@ -143,18 +156,17 @@ impl Shader {
         self.padded.extend((1..=reach_px).map(|k| last + (last - one_but_last) * k as f32));
     }
 
-    fn paint(&self, canvas: &Canvas, row: usize, pixels: &mut [u8]) {
+    fn paint<const IS_ORTHOGRAPHIC: bool>(&self, canvas: &Canvas, row: usize, pixels: &mut [u8]) {
         let blocks = canvas.row_blocks(row);
         let (whole, rest) = pixels.as_chunks_mut::<{ 3 * LANES }>();
         let mut whole = whole.iter_mut();
         let tags = &canvas.tags[blocks.clone()];
-        let is_orthographic = matches!(self.optics, Some(Optics::Orthographic { .. }));
         let depths = canvas.nearness[blocks.clone()].iter().zip(&self.shortness[blocks]);
         for ((tags, (nearness, shortness)), lights) in
             tags.iter().zip(depths).zip(self.light.as_chunks().0)
         {
-            let facing = match is_orthographic {
-                true => *shortness,
+            let facing = match IS_ORTHOGRAPHIC {
+                true => [1.0; LANES],
                 false => std::array::from_fn(|lane| nearness[lane] * shortness[lane]),
             };
             let rgb = self.colours(tags, &facing, lights);
@@ -197,29 +209,22 @@ fn to_byte(value: f32) -> u32 {
     (value.min(255.0) + 8_388_608.0).to_bits()
 }
 
-/// How much nearer the surroundings are becomes a bend: divided by `relative . [nearness, 1]`,
-/// times `scale`.
-#[derive(Clone, Copy)]
-struct Bend {
-    scale: f32,
-    relative: [f32; 2],
-}
-
 /// Takes from `light` what `shade` makes of the bend of each pixel's surroundings.
 ///
-/// Inverse depth is linear on a plane: the bend is how much nearer the surroundings are than a
-/// plane would be, relative to depth and to the neighbours' spacing.
+/// Nearness is linear on a plane: the bend is how much nearer the surroundings are than a plane
+/// would be, in `unit`s and relative to the neighbours' spacing.
 #[inline(always)]
 fn darken_row(
     light: &mut [f32],
     centre: &[f32],
     [left, right, above, below]: [&[f32]; 4],
-    Bend { scale, relative: [slope, offset] }: Bend,
+    scale: f32,
+    unit: impl Fn(f32) -> f32,
     shade: impl Fn(f32) -> f32,
 ) {
     for i in 0..light.len() {
         let around = 0.25 * (left[i] + right[i] + above[i] + below[i]);
-        let bend = (around - centre[i]) / (slope * centre[i] + offset) * scale;
+        let bend = (around - centre[i]) / unit(centre[i]) * scale;
         light[i] *= 1.0 - shade(bend);
     }
 }
