@@ -253,6 +253,20 @@ def test_states_show_in_records(engine: Engine) -> None:
     assert records(engine)[lamp["objectId"]] == lamp
 
 
+def test_states_of_many_are_set_at_once(engine: Engine) -> None:
+    def those(flag: str) -> list[Json]:
+        return [record for record in records(engine).values() if record[flag]]
+
+    do(engine, "SetObjectStates", SetObjectStates={"stateChange": "toggleable", "isToggled": True})
+    assert those("toggleable")
+    assert all(record["isToggled"] for record in those("toggleable"))
+    do(engine, "SetObjectStates", SetObjectStates={"objectType": "FloorLamp", "stateChange": "toggleable"})
+    assert {record["objectType"] for record in those("toggleable") if not record["isToggled"]} == {"FloorLamp"}
+    do(engine, "SetObjectStates", SetObjectStates={"stateChange": "openable", "isOpen": True})
+    assert all(record["openness"] == 1 for record in those("openable"))
+    assert "stateChange" in fail(engine, "SetObjectStates", SetObjectStates={"stateChange": "sliceable"})
+
+
 def test_states_that_an_object_has_not_are_refused(engine: Engine) -> None:
     dresser = next(record for record in records(engine).values() if record["objectType"] == "Dresser")["objectId"]
     assert fail(engine, "OpenObject", objectId=dresser, forceAction=True) == f"{dresser} is not an Openable object"

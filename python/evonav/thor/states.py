@@ -3,7 +3,10 @@
 The shape of furniture is one block, so an open fridge is drawn closed.
 """
 
+from collections.abc import Collection, Mapping
 from typing import Any
+
+from pydantic import BaseModel
 
 from evonav.thor import edits, frame_actions, objects
 from evonav.thor.actions import ActionError, action
@@ -27,7 +30,7 @@ def open_object(
     if not 0 <= openness <= 1:
         raise ActionError("openness must be in [0.0:1.0]")
     _require(record, "openable", f"{record['objectId']} is not an Openable object")
-    _set(engine.scene, record["objectId"], "openness", openness)
+    _set(engine.scene, [record["objectId"]], {"openness": openness})
 
 
 @action("CloseObject")
@@ -97,7 +100,7 @@ def fill_object_with_liquid(
         raise ActionError(f"{fillLiquid} is not a valid Liquid Type")
     record = _target(engine, objectId, None, None, forceAction)
     _flip(engine, record, "isFilledWithLiquid", "canFillWithLiquid", "CanBeFilled", value=True)
-    _set(engine.scene, objectId, "fillLiquid", fillLiquid)
+    _set(engine.scene, [objectId], {"fillLiquid": fillLiquid})
 
 
 @action("EmptyLiquidFromObject")
@@ -105,6 +108,52 @@ def empty_liquid_from_object(engine: Engine, *, objectId: str, forceAction: bool
     """Empties an object."""
     record = _target(engine, objectId, None, None, forceAction)
     _flip(engine, record, "isFilledWithLiquid", "canFillWithLiquid", "CanBeFilled", value=False)
+
+
+class ObjectStates(BaseModel):
+    """Which objects `SetObjectStates` sets, and to what."""
+
+    objectType: str | None = None
+    stateChange: str | None = None
+    """The flag that the objects have to have: `toggleable` and the like."""
+    isOpen: bool = False
+    isToggled: bool = False
+    isFilledWithLiquid: bool = False
+    isDirty: bool = False
+    isCooked: bool = False
+
+
+# The state that goes with a flag, and the house file's key for it.
+_SETTABLE = {
+    "openable": ("isOpen", "openness"),
+    "toggleable": ("isToggled", "isOn"),
+    "canFillWithLiquid": ("isFilledWithLiquid", "isFilledWithLiquid"),
+    "dirtyable": ("isDirty", "isDirty"),
+    "cookable": ("isCooked", "isCooked"),
+}
+
+
+@action("SetObjectStates")
+def set_object_states(
+    engine: Engine,
+    *,
+    SetObjectStates: ObjectStates,
+    **unused: Any,  # noqa: ANN401
+) -> None:
+    """Sets one state of all objects that have it, or of those of a type; nothing breaks or is cut here."""
+    wanted = SetObjectStates
+    if wanted.stateChange is None:
+        raise ActionError("SetObjectStates needs a stateChange, and takes an objectType")
+    if wanted.stateChange not in _SETTABLE:
+        raise ActionError(f"stateChange {wanted.stateChange} is not one of {', '.join(_SETTABLE)}")
+    state, key = _SETTABLE[wanted.stateChange]
+    value = getattr(wanted, state)
+    chosen = [
+        record["objectId"]
+        for record in objects.static_records(engine.scene)
+        if record[wanted.stateChange] and wanted.objectType in (None, record["objectType"])
+    ]
+    _set(engine.scene, chosen, {key: float(value) if key == "openness" else value})
 
 
 def _target(engine: Engine, object_id: str | None, x: float | None, y: float | None, is_forced: bool) -> objects.Record:
@@ -131,21 +180,19 @@ def _toggle(engine: Engine, record: objects.Record, *, is_on: bool) -> None:
     if record["isToggled"] == is_on:
         way = "on" if is_on else "off"
         raise ActionError(f"can't toggle object {way} if it's already {way}!")
-    _set(engine.scene, record["objectId"], "isOn", is_on)
+    _set(engine.scene, [record["objectId"]], {"isOn": is_on})
 
 
 def _flip(engine: Engine, record: objects.Record, state: str, flag: str, name: str, *, value: bool) -> None:
     _require(record, flag, f"{record['objectId']} does not have {name} property!")
     if record[state] == value:
         raise ActionError(f"{record['objectId']} already has {state} {value}")
-    _set(engine.scene, record["objectId"], state, value)
+    _set(engine.scene, [record["objectId"]], {state: value})
 
 
-def _set(scene: Scene, object_id: str, key: str, value: object) -> None:
+def _set(scene: Scene, object_ids: Collection[str], values: Mapping[str, object]) -> None:
     """Writes into the house file, from which records and pictures come."""
-    record = objects.record_of(scene, object_id)
     with edits.edited(scene) as house:
-        entries = [entry for entry, _ in objects.placed_objects(house)] + [*house.get("doors", ())]
-        for entry in entries:
-            if entry["id"] == record["objectId"]:
-                entry[key] = value
+        for entry in [entry for entry, _ in objects.placed_objects(house)] + [*house.get("doors", ())]:
+            if entry["id"] in object_ids:
+                entry.update(values)
