@@ -23,13 +23,15 @@ const LEAST_FALL_M: f64 = 0.1;
 const SLENDER: f64 = 4.0;
 /// Less than this is upright.
 const ASKEW_DEG: f64 = 0.5;
-/// Rounding of heights.
+/// Headings to tip to, seen from its own.
+const TURNS_DEG: [f64; 8] = [0.0, 180.0, 90.0, 270.0, 45.0, 135.0, 225.0, 315.0];
+/// Rounding of places.
 const ROUND_M: f64 = 1e-4;
 
 /// Where everything that hangs in the air comes to rest.
 ///
-/// It falls straight down onto the highest thing under it. What is slender and askew then lies on
-/// its side, along its heading or across, if there is room; the rest stands. What is fixed
+/// It falls straight down onto the highest thing under it. What is slender and askew then tips over
+/// its foot, to whichever side has room, along its heading first; the rest stands. What is fixed
 /// (`kinematic`), or of a category that hangs on walls, stays.
 ///
 /// # Arguments
@@ -52,7 +54,11 @@ pub fn settled(
             continue;
         }
         let (support_m, _) = support(&layout, index, &item.placement);
-        if bottom_m(&item.solids) - support_m >= LEAST_FALL_M {
+        // Inside its parent it rests on something, be it a drawer that the shapes do not show.
+        let parent_m = object.parent.map_or(f64::NEG_INFINITY, |parent| {
+            layout.items[parent].solids.iter().fold(f64::NEG_INFINITY, |m, s| m.max(s.top_m))
+        });
+        if bottom_m(&item.solids) - support_m.max(parent_m) >= LEAST_FALL_M {
             layout.items[index].is_on_floor = false;
             let place = fallen(&layout, index);
             layout.put(index, place);
@@ -69,22 +75,32 @@ fn fallen(layout: &Layout, index: usize) -> Placement {
     let signed = |angle: f64| (angle + 180.0).rem_euclid(360.0) - 180.0;
     let is_lying = height_m > SLENDER * width_m.max(depth_m)
         && [x_deg, z_deg].iter().any(|&angle| signed(angle).abs() > ASKEW_DEG);
-    let standing = [0.0, yaw_deg, 0.0];
-    let lying = [0.0, 180.0, 90.0, 270.0].map(|turn| [90.0, turned_deg(yaw_deg + turn), 0.0]);
-    let ways = if is_lying { &lying[..] } else { &[] };
-    let rest = |&rotation_deg: &[f64; 3]| {
+    let standing = ([0.0, yaw_deg, 0.0], position_m);
+    // A pitch of 90 degrees lays the top where the heading points.
+    let lying = |turn_deg: &f64| {
+        let heading_deg = turned_deg(yaw_deg + turn_deg);
+        let (sin, cos) = heading_deg.to_radians().sin_cos();
+        let [x, y, z] = position_m;
+        let reach_m = 0.5 * height_m;
+        let middle_m = [x + reach_m * sin, y, z + reach_m * cos];
+        ([90.0, heading_deg, 0.0], middle_m.map(|value| round_to(value, ROUND_M)))
+    };
+    let turns: &[f64] = if is_lying { &TURNS_DEG } else { &[] };
+    let rest = |(rotation_deg, position_m): ([f64; 3], [f64; 3])| {
         let mut place = Placement { position_m, rotation_deg, parent: None };
         let solids = item.solids_at(&place);
-        let (support_m, borne_by) = support(layout, index, &place);
+        let (support_m, bearer) = support(layout, index, &place);
         place.position_m[1] += support_m - bottom_m(&solids);
         place.position_m[1] = round_to(place.position_m[1], ROUND_M);
-        place.parent = borne_by.map(|bearer| bearer.index);
-        (place, borne_by.is_none_or(|bearer| bearer.is_central))
+        place.parent = bearer.map(|bearer| bearer.index);
+        (place, bearer.is_none_or(|bearer| bearer.is_central))
     };
-    ways.iter()
+    turns
+        .iter()
+        .map(lying)
         .map(rest)
         .find(|(place, is_stable)| *is_stable && layout.is_clear(&[(index, *place)]))
-        .map_or_else(|| rest(&standing).0, |(place, _)| place)
+        .map_or_else(|| rest(standing).0, |(place, _)| place)
 }
 
 /// What a thing lands on.
