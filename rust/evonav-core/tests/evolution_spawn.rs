@@ -2,10 +2,15 @@
 
 mod solids;
 
+use std::f64::consts::PI;
+
 use evonav_core::{
-    assets::catalogue::{Catalogue, UnknownAssets},
+    assets::{
+        catalogue::{Catalogue, UnknownAssets},
+        part::{Part, Primitive},
+    },
     evolution::{SpawnRequest, Spawned, random_spawn, settled},
-    geometry::Vec3,
+    geometry::{Vec3, sub},
     house::House,
     world::scene::{Body, BodyKind, Scene},
 };
@@ -54,6 +59,30 @@ fn body<'a>(scene: &'a Scene, id: &str) -> &'a Body {
     scene.bodies.iter().find(|body| body.id == id).unwrap()
 }
 
+/// Whether a point lies in a part as it is drawn: polygons inscribed in the ellipses of its definition.
+fn holds_drawn(part: &Part, point_m: Vec3) -> bool {
+    let offset = sub(point_m, part.centre_m);
+    let own: Vec3 = std::array::from_fn(|j| (0..3).map(|i| part.rotation[i][j] * offset[i]).sum());
+    match part.primitive {
+        // The drawn globe has 12 meridians and 6 bands.
+        Primitive::Ellipsoid { half_m } => {
+            let inner_m = half_m.map(|half| half * (PI / 12.0).cos().powi(2));
+            (0..3).map(|i| (own[i] / inner_m[i]).powi(2)).sum::<f64>() <= 1.0
+        }
+        Primitive::Frustum { bottom_m, top_m, half_height_m, sides } => {
+            let t = 0.5 * (own[1] / half_height_m + 1.0);
+            let half_m = [0, 1].map(|i| bottom_m[i] + t * (top_m[i] - bottom_m[i]));
+            let ring: Vec<Vec3> = Primitive::ring_m(half_m, 0.0, sides).collect();
+            let is_left = |k: usize| {
+                let (a, b) = (ring[k], ring[(k + 1) % ring.len()]);
+                (b[0] - a[0]) * (own[2] - a[2]) >= (b[2] - a[2]) * (own[0] - a[0])
+            };
+            (0.0..=1.0).contains(&t) && (0..ring.len()).all(is_left)
+        }
+        Primitive::Cuboid { .. } => holds(part, point_m),
+    }
+}
+
 /// Points inside both bodies, on a lattice over what their boxes share, `margin_m` in from its faces.
 fn shared_points(a: &Body, b: &Body, margin_m: f64) -> usize {
     const STEPS: usize = 8;
@@ -63,7 +92,7 @@ fn shared_points(a: &Body, b: &Body, margin_m: f64) -> usize {
         return 0;
     }
     let at = |i: usize, k: usize| low[i] + (high[i] - low[i]) * k as f64 / STEPS as f64;
-    let is_in = |body: &Body, point: Vec3| body.parts.iter().any(|part| holds(part, point));
+    let is_in = |body: &Body, point: Vec3| body.parts.iter().any(|part| holds_drawn(part, point));
     let lattice = (0..=STEPS)
         .flat_map(|x| (0..=STEPS).flat_map(move |y| (0..=STEPS).map(move |z| [x, y, z])));
     lattice
@@ -72,11 +101,14 @@ fn shared_points(a: &Body, b: &Body, margin_m: f64) -> usize {
         .count()
 }
 
-/// Whether a part of `bearer` is right under the middle of `body`.
+/// Whether a part of `bearer` is right under the middle of `body`, or under one of its quarters.
 fn is_borne(body: &Body, bearer: &Body) -> bool {
-    let [x, _, z] = body.aabb.centre_m();
-    let under = [x, body.aabb.min_m[1] - 0.004, z];
-    bearer.parts.iter().any(|part| holds(part, under))
+    let ([x, _, z], [width, _, depth]) = (body.aabb.centre_m(), body.aabb.size_m());
+    let offsets = [[0.0, 0.0], [0.35, 0.35], [0.35, -0.35], [-0.35, 0.35], [-0.35, -0.35]];
+    offsets.iter().any(|[right, ahead]| {
+        let under = [x + right * width, body.aabb.min_m[1] - 0.004, z + ahead * depth];
+        bearer.parts.iter().any(|part| holds(part, under))
+    })
 }
 
 proptest! {
