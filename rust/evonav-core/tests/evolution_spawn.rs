@@ -21,9 +21,9 @@ use solids::holds;
 const HOUSE: &str = include_str!("data/house_100_objects.json");
 
 fn house_with(extra: Vec<Value>) -> House {
-    let mut document: Value = serde_json::from_str(HOUSE).unwrap();
-    document["objects"].as_array_mut().unwrap().extend(extra);
-    House::from_json("test", &document.to_string()).unwrap()
+    let mut document: Value = serde_json::from_str(HOUSE).expect("JSON");
+    document["objects"].as_array_mut().expect("a list").extend(extra);
+    House::from_json("test", &document.to_string()).expect("a house")
 }
 
 fn object(id: &str, asset_id: &str, position_m: Vec3, rotation_deg: Vec3) -> Value {
@@ -33,7 +33,7 @@ fn object(id: &str, asset_id: &str, position_m: Vec3, rotation_deg: Vec3) -> Val
 }
 
 fn scene_of(house: &House) -> Scene {
-    Scene::build(house, Catalogue::bundled(), UnknownAssets::Error).unwrap()
+    Scene::build(house, Catalogue::bundled(), UnknownAssets::Error).expect("known assets")
 }
 
 fn request(seed: u64) -> SpawnRequest {
@@ -52,11 +52,12 @@ fn request(seed: u64) -> SpawnRequest {
 
 fn spawned(house: &House, request: &SpawnRequest) -> Spawned {
     let scene = scene_of(house);
-    random_spawn(house, Catalogue::bundled(), UnknownAssets::Error, &scene, request).unwrap()
+    random_spawn(house, Catalogue::bundled(), UnknownAssets::Error, &scene, request)
+        .expect("a sound request")
 }
 
 fn body<'a>(scene: &'a Scene, id: &str) -> &'a Body {
-    scene.bodies.iter().find(|body| body.id == id).unwrap()
+    scene.bodies.iter().find(|body| body.id == id).expect("a body")
 }
 
 /// Whether a point lies in a part as it is drawn: polygons inscribed in the ellipses of its definition.
