@@ -16,6 +16,8 @@ use crate::{
 const PITCH_M: f64 = 0.3;
 /// Most points along a side of a face.
 const MAX_POINTS_A_SIDE: f64 = 20.0;
+/// Where the points at corners lie between the middle of the face, 0, and the corner, 1.
+const INSIDE: f64 = 0.96;
 /// Most points of a body.
 const MAX_POINTS: usize = 200;
 /// AI2-THOR casts its rays this far beyond the point.
@@ -93,7 +95,11 @@ fn is_near(scene: &Scene, index: usize, axis_m: Vec2, reach_m: f64) -> bool {
 }
 
 /// Points by which a body is seen: on a grid of about 0.3 m over its four-sided faces, in the
-/// middle of all others. Of more than 200 every second, third ... is taken.
+/// middle of all others, and just inside the corners of all. Of more than 200 every second, third
+/// ... is taken.
+///
+/// The corners matter for what the border of the picture or a body before it cuts: 4 of 14 objects
+/// that AI2-THOR is recorded to call visible show no middle of a face.
 pub fn visibility_points(mesh: &SceneMesh, body: usize) -> Vec<Vec3> {
     let body = body as u32;
     let from = mesh.parts.partition_point(|part| part.body < body);
@@ -108,10 +114,18 @@ pub fn visibility_points(mesh: &SceneMesh, body: usize) -> Vec<Vec3> {
                 4 => push_grid(&mut points_m, [at(0), at(1), at(2), at(3)]),
                 count => points_m.push(weighted((0..count).map(|i| (1.0 / count as f64, at(i))))),
             }
+            push_corners(&mut points_m, corners.len(), at);
         }
     }
     let step = points_m.len().div_ceil(MAX_POINTS).max(1);
     points_m.into_iter().step_by(step).collect()
+}
+
+/// Points of a face just inside its corners.
+fn push_corners(points_m: &mut Vec<Vec3>, count: usize, at: impl Fn(usize) -> Vec3) {
+    let middle_m = weighted((0..count).map(|i| (1.0 / count as f64, at(i))));
+    let inside = |i| weighted([(INSIDE, at(i)), (1.0 - INSIDE, middle_m)].into_iter());
+    points_m.extend((0..count).map(inside));
 }
 
 /// Centres of the cells of a grid over a face with four corners.
