@@ -144,6 +144,14 @@ def test_objects_hold_the_agent_on_a_leash() -> None:
     message = refused(engine, "MoveBack", objectId=body.id, maxAgentsDistance=0.01)
     assert message == f"Agent movement would bring it beyond the max distance of {body.id}"
     done(engine, "MoveBack", objectId=body.id, maxAgentsDistance=100)
+    x_m, z_m = engine.agent.point_m
+    half_x_m, half_z_m = body.size_m[0] / 2, body.size_m[2] / 2
+    nearest = (
+        min(max(x_m, body.centre_m[0] - half_x_m), body.centre_m[0] + half_x_m),
+        min(max(z_m, body.centre_m[2] - half_z_m), body.centre_m[2] + half_z_m),
+    )
+    assert done(engine, "DistanceToObject", objectId=body.id) == pytest.approx(math.dist(nearest, (x_m, z_m)))
+    assert refused(engine, "DistanceToObject", objectId="nothing") == "No object with ID nothing"
 
 
 def test_turns() -> None:

@@ -158,6 +158,12 @@ def is_within_bounds(engine: Engine, point_m: tuple[float, float]) -> bool:
     )
 
 
+@action("DistanceToObject")
+def distance_to_object(engine: Engine, *, objectId: str) -> float:
+    """From the agent to the object's box, on the ground plane."""
+    return _distance_m(engine, objectId)
+
+
 def _distance_m(engine: Engine, object_id: str) -> float:
     """From the agent to an object's box, on the ground plane."""
     body = next((body for body in engine.scene.simulator.objects if body.id == object_id), None)
