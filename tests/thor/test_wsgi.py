@@ -86,6 +86,18 @@ def test_events_and_actions_go_back_and_forth(server, connect) -> None:
         }
 
 
+def test_any_text_arrives(server, connect) -> None:
+    """Half a surrogate pair is JSON, and so may be in a house."""
+    text = "\ud800 Grüße \U0001f600"
+    packed = msgpack.packb(
+        {"agents": [msgpack.unpackb(_metadata(0))["agents"][0] | {"errorMessage": text}], "sequenceId": 0},
+        unicode_errors="surrogatepass",
+    )
+    connect().send([(FieldType.METADATA, packed)])
+    assert server.receive().metadata["errorMessage"] == text
+    server.send({})
+
+
 def test_third_party_images_keep_their_order(server, connect) -> None:
     transport = connect()
     pairs = []

@@ -12,6 +12,7 @@ import select
 from collections.abc import Callable, Iterable
 
 import msgpack
+from pydantic_core import to_json
 
 from evonav.thor.fifo import MAX_MESSAGE_BYTES, Body, ClientGone, Field, FieldType, FramingError
 
@@ -151,4 +152,7 @@ def _form(fields: Iterable[Field], token: str, boundary: str) -> bytes:
 def _json_of(packed: Body) -> bytes:
     """Metadata, which the engine packs for the FIFO transport, as JSON."""
     metadata = msgpack.unpackb(packed, strict_map_key=False, unicode_errors="surrogatepass")
-    return json.dumps(metadata, separators=(",", ":")).encode()
+    try:
+        return to_json(metadata, inf_nan_mode="constants")
+    except ValueError:  # half of a surrogate pair, which JSON can say and UTF-8 cannot
+        return json.dumps(metadata, separators=(",", ":")).encode()
