@@ -84,6 +84,8 @@ def test_the_map_view_holds_the_house_and_nothing_hides_its_large_objects(contro
     assert camera["rotation"] == vector(90, 0, 0)
     assert camera["position"]["x"] == pytest.approx(bounds["center"]["x"], abs=0.2)
     assert camera["position"]["z"] == pytest.approx(bounds["center"]["z"], abs=0.2)
+    top = bounds["center"]["y"] + bounds["size"]["y"] / 2
+    assert top - 0.2 < camera["position"]["y"] <= top
     assert camera["orthographicSize"] == pytest.approx(max(bounds["size"]["x"], bounds["size"]["z"]) / 2, abs=0.2)
     num_whole = 0
     masks = event.third_party_instance_masks[0]
@@ -121,6 +123,8 @@ def test_the_skybox_is_where_nothing_is(controller) -> None:
     for colour, expected in (("orange", [255, 165, 0]), ("#102030", [16, 32, 48])):
         event = controller.step("UpdateThirdPartyCamera", skyboxColor=colour, farClippingPlane=50)
         assert (event.third_party_camera_frames[0][nothing] == expected).all()
+    kept = controller.step("UpdateThirdPartyCamera", farClippingPlane=50)
+    assert (kept.third_party_camera_frames[0][nothing] == [16, 32, 48]).all()
     plain = controller.step("UpdateThirdPartyCamera", skyboxColor="default", farClippingPlane=50)
     assert not (plain.third_party_camera_frames[0][nothing] == [16, 32, 48]).all()
 
@@ -159,6 +163,16 @@ def test_several_cameras_with_metadata_are_updated_by_id_and_dropped_by_reset(co
     again = controller.reset(scene=house)
     assert again.third_party_camera_frames == []
     assert again.metadata["thirdPartyCameras"] == []
+
+
+def test_angles_come_back_as_unity_gives_them(controller) -> None:
+    """Tipped over backwards is turned around and upside down: other numbers, the same picture."""
+    position = controller.last_event.metadata["cameraPosition"]
+    controller.step("AddThirdPartyCamera", position=position, rotation=vector(135, 10, 0), raise_for_failure=True)
+    event = controller.step("AddThirdPartyCamera", position=position, rotation=vector(45, 190, 180))
+    assert [camera["rotation"] for camera in event.metadata["thirdPartyCameras"]] == [vector(45, 190, 180)] * 2
+    one, other = event.third_party_instance_segmentation_frames
+    assert (one == other).all(axis=-1).mean() > 0.99
 
 
 def test_a_camera_where_the_agents_is_sees_the_same(controller) -> None:
