@@ -14,11 +14,12 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from enum import IntEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from numpy.typing import NDArray
+if TYPE_CHECKING:  # NumPy takes longer to import than all else; the pipes are open by then.
+    from numpy.typing import NDArray
 
-Body = bytes | NDArray[Any]
+Body: TypeAlias = "bytes | NDArray[Any]"
 """Of a field; an array goes out as it lies in memory."""
 
 MAX_MESSAGE_BYTES = 256 * 2**20
@@ -52,7 +53,7 @@ class FieldType(IntEnum):
     END_OF_MESSAGE = 255
 
 
-Field = tuple[FieldType, Body]
+Field: TypeAlias = "tuple[FieldType, Body]"
 
 
 class ClientGone(Exception):  # noqa: N818 - how a session ends
