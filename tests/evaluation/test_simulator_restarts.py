@@ -90,3 +90,15 @@ def test_means_of_the_machine_do_not_make_another_run(tasks, tmp_path):
     elsewhere = flaky(tmp_path / "elsewhere", num_losses=0)
     evaluate([AGENT], tasks, tmp_path / "run", config=elsewhere, num_workers=0)
     assert not (tmp_path / "elsewhere" / "starts").exists()
+
+
+@pytest.mark.parametrize("num_workers", [0, 1])
+def test_episodes_of_a_worker_share_a_simulator(tmp_path, num_workers):
+    write_tasks(tmp_path / "tasks")
+    both = task_files(tmp_path / "tasks")
+    agents = ["nearest-frontier", "toy_agents:Raising", AGENT]
+    evaluate(agents, both, tmp_path / "whole", config=CONFIG, num_workers=0)
+    config = flaky(tmp_path / "starts", num_losses=0)
+    evaluate(agents, both, tmp_path / "run", config=config, num_workers=num_workers)
+    assert len((tmp_path / "starts" / "starts").read_text()) == 1
+    assert texts(tmp_path / "run") == texts(tmp_path / "whole")

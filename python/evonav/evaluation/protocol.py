@@ -114,7 +114,7 @@ class StageOutcome:
     wall_s: float
     cpu_s: float
     num_simulator_restarts: int = 0
-    """How often the simulator's process was lost in this stage; see `evonav.evaluation.workers.run_case`."""
+    """How often the simulator's process was lost in this stage; see `evonav.evaluation.workers.run_job`."""
 
 
 def as_errored(record: StageRecord, kind: ErrorKind, message: str) -> StageRecord:

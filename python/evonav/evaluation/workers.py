@@ -15,7 +15,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Generator, Iterator, Sequence
-from contextlib import closing, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -24,6 +24,7 @@ from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
 from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
 from evonav.evaluation.rollout import Episode
+from evonav.world.simulator import Simulator
 
 MAX_SIMULATOR_RESTARTS = 2
 """A stage."""
@@ -52,23 +53,45 @@ class JobEvent:
     """Why the job ended before its last stage."""
 
 
-def run_job(job: EpisodeJob, backend: Backend, protocol: ProtocolConfig) -> Iterator[StageOutcome]:
-    """Runs an episode in this process."""
-    case = backend.load_case(Path(job.path))
-    yield from run_case(case, job, backend, protocol)
+class Workplace:
+    """Where episodes run one after another, with one simulator for all: one with a process takes long to start."""
+
+    def __init__(self, backend: Backend, protocol: ProtocolConfig) -> None:
+        """Makes nothing yet."""
+        self.backend = backend
+        self.protocol = protocol
+        self._simulator: Simulator | None = None
+
+    @contextmanager
+    def simulator(self) -> Iterator[Simulator]:
+        """The simulator; it is not used again after an episode that did not end by itself."""
+        simulator, self._simulator = self._simulator or self.backend.make_simulator(), None
+        try:
+            yield simulator
+        except BaseException:
+            simulator.close()
+            raise
+        self._simulator = simulator
+
+    def close(self) -> None:
+        """Closes the simulator; safe to call twice."""
+        if self._simulator is not None:
+            self._simulator.close()
+        self._simulator = None
 
 
-def run_case(case: EpisodeCase, job: EpisodeJob, backend: Backend, protocol: ProtocolConfig) -> Iterator[StageOutcome]:
-    """Runs an episode of a loaded task in this process.
+def run_job(job: EpisodeJob, workplace: Workplace) -> Generator[StageOutcome]:
+    """Runs an episode in this process.
 
     Yields:
         Outcomes of the stages. After the loss of a simulator's process, those from stage 1 on again.
     """
+    case = workplace.backend.load_case(Path(job.path))
     num_restarts: Counter[int] = Counter()
     is_whole = False
     while not is_whole:
         is_whole = True
-        with closing(_attempt(case, job, backend, protocol)) as outcomes:
+        with closing(_attempt(case, job, workplace)) as outcomes:
             for outcome in outcomes:
                 record, stage = outcome.record, outcome.record.stage
                 kind = None if record.error is None or record.state is EndState.NOT_RUN else record.error.kind
@@ -79,25 +102,25 @@ def run_case(case: EpisodeCase, job: EpisodeJob, backend: Backend, protocol: Pro
                 yield replace(outcome, num_simulator_restarts=num_restarts[stage])
 
 
-def _attempt(case: EpisodeCase, job: EpisodeJob, backend: Backend, protocol: ProtocolConfig) -> Generator[StageOutcome]:
-    simulator = backend.make_simulator()
-    try:
+def _attempt(case: EpisodeCase, job: EpisodeJob, workplace: Workplace) -> Generator[StageOutcome]:
+    perception = workplace.backend.make_perception()
+    with workplace.simulator() as simulator:
         agent = make_agent(job.agent)
-        yield from Episode(case, job.agent, agent, simulator, backend.make_perception(), protocol, job.seed).run()
-    finally:
-        simulator.close()
+        yield from Episode(case, job.agent, agent, simulator, perception, workplace.protocol, job.seed).run()
 
 
 def run_here(jobs: Sequence[EpisodeJob], backend: Backend, protocol: ProtocolConfig) -> Iterator[JobEvent]:
     """Runs jobs one after another in this process: for debuggers. Nothing is contained but exceptions."""
-    for job in jobs:
-        try:
-            for outcome in run_job(job, backend, protocol):
-                yield JobEvent(job, outcome)
-        except Exception as error:
-            yield JobEvent(job, is_end=True, failure=(ErrorKind.HARNESS, f"{type(error).__name__}: {error}"))
-        else:
-            yield JobEvent(job, is_end=True)
+    with closing(Workplace(backend, protocol)) as workplace:
+        for job in jobs:
+            try:
+                with closing(run_job(job, workplace)) as outcomes:
+                    for outcome in outcomes:
+                        yield JobEvent(job, outcome)
+            except Exception as error:
+                yield JobEvent(job, is_end=True, failure=(ErrorKind.HARNESS, f"{type(error).__name__}: {error}"))
+            else:
+                yield JobEvent(job, is_end=True)
 
 
 def run_in_workers(
@@ -214,34 +237,38 @@ def _serve(connection: Connection, backend_json: str, protocol_json: str) -> Non
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt means
     signal.signal(signal.SIGTERM, _end)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    backend = Backend(**json.loads(backend_json))
-    protocol = ProtocolConfig(**json.loads(protocol_json))
-    while True:
-        try:
-            job = EpisodeJob(**json.loads(connection.recv_bytes()))
-        except (EOFError, OSError):
-            return
-        failure: tuple[str, str] | None = None
-        try:
-            for outcome in run_job(job, backend, protocol):
-                plan = outcome.stage_map
-                _send(
-                    connection,
-                    {
-                        "kind": "stage",
-                        "record": outcome.record.model_dump_json(),
-                        "map": None if plan is None else plan.model_dump_json(),
-                        "wall_s": outcome.wall_s,
-                        "cpu_s": outcome.cpu_s,
-                        "num_simulator_restarts": outcome.num_simulator_restarts,
-                    },
-                )
-        except BrokenPipeError:
-            return
-        except Exception as error:
-            failure = (ErrorKind.HARNESS.value, f"{type(error).__name__}: {error}")
-        with suppress(BrokenPipeError):
-            _send(connection, {"kind": "end", "failure": failure})
+    workplace = Workplace(Backend(**json.loads(backend_json)), ProtocolConfig(**json.loads(protocol_json)))
+    with closing(workplace), suppress(EOFError, OSError):  # of the connection: the parent hung up
+        while True:
+            _serve_job(connection, EpisodeJob(**json.loads(connection.recv_bytes())), workplace)
+
+
+def _serve_job(connection: Connection, job: EpisodeJob, workplace: Workplace) -> None:
+    failure: tuple[str, str] | None = None
+    try:
+        with closing(run_job(job, workplace)) as outcomes:
+            for outcome in outcomes:
+                _send_stage(connection, outcome)
+    except BrokenPipeError:
+        raise
+    except Exception as error:
+        failure = (ErrorKind.HARNESS.value, f"{type(error).__name__}: {error}")
+    _send(connection, {"kind": "end", "failure": failure})
+
+
+def _send_stage(connection: Connection, outcome: StageOutcome) -> None:
+    plan = outcome.stage_map
+    _send(
+        connection,
+        {
+            "kind": "stage",
+            "record": outcome.record.model_dump_json(),
+            "map": None if plan is None else plan.model_dump_json(),
+            "wall_s": outcome.wall_s,
+            "cpu_s": outcome.cpu_s,
+            "num_simulator_restarts": outcome.num_simulator_restarts,
+        },
+    )
 
 
 def _end(number: int, _: object) -> None:
