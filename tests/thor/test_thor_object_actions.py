@@ -288,6 +288,32 @@ def test_a_house_file_says_what_is_open_on_and_dirty() -> None:
     assert not records(engine)[lamp]["isToggled"]
 
 
+def test_what_a_house_file_says_null_of_is_as_the_asset_comes(engine: Engine) -> None:
+    house = engine.scene.house
+    assert house is not None
+    entries = [entry for entry, _ in objects.placed_objects(house)]
+    for entry in entries:
+        for key in ("openness", "isOn", "isDirty"):
+            entry.pop(key, None)
+    do(engine, "CreateHouse", house=house)
+    before = records(engine)
+    assert any(record["isToggled"] for record in before.values())
+    for entry in entries:
+        entry.update({"openness": None, "isOn": None, "isDirty": None})
+    do(engine, "CreateHouse", house=house)
+    assert records(engine) == before
+
+
+def test_what_is_taken_out_of_a_fridge_is_cold_no_more(engine: Engine) -> None:
+    fridge = next(record for record in records(engine).values() if record["objectType"] == "Fridge")
+    food = fridge["receptacleObjectIds"][0]
+    assert records(engine)[food]["temperature"] == "Cold"
+    x_m, _, z_m = engine.scene.simulator.pose.position_m
+    do(engine, "PlaceObjectAtPoint", objectId=food, position={"x": x_m, "y": 1.0, "z": z_m})
+    assert records(engine)[food]["temperature"] == "RoomTemp"
+    assert food not in records(engine)[fridge["objectId"]]["receptacleObjectIds"]
+
+
 def test_a_door_is_drawn_as_open_as_it_is(engine: Engine) -> None:
     door = next(record for record in records(engine).values() if record["objectType"] == "Doorway" and record["isOpen"])
     size_m = np.ptp(corners_m(door), axis=0)

@@ -44,7 +44,6 @@ _STATES = (
     ("isCooked", "cookable", "isCooked"),
     ("isSliced", "sliceable", "isSliced"),
 )
-_OPEN = 1.0
 # Where a receptacle trigger box of the floor ends when the house does not say.
 _FLOOR_REACH_M = 0.7
 
@@ -131,7 +130,7 @@ def record_of(scene: Scene, object_id: str) -> Record:
 def own_size_m(scene: Scene, entry: Mapping[str, Any]) -> NDArray[np.float64]:
     """Edges of a house object's box along its own axes."""
     record = record_of(scene, entry["id"])
-    facts = facts_of(str(entry.get("assetId", "")), record["objectType"])
+    facts = facts_of(str(_given(entry, "assetId", "")), record["objectType"])
     return np.array(facts.size_m or list(record["axisAlignedBoundingBox"]["size"].values()))
 
 
@@ -187,12 +186,11 @@ def _relate(house: Mapping[str, Any], records: list[Record]) -> None:
         record["parentReceptacles"] = [parent["objectId"] for parent in known] or None
         for parent in known:
             parent["receptacleObjectIds"].append(record["objectId"])
-        if any(parent["isColdSource"] for parent in known):
-            record["temperature"] = "Cold"
+        record["temperature"] = "Cold" if any(parent["isColdSource"] for parent in known) else "RoomTemp"
 
 
 def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
-    facts = facts_of(str(entry.get("assetId", "")), body.category)
+    facts = facts_of(str(_given(entry, "assetId", "")), body.category)
     rotation = {axis: float(entry["rotation"][axis]) % 360.0 for axis in "xyz"}
     centre_m = (float(entry["position"]["x"]), body.centre_m[1], float(entry["position"]["z"]))
     record = _record(entry, body.category, facts, centre_m, rotation)
@@ -205,7 +203,7 @@ def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
 
 def _opening_record(entry: Mapping[str, Any], body: SceneObject, house: Mapping[str, Any]) -> Record:
     """A door or window: AI2-THOR puts the middle of the closed one at `assetPosition` along `wall0`."""
-    facts = facts_of(str(entry.get("assetId", "")), body.category)
+    facts = facts_of(str(_given(entry, "assetId", "")), body.category)
     wall = next((wall for wall in house["walls"] if wall["id"] == entry.get("wall0")), None)
     centre_m, yaw_deg = body.centre_m, 0.0
     if wall is not None:
@@ -251,13 +249,14 @@ def _record(
 ) -> Record:
     """A record without boxes and relations. `position` is the asset's pivot."""
     is_openable = "openable" in facts.flags
-    openness = float(entry.get("openness", _OPEN if "isOpen" in facts.first_states else 0.0)) if is_openable else 0.0
+    openness = float(_given(entry, "openness", "isOpen" in facts.first_states)) if is_openable else 0.0
     pivot_m = np.add(centre_m, rotation_of(rotation) @ facts.pivot_m).tolist()
     states = {
-        state: flag in facts.flags and bool(entry.get(key, state in facts.first_states)) for state, flag, key in _STATES
+        state: flag in facts.flags and bool(_given(entry, key, state in facts.first_states))
+        for state, flag, key in _STATES
     }
     return {
-        "name": str(entry.get("name", entry["id"])),
+        "name": str(_given(entry, "name", entry["id"])),
         "position": dict(zip("xyz", pivot_m, strict=True)),
         "rotation": rotation,
         "visible": False,
@@ -265,7 +264,7 @@ def _record(
         **{flag: flag in facts.flags for flag in FLAGS},
         **states,
         "fillLiquid": entry.get("fillLiquid") if states["isFilledWithLiquid"] else None,
-        "temperature": str(entry.get("temperature", "RoomTemp")),
+        "temperature": "RoomTemp",
         "isOpen": openness > 0.0,
         "openness": openness,
         "isPickedUp": False,
@@ -275,13 +274,19 @@ def _record(
         "distance": 0.0,
         "objectType": object_type,
         "objectId": entry["id"],
-        "assetId": str(entry.get("assetId", "")),
+        "assetId": str(_given(entry, "assetId", "")),
         "parentReceptacles": None,
         "controlledObjects": [] if "toggleable" in facts.flags else None,
         "isMoving": False,
         "axisAlignedBoundingBox": None,
         "objectOrientedBoundingBox": None,
     }
+
+
+def _given(entry: Mapping[str, Any], key: str, otherwise: object) -> Any:  # noqa: ANN401
+    """What the house file says; it may say `null` of what it leaves open."""
+    value = entry.get(key)
+    return otherwise if value is None else value
 
 
 def rotation_of(euler_deg: Mapping[str, float]) -> NDArray[np.float64]:
@@ -334,7 +339,7 @@ def _floor_id(house: Mapping[str, Any]) -> str:
 
 
 def _floor_reach_m(house: Mapping[str, Any]) -> float:
-    return float((house.get("proceduralParameters") or {}).get("receptacleHeight", _FLOOR_REACH_M))
+    return float((house.get("proceduralParameters") or {}).get("receptacleHeight") or _FLOOR_REACH_M)
 
 
 def _wall_ends(wall: Mapping[str, Any]) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
