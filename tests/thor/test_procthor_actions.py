@@ -107,6 +107,7 @@ def test_spawned_things_rest_on_the_receptacle_and_apart(house: Json, table: str
     for index in range(6):
         name = f"small|{index}"
         do(engine, "SpawnAsset", assetId="Mug_1", generatedId=name, position={"y": -20})
+        assert record_of(engine, name)["axisAlignedBoundingBox"]["center"]["y"] == pytest.approx(-20)
         engine.execute(spawn_request(name, table, index))
         if engine.last.is_success:
             names.append(name)

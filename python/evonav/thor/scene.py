@@ -1,5 +1,6 @@
 """The scene that actions read and change: a ProcTHOR house, and the simulator of it as it now is."""
 
+import copy
 import json
 from itertools import count
 from typing import Any
@@ -47,9 +48,10 @@ class Scene:
 
     def apply(self, delta_json: str) -> None:
         """Moves objects as a `HouseDelta` says; only they are built again."""
-        simulator = self.simulator
-        self.begin_edit()
+        # Another simulator: what was derived from this one is known by it.
+        simulator = copy.copy(self.simulator)
         simulator.apply(delta_json)
+        self.begin_edit()
         self.house, self._simulator = json.loads(simulator.house_json), simulator
 
     def note_relations(self) -> None:

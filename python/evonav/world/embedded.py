@@ -291,6 +291,12 @@ class EmbeddedSimulator:
         self._loaded = None
         self._objects = None
 
+    def __copy__(self) -> "EmbeddedSimulator":
+        """Another simulator of the same house, which `apply` replaces and never changes: both share it."""
+        twin = type(self).__new__(type(self))
+        twin.__dict__.update(self.__dict__)
+        return twin
+
     def __getstate__(self) -> dict[str, Any]:
         """House and pose; see the class."""
         house_json = self._loaded and self._loaded.house_json()
