@@ -224,6 +224,13 @@ def test_unknown_revisions(remote, revision, kind) -> None:
     assert not list(Path(os.environ["HOME"]).glob(".prior/datasets/allenai/procthor-10k/*"))
 
 
+def test_what_prior_already_has_needs_no_network(remote) -> None:
+    first = fetch_procthor10k(remote.commit)
+    shutil.rmtree(os.environ["EVONAV_CACHE"])
+    shutil.rmtree(remote.path)
+    assert fetch_procthor10k(remote.commit) == first
+
+
 def test_a_clone_cut_short_is_made_again(remote) -> None:
     clone = Path(os.environ["HOME"]) / ".prior/datasets/allenai/procthor-10k" / remote.commit
     clone.mkdir(parents=True)
