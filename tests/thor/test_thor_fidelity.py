@@ -12,6 +12,7 @@ import pytest
 from evonav.house import bundled_houses
 from evonav.thor import actions
 from evonav.thor.engine import Engine
+from evonav.thor.objects import static_records
 
 ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("EVONAV_SHARED", ROOT.parent / "shared")) / "data"
@@ -111,6 +112,14 @@ def test_every_action_of_the_issue_is_served_and_documented() -> None:
     documented = set(re.findall(r"`(\w+)`", section))
     assert documented <= set(actions.action_names())
     assert documented >= NAMED_BY_THE_ISSUE
+
+
+def test_every_field_of_a_record_is_documented(house: dict[str, Any]) -> None:
+    section = DOCUMENT.split("## Object metadata")[1].split("\n## ")[0]
+    engine = Engine()
+    engine.configure()
+    assert engine.execute({"action": "CreateHouse", "house": copy.deepcopy(house)}).is_success
+    assert {key for record in static_records(engine.scene) for key in record} <= set(re.findall(r"`(\w+)`", section))
 
 
 def quoted_failures() -> list[Any]:

@@ -4,7 +4,7 @@ import copy
 import json
 from collections.abc import Iterator
 
-from pydantic import BaseModel, ConfigDict, NonNegativeInt, PositiveInt
+from pydantic import BaseModel, ConfigDict, NonNegativeInt
 
 from evonav.thor.actions import ActionError, ErrorCode, action
 from evonav.thor.engine import Engine
@@ -34,7 +34,7 @@ def initial_random_spawn(
     excludedObjectIds: list[str] | None = None,
     objectIds: list[str] | None = None,
     receptacleObjectIds: list[str] | None = None,
-    numPlacementAttempts: PositiveInt = 5,
+    numPlacementAttempts: int = 5,
     allowFloor: bool = False,
     allowMoveable: bool = False,
 ) -> None:
@@ -43,9 +43,15 @@ def initial_random_spawn(
     `placeStationary` changes nothing, since what is put down here neither rolls nor falls over. Of objects that are
     named, all must find a place.
     """
+    if numPlacementAttempts <= 0:
+        raise ActionError("numPlacementAttempts must be a positive integer.")
     if objectIds and excludedObjectIds:
         raise ActionError("objectIds and excludedObjectIds exclude each other", ErrorCode.INVALID_ARGUMENT)
     scene = engine.scene
+    known = {entry["id"] for entry, _ in placed_objects(scene.house or {})}
+    for object_id in excludedObjectIds or []:
+        if object_id not in known:
+            raise ActionError(f"Cannot find sim object with id '{object_id}'")
     copies = [] if numDuplicatesOfType is None else _duplicate(scene.begin_edit(), numDuplicatesOfType)
     request = {
         "seed": randomSeed % 2**64,

@@ -28,7 +28,9 @@ def spawn_asset(
 ) -> dict[str, str]:
     """Puts an asset into the scene: `position` is the middle of its box. Nothing is tested for collision."""
     if not is_known(assetId):
-        raise ActionError(f"Object '{assetId}' is not contained in asset database")
+        raise ActionError(
+            f"Object '{assetId}' is not contained in asset database, you may need to rebuild asset database."
+        )
     entries = _house_or_stage(engine.scene)["objects"]
     entries.append(
         {
@@ -100,7 +102,11 @@ def advance_physics_step(
 ) -> None:
     """Brings down what hangs in the air, at once and for good: there is no time in which it falls."""
     if timeStep <= 0 or timeStep > _LONGEST_STEP_S:
-        raise ActionError(f"timeStep must be positive and at most {_LONGEST_STEP_S} s, it is {timeStep}")
+        raise ActionError(
+            "Please use a timeStep between 0.0f and 0.05f. Larger timeSteps produce inconsistent simulation results."
+        )
+    if simSeconds is not None and simSeconds < 0:
+        raise ActionError(f"simSeconds must be non-negative (simSeconds=={simSeconds:g}).")
     delta_json = engine.scene.simulator.settled()
     if json.loads(delta_json)["moves"]:
         engine.scene.apply(delta_json)
