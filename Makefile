@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
-.PHONY: setup demo test lint bench wheel data readme clean
+.PHONY: setup demo test test-procthor lint bench wheel data readme clean
 
 $(VENV)/.dependencies: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -24,6 +24,16 @@ demo: setup
 test: setup
 	cargo test --workspace
 	$(BIN)/python -m pytest
+
+# Whole houses by the published generator, which has an environment of its own (docs/procthor.md).
+$(VENV)-procthor/.dependencies: pyproject.toml
+	$(PYTHON) -m venv $(VENV)-procthor
+	$(VENV)-procthor/bin/python -m pip install --quiet --upgrade "pip>=25.1"
+	$(VENV)-procthor/bin/python -m pip install --quiet --group procthor
+	touch $@
+
+test-procthor: setup $(VENV)-procthor/.dependencies
+	EVONAV_PROCTHOR_PYTHON=$(CURDIR)/$(VENV)-procthor/bin/python $(BIN)/python -m pytest tests/thor/test_procthor_houses.py
 
 lint: setup
 	cargo fmt --all --check
