@@ -5,8 +5,9 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::{Parameters, generate_task},
+    evolution::{Parameters, SpawnRequest, generate_task, random_spawn},
     house::House,
+    world::scene::Scene,
 };
 
 const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");
@@ -33,9 +34,24 @@ fn bench_generation(c: &mut Criterion) {
     }
 }
 
+/// AI2-THOR's `InitialRandomSpawn` of everything that can be carried.
+fn bench_random_spawn(c: &mut Criterion) {
+    let house = House::from_json("house_100_objects", HOUSE).expect("a valid house");
+    let (catalogue, unknown) = (Catalogue::bundled(), UnknownAssets::Error);
+    let scene = Scene::build(&house, catalogue, unknown).expect("known assets");
+    let mut request =
+        SpawnRequest::from_json(r#"{"seed": 0, "num_attempts": 5}"#).expect("a sound request");
+    c.bench_function("random_spawn/house_100_objects", |b| {
+        b.iter(|| {
+            request.seed += 1;
+            random_spawn(black_box(&house), catalogue, unknown, &scene, &request)
+        });
+    });
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(10);
-    targets = bench_generation
+    targets = bench_generation, bench_random_spawn
 }
 criterion_main!(benches);
