@@ -104,6 +104,8 @@ def action(*names: str, unused: Mapping[str, type] = MappingProxyType({})) -> Ca
         required = tuple(p.name for p in named if p.default is p.empty)
         types = {p.name: p.annotation for p in named} | dict(unused)
         for name in names:
+            if name in _ACTIONS:
+                raise ValueError(f"{name} is registered twice")
             _ACTIONS[name] = _Action(function, named != parameters, required, types, frozenset(unused))
         return function
 

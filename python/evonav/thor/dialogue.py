@@ -21,7 +21,6 @@ NEAR_M = 0.1
 """The camera's near plane."""
 
 _MAX_PX = 4096
-_MAX_TIME_STEP_S = 0.05
 _MIN_GRID_M = 0.01
 # AI2-THOR renders these; a client that asked for them and got none would fail far from here.
 _MISSING_IMAGES = ("renderNormalsImage", "renderFlowImage")
@@ -120,18 +119,6 @@ def change_quality(engine: Engine, *, quality: str) -> None:
     """Does nothing: there is one quality."""
 
 
-@action("SetObjectFilter")
-def set_object_filter(engine: Engine, *, objectIds: list[str]) -> None:
-    """Lists only these objects in the metadata; unknown ids do not matter."""
-    engine.object_filter = frozenset(objectIds)
-
-
-@action("ResetObjectFilter")
-def reset_object_filter(engine: Engine) -> None:
-    """Lists all objects again."""
-    engine.object_filter = None
-
-
 @action("GetSceneBounds")
 def get_scene_bounds(engine: Engine) -> list[Vector]:
     """The smallest and the largest corner of the box around everything."""
@@ -139,21 +126,3 @@ def get_scene_bounds(engine: Engine) -> list[Vector]:
     if bounds is None:
         raise ActionError(f"scene {engine.scene.name} holds no house: call CreateHouse first")
     return [vector(*bounds["cornerPoints"][corner]) for corner in (-1, 0)]
-
-
-@action("PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
-def pause_physics(engine: Engine, **_: object) -> None:
-    """Does nothing: everything is at rest, always."""
-
-
-@action("AdvancePhysicsStep")
-def advance_physics_step(
-    engine: Engine, *, timeStep: float = 0.02, simSeconds: float | None = None, allowAutoSimulation: bool = False
-) -> None:
-    """Does nothing: everything is at rest, always."""
-    if not 0.0 < timeStep <= _MAX_TIME_STEP_S:
-        raise ActionError(
-            "Please use a timeStep between 0.01f and 0.05f. Larger timeSteps produce inconsistent results."
-        )
-    if simSeconds is not None and simSeconds < 0.0:
-        raise ActionError(f"simSeconds must be non-negative! You gave: {simSeconds:g}.")
