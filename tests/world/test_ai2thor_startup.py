@@ -227,7 +227,9 @@ def test_the_process_ends_with_evonav_whatever_ends_that(script: Script, tmp_pat
         "Ai2ThorSimulator(options=Ai2ThorOptions(sys.argv[1])).start()\n"
     )
     executable = script(f"trap '' TERM INT HUP; echo $$ > '{pid_file}'; while :; do sleep 0.1; done")
-    with subprocess.Popen([sys.executable, "-c", program, executable], stderr=subprocess.DEVNULL) as evonav:
+    environment = os.environ | {"TMPDIR": str(tmp_path)}  # a process that is killed cannot clean up
+    command = [sys.executable, "-c", program, executable]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL, env=environment) as evonav:
         _wait_until(lambda: pid_file.is_file() and pid_file.read_text().endswith("\n"))
         pid = int(pid_file.read_text())
         evonav.send_signal(number)
