@@ -53,7 +53,7 @@ pub(super) struct Shader {
     is_orthographic: bool,
     /// Pixels per metre, in perspective views at depth 1.
     scale_px: f32,
-    /// 1 over the length of each pixel's ray at depth 1; not used in orthographic views.
+    /// 1 over the length of each pixel's ray at depth 1; [`Self::level_facing`] in orthographic views.
     shortness: Vec<[f32; LANES]>,
     /// The row at hand with its ends continued.
     padded: Vec<f32>,
@@ -98,10 +98,10 @@ impl Shader {
     pub fn shade(&mut self, canvas: &Canvas, rgb: &mut [u8]) {
         for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
             self.darken(canvas, row);
-            match self.is_orthographic {
-                true => self.paint::<true>(canvas, row, pixels),
-                false => self.paint::<false>(canvas, row, pixels),
+            if self.is_orthographic {
+                self.level_facing(canvas, row);
             }
+            self.paint(canvas, row, pixels);
         }
     }
 
@@ -156,7 +156,16 @@ impl Shader {
         self.padded.extend((1..=reach_px).map(|k| last + (last - one_but_last) * k as f32));
     }
 
-    fn paint<const IS_ORTHOGRAPHIC: bool>(&self, canvas: &Canvas, row: usize, pixels: &mut [u8]) {
+    /// Makes nearness times `shortness` 1 in a row: all looks are along the axis.
+    fn level_facing(&mut self, canvas: &Canvas, row: usize) {
+        let blocks = canvas.row_blocks(row);
+        let nearness = &canvas.nearness[blocks.clone()];
+        for (shortness, nearness) in self.shortness[blocks].iter_mut().zip(nearness) {
+            *shortness = nearness.map(|w| 1.0 / w);
+        }
+    }
+
+    fn paint(&self, canvas: &Canvas, row: usize, pixels: &mut [u8]) {
         let blocks = canvas.row_blocks(row);
         let (whole, rest) = pixels.as_chunks_mut::<{ 3 * LANES }>();
         let mut whole = whole.iter_mut();
@@ -165,10 +174,7 @@ impl Shader {
         for ((tags, (nearness, shortness)), lights) in
             tags.iter().zip(depths).zip(self.light.as_chunks().0)
         {
-            let facing = match IS_ORTHOGRAPHIC {
-                true => [1.0; LANES],
-                false => std::array::from_fn(|lane| nearness[lane] * shortness[lane]),
-            };
+            let facing = std::array::from_fn(|lane| nearness[lane] * shortness[lane]);
             let rgb = self.colours(tags, &facing, lights);
             match whole.next() {
                 Some(pixels) => pixels.copy_from_slice(rgb.as_flattened()),
