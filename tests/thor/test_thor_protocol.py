@@ -171,6 +171,15 @@ def test_settings_that_cannot_be(start_controller: Any, settings: dict[str, Any]
         start_controller(scene="Procedural", **settings)
 
 
+def test_settings_that_cannot_be_drawn_leave_the_scene(controller: Any) -> None:
+    before = controller.last_event
+    for degrees in (1e-6, 179.999):
+        event = controller.step("Initialize", fieldOfView=degrees)
+        if not event.metadata["lastActionSuccess"]:
+            assert event.metadata["fov"] == before.metadata["fov"]
+    assert len(controller.step("Pass").metadata["objects"]) == len(before.metadata["objects"])
+
+
 def test_settings_of_a_wrong_type(start_controller: Any) -> None:
     with pytest.raises(ValueError, match="Initialize has an invalid argument: gridSize"):
         start_controller(scene="Procedural", gridSize="wide")

@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from evonav.errors import EvonavError
 from evonav.thor import objects
 from evonav.thor.actions import ActionError, ErrorCode, action
 from evonav.thor.agent import Agent, body_of
@@ -99,9 +100,18 @@ def initialize(engine: Engine, **settings: Any) -> dict[str, float]:  # noqa: AN
         problem = f"action: Initialize has an invalid argument: {name} (=={value}). {first['msg']}"
         raise ActionError(problem, ErrorCode.INVALID_ARGUMENT) from error
     check_settings(wanted)
-    engine.agent.body = body_of(wanted.agentMode, wanted.maxUpwardLookAngle, wanted.maxDownwardLookAngle)
-    engine.settings = wanted
-    engine.configure()
+    body = body_of(wanted.agentMode, wanted.maxUpwardLookAngle, wanted.maxDownwardLookAngle)
+    before = engine.settings, engine.agent.body
+    engine.settings, engine.agent.body = wanted, body
+    try:
+        engine.configure()
+        if engine.scene.house is not None:
+            # What cannot be drawn so is refused here, not by the next event.
+            engine.view(rgb=False, instances=False)
+    except EvonavError:
+        engine.settings, engine.agent.body = before
+        engine.configure()
+        raise
     return {"cameraNearPlane": NEAR_M, "cameraFarPlane": FAR_M}
 
 
