@@ -6,11 +6,12 @@ use crate::{geometry::Vec2, world::collision::Obstacle};
 
 /// Most that a path turns at one node around a corner.
 const TURN_RAD: f64 = FRAC_PI_8;
-/// How often the turn at a node is halved to pass a narrow gap: down to a hundredth of a
-/// millimetre of room.
+/// How often the turn at a node is halved to pass a narrow gap: down to two tenths of a millimetre
+/// of room.
 const MOST_SPLITS: u32 = 5;
-/// Nodes keep this much more than the agent's radius, so that rounding never blocks an edge.
-const SKIN_M: f64 = 1e-6;
+/// Nodes keep this much more than the agent's radius, so that an agent that walks an edge by
+/// rounded headings, in steps, is never blocked: 1e-4 degrees are 2e-5 m after 10 m.
+const SKIN_M: f64 = 1e-4;
 /// Slack of the tangency test, metres over the length of an edge: errs towards more edges.
 const TANGENT_SLACK_M: f64 = 1e-6;
 
