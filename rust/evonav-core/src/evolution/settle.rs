@@ -38,7 +38,7 @@ const ROUND_M: f64 = 1e-4;
 /// * `scene` - built from the same house.
 ///
 /// # Errors
-/// Those of [`Layout::new`].
+/// [`Error::House`] for an unknown asset, if `unknown` says so.
 pub fn settled(
     house: &House,
     catalogue: &Catalogue,

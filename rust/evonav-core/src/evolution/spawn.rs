@@ -89,8 +89,8 @@ enum Receptacle {
 /// * `scene` - built from the same house.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] for an object or receptacle that the house does not hold, and those
-/// of [`Layout::new`].
+/// [`Error::InvalidArgument`] for an object or receptacle that the house does not hold,
+/// [`Error::House`] for an unknown asset, if `unknown` says so.
 pub fn random_spawn(
     house: &House,
     catalogue: &Catalogue,
