@@ -221,5 +221,34 @@ def test_large_bodies_pass_in_portions(tmp_path: Path) -> None:
     pipes.close()
 
 
+def test_a_message_broken_off_anywhere_makes_the_client_raise() -> None:
+    """AI2-THOR's own reader, which waits for its timeout at the end of a pipe; never is a torn picture an event."""
+    fifo_server = pytest.importorskip("ai2thor.fifo_server")
+    metadata = {"agents": [{"name": "agent"}], "activeAgentId": 0}
+    packed = msgpack.packb(metadata)
+    message = HEADER.pack(1, len(packed)) + packed + HEADER.pack(4, 12) + bytes(range(12)) + EOM
+    for num_sent in range(len(message)):
+        server = fifo_server.FifoServer(width=2, height=2)
+        server.start()
+        reader = os.open(server.server_pipe_path, os.O_RDONLY | os.O_NONBLOCK)
+        with os.fdopen(reader, "rb", buffering=0) as server.server_pipe:
+            fifo = Fifo(Path(server.server_pipe_path), Path(server.client_pipe_path), lambda: False)
+            writer = os.open(server.server_pipe_path, os.O_WRONLY)
+            os.write(writer, message[:num_sent])
+            os.close(writer)
+            thread = threading.Thread(target=fifo.break_off)
+            thread.start()
+            began_s = time.monotonic()
+            if num_sent <= len(message) - len(EOM):
+                with pytest.raises((KeyError, ValueError)):
+                    server.receive()
+            else:  # the end itself was begun: the message is whole
+                assert server._recv_message(None) == (metadata, {"image": [bytes(range(12))]})
+            assert time.monotonic() - began_s < WITHIN_S
+        thread.join()
+        fifo.close()
+        server.tmp_dir.cleanup()
+
+
 def test_the_limit_is_above_every_house() -> None:
     assert MAX_MESSAGE_BYTES > 100e6

@@ -94,7 +94,7 @@ def clients(tmp_path: Path, house: dict[str, Any]) -> Iterator[Any]:
 
 
 def test_stop_ends_the_engine(clients: Any) -> None:
-    client = clients("20")
+    client = clients("--steps", "20")
     client.assert_all_gone()
     assert client.process.returncode == 0
 
@@ -116,16 +116,49 @@ def test_a_killed_client_leaves_no_engine(clients: Any, seed: int) -> None:
     assert "Traceback" not in client.logged()
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV])
-def test_a_killed_engine_ends_the_client_soon(clients: Any, number: signal.Signals) -> None:
-    client = clients()
-    engine = int(client.line("started"))
-    client.line("stepped")
-    os.kill(engine, number)
+def _assert_fails_soon(client: Client, within_s: float = WITHIN_S) -> None:
+    began_s = time.monotonic()
     client.assert_all_gone()
+    assert time.monotonic() - began_s < within_s
+    assert client.process.stdout is not None
     words = client.process.stdout.read()
     assert "failed" in words
+    assert "failed TimeoutError" not in words
     assert "stopped" in words
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGSEGV, signal.SIGABRT])
+@pytest.mark.parametrize("victim", ["process", "worker"])
+def test_a_killed_engine_ends_the_client_soon(clients: Any, number: signal.Signals, victim: str) -> None:
+    client = clients()
+    process = int(client.line("started"))
+    client.line("stepped")
+    (worker,) = (pid for pid in client.engines() if pid != process)
+    os.kill(process if victim == "process" else worker, number)
+    _assert_fails_soon(client)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("size_px", [300, 1500])
+def test_an_engine_killed_at_any_moment_ends_the_client_soon(clients: Any, seed: int, size_px: int) -> None:
+    """The larger images do not fit into the pipe, so that most of the time a message is under way."""
+    client = clients("--size", str(size_px))
+    process = int(client.line("started"))
+    (worker,) = (pid for pid in client.engines() if pid != process)
+    time.sleep(random.Random(seed).uniform(0.0, 0.3))
+    os.kill(worker if seed % 2 else process, signal.SIGKILL)
+    _assert_fails_soon(client)
+
+
+def test_both_processes_of_the_engine_killed(clients: Any) -> None:
+    """Nobody is left to say goodbye: the client waits for its timeout, or sees that nobody reads its next action."""
+    client = clients("--timeout", "2")
+    client.line("started")
+    client.line("stepped")
+    for pid in client.engines():
+        os.kill(pid, signal.SIGKILL)
+    client.assert_all_gone()
+    assert "failed" in client.process.stdout.read()
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -1,11 +1,11 @@
-"""A client to be killed: `python thor_client.py HOUSE [STEPS]` drives a controller, for ever without STEPS.
+"""A client to be killed: `python thor_client.py HOUSE [--steps N]` drives a controller, for ever without `--steps`.
 
 Says `started PID` (of the engine), `stepped N` now and then, `failed ERROR` and `stopped`.
 """
 
+import argparse
 import contextlib
 import json
-import sys
 from pathlib import Path
 
 from ai2thor.controller import Controller
@@ -18,15 +18,24 @@ def _say(*words: object) -> None:
 
 
 def main() -> None:
-    house = json.loads(Path(sys.argv[1]).read_text())
-    num_steps = int(sys.argv[2]) if len(sys.argv) > 2 else None
+    parser = argparse.ArgumentParser()
+    parser.add_argument("house", type=Path)
+    parser.add_argument("--steps", type=int)
+    parser.add_argument("--size", type=int, default=300)
+    parser.add_argument("--timeout", type=float, default=100.0)  # the client's default
+    options = parser.parse_args()
     controller = Controller(
-        local_executable_path=evonav.thor.executable(), x_display="0", scene=house, server_timeout=3.0
+        local_executable_path=evonav.thor.executable(),
+        x_display="0",
+        scene=json.loads(options.house.read_text()),
+        width=options.size,
+        height=options.size,
+        server_timeout=options.timeout,
     )
-    _say("started", controller.server.unity_proc.pid)
+    _say("started", controller.unity_pid)
     done = 0
     try:
-        while done != num_steps:
+        while done != options.steps:
             controller.step("RotateRight", degrees=30)
             done += 1
             if done % 10 == 0:

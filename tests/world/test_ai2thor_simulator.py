@@ -178,7 +178,7 @@ def test_a_process_that_is_lost_is_told_and_replaced(number: int, how: str, ask:
     try:
         start = simulator.reset(HOUSE)
         pid = pid_of(simulator)
-        os.kill(pid, number)
+        os.killpg(pid, number)  # our engine is two processes
         began_s = time.monotonic()
         with pytest.raises(SimulatorLostError, match=how):
             ask(simulator)

@@ -30,6 +30,8 @@ _HEADER = struct.Struct("!BI")
 # adopted too early to notice.
 _CONNECT_TIMEOUT_S = 5.0
 _WATCH_MS = 500
+# A client amid a message reads on at once.
+_STALL_MS = 500
 # Linux's; a whole event fits, so that engine and client change places once a step.
 _SET_PIPE_SIZE, _PIPE_BYTES = 1031, 2**20
 # Of one `writev`; POSIX grants 16, Linux 1024.
@@ -83,7 +85,7 @@ class Fifo:
             ClientGone: Nobody reads the server pipe.
             OSError: A path is no pipe that can be opened.
         """
-        self._is_orphan = is_orphan
+        self.is_orphan = is_orphan
         self._pending = bytearray()
         self._is_sending = False
         self._out = self._opened_for_writing(server_pipe)
@@ -102,6 +104,8 @@ class Fifo:
         while True:
             kind, num_bytes = _HEADER.unpack(self._read(_HEADER.size, is_start=body is None))
             if kind == FieldType.END_OF_MESSAGE and num_bytes == 0 and body is not None:
+                if self.is_orphan():  # a client that never pauses keeps `_wait` from asking
+                    raise ClientGone("the process that started the engine is gone")
                 return body
             if kind != FieldType.ACTION or body is not None:
                 raise FramingError(f"field type {kind} of {num_bytes} bytes where an action belongs")
@@ -129,11 +133,29 @@ class Fifo:
 
         Its reader takes a closed pipe for a slow one and waits for its timeout, 100 s; at an empty message it raises.
         """
-        if not self._is_sending:
+        if self._is_sending:
+            self.break_off()
+        else:
             with suppress(OSError):
                 os.write(self._out, _HEADER.pack(FieldType.END_OF_MESSAGE, 0))
         os.close(self._out)
         os.close(self._in)
+
+    def stop_reading(self) -> None:
+        """Closes the client's pipe alone, so that a client that writes sees that nobody else reads it."""
+        os.close(self._in)
+
+    def break_off(self) -> None:
+        """Wakes a client wherever in a message it waits.
+
+        Zeros complete any field; more of them are a header of no type, at which it raises. An end of the message would
+        be taken for the end of a good one.
+        """
+        poll = select.poll()
+        poll.register(self._out, select.POLLOUT)
+        with suppress(OSError):
+            while poll.poll(_STALL_MS):
+                os.write(self._out, bytes(2**16))
 
     def _opened_for_writing(self, path: Path) -> int:
         deadline_s = time.monotonic() + _CONNECT_TIMEOUT_S
@@ -144,7 +166,7 @@ class Fifo:
             except OSError as error:
                 if error.errno != errno.ENXIO:
                     raise
-            if self._is_orphan():
+            if self.is_orphan():
                 raise ClientGone("the client went before it opened its pipe")
             time.sleep(0.002)
         raise ClientGone(f"no client opened {path} within {_CONNECT_TIMEOUT_S:.0f} s")
@@ -188,5 +210,5 @@ class Fifo:
             ready = dict(poll.poll(_WATCH_MS))
             if ready.get(file, 0) & event or ready.get(self._in, 0) & select.POLLHUP:
                 return
-            if ready or self._is_orphan():
+            if ready or self.is_orphan():
                 raise ClientGone("the client is gone")

@@ -12,6 +12,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from evonav.thor.fifo import ClientGone, Fifo, FramingError
+from evonav.thor.supervisor import fork_worker
 
 if TYPE_CHECKING:
     from evonav.thor.wsgi import Wsgi
@@ -60,7 +61,13 @@ def _connect_and_serve(options: argparse.Namespace, parent_pid: int) -> int:
     except (ClientGone, OSError, ValueError) as error:
         _LOG.error("cannot connect: %s", error)
         return 1
+    if isinstance(transport, Fifo):
+        # The client sees for itself that a process of the other transport has ended.
+        status = fork_worker(transport)
+        if status is not None:
+            return status
     try:
+        _LOG.info("serves process %d", parent_pid)
         _serve(transport, options)
     except ClientGone as end:
         _LOG.info("ends: %s", end)
@@ -100,7 +107,6 @@ def _serve(transport: "Fifo | Wsgi", options: argparse.Namespace) -> None:
     engine = Engine(width_px=options.width, height_px=options.height)
     has_camera = not options.nographics and os.environ.get("AI2THOR_SERVER_SIDE_SCREENSHOT") != "False"
     emitter = Emitter(engine, has_camera=has_camera, has_patches=isinstance(transport, Fifo))
-    _LOG.info("serves process %d, %d x %d", os.getppid(), engine.width_px, engine.height_px)
     transport.send(emitter.event({"sequenceId": 0}))
     while True:
         message = _decoded(transport.receive())
@@ -133,8 +139,9 @@ class _Stopped(BaseException):
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
-    # A second one is not to interrupt the ending.
-    signal.signal(number, signal.SIG_IGN)
+    # A second one is not to interrupt the ending; of one that came with the first, SIG_IGN would make CPython complain.
+    for other in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(other, lambda *_: None)
     raise _Stopped(number)
 
 
