@@ -222,7 +222,8 @@ def test_the_process_ends_with_evonav_whatever_ends_that(script: Script, tmp_pat
     """A process that, unlike our engine, does not look whether anybody is left."""
     pid_file = tmp_path / "pid"
     program = (
-        "import sys\n"
+        "import signal, sys\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # shells start background jobs that ignore it
         "from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator\n"
         "Ai2ThorSimulator(options=Ai2ThorOptions(sys.argv[1])).start()\n"
     )
@@ -233,7 +234,10 @@ def test_the_process_ends_with_evonav_whatever_ends_that(script: Script, tmp_pat
         _wait_until(lambda: pid_file.is_file() and pid_file.read_text().endswith("\n"))
         pid = int(pid_file.read_text())
         evonav.send_signal(number)
-        evonav.wait(10.0)
+        try:
+            evonav.wait(10.0)
+        finally:
+            evonav.kill()
     try:
         _wait_until(lambda: not _is_alive(pid))
     finally:
