@@ -190,12 +190,19 @@ def test_the_building_stays(engine: Engine) -> None:
     assert "part of the building" in fail(engine, "DisableObject", objectId=wall["objectId"])
 
 
-@pytest.mark.parametrize("action", ["DisableObject", "RemoveFromScene", "EnableObject", "OpenObject", "Contains"])
+@pytest.mark.parametrize("action", ["RemoveFromScene", "OpenObject", "Contains"])
 def test_unknown_ids_are_named(engine: Engine, action: str) -> None:
     assert (
         fail(engine, action, objectId="Ghost")
         == "ArgumentException: objectId: Ghost is not the objectId on any object in the scene!"
     )
+
+
+def test_unknown_ids_where_ai2thor_has_other_words(engine: Engine) -> None:
+    assert fail(engine, "DisableObject", objectId="Ghost") == ""
+    assert fail(engine, "EnableObject", objectId="Ghost") == ""
+    at = {"x": 1.0, "y": 1.0, "z": 1.0}
+    assert fail(engine, "PlaceObjectAtPoint", objectId="Ghost", position=at) == "Cannot find object with id Ghost."
 
 
 @pytest.mark.parametrize("number", [0, 2])
@@ -323,8 +330,9 @@ def test_a_door_is_drawn_as_open_as_it_is(engine: Engine) -> None:
     assert math.isclose(closed_m[1], size_m[1], abs_tol=1e-6)
 
 
-def test_an_object_is_visible_from_its_interactable_poses_and_from_no_others(engine: Engine) -> None:
-    target = next(record for record in records(engine).values() if record["objectType"] == "FloorLamp")["objectId"]
+@pytest.mark.parametrize("object_type", ["FloorLamp", "Dresser", "Doorway", "Wall"])
+def test_an_object_is_visible_from_its_interactable_poses_and_from_no_others(engine: Engine, object_type: str) -> None:
+    target = next(record for record in records(engine).values() if record["objectType"] == object_type)["objectId"]
     positions = do(engine, "GetReachablePositions")[::6]
     found = do(engine, "GetInteractablePoses", objectId=target, positions=positions, standings=[True])
     assert found
@@ -343,6 +351,16 @@ def test_an_object_is_visible_from_its_interactable_poses_and_from_no_others(eng
     older = do(engine, "PositionsFromWhichItemIsInteractable", objectId=target, positions=positions)
     assert set(older) == {"x", "y", "z", "rotation", "standing", "horizon"}
     assert older["standing"].count(1.0) == len(found)
+
+
+def test_poses_of_an_absurd_grid_are_refused(engine: Engine) -> None:
+    target = next(record for record in records(engine).values() if record["objectType"] == "FloorLamp")["objectId"]
+    x_m, z_m = engine.agent.point_m
+    positions = [{"x": x_m + 1e-3 * i, "y": 0.9, "z": z_m} for i in range(2)]
+    lamp = records(engine)[target]["position"]
+    many = [{"x": lamp["x"], "y": 0.9, "z": lamp["z"]}] * 4000
+    message = fail(engine, "GetInteractablePoses", objectId=target, positions=positions + many)
+    assert "gridSize 0.25 m gives 4002 positions" in message
 
 
 def test_things_can_be_put_at_spawn_coordinates(engine: Engine) -> None:

@@ -115,6 +115,26 @@ def test_too_many_steps() -> None:
     assert message == "InvalidOperationException: Too many steps taken in GetReachablePositions."
 
 
+def test_a_grid_of_too_many_positions_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = engine_in(HOUSES[0])
+    num_points = len(run(engine, "GetReachablePositions", gridSize=0.5))
+    monkeypatch.setattr("evonav.thor.paths._MAX_POSITIONS", num_points)
+    run(engine, "GetReachablePositions", gridSize=0.5)
+    monkeypatch.setattr("evonav.thor.paths._MAX_POSITIONS", num_points - 1)
+    assert f"gridSize 0.5 m gives more than {num_points - 1} positions" in refused(
+        engine, "GetReachablePositions", gridSize=0.5
+    )
+
+
+@pytest.mark.parametrize("name", ["position", "rotation", "horizon"])
+def test_a_forced_pose_of_more_than_single_precision_is_refused(name: str) -> None:
+    engine = engine_in(HOUSES[0])
+    before = engine.state
+    pose = {name: 1e300 if name == "horizon" else {"x": 0.0, "y": 1e300, "z": 0.0}}
+    assert "single precision" in refused(engine, "Teleport", forceAction=True, **pose)
+    assert engine.state == before
+
+
 @settings(max_examples=30, deadline=None)
 @given(data=st.data(), house=st.sampled_from(HOUSES))
 def test_corners_are_the_embedded_simulators(data: st.DataObject, house: Json) -> None:

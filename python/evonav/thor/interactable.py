@@ -8,6 +8,7 @@ import numpy as np
 
 from evonav.thor import objects, paths
 from evonav.thor.actions import ActionError, Vector3, action
+from evonav.thor.agent import Agent
 from evonav.thor.engine import Engine
 from evonav.thor.motion import invalid_operation
 from evonav.thor.surfaces import surfaces_of
@@ -19,6 +20,7 @@ _HORIZONS_DEG = (-30.0, 0.0, 30.0, 60.0)
 # A receptacle's surface is looked at on a grid of so many points a side.
 _POINTS_A_SIDE = 20
 _NO_LIMIT = 2**31 - 1
+_MAX_TESTS = 100_000
 
 
 @action("GetInteractablePoses")
@@ -59,7 +61,13 @@ def get_interactable_poses(
     chosen = (_HORIZONS_DEG if horizons is None else horizons, [False, True] if standings is None else standings)
     if not (positions and yaws_deg and chosen[0] and chosen[1]):
         raise invalid_operation("Every degree of freedom must have at least 1 valid value.")
-    near = _near(record, positions, reach_m + settings.gridSize)
+    near = _near(record, positions, reach_m)
+    num_tests = len(near) * len(yaws_deg) * len(chosen[0]) * len(chosen[1])
+    if num_tests > _MAX_TESTS:
+        raise invalid_operation(
+            f"Too many poses to look from: gridSize {settings.gridSize:g} m gives {len(positions)} positions,"
+            f" and {num_tests} poses near {objectId}, more than {_MAX_TESTS}."
+        )
     poses: list[Pose] = []
     for horizon_deg in chosen[0]:
         for is_standing in chosen[1]:
@@ -67,7 +75,9 @@ def get_interactable_poses(
                 there = replace(agent, horizon_deg=horizon_deg, is_standing=is_standing, yaw_deg=yaw_deg % 360.0)
                 for position in near:
                     there.x_m, there.y_m, there.z_m = position.x, position.y, position.z
-                    if objectId in objects.visible_ids(engine.scene, there, reach_m):
+                    if _may_frame(engine, there, record) and objectId in objects.visible_ids(
+                        engine.scene, there, reach_m
+                    ):
                         place = {"x": position.x, "y": position.y, "z": position.z}
                         pose = {"rotation": yaw_deg, "standing": is_standing, "horizon": horizon_deg}
                         poses.append({**place, **pose})
@@ -117,11 +127,31 @@ def get_spawn_coordinates_above_receptacle(
 
 
 def _near(record: objects.Record, positions: Sequence[Vector3], reach_m: float) -> list[Vector3]:
-    """Positions from which the object may be within reach."""
-    size_m = list(record["axisAlignedBoundingBox"]["size"].values())
-    pivot = record["position"]
-    limit_m = reach_m + math.hypot(*size_m)
-    return [p for p in positions if math.dist((p.x, p.y, p.z), pivot.values()) <= limit_m]
+    """Positions from which the object's box is within reach on the ground."""
+    box = record["axisAlignedBoundingBox"]
+    (x_m, z_m), (half_x_m, half_z_m) = ((box["center"][a] for a in "xz"), (0.5 * box["size"][a] for a in "xz"))
+    return [
+        at
+        for at in positions
+        if math.hypot(max(abs(at.x - x_m) - half_x_m, 0.0), max(abs(at.z - z_m) - half_z_m, 0.0)) <= reach_m + 1e-6
+    ]
+
+
+def _may_frame(engine: Engine, agent: Agent, record: objects.Record) -> bool:
+    """Whether the sphere around the object's box touches the cone around the picture."""
+    box, intrinsics = record["axisAlignedBoundingBox"], engine.scene.simulator.intrinsics
+    radius_m = 0.5 * math.hypot(*box["size"].values()) + 1e-6
+    to_box_m = [at - eye for at, eye in zip(box["center"].values(), objects.eye_m(agent), strict=True)]
+    distance_m = math.hypot(*to_box_m)
+    if distance_m <= radius_m:
+        return True
+    half = math.tan(0.5 * intrinsics.vertical_fov_rad)
+    cone_rad = math.atan(half * math.hypot(1.0, intrinsics.width_px / intrinsics.height_px))
+    yaw_rad, down_rad = math.radians(agent.yaw_deg), math.radians(agent.horizon_deg)
+    level = math.cos(down_rad)
+    ahead = (math.sin(yaw_rad) * level, -math.sin(down_rad), math.cos(yaw_rad) * level)
+    cosine = sum(a * b for a, b in zip(ahead, to_box_m, strict=True)) / distance_m
+    return math.acos(max(-1.0, min(1.0, cosine))) <= cone_rad + math.asin(radius_m / distance_m)
 
 
 def _is_reached(engine: Engine, point_m: tuple[float, float, float], body: int) -> bool:

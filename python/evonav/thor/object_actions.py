@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from evonav.thor import edits, objects
-from evonav.thor.actions import ActionError, Vector3, action
+from evonav.thor.actions import ActionError, Vector3, action, brief
 from evonav.thor.engine import Engine
 from evonav.thor.scene import Scene
 from evonav.thor.surfaces import fresh_surfaces
@@ -96,7 +96,8 @@ def place_object_at_point(
 ) -> None:
     """Puts an object on the surface under a point, if there is room; of several points at the first where there is."""
     scene = engine.scene
-    objects.record_of(scene, objectId)
+    if not _is_listed(scene, objectId):
+        raise ActionError(f"Cannot find object with id {brief(objectId)}.")
     points = [position] if position is not None else positions or []
     if not points:
         raise ActionError("PlaceObjectAtPoint needs a position")
@@ -144,6 +145,8 @@ def teleport_object(
 @action("DisableObject")
 def disable_object(engine: Engine, *, objectId: str) -> None:
     """Takes an object out of the scene until `EnableObject`; what stood on it falls."""
+    if not _is_listed(engine.scene, objectId):
+        raise ActionError("")  # AI2-THOR says no more.
     _remove(engine.scene, [objectId])
 
 
@@ -168,7 +171,8 @@ def enable_object(engine: Engine, *, objectId: str) -> None:
     """Puts a disabled object back where it was; does nothing to one that is there."""
     scene = engine.scene
     if objectId not in scene.disabled:
-        objects.record_of(scene, objectId)
+        if not _is_listed(scene, objectId):
+            raise ActionError("")  # AI2-THOR says no more.
         return
     with edits.edited(scene) as house:
         entry = scene.disabled.pop(objectId)
@@ -180,6 +184,10 @@ def enable_object(engine: Engine, *, objectId: str) -> None:
 @action("MakeAllObjectsMoveable", "MakeAllObjectsStationary")
 def change_physics(engine: Engine) -> None:
     """Nothing to do where everything is at rest."""
+
+
+def _is_listed(scene: Scene, object_id: str) -> bool:
+    return any(record["objectId"] == object_id for record in objects.static_records(scene))
 
 
 def _put_pivot(entry: dict[str, Any], object_type: str, position: Vector3, rotation: Vector3) -> None:

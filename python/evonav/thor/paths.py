@@ -28,6 +28,8 @@ _ALLOWED_ERROR_M = 1e-4
 """How far one end of a path may be moved without a complaint, unless told."""
 _MAX_STEPS = 10_000
 _MIN_GRID_M = 0.01
+_MAX_POSITIONS = 250_000
+"""What a second or two finds; AI2-THOR would go on to `maxStepCount / gridSize**2`."""
 _OFFSETS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 """Steps `(right, ahead)` on the grid, in AI2-THOR's order."""
 
@@ -50,6 +52,9 @@ def get_reachable_positions(
         positions.append({"x": x_m, "y": y_m, "z": z_m})
         if len(positions) > limit:
             raise motion.invalid_operation("Too many steps taken in GetReachablePositions.")
+        if len(positions) > _MAX_POSITIONS:
+            size = f"gridSize {grid_m:g} m gives more than {_MAX_POSITIONS} positions"
+            raise motion.invalid_operation(f"Too many steps taken in GetReachablePositions: {size}.")
     return positions
 
 

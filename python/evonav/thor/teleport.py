@@ -10,6 +10,7 @@ from evonav.thor.agent import BODY_Y_M, canonical_deg, canonical_yaw_deg
 from evonav.thor.engine import Engine
 from evonav.thor.motion import invalid_operation, is_within_bounds, missing_arguments, snapped, vector_text
 
+_FLOAT32_MAX = 3.4028234663852886e38
 _GROUND_M = 0.05
 """How far over the floor one may teleport and still be set down on it."""
 _FALL_M = 2 * 9.81
@@ -89,6 +90,9 @@ def _teleport(
     engine: Engine, at: Vector3, rotation: Vector3, horizon_deg: float, is_standing: bool, is_forced: bool
 ) -> None:
     agent, y_m = engine.agent, at.y
+    # AI2-THOR's numbers are of single precision.
+    if not all(abs(value) <= _FLOAT32_MAX for value in (at.x, at.y, at.z, rotation.y, horizon_deg)):
+        raise out_of_range("Teleport pose has numbers that are not finite in single precision.")
     if not is_forced:
         _check_pose(engine, at, rotation, horizon_deg)
         y_m = BODY_Y_M
