@@ -222,8 +222,7 @@ def test_the_process_ends_with_evonav_whatever_ends_that(script: Script, tmp_pat
     """A process that, unlike our engine, does not look whether anybody is left."""
     pid_file = tmp_path / "pid"
     program = (
-        "import signal, sys\n"
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # shells start background jobs that ignore it
+        "import sys\n"
         "from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator\n"
         "Ai2ThorSimulator(options=Ai2ThorOptions(sys.argv[1])).start()\n"
     )
