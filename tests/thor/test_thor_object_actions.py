@@ -5,12 +5,14 @@ import math
 from itertools import islice
 from typing import Any
 
+import msgpack
 import numpy as np
 import pytest
 
 from evonav.house import bundled_houses
 from evonav.thor import objects
 from evonav.thor.engine import Engine
+from evonav.thor.metadata import MetadataEncoder
 
 Json = dict[str, Any]
 
@@ -372,3 +374,18 @@ def test_things_can_be_put_at_spawn_coordinates(engine: Engine) -> None:
     assert records(engine)[small]["parentReceptacles"] == [table["objectId"]]
     assert set(rest) <= set(do(engine, "Contains", objectId=table["objectId"]))
     assert "not found within" in fail(engine, "GetSpawnCoordinatesAboveReceptacle", objectId=table["objectId"])
+
+
+def test_events_list_what_the_filter_lets_through_after_every_edit(engine: Engine) -> None:
+    """Whatever was packed before, an event is that of an encoder that has packed nothing yet."""
+    kept = MetadataEncoder()
+    first, second, *_ = movable(engine)
+    for wanted in (frozenset(), frozenset({second["objectId"]}), None):
+        engine.object_filter = wanted
+        packed = kept.event(engine, sequence_id=1, has_colors=False)
+        assert packed == MetadataEncoder().event(engine, sequence_id=1, has_colors=False)
+        listed = {record["objectId"] for record in msgpack.unpackb(packed)["agents"][0]["objects"]}
+        assert listed == (set(records(engine)) if wanted is None else set(wanted))
+    do(engine, "DisableObject", objectId=first["objectId"])
+    packed = kept.event(engine, sequence_id=1, has_colors=False)
+    assert packed == MetadataEncoder().event(engine, sequence_id=1, has_colors=False)

@@ -1,6 +1,6 @@
 """An event's metadata in msgpack, with the fields of AI2-THOR's `MetadataWrapper` (`AgentManager.cs`).
 
-What depends on the scene only, most of it, is packed once a version of the scene.
+What depends on the scene only, most of it, is packed once a version of the scene, and only if it is listed.
 """
 
 import struct
@@ -55,7 +55,7 @@ class MetadataEncoder:
 
     def __init__(self) -> None:
         self._scene_version = -1
-        self._records: list[tuple[str, bytes]] = []
+        self._packed: dict[int, bytes] = {}
         self._bounds: dict[str, Any] | None = None
         self._palette = Palette(-1, [], np.zeros((1, 4), np.uint8), np.zeros((1, 4), np.uint8))
         self._colors = b""
@@ -93,8 +93,11 @@ class MetadataEncoder:
         views = objects.views(engine.scene, engine.agent, engine.settings)
         wanted = engine.object_filter
         parts = [b""]
-        for (object_id, static), view in zip(self._records, views, strict=True):
-            if wanted is None or object_id in wanted:
+        for i, (record, view) in enumerate(zip(objects.static_records(engine.scene), views, strict=True)):
+            if wanted is None or record["objectId"] in wanted:
+                static = self._packed.get(i)
+                if static is None:
+                    static = self._packed[i] = _static(record)
                 distance, sight = _DOUBLE.pack(view.distance_m), _SIGHT[view.is_visible, view.is_interactable]
                 parts += (static, _DISTANCE, distance, sight)
         parts[0] = _ARRAY32.pack(0xDD, (len(parts) - 1) // 4)
@@ -103,8 +106,7 @@ class MetadataEncoder:
     def _refresh(self, scene: Scene) -> None:
         if self._scene_version == scene.version:
             return
-        records = objects.static_records(scene)
-        self._records = [(record["objectId"], _static(record)) for record in records]
+        self._packed = {}
         self._bounds = scene_bounds(scene)
         self._scene_version = scene.version
 
