@@ -84,16 +84,27 @@ fn holds_drawn(part: &Part, point_m: Vec3) -> bool {
     }
 }
 
-/// Points inside both bodies, on a lattice over what their boxes share, `margin_m` in from its faces.
-fn shared_points(a: &Body, b: &Body, margin_m: f64) -> usize {
+/// Points of a lattice over what two boxes share around which parts of both bodies share more than
+/// `touch_m`: parts that overlap by less only touch.
+fn shared_points(a: &Body, b: &Body, touch_m: f64) -> usize {
     const STEPS: usize = 8;
-    let low: Vec3 = std::array::from_fn(|i| a.aabb.min_m[i].max(b.aabb.min_m[i]) + margin_m);
-    let high: Vec3 = std::array::from_fn(|i| a.aabb.max_m[i].min(b.aabb.max_m[i]) - margin_m);
+    let low: Vec3 = std::array::from_fn(|i| a.aabb.min_m[i].max(b.aabb.min_m[i]) + touch_m);
+    let high: Vec3 = std::array::from_fn(|i| a.aabb.max_m[i].min(b.aabb.max_m[i]) - touch_m);
     if (0..3).any(|i| low[i] >= high[i]) {
         return 0;
     }
     let at = |i: usize, k: usize| low[i] + (high[i] - low[i]) * k as f64 / STEPS as f64;
-    let is_in = |body: &Body, point: Vec3| body.parts.iter().any(|part| holds_drawn(part, point));
+    let around = |point: Vec3| {
+        let shifts = (0..3).flat_map(|i| [(i, -0.5 * touch_m), (i, 0.5 * touch_m)]);
+        shifts.map(move |(i, shift_m)| {
+            let mut shifted = point;
+            shifted[i] += shift_m;
+            shifted
+        })
+    };
+    let is_in = |body: &Body, point: Vec3| {
+        body.parts.iter().any(|part| around(point).all(|p| holds_drawn(part, p)))
+    };
     let lattice = (0..=STEPS)
         .flat_map(|x| (0..=STEPS).flat_map(move |y| (0..=STEPS).map(move |z| [x, y, z])));
     lattice
