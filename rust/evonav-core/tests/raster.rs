@@ -180,7 +180,22 @@ proptest! {
         for index in 0..camera.width_px * camera.height_px {
             let (row, col) = (index / camera.width_px, index % camera.width_px);
             let (origin_m, ray) = look_through(&view, [col as f64 + 0.5, row as f64 + 0.5]);
-            let slack = |depth: f64| 1e-6 * depth.max(1.0) * (1.0 + 10.0 * depth);
+            // A plane that is seen edge-on takes rounding to depth by the sine of that angle.
+            let grazing = |depth: f64| {
+                let point_m = add(origin_m, ray.map(|r| depth * r));
+                let sines = triangles.iter().filter_map(|t| {
+                    let [a, b, c] = t.vertices_m;
+                    let normal = cross(sub(b, a), sub(c, a));
+                    let length = dot(normal, normal).sqrt();
+                    let is_on = dot(normal, sub(point_m, a)).abs() < 1e-4 * length;
+                    is_on.then(|| dot(normal, ray).abs() / length)
+                });
+                sines.fold(0.1, f64::min).max(1e-4)
+            };
+            let slack = |depth: f64| {
+                let at = if depth.is_finite() { grazing(depth) } else { 0.1 };
+                1e-7 * depth.max(1.0) * (1.0 + 10.0 * depth) / at
+            };
             let nearest = |least, margin, most| {
                 cast_naive(&triangles, origin_m, ray, least, margin).filter(|hit| hit.0 < most)
             };
