@@ -73,7 +73,7 @@ class Planner:
     """The simulator's shortest paths, to the nearest reachable place where a point itself is cut off.
 
     The free point nearest to an object may lie in a pocket behind furniture; the paper's reading is the nearest
-    *reachable* one (docs/paper-readings.md).
+    *reachable* one (docs/parity.md).
     """
 
     def __init__(self, simulator: Simulator) -> None:

@@ -1,6 +1,7 @@
 //! Task generation: which room evolves, what moves where, and which object is the goal
 //! (paper, Sec. 3.2 and A.1-A.4).
 
+mod evolve;
 mod generate;
 mod goals;
 mod layout;
@@ -16,6 +17,7 @@ mod spawn;
 mod stage;
 mod state;
 mod surfaces;
+mod target;
 
 pub use generate::{Generation, generate_task};
 pub use goals::{Candidate, GoalBias, goal_room_weights, sample_goal, target_scores};

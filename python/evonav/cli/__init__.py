@@ -1,0 +1,53 @@
+"""The `evonav` command. Exit codes: 0 done, 1 an error that is told, 2 wrong usage, 3 incomplete, 130 interrupted."""
+
+import sys
+
+import typer
+
+from evonav.cli.evaluate import demo, evaluate, report, strip
+from evonav.cli.houses import houses_app
+from evonav.cli.tasks import generate
+
+EXIT_ERROR = 1
+
+app = typer.Typer(
+    name="evonav",
+    help="EvoNav-Bench: lifelong navigation in homes that change.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+for command in (evaluate, demo, report, strip, generate):
+    app.command()(command)
+app.add_typer(houses_app, name="houses")
+
+
+@app.command(name="agents")
+def list_agents() -> None:
+    """Lists agents and yardsticks by name."""
+    from evonav.agents.registry import agent_descriptions
+    from evonav.evaluation.privileged import YARDSTICKS
+
+    yardsticks = {name: f"yardstick: {kind.description}" for name, kind in YARDSTICKS.items()}
+    for name, description in {**agent_descriptions(), **yardsticks}.items():
+        typer.echo(f"{name:18}{description}")
+    typer.echo(f"{'module:Class':18}any class of yours with the methods of evonav.agents.agent.Agent")
+
+
+@app.command()
+def version() -> None:
+    """Prints the version."""
+    from evonav import __version__
+
+    typer.echo(__version__)
+
+
+def main() -> None:
+    """Runs the command; errors of evonav are one line, not a traceback."""
+    from evonav.errors import EvonavError
+
+    try:
+        app()
+    except EvonavError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(EXIT_ERROR)

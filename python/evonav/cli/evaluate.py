@@ -1,0 +1,207 @@
+"""Running agents, and what comes of it: `evaluate`, `demo`, `report`, `strip`."""
+
+import signal
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evonav.cli.display import print_table, progress, status
+from evonav.cli.options import (
+    HEURISTICS,
+    Agents,
+    AnyAsset,
+    Houses,
+    Limit,
+    Out,
+    Seed,
+    SimulatorName,
+    Tasks,
+    ThorCommit,
+    ThorDisplay,
+    ThorExecutable,
+    ThorGpu,
+    ThorPlatform,
+    ThorTimeout,
+    Which,
+    Workers,
+    count_of,
+)
+
+if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
+    from collections.abc import Iterator, Mapping
+
+    from evonav.evaluation.backend import Backend
+    from evonav.evaluation.engine import RunConfig, TaskFile
+    from evonav.evaluation.metrics import AgentSummary
+
+EXIT_INCOMPLETE = 3
+EXIT_INTERRUPTED = 130
+
+
+def evaluate(
+    out: Out,
+    agents: Agents = HEURISTICS,
+    houses: Houses = None,
+    tasks: Tasks = None,
+    limit: Limit = None,
+    seed: Seed = 0,
+    workers: Workers = None,
+    retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
+    allow_unknown_assets: AnyAsset = False,
+    simulator: Which = SimulatorName.EMBEDDED,
+    thor_executable: ThorExecutable = None,
+    thor_commit: ThorCommit = None,
+    thor_platform: ThorPlatform = None,
+    thor_gpu: ThorGpu = None,
+    thor_display: ThorDisplay = None,
+    thor_timeout: ThorTimeout = 100.0,
+) -> None:
+    """Evaluates agents on tasks; run again to resume. Leaves records.sqlite and summary.json in OUT."""
+    if houses is not None and tasks is not None:
+        raise typer.BadParameter("give --houses or --tasks, not both")
+    num_workers = count_of(workers)
+    build = {
+        "executable": thor_executable,
+        "commit_id": thor_commit,
+        "platform": None if thor_platform is None else thor_platform.value,
+    }
+    host = {"gpu_device": thor_gpu, "x_display": thor_display, "timeout_s": thor_timeout}
+    config = _config(seed, _backend(simulator, allow_unknown_assets, build, host))
+    with _tasks(out, houses, tasks, limit, seed, allow_unknown_assets) as task_files:
+        summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored)
+    print_table(summaries)
+    _exit(summaries)
+
+
+def demo(
+    out: Out = Path("out/demo"),
+    agents: Agents = HEURISTICS,
+    limit: Limit = None,
+    seed: Seed = 0,
+    workers: Workers = None,
+) -> None:
+    """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report."""
+    num_workers = count_of(workers)
+    with _tasks(out, None, None, limit, seed, False) as task_files:
+        summaries = _evaluate(out, agents, task_files, _config(seed), num_workers, retry_errored=False)
+    print_table(summaries)
+    _report(out)
+    _exit(summaries)
+
+
+def report(run: Annotated[Path, typer.Argument(help="Folder of a run.")]) -> None:
+    """Writes a run's HTML report, from its records alone."""
+    from evonav.evaluation.engine import write_summary
+
+    print_table(write_summary(run))
+    _report(run)
+
+
+def strip(
+    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    out: Annotated[Path, typer.Option(help="SVG file to write.")],
+    task: Annotated[str | None, typer.Argument(help="Id of a task of the run; default: the most telling one.")] = None,
+    agents: Annotated[str, typer.Option(help="Agents of the run, comma-separated: a row each.")] = "ftu",
+    stages: Annotated[str, typer.Option(help="Stages, comma-separated; default: all.")] = "",
+) -> None:
+    """Draws one task of a run as a picture: stages side by side, agents below each other."""
+    from evonav.report import write_strip
+
+    try:
+        numbers = [int(stage) for stage in stages.split(",")] if stages else None
+    except ValueError:
+        raise typer.BadParameter(f"--stages {stages}: numbers, comma-separated") from None
+    typer.echo(f"picture: {write_strip(run, task, agents.split(','), out, stages=numbers)}")
+
+
+@contextmanager
+def _tasks(
+    out: Path, houses: Path | None, tasks: Path | None, limit: int | None, seed: int, allow_unknown_assets: bool
+) -> "Iterator[list[TaskFile]]":
+    """The tasks of a run: given, generated into the run's folder, or bundled."""
+    from evonav.evaluation.datasets import bundled_tasks, make_tasks
+    from evonav.evaluation.engine import task_file, task_files
+
+    with ExitStack() as stack:
+        if houses is not None:
+            with status("Generating tasks") as tell:
+                generated = make_tasks(
+                    houses,
+                    out / "tasks",
+                    limit=limit,
+                    seed=seed,
+                    allow_unknown_assets=allow_unknown_assets,
+                    on_task=tell,
+                )
+            yield [task_file(root) for root in generated]
+        else:
+            directory = tasks if tasks is not None else stack.enter_context(bundled_tasks())
+            yield task_files(directory, limit)
+
+
+def _evaluate(
+    out: Path,
+    agents: str,
+    task_files: "list[TaskFile]",
+    config: "RunConfig",
+    num_workers: int,
+    retry_errored: bool,
+) -> "list[AgentSummary]":
+    from evonav.evaluation.engine import evaluate
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)  # what a scheduler sends is to be as good as Ctrl-C
+    try:
+        with status("Starting the simulator"):
+            config.backend.check()
+        with progress() as show:
+            return evaluate(
+                [name.strip() for name in agents.split(",") if name.strip()],
+                task_files,
+                out,
+                config=config,
+                num_workers=num_workers,
+                retry_errored=retry_errored,
+                on_progress=show,
+            )
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted; finished stages are in {out}, the same command goes on from there", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def _config(seed: int, backend: "Backend | None" = None) -> "RunConfig":
+    from evonav.evaluation.backend import Backend
+    from evonav.evaluation.engine import RunConfig
+
+    return RunConfig(seed=seed, backend=backend or Backend())
+
+
+def _backend(
+    simulator: SimulatorName, allow_unknown_assets: bool, build: "Mapping[str, object]", host: "Mapping[str, object]"
+) -> "Backend":
+    """The simulator of the options; those that were not given are left to it."""
+    from evonav.evaluation.backend import Backend
+
+    module = "evonav.evaluation.backend"
+    given = {key: value for key, value in build.items() if value is not None}
+    if simulator is SimulatorName.AI2THOR:
+        means = {key: value for key, value in host.items() if value is not None}
+        return Backend(simulator=f"{module}:ai2thor_simulator", simulator_options=given, host_options=means)
+    if given or any(host[key] is not None for key in ("gpu_device", "x_display")):
+        raise typer.BadParameter("--thor-... options are for --simulator ai2thor")
+    return Backend(simulator=f"{module}:lenient_simulator") if allow_unknown_assets else Backend()
+
+
+def _exit(summaries: "list[AgentSummary]") -> None:
+    if any(summary.is_incomplete for summary in summaries):
+        raise typer.Exit(EXIT_INCOMPLETE)
+
+
+def _report(run: Path) -> None:
+    from evonav.report import write_report
+
+    typer.echo(f"report: {write_report(run)}")

@@ -1,0 +1,58 @@
+"""Options that commands share."""
+
+import os
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+HEURISTICS = "fu,stage-reset,ftu"
+
+Agents = Annotated[str, typer.Option(help="Names, comma-separated; see `evonav agents`.")]
+HOUSES = "ProcTHOR JSON, JSONL, JSONL.gz, or procthor-10k:SPLIT"
+Houses = Annotated[Path | None, typer.Option(help=f"{HOUSES} to generate tasks from.")]
+Tasks = Annotated[Path | None, typer.Option(help="Folder of tasks; default: the bundled ones.")]
+Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-room) houses or tasks.")]
+Seed = Annotated[int, typer.Option(min=0, help="Decides everything random.")]
+Workers = Annotated[int | None, typer.Option(min=0, help="Processes; default: one a core. 0: in this process.")]
+AnyAsset = Annotated[
+    bool,
+    typer.Option("--allow-unknown-assets", help="Objaverse houses: unknown assets get their category's usual size."),
+]
+
+
+class SimulatorName(str, Enum):
+    """Which simulator runs the episodes."""
+
+    EMBEDDED = "embedded"
+    AI2THOR = "ai2thor"
+
+
+class Platform(str, Enum):
+    """How Unity draws."""
+
+    CLOUD = "cloud"
+    X11 = "x11"
+
+
+Which = Annotated[SimulatorName, typer.Option(help="Evonav's own, or AI2-THOR through its client (docs/ai2thor.md).")]
+ThorExecutable = Annotated[
+    str | None, typer.Option(help="AI2-THOR: path of a build's executable, or `evonav`: our engine. Default: download.")
+]
+ThorCommit = Annotated[str | None, typer.Option(help="AI2-THOR: build to download. Default: the client's.")]
+ThorPlatform = Annotated[Platform | None, typer.Option(help="AI2-THOR: Vulkan without a display, or an X display.")]
+ThorGpu = Annotated[int | None, typer.Option(min=0, help="AI2-THOR: GPU to draw on.")]
+ThorDisplay = Annotated[str | None, typer.Option(help="AI2-THOR: X display, such as :0. Default: DISPLAY.")]
+ThorTimeout = Annotated[
+    float,
+    typer.Option(min=1.0, help="AI2-THOR: seconds for an answer, three times that to start; then it is restarted."),
+]
+Out = Annotated[Path, typer.Option(help="Folder of the run; an unfinished one is resumed.")]
+
+
+def count_of(workers: int | None) -> int:
+    """Processes to start: as told, or one a core."""
+    if workers is not None:
+        return workers
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

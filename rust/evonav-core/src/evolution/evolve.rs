@@ -1,0 +1,143 @@
+//! The hidden change between two stages: whether, where, how (paper, Sec. 3.2).
+
+use super::{
+    Mode, RoomHistory,
+    generate::Generator,
+    layout::Layout,
+    modify::{Modification, Modifier},
+    record::{ChangeRecord, EvolutionOutcome, EvolutionRecord, RoomWeightRecord},
+    sample_evolved_room,
+    stage::StageWorld,
+    state::State,
+};
+use crate::{
+    Error,
+    house::{House, HouseDelta},
+};
+
+impl Generator<'_> {
+    /// `SampleSceneEvolution`: which room changes, how, and what that moves.
+    pub(super) fn sample_scene_evolution(
+        &self,
+        world: &StageWorld,
+        state: &State,
+        stage: usize,
+    ) -> Result<(EvolutionRecord, HouseDelta), Error> {
+        let parameters = self.parameters;
+        if self.stream(stage, "trigger").uniform() >= parameters.evolve_probability {
+            return Ok((no_evolution(EvolutionOutcome::NotTriggered), HouseDelta::default()));
+        }
+        let house = &world.house;
+        let window = state.changed.len().saturating_sub(parameters.changed_room_window);
+        let rooms: Vec<RoomHistory> = (0..house.rooms.len())
+            .map(|room| RoomHistory {
+                num_assets: house.objects.iter().filter(|o| o.room == Some(room)).count(),
+                is_visited: state.visited[room],
+                is_transition_room: state.transition_room(house) == Some(room),
+                was_changed_recently: state.changed[window..].contains(&Some(room)),
+            })
+            .collect();
+        let (room, weights) =
+            sample_evolved_room(&rooms, parameters, &mut self.stream(stage, "room"));
+        let weighed = |((room, history), weight): ((usize, &RoomHistory), &f64)| RoomWeightRecord {
+            room_id: house.rooms[room].id.clone(),
+            num_assets: history.num_assets,
+            is_visited: history.is_visited,
+            is_transition_room: history.is_transition_room,
+            was_changed_recently: history.was_changed_recently,
+            weight: *weight,
+        };
+        let mut record = no_evolution(EvolutionOutcome::NoRoom);
+        record.room_weights = rooms.iter().enumerate().zip(&weights).map(weighed).collect();
+        let Some(room) = room else { return Ok((record, HouseDelta::default())) };
+        record.room_id = Some(house.rooms[room].id.clone());
+        record.mode = Mode::sample(parameters, &mut self.stream(stage, "mode"));
+        record.outcome = EvolutionOutcome::NoPlacement;
+        let Some(mode) = record.mode else { return Ok((record, HouseDelta::default())) };
+        let modified = self.modify(world, state, stage, room, mode)?;
+        let Some(Modification { layout, salient, unmoved }) = modified else {
+            return Ok((record, HouseDelta::default()));
+        };
+        let delta = layout.delta_from(house);
+        record.changes = changes_of(house, &layout, parameters.relocated_min_m);
+        record.outcome = EvolutionOutcome::Evolved;
+        record.salient_id = salient.map(|index| house.objects[index].id.clone());
+        let has_moved = |id: &String| record.changes.iter().any(|c| c.is_relocated && c.id == *id);
+        record.unmoved_ids = unmoved
+            .iter()
+            .map(|&index| house.objects[index].id.clone())
+            .filter(|id| mode != Mode::SalientObject && !has_moved(id))
+            .collect();
+        Ok((record, delta))
+    }
+
+    fn modify(
+        &self,
+        world: &StageWorld,
+        state: &State,
+        stage: usize,
+        room: usize,
+        mode: Mode,
+    ) -> Result<Option<Modification>, Error> {
+        let start_m = state.position_m();
+        let reachable = world.reachable(&world.navigation, start_m)?;
+        let before = world.access(&world.layout, &reachable, self.parameters);
+        let is_navigable = |layout: &Layout| {
+            let navigation = world.navigation.with_scene(&layout.scene);
+            let reachable = navigation.and_then(|n| world.reachable(&n, start_m));
+            // An error here is a scene without geometry: not navigable.
+            reachable.is_ok_and(|r| world.access(layout, &r, self.parameters).includes(&before))
+        };
+        let mut modifier = Modifier {
+            house: &world.house,
+            catalogue: self.catalogue,
+            parameters: self.parameters,
+            stream: &mut self.stream(stage, "placement"),
+            is_navigable,
+        };
+        Ok(modifier.modify(&world.layout, room, mode))
+    }
+}
+
+/// Every object whose pose or support differs between house and layout.
+fn changes_of(house: &House, layout: &Layout, relocated_min_m: f64) -> Vec<ChangeRecord> {
+    let id_of = |index: Option<usize>| index.map(|i| house.objects[i].id.clone());
+    let changed = house.objects.iter().zip(&layout.items).filter(|(object, item)| {
+        let now = item.placement;
+        (object.position_m, object.rotation_deg, object.parent)
+            != (now.position_m, now.rotation_deg, now.parent)
+    });
+    changed
+        .map(|(object, item)| {
+            let now = item.placement;
+            let squares =
+                (0..3).map(|axis| (now.position_m[axis] - object.position_m[axis]).powi(2));
+            let displacement_m = squares.sum::<f64>().sqrt();
+            ChangeRecord {
+                id: object.id.clone(),
+                category: item.asset.category.clone(),
+                from_position_m: object.position_m,
+                from_rotation_deg: object.rotation_deg,
+                from_support_id: id_of(object.parent),
+                to_position_m: now.position_m,
+                to_rotation_deg: now.rotation_deg,
+                to_support_id: id_of(now.parent),
+                displacement_m,
+                is_relocated: displacement_m > relocated_min_m || now.parent != object.parent,
+            }
+        })
+        .collect()
+}
+
+/// A transition without change.
+pub(super) fn no_evolution(outcome: EvolutionOutcome) -> EvolutionRecord {
+    EvolutionRecord {
+        outcome,
+        mode: None,
+        room_id: None,
+        salient_id: None,
+        room_weights: vec![],
+        changes: vec![],
+        unmoved_ids: vec![],
+    }
+}
