@@ -6,7 +6,7 @@ import typer
 
 from evonav.cli.evaluate import demo, evaluate, report, strip
 from evonav.cli.houses import houses_app
-from evonav.cli.tasks import generate
+from evonav.cli.tasks import generate, tasks_app
 
 EXIT_ERROR = 1
 
@@ -20,6 +20,7 @@ app = typer.Typer(
 for command in (evaluate, demo, report, strip, generate):
     app.command()(command)
 app.add_typer(houses_app, name="houses")
+app.add_typer(tasks_app, name="tasks")
 
 
 @app.command(name="agents")

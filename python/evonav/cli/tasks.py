@@ -1,4 +1,4 @@
-"""Task files: `generate`."""
+"""Task files: `generate` and `tasks ...`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,6 +7,10 @@ import typer
 
 from evonav.cli.display import status
 from evonav.cli.options import HOUSES, AnyAsset, Limit, Seed
+
+tasks_app = typer.Typer(help="Task files: what is in them.", no_args_is_help=True)
+
+Folder = Annotated[Path, typer.Argument(help="Folder of tasks, one folder each.")]
 
 
 def generate(
@@ -22,3 +26,14 @@ def generate(
     with status("Generating tasks") as tell:
         tasks = make_tasks(houses, out, limit=limit, seed=seed, allow_unknown_assets=allow_unknown_assets, on_task=tell)
     typer.echo(f"{len(tasks)} tasks in {out}")
+
+
+@tasks_app.command(name="list")
+def list_tasks(folder: Folder, limit: Limit = None) -> None:
+    """Lists tasks: id, rooms, stages, and the stages before which the house changes."""
+    from evonav.tasks import load_tasks
+
+    for task in load_tasks(folder, limit):
+        changed = [str(stage.stage) for stage in task.oracle_stages if stage.evolution.outcome == "evolved"]
+        rooms = f"{task.header.house.num_rooms:2} rooms"
+        typer.echo(f"{task.task_id}  {rooms}  {task.num_stages} stages  changed before: {', '.join(changed) or '-'}")

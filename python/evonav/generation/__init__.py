@@ -1,7 +1,8 @@
 """Tasks made from houses."""
 
 from evonav.generation.pipeline import Rejections, TaskRejectedError, generate_task, generate_tasks
-from evonav.tasks.manifest import GenerationParameters, write_task
+from evonav.tasks import write_task
+from evonav.tasks.manifest import GenerationParameters
 
 __all__ = [
     "GenerationParameters",

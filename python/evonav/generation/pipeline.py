@@ -15,15 +15,8 @@ from evonav import _core
 from evonav.errors import TaskError
 from evonav.generation.describe import adjectives_of, appearance_instruction, basic_instruction, parse_relations
 from evonav.house import House
-from evonav.tasks.manifest import (
-    GenerationParameters,
-    HouseDelta,
-    HouseSource,
-    PublicStage,
-    Task,
-    TaskHeader,
-    checksums_of,
-)
+from evonav.tasks.files import checksums_of
+from evonav.tasks.manifest import GenerationParameters, HouseSource, PublicStage, Task, TaskHeader
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.records import sha256_of
 
@@ -103,8 +96,7 @@ def generate_task(
         public_stages=tuple(_public_stage(k, stage) for k, stage in enumerate(stages, start=1)),
         reference_images=tuple(_image(data, config.reference_image_px) for data in images),
         oracle_stages=oracle,
-        first_house_json=houses[0],
-        deltas=tuple(HouseDelta.model_validate_json(json.dumps(stage["delta"])) for stage in stages[1:]),
+        houses_json=tuple(houses),
     )
     return dataclasses.replace(task, header=header.model_copy(update={"checksums": checksums_of(task)}))
 

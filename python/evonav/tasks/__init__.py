@@ -1,6 +1,7 @@
 """Tasks on disk: public and oracle parts, apart."""
 
-from evonav.tasks.manifest import Task, load_task, load_tasks, write_task
+from evonav.tasks.files import load_task, load_tasks, write_task
+from evonav.tasks.manifest import Task
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.public import StageInput, TaskInfo
 

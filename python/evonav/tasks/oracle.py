@@ -102,7 +102,7 @@ class Target(Record):
 class OracleStage(Record):
     """Everything about a stage that the agent must not know."""
 
-    schema_version: Literal[1] = 1
+    schema_version: Literal[2] = 2
     stage: Annotated[int, Field(ge=1)]
     house_sha256: Sha256
     """Of `Task.house_json(stage)`, UTF-8."""

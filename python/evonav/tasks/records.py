@@ -109,7 +109,7 @@ def read_gzip(path: Path) -> bytes:
 
 def write_gzip(data: bytes) -> bytes:
     """Gzips without time stamp or name, so that the same contents give the same bytes (for one zlib build)."""
-    return gzip.compress(data, compresslevel=9, mtime=0)
+    return gzip.compress(data, compresslevel=6, mtime=0)
 
 
 def record_bytes(record: Record) -> bytes:
