@@ -43,6 +43,8 @@ class GenerationParameters(Record):
     relocated_min_m: NonNegativeFloat = 0.1
     placement_tries: PositiveInt = 100
     """Places tried for an object before it stays where it is."""
+    modification_tries: Annotated[int, Field(ge=1, le=1000)] = 3
+    """Times that a room's modification is tried, with fresh places, before it is given up."""
 
 
 class HouseSource(Record):

@@ -12,6 +12,9 @@ Mode = Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"]
 Outcome = Literal["first_stage", "not_triggered", "no_room", "no_placement", "evolved"]
 """How a transition went: `no_room` when every room's weight is 0, `no_placement` when nothing drawn could be moved."""
 
+Failure = Literal["nothing_movable", "no_free_place", "cuts_off"]
+"""Why nothing could be moved: nothing there to move, no free place drawn, or only places that cut something off."""
+
 
 class Change(Record):
     """One object that was moved, children of a moved support included."""
@@ -51,9 +54,17 @@ class Evolution(Record):
     """The salient object that was moved, under `SALIENT_OBJECT`."""
     room_weights: tuple[RoomWeight, ...]
     """Empty when evolution was not triggered."""
+    failure: Failure | None = None
+    """Why nothing could be moved, under `no_placement`."""
     changes: tuple[Change, ...]
     unmoved_ids: tuple[Id, ...]
     """Objects that were to move, but for which no valid place was found."""
+    blocking_ids: tuple[Id, ...] = ()
+    """Those of them that had free places, each of which would have cut something off."""
+    crowded_ids: tuple[Id, ...] = ()
+    """Furniture that had to do without the free floor that ProcTHOR leaves around it."""
+    rearranged_ids: tuple[Id, ...] = ()
+    """Furniture of groups that fitted nowhere as they stood: arranged anew by ProcTHOR's definition of the group."""
 
     @property
     def relocated_ids(self) -> tuple[str, ...]:

@@ -4,8 +4,10 @@ use super::{
     Mode, RoomHistory,
     generate::Generator,
     layout::Layout,
-    modify::{Modification, Modifier},
-    record::{ChangeRecord, EvolutionOutcome, EvolutionRecord, RoomWeightRecord},
+    modify::{Blocked, Modification, Modifier},
+    record::{
+        ChangeRecord, EvolutionOutcome, EvolutionRecord, ModificationFailure, RoomWeightRecord,
+    },
     sample_evolved_room,
     stage::StageWorld,
     state::State,
@@ -55,22 +57,31 @@ impl Generator<'_> {
         record.outcome = EvolutionOutcome::NoPlacement;
         let Some(mode) = record.mode else { return Ok((record, HouseDelta::default())) };
         let modified = self.modify(world, state, stage, room, mode)?;
-        let Some(Modification { layout, salient, unmoved }) = modified else {
-            return Ok((record, HouseDelta::default()));
+        let Modification { layout, salient, unmoved, crowded, rearranged } = match modified {
+            Ok(modification) => modification,
+            Err(failure) => {
+                record.failure = Some(failure);
+                return Ok((record, HouseDelta::default()));
+            }
         };
         let delta = layout.delta_from(house);
         record.changes = changes_of(house, &layout, parameters.relocated_min_m);
         record.outcome = EvolutionOutcome::Evolved;
-        record.salient_id = salient.map(|index| house.objects[index].id.clone());
+        let id_of = |index: usize| house.objects[index].id.clone();
+        record.salient_id = salient.map(id_of);
         let has_moved = |id: &String| record.changes.iter().any(|c| c.is_relocated && c.id == *id);
-        record.unmoved_ids = unmoved
-            .iter()
-            .map(|&index| house.objects[index].id.clone())
-            .filter(|id| mode != Mode::SalientObject && !has_moved(id))
-            .collect();
+        let stays = |&&(index, _): &&(usize, Blocked)| !has_moved(&id_of(index));
+        let unmoved: Vec<_> = unmoved.iter().filter(stays).collect();
+        let is_blocking = |&&&(_, why): &&&(usize, Blocked)| why == Blocked::CutsOff;
+        record.unmoved_ids = unmoved.iter().map(|(index, _)| id_of(*index)).collect();
+        record.blocking_ids =
+            unmoved.iter().filter(is_blocking).map(|(index, _)| id_of(*index)).collect();
+        record.crowded_ids = crowded.into_iter().map(id_of).collect();
+        record.rearranged_ids = rearranged.into_iter().map(id_of).collect();
         Ok((record, delta))
     }
 
+    /// Modifies a room; with fresh places, but the same room and mode, where nothing could move.
     fn modify(
         &self,
         world: &StageWorld,
@@ -78,7 +89,7 @@ impl Generator<'_> {
         stage: usize,
         room: usize,
         mode: Mode,
-    ) -> Result<Option<Modification>, Error> {
+    ) -> Result<Result<Modification, ModificationFailure>, Error> {
         let start_m = state.position_m();
         let reachable = world.reachable(&world.navigation, start_m)?;
         let before = world.access(&world.layout, &reachable, self.parameters);
@@ -92,10 +103,18 @@ impl Generator<'_> {
             house: &world.house,
             catalogue: self.catalogue,
             parameters: self.parameters,
-            stream: &mut self.stream(stage, "placement"),
+            stream: self.stream(stage, "placement"),
             is_navigable,
         };
-        Ok(modifier.modify(&world.layout, room, mode))
+        let mut made = modifier.modify(&world.layout, room, mode);
+        for retry in 1..self.parameters.modification_tries {
+            if matches!(made, Ok(_) | Err(ModificationFailure::NothingMovable)) {
+                break;
+            }
+            modifier.stream = self.stream(stage, &format!("placement, retry {retry}"));
+            made = modifier.modify(&world.layout, room, mode);
+        }
+        Ok(made)
     }
 }
 
@@ -137,7 +156,11 @@ pub(super) fn no_evolution(outcome: EvolutionOutcome) -> EvolutionRecord {
         room_id: None,
         salient_id: None,
         room_weights: vec![],
+        failure: None,
         changes: vec![],
         unmoved_ids: vec![],
+        blocking_ids: vec![],
+        crowded_ids: vec![],
+        rearranged_ids: vec![],
     }
 }

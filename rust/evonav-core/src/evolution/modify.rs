@@ -4,6 +4,7 @@ use super::{
     Mode, Parameters,
     layout::{Layout, Placement},
     placement::{RoomPlan, Unit},
+    record::ModificationFailure,
     surfaces::{receptacles_for, sample_surface_place},
 };
 use crate::{
@@ -24,8 +25,21 @@ pub struct Modification {
     pub layout: Layout,
     /// The object that `SALIENT_OBJECT` moved.
     pub salient: Option<usize>,
-    /// Objects that were to move, but for which no valid place was found.
-    pub unmoved: Vec<usize>,
+    /// Objects that were to move, but for which no valid place was found, and why.
+    pub unmoved: Vec<(usize, Blocked)>,
+    /// Furniture without the free floor around it that ProcTHOR leaves.
+    pub crowded: Vec<usize>,
+    /// Furniture of groups that were arranged anew.
+    pub rearranged: Vec<usize>,
+}
+
+/// Why something stays where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Blocked {
+    /// No place drawn was free.
+    NoFreePlace,
+    /// Places were free, and each cut something off.
+    CutsOff,
 }
 
 /// What a modification needs to know, and its random stream.
@@ -37,7 +51,7 @@ pub struct Modifier<'a, N> {
     /// Θ.
     pub parameters: &'a Parameters,
     /// Source of all draws.
-    pub stream: &'a mut Stream,
+    pub stream: Stream,
     /// Whether everything that could be reached still can.
     pub is_navigable: N,
 }
@@ -49,14 +63,25 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
     /// where they are: every intermediate layout is valid, so that a unit that fits nowhere else
     /// can keep its place. Units that failed are tried once more when all others have moved.
     ///
-    /// # Returns
-    /// `None` if nothing in the room could be moved.
-    pub fn modify(&mut self, layout: &Layout, room: usize, mode: Mode) -> Option<Modification> {
+    /// # Errors
+    /// Why nothing in the room could be moved.
+    pub fn modify(
+        &mut self,
+        layout: &Layout,
+        room: usize,
+        mode: Mode,
+    ) -> Result<Modification, ModificationFailure> {
         let house = self.house;
         let in_room: Vec<usize> =
             (0..layout.items.len()).filter(|&i| house.objects[i].room == Some(room)).collect();
         let plan = RoomPlan::of(house, &house.rooms[room]);
-        let mut done = Modification { layout: layout.clone(), salient: None, unmoved: Vec::new() };
+        let mut done = Modification {
+            layout: layout.clone(),
+            salient: None,
+            unmoved: Vec::new(),
+            crowded: Vec::new(),
+            rearranged: Vec::new(),
+        };
         let is_moved = match mode {
             Mode::SalientObject => self.move_salient(&mut done, &in_room, &plan),
             Mode::RetainGroup => {
@@ -70,7 +95,13 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
                 self.move_small(&mut done, &in_room) || have_moved
             }
         };
-        is_moved.then_some(done)
+        let cuts_off = || done.unmoved.iter().any(|&(_, why)| why == Blocked::CutsOff);
+        match is_moved {
+            true => Ok(done),
+            false if done.unmoved.is_empty() => Err(ModificationFailure::NothingMovable),
+            false if cuts_off() => Err(ModificationFailure::CutsOff),
+            false => Err(ModificationFailure::NoFreePlace),
+        }
     }
 
     /// Moves one large object with what stands on it, drawn in proportion to 1 + the number of
@@ -94,11 +125,15 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
             .collect();
         while let Some(drawn) = self.stream.choose_weighted(&weights) {
             let root = in_room[drawn];
-            if self.move_unit(&mut done.layout, &[root], plan) {
-                done.salient = Some(root);
-                return true;
+            match self.move_unit(&mut done.layout, &[root], plan) {
+                Ok(()) => {
+                    // It was drawn without replacement: nothing else was to move.
+                    done.unmoved.clear();
+                    done.salient = Some(root);
+                    return true;
+                }
+                Err(why) => done.unmoved.push((root, why)),
             }
-            done.unmoved.push(root);
             weights[drawn] = 0.0;
         }
         false
@@ -113,13 +148,20 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
     ) -> bool {
         let mut order: Vec<usize> = (0..units.len()).collect();
         self.stream.shuffle(&mut order);
+        let mut reasons = vec![Blocked::NoFreePlace; units.len()];
         for _ in 0..2 {
-            order.retain(|&unit| !self.move_unit(&mut done.layout, &units[unit], plan));
+            order.retain(|&unit| match self.move_unit(&mut done.layout, &units[unit], plan) {
+                Ok(()) => false,
+                Err(why) => {
+                    reasons[unit] = why;
+                    true
+                }
+            });
         }
         for &unit in &order {
             let layout = &done.layout;
             let members = units[unit].iter().flat_map(|&root| layout.with_supported(root));
-            done.unmoved.extend(members);
+            done.unmoved.extend(members.map(|member| (member, reasons[unit])));
         }
         order.len() < units.len()
     }
@@ -137,7 +179,7 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
             order.retain(|&index| !self.move_small_one(&mut done.layout, index, in_room));
         }
         let num_moved = num_small - order.len();
-        done.unmoved.extend(order);
+        done.unmoved.extend(order.into_iter().map(|index| (index, Blocked::NoFreePlace)));
         num_moved > 0
     }
 
@@ -145,7 +187,9 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
         let receptacles = receptacles_for(layout, self.catalogue, index, in_room);
         let least_m = self.parameters.relocated_min_m;
         let drawn = (0..self.parameters.placement_tries)
-            .find_map(|_| sample_surface_place(layout, index, &receptacles, least_m, self.stream));
+            .find_map(|_| {
+                sample_surface_place(layout, index, &receptacles, least_m, &mut self.stream)
+            });
         if let Some(placement) = drawn {
             // Small things have nothing on them, bar a rare plate: that goes along.
             let old = layout.items[index].placement;
@@ -161,7 +205,12 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
         drawn.is_some()
     }
 
-    fn move_unit(&mut self, layout: &mut Layout, roots: &[usize], plan: &RoomPlan) -> bool {
+    fn move_unit(
+        &mut self,
+        layout: &mut Layout,
+        roots: &[usize],
+        plan: &RoomPlan,
+    ) -> Result<(), Blocked> {
         let places = match roots {
             [root] => self.places_for(&layout.items[*root].asset.category),
             _ => Vec::new(),
@@ -172,14 +221,14 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
         let mut num_cut = 0;
         for _ in 0..self.parameters.placement_tries {
             let least_m = self.parameters.relocated_min_m;
-            let Some(drawn) = unit.sample_places(layout, plan, least_m, self.stream) else {
+            let Some(drawn) = unit.sample_places(layout, plan, least_m, &mut self.stream) else {
                 continue;
             };
             for (index, placement) in drawn {
                 layout.put(index, placement);
             }
             if (self.is_navigable)(layout) {
-                return true;
+                return Ok(());
             }
             for &(index, placement) in &before {
                 layout.put(index, placement);
@@ -189,7 +238,7 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
                 break;
             }
         }
-        false
+        Err(if num_cut > 0 { Blocked::CutsOff } else { Blocked::NoFreePlace })
     }
 
     /// Where a category may stand on the floor, by ProcTHOR's annotations.
@@ -200,17 +249,24 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
     }
 }
 
-/// Furniture of a room by asset group: ProcTHOR numbers a group's members `room|group|member`.
+/// Furniture of a room by asset group, as ProcTHOR numbers a group's members: `room|group|member`,
+/// in some of its versions with a name before it (`chair-diningtable|7|2|0`).
 fn groups_of(house: &House, layout: &Layout, in_room: &[usize]) -> Vec<Vec<usize>> {
-    let mut groups: Vec<(Option<&str>, Vec<usize>)> = Vec::new();
+    let mut groups: Vec<(Option<[&str; 2]>, Vec<usize>)> = Vec::new();
     for &index in in_room.iter().filter(|&&i| layout.items[i].is_on_floor) {
-        let id = house.objects[index].id.as_str();
-        let is_member = id.split('|').count() == 3 && id.starts_with(|c: char| c.is_ascii_digit());
-        let key = if is_member { id.rsplit_once('|').map(|(group, _)| group) } else { None };
+        let key = group_key(&house.objects[index].id);
         match groups.iter_mut().find(|(other, _)| key.is_some() && *other == key) {
             Some((_, members)) => members.push(index),
             None => groups.push((key, vec![index])),
         }
     }
     groups.into_iter().map(|(_, members)| members).collect()
+}
+
+/// Room and group by which an id's last numbers name a member of an asset group.
+fn group_key(id: &str) -> Option<[&str; 2]> {
+    let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+    let mut parts = id.rsplit('|');
+    let [member, group, room] = [parts.next()?, parts.next()?, parts.next()?];
+    [member, group, room].into_iter().all(is_number).then_some([room, group])
 }

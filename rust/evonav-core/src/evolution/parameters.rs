@@ -46,6 +46,8 @@ pub struct Parameters {
     pub relocated_min_m: f64,
     /// Places tried for an object before it stays where it is.
     pub placement_tries: usize,
+    /// Times that a room's modification is tried, with fresh places, before it is given up.
+    pub modification_tries: usize,
 }
 
 impl Default for Parameters {
@@ -69,6 +71,7 @@ impl Default for Parameters {
             reference_min_visible_px: 50,
             relocated_min_m: 0.1,
             placement_tries: 100,
+            modification_tries: 3,
         }
     }
 }
@@ -123,7 +126,9 @@ impl Parameters {
         let expected = "at least reference_min_m";
         Error::require("reference_max_m", self.reference_max_m, expected, |v| v >= least)?;
         let is_tries = |v: usize| (1..=100_000).contains(&v);
-        Error::require("placement_tries", self.placement_tries, "in 1..=100000", is_tries)
+        Error::require("placement_tries", self.placement_tries, "in 1..=100000", is_tries)?;
+        let is_tries = |v: usize| (1..=1000).contains(&v);
+        Error::require("modification_tries", self.modification_tries, "in 1..=1000", is_tries)
     }
 
     /// Weights of the three modes, in the order of [`super::Mode::ALL`].

@@ -102,7 +102,7 @@ pub enum EvolutionOutcome {
     NotTriggered,
     /// All rooms have weight 0.
     NoRoom,
-    /// Nothing in the drawn room could be moved.
+    /// Nothing in the drawn room could be moved, [`EvolutionRecord::failure`] says why.
     NoPlacement,
     /// The room changed.
     Evolved,
@@ -121,10 +121,31 @@ pub struct EvolutionRecord {
     pub salient_id: Option<String>,
     /// Factors of every room's weight; empty when not triggered.
     pub room_weights: Vec<RoomWeightRecord>,
+    /// Why nothing could be moved; only with [`EvolutionOutcome::NoPlacement`].
+    pub failure: Option<ModificationFailure>,
     /// Every object whose pose or support differs.
     pub changes: Vec<ChangeRecord>,
     /// Objects that were to move and could not.
     pub unmoved_ids: Vec<String>,
+    /// Those of them that had free places, each of which would have cut something off.
+    pub blocking_ids: Vec<String>,
+    /// Furniture that had to do without the free floor that ProcTHOR leaves around it.
+    pub crowded_ids: Vec<String>,
+    /// Furniture of groups that fitted nowhere as they stood: arranged anew by ProcTHOR's
+    /// definition of the group.
+    pub rearranged_ids: Vec<String>,
+}
+
+/// Why nothing in a room could be moved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ModificationFailure {
+    /// There is nothing in it that the modification moves.
+    NothingMovable,
+    /// No place drawn was free.
+    NoFreePlace,
+    /// Every free place cut off a room or object.
+    CutsOff,
 }
 
 /// One room's weight.
