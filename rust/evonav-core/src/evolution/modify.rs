@@ -186,10 +186,9 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
     fn move_small_one(&mut self, layout: &mut Layout, index: usize, in_room: &[usize]) -> bool {
         let receptacles = receptacles_for(layout, self.catalogue, index, in_room);
         let least_m = self.parameters.relocated_min_m;
-        let drawn = (0..self.parameters.placement_tries)
-            .find_map(|_| {
-                sample_surface_place(layout, index, &receptacles, least_m, &mut self.stream)
-            });
+        let drawn = (0..self.parameters.placement_tries).find_map(|_| {
+            sample_surface_place(layout, index, &receptacles, least_m, &mut self.stream)
+        });
         if let Some(placement) = drawn {
             // Small things have nothing on them, bar a rare plate: that goes along.
             let old = layout.items[index].placement;
