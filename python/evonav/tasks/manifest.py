@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
+from evonav.tasks.extensions import Extensions
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.public import StageInput
-from evonav.tasks.records import Id, PoseRecord, Record, Sha256
+from evonav.tasks.records import Id, PoseRecord, Probability, Record, Sha256
 from evonav.world.pose import Pose
 
-Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 TaskId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,127}$")]
 
 
@@ -45,6 +45,7 @@ class GenerationParameters(Record):
     """Places tried for an object before it stays where it is."""
     modification_tries: Annotated[int, Field(ge=1, le=1000)] = 3
     """Times that a room's modification is tried, with fresh places, before it is given up."""
+    extensions: Extensions = Extensions()
 
 
 class HouseSource(Record):

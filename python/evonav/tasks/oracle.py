@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt
 
-from evonav.tasks.records import Id, Point2, Point3, PoseRecord, Record, Sha256
+from evonav.tasks.records import Id, Point2, Point3, PoseRecord, Probability, Record, Sha256
 
 Mode = Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"]
 """Room modification (paper, Sec. 3.2)."""
@@ -31,6 +31,44 @@ class Change(Record):
     """Distance between the box centres, 3-D."""
     is_relocated: bool
     """Moved more than 0.1 m, or stands on another support."""
+    cause: Id | None = None
+    """The process that moved it: the mode, or an extension such as `ACTIVITY:cook`."""
+
+
+class ObjectRecord(Record):
+    """An object that came (where it is) or went (where it was); by an extension."""
+
+    id: Id
+    category: Id
+    asset_id: Id
+    position_m: Point3
+    rotation_deg: Point3
+    support_id: Id | None
+    cause: Id
+
+
+class StateChange(Record):
+    """A door or object that opened, closed, or went on or off; by an extension."""
+
+    id: Id
+    category: Id
+    field: Literal["openness", "isOn"]
+    before: Probability
+    """Openness, or 1 for on."""
+    after: Probability
+    cause: Id
+
+
+class Activity(Record):
+    """What one person did between two stages."""
+
+    person: NonNegativeInt
+    name: Id
+    room_id: Id | None
+    """`None` away from home."""
+    start_min: NonNegativeInt
+    """After midnight of the first stage's day."""
+    end_min: NonNegativeInt
 
 
 class RoomWeight(Record):
@@ -65,6 +103,14 @@ class Evolution(Record):
     """Furniture that had to do without the free floor that ProcTHOR leaves around it."""
     rearranged_ids: tuple[Id, ...] = ()
     """Furniture of groups that fitted nowhere as they stood: arranged anew by ProcTHOR's definition of the group."""
+    additions: tuple[ObjectRecord, ...] = ()
+    """Empty unless an extension is on, as all below."""
+    removals: tuple[ObjectRecord, ...] = ()
+    states: tuple[StateChange, ...] = ()
+    clock_min: NonNegativeInt | None = None
+    """Time of day of the stage, minutes after midnight."""
+    activities: tuple[Activity, ...] = ()
+    """What people did since the stage before."""
 
     @property
     def relocated_ids(self) -> tuple[str, ...]:

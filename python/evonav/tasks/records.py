@@ -21,6 +21,7 @@ Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]
 """`(x, y, z)` in metres, or Unity Euler angles in degrees."""
 Id = Annotated[str, Field(min_length=1, max_length=256)]
+Probability = Annotated[float, Field(ge=0.0, le=1.0)]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 

@@ -26,7 +26,7 @@ fn bench_house(c: &mut Criterion) {
         rotation_deg: object.rotation_deg,
         parent: None,
     });
-    let delta = HouseDelta { moves: moves.collect() };
+    let delta = HouseDelta { moves: moves.collect(), ..HouseDelta::default() };
     // The yardstick: JSON to a tree and nothing else.
     c.bench_function("house/serde_json_value", |b| {
         b.iter(|| serde_json::from_str::<serde_json::Value>(black_box(HOUSE)));

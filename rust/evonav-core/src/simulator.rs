@@ -77,10 +77,15 @@ impl EmbeddedSimulator {
     /// Those of [`House::apply`] and [`Self::new`].
     pub fn apply(&self, delta: &HouseDelta) -> Result<Self, Error> {
         let house = self.house.apply(delta)?;
-        let moved: Vec<usize> =
-            delta.moves.iter().filter_map(|change| house.object_index(&change.id)).collect();
+        let states = delta.states.iter().map(|change| &change.id);
+        let changed = delta.moves.iter().map(|change| &change.id).chain(states);
+        let changed: Option<Vec<usize>> = changed.map(|id| house.object_index(id)).collect();
         let (catalogue, unknown) = (Catalogue::bundled(), self.config.unknown);
-        let scene = self.scene.rebuild(&house, catalogue, unknown, &moved)?;
+        let scene = match changed {
+            Some(changed) => self.scene.rebuild(&house, catalogue, unknown, &changed)?,
+            // Something that is no object changed: a door, and `rebuild` keeps the structure.
+            None => Scene::build(&house, catalogue, unknown)?,
+        };
         let navigation = self.navigation.with_scene(&scene)?;
         Self::assemble(house, self.config, scene, navigation)
     }

@@ -159,7 +159,7 @@ fn a_rebuilt_scene_is_the_built_scene() {
         },
     ];
     let moved: Vec<String> = moves.iter().map(|m| m.id.clone()).collect();
-    let after = house.apply(&HouseDelta { moves }).expect("known objects");
+    let after = house.apply(&HouseDelta { moves, ..HouseDelta::default() }).expect("known objects");
     let indices: Vec<usize> = moved.iter().filter_map(|id| after.object_index(id)).collect();
     let catalogue = Catalogue::bundled();
     let rebuilt = scene.rebuild(&after, catalogue, UNKNOWN, &indices).expect("known assets");
@@ -182,7 +182,9 @@ fn children_fall_onto_what_they_stand_on_and_with_it() {
         rotation_deg: [0.0, 30.0, 0.0],
         parent: None,
     };
-    let after = house.apply(&HouseDelta { moves: vec![lower] }).expect("a known object");
+    let after = house
+        .apply(&HouseDelta { moves: vec![lower], ..HouseDelta::default() })
+        .expect("a known object");
     let (catalogue, index) = (Catalogue::bundled(), after.object_index("1|1").expect("there"));
     let rebuilt = scene.rebuild(&after, catalogue, UNKNOWN, &[index]).expect("known assets");
     assert_eq!(rebuilt, Scene::build(&after, catalogue, UNKNOWN).expect("known assets"));

@@ -3,7 +3,6 @@
 use std::sync::Mutex;
 
 use evonav_core::{
-    Error,
     assets::catalogue::{Catalogue, UnknownAssets},
     evolution::{SpawnRequest, random_spawn, settled},
     geometry::{Pose, Vec2, Vec3},
@@ -88,8 +87,7 @@ impl PyEmbeddedSimulator {
 
     /// A simulator of this house after a `HouseDelta` (JSON).
     fn apply(&self, py: Python<'_>, delta_json: &str) -> PyResult<Self> {
-        let delta: HouseDelta = serde_json::from_str(delta_json)
-            .map_err(|e| error::to_py(Error::invalid("delta_json", e, "a HouseDelta")))?;
+        let delta: HouseDelta = HouseDelta::from_json(delta_json).map_err(error::to_py)?;
         py.detach(|| self.core.apply(&delta)).map(Self::from).map_err(error::to_py)
     }
 

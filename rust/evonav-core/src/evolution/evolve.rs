@@ -65,7 +65,7 @@ impl Generator<'_> {
             }
         };
         let delta = layout.delta_from(house);
-        record.changes = changes_of(house, &layout, parameters.relocated_min_m);
+        record.changes = changes_of(house, &layout, parameters.relocated_min_m, mode.name());
         record.outcome = EvolutionOutcome::Evolved;
         let id_of = |index: usize| house.objects[index].id.clone();
         record.salient_id = salient.map(id_of);
@@ -119,7 +119,12 @@ impl Generator<'_> {
 }
 
 /// Every object whose pose or support differs between house and layout.
-fn changes_of(house: &House, layout: &Layout, relocated_min_m: f64) -> Vec<ChangeRecord> {
+fn changes_of(
+    house: &House,
+    layout: &Layout,
+    relocated_min_m: f64,
+    cause: &str,
+) -> Vec<ChangeRecord> {
     let id_of = |index: Option<usize>| index.map(|i| house.objects[i].id.clone());
     let changed = house.objects.iter().zip(&layout.items).filter(|(object, item)| {
         let now = item.placement;
@@ -143,6 +148,7 @@ fn changes_of(house: &House, layout: &Layout, relocated_min_m: f64) -> Vec<Chang
                 to_support_id: id_of(now.parent),
                 displacement_m,
                 is_relocated: displacement_m > relocated_min_m || now.parent != object.parent,
+                cause: cause.to_owned(),
             }
         })
         .collect()
@@ -162,5 +168,10 @@ pub(super) fn no_evolution(outcome: EvolutionOutcome) -> EvolutionRecord {
         blocking_ids: vec![],
         crowded_ids: vec![],
         rearranged_ids: vec![],
+        additions: vec![],
+        removals: vec![],
+        states: vec![],
+        clock_min: None,
+        activities: vec![],
     }
 }

@@ -225,7 +225,7 @@ impl Layout {
                 parent: placement.parent.map(|parent| house.objects[parent].id.clone()),
             })
         });
-        HouseDelta { moves: moves.collect() }
+        HouseDelta { moves: moves.collect(), ..HouseDelta::default() }
     }
 }
 

@@ -2,6 +2,7 @@
 //! (paper, Sec. 3.2 and A.1-A.4).
 
 mod evolve;
+mod extensions;
 mod generate;
 mod goals;
 mod layout;
@@ -19,6 +20,7 @@ mod state;
 mod surfaces;
 mod target;
 
+pub use extensions::{Extensions, Occurrence, Schedule};
 pub use generate::{Generation, generate_task};
 pub use goals::{Candidate, GoalBias, goal_room_weights, sample_goal, target_scores};
 pub use parameters::Parameters;

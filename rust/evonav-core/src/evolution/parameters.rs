@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Extensions;
 use crate::Error;
 
 /// Θ (paper, Sec. A.2), and the numbers that the paper leaves open.
@@ -48,6 +49,9 @@ pub struct Parameters {
     pub placement_tries: usize,
     /// Times that a room's modification is tried, with fresh places, before it is given up.
     pub modification_tries: usize,
+    /// What goes beyond the paper.
+    #[serde(default)]
+    pub extensions: Extensions,
 }
 
 impl Default for Parameters {
@@ -72,6 +76,7 @@ impl Default for Parameters {
             relocated_min_m: 0.1,
             placement_tries: 100,
             modification_tries: 3,
+            extensions: Extensions::default(),
         }
     }
 }
@@ -128,7 +133,8 @@ impl Parameters {
         let is_tries = |v: usize| (1..=100_000).contains(&v);
         Error::require("placement_tries", self.placement_tries, "in 1..=100000", is_tries)?;
         let is_tries = |v: usize| (1..=1000).contains(&v);
-        Error::require("modification_tries", self.modification_tries, "in 1..=1000", is_tries)
+        Error::require("modification_tries", self.modification_tries, "in 1..=1000", is_tries)?;
+        self.extensions.check()
     }
 
     /// Weights of the three modes, in the order of [`super::Mode::ALL`].

@@ -134,6 +134,16 @@ pub struct EvolutionRecord {
     /// Furniture of groups that fitted nowhere as they stood: arranged anew by ProcTHOR's
     /// definition of the group.
     pub rearranged_ids: Vec<String>,
+    /// Objects that were not there before; by an extension, as all below.
+    pub additions: Vec<ObjectRecord>,
+    /// Objects that are there no more, as they were.
+    pub removals: Vec<ObjectRecord>,
+    /// Doors and objects that opened, closed, or went on or off.
+    pub states: Vec<StateChangeRecord>,
+    /// Time of day of the stage, minutes after midnight, where people have a schedule.
+    pub clock_min: Option<usize>,
+    /// What people did since the stage before.
+    pub activities: Vec<ActivityRecord>,
 }
 
 /// Why nothing in a room could be moved.
@@ -188,6 +198,59 @@ pub struct ChangeRecord {
     pub displacement_m: f64,
     /// Farther than `relocated_min_m`, or on another support.
     pub is_relocated: bool,
+    /// The process that moved it: the mode, or an extension.
+    pub cause: String,
+}
+
+/// An object that came or went.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ObjectRecord {
+    /// Object.
+    pub id: String,
+    /// Its category.
+    pub category: String,
+    /// Key of the asset catalogue.
+    pub asset_id: String,
+    /// Centre of its box.
+    pub position_m: Vec3,
+    /// Euler angles.
+    pub rotation_deg: Vec3,
+    /// What it stands or stood on.
+    pub support_id: Option<String>,
+    /// `INSERTION` or `REMOVAL`.
+    pub cause: String,
+}
+
+/// A state of a door or an object that changed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StateChangeRecord {
+    /// Door or object.
+    pub id: String,
+    /// Its category.
+    pub category: String,
+    /// `openness` or `isOn`, as house files call it.
+    pub field: &'static str,
+    /// Before: openness, or 1 for on.
+    pub before: f64,
+    /// After.
+    pub after: f64,
+    /// The extension.
+    pub cause: String,
+}
+
+/// What one person did.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct ActivityRecord {
+    /// Who, from 0.
+    pub person: usize,
+    /// What, as in `ACTIVITY:<name>`.
+    pub name: String,
+    /// Where; `None` away from home.
+    pub room_id: Option<String>,
+    /// Begin, minutes after midnight of the first stage's day.
+    pub start_min: usize,
+    /// End.
+    pub end_min: usize,
 }
 
 /// S.

@@ -21,6 +21,15 @@ impl Mode {
     /// In the order of [`Parameters::mode_weights`].
     pub const ALL: [Self; 3] = [Self::SalientObject, Self::RetainGroup, Self::FullShuffle];
 
+    /// As records name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SalientObject => "SALIENT_OBJECT",
+            Self::RetainGroup => "RETAIN_GROUP",
+            Self::FullShuffle => "FULL_SHUFFLE",
+        }
+    }
+
     /// Draws a mode (paper, Sec. A.2).
     pub fn sample(parameters: &Parameters, stream: &mut Stream) -> Option<Self> {
         stream.choose_weighted(&parameters.mode_weights()).map(|index| Self::ALL[index])

@@ -1,18 +1,31 @@
 //! Changes between two stages of a house.
 
+use std::collections::HashMap;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::House;
 use crate::{Error, geometry::Vec3};
 
-/// What an evolution changes: the paper's ΔH.
+/// What an evolution changes: the paper's ΔH, and what goes beyond it.
+///
+/// Applied in the order of the fields; each list in its own order.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HouseDelta {
-    /// Moves, applied in order. What stands on a moved object keeps its own position unless it
-    /// is listed too.
+    /// New objects.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub added: Vec<AddedObject>,
+    /// Moves. What stands on a moved object keeps its own position unless it is listed too.
+    #[serde(default)]
     pub moves: Vec<ObjectMove>,
+    /// Ids of objects that vanish; what still stands on one must be listed too.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub removed: Vec<String>,
+    /// Doors and objects that open, close, go on or off.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub states: Vec<StateChange>,
 }
 
 /// A new place for one object.
@@ -29,18 +42,45 @@ pub struct ObjectMove {
     pub parent: Option<String>,
 }
 
+/// An object that was not there before.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AddedObject {
+    /// Its id, which nothing else in the house has.
+    pub id: String,
+    /// Key of the asset catalogue.
+    pub asset_id: String,
+    /// Centre of its box.
+    pub position_m: Vec3,
+    /// Unity Euler angles, degrees.
+    pub rotation_deg: Vec3,
+    /// What it stands on or in: an object of the house, or one added before.
+    pub parent: Option<String>,
+}
+
+/// New states of one door or object; what is `None` stays.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StateChange {
+    /// Door or object.
+    pub id: String,
+    /// 0 closed, 1 open.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub openness: Option<f64>,
+    /// `isOn`: lamps, screens. Objects only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub is_on: Option<bool>,
+}
+
 impl HouseDelta {
-    /// Reads a delta: `{"moves": [{"id", "position_m", "rotation_deg", "parent"}]}`.
+    /// Reads a delta: `{"moves": [{"id", "position_m", "rotation_deg", "parent"}], "added": [...],
+    /// "removed": [id], "states": [...]}`, each of which may be left out.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] saying what is malformed, and where.
     pub fn from_json(json: &str) -> Result<Self, Error> {
         let malformed = |error: serde_json::Error| {
-            Error::invalid(
-                "delta",
-                error,
-                "{\"moves\": [{\"id\", \"position_m\", \"rotation_deg\", \"parent\"}]}",
-            )
+            Error::invalid("delta", error, "{\"moves\", \"added\", \"removed\", \"states\"}")
         };
         serde_json::from_str(json).map_err(malformed)
     }
@@ -50,9 +90,23 @@ impl HouseDelta {
         // Numbers and strings alone: writing them cannot fail.
         serde_json::to_string(self).unwrap_or_default()
     }
+
+    /// Whether it changes nothing.
+    pub fn is_empty(&self) -> bool {
+        let Self { added, moves, removed, states } = self;
+        added.is_empty() && moves.is_empty() && removed.is_empty() && states.is_empty()
+    }
 }
 
-/// An object of the document, taken out of the tree.
+/// The objects of a document, taken out of their tree.
+struct Tree<'a> {
+    house: &'a House,
+    nodes: Vec<Loose>,
+    roots: Vec<usize>,
+    index: HashMap<&'a str, usize>,
+}
+
+/// One of them.
 struct Loose {
     fields: Map<String, Value>,
     parent: Option<usize>,
@@ -62,72 +116,34 @@ struct Loose {
 impl House {
     /// This house after `delta`.
     ///
-    /// The document changes only in the position, rotation and place in the tree of what moves:
-    /// an object with a new parent becomes the last of its children. Since [`House::objects`]
-    /// follows the document, a new parent changes indices; ids stay.
+    /// The document changes only in what the delta says: an object that is new, or has a new
+    /// parent, becomes the last of its children. Since [`House::objects`] follows the document,
+    /// that changes indices; ids stay.
     ///
     /// # Errors
-    /// [`Error::House`] if a move names an object or parent that is not there, the same object
-    /// twice, would make an object stand on itself, or the result is no valid house.
+    /// [`Error::House`] naming object and field: for an object or parent that is not there, an
+    /// added id that is, an object moved or removed twice, one that would stand on itself, a
+    /// removed one on which something still stands, a state outside its domain, or if the result
+    /// is no valid house.
     pub fn apply(&self, delta: &HouseDelta) -> Result<Self, Error> {
-        let (mut loose, mut roots) = self.take_apart();
-        let mut has_moved = vec![false; loose.len()];
+        let mut tree = Tree::of(self);
+        delta.added.iter().try_for_each(|object| tree.add(object))?;
+        let mut is_moved = vec![false; tree.nodes.len()];
         for step in &delta.moves {
-            let fail = |field: &str, message: &str| self.error(&step.id, field, message);
-            let index = self
-                .object_index(&step.id)
-                .ok_or_else(|| fail("id", "is no object of the house"))?;
-            if std::mem::replace(&mut has_moved[index], true) {
-                return Err(fail("id", "is moved twice"));
+            let index = tree.find(&step.id, &step.id, "id")?;
+            if std::mem::replace(&mut is_moved[index], true) {
+                return Err(self.error(&step.id, "id", "is moved twice"));
             }
-            if step.position_m.iter().chain(&step.rotation_deg).any(|value| !value.is_finite()) {
-                let message = format!("is {:?} turned {:?}", step.position_m, step.rotation_deg);
-                return Err(fail("position", &format!("{message}, expected finite numbers")));
-            }
-            let parent = match &step.parent {
-                None => None,
-                Some(id) => {
-                    let missing =
-                        || fail("parent", &format!("is {id:?}, which is no object of the house"));
-                    Some(self.object_index(id).ok_or_else(missing)?)
-                }
-            };
-            if std::iter::successors(parent, |&above| loose[above].parent)
-                .any(|above| above == index)
-            {
-                return Err(fail(
-                    "parent",
-                    &format!("{:?} stands on the object itself", step.parent),
-                ));
-            }
-            let fields = &mut loose[index].fields;
-            for (key, [x, y, z]) in [("position", step.position_m), ("rotation", step.rotation_deg)]
-            {
-                fields.insert(key.to_owned(), json!({"x": x, "y": y, "z": z}));
-            }
-            let before = std::mem::replace(&mut loose[index].parent, parent);
-            if before != parent {
-                before
-                    .map_or(&mut roots, |p| &mut loose[p].children)
-                    .retain(|&child| child != index);
-                parent.map_or(&mut roots, |p| &mut loose[p].children).push(index);
-            }
+            tree.move_to(index, step)?;
         }
+        tree.remove(&delta.removed)?;
         let mut document = self.document_without_objects();
-        document.insert("objects".to_owned(), assemble(&mut loose, &roots));
-        Self::from_document(&self.name, Value::Object(document))
-    }
-
-    /// Objects in the order of [`House::objects`], and which of them are roots.
-    fn take_apart(&self) -> (Vec<Loose>, Vec<usize>) {
-        let mut loose = Vec::with_capacity(self.objects.len());
-        collect(self.document.get("objects"), &mut loose);
-        for (entry, object) in loose.iter_mut().zip(&self.objects) {
-            entry.parent = object.parent;
-            entry.children.clone_from(&object.children);
+        for change in &delta.states {
+            tree.set_state(change, &mut document)?;
         }
-        let roots = (0..self.objects.len()).filter(|&i| self.objects[i].parent.is_none());
-        (loose, roots.collect())
+        let roots = std::mem::take(&mut tree.roots);
+        document.insert("objects".to_owned(), assemble(&mut tree.nodes, &roots));
+        Self::from_document(&self.name, Value::Object(document))
     }
 
     /// A copy of the document with `objects` (kept in place) set to null.
@@ -139,6 +155,144 @@ impl House {
                 (key.clone(), value)
             })
             .collect()
+    }
+}
+
+impl<'a> Tree<'a> {
+    /// Objects in the order of [`House::objects`].
+    fn of(house: &'a House) -> Self {
+        let mut nodes = Vec::with_capacity(house.objects.len());
+        collect(house.document.get("objects"), &mut nodes);
+        for (node, object) in nodes.iter_mut().zip(&house.objects) {
+            node.parent = object.parent;
+            node.children.clone_from(&object.children);
+        }
+        let roots = (0..nodes.len()).filter(|&i| nodes[i].parent.is_none()).collect();
+        let ids = house.objects.iter().enumerate();
+        let index = ids.map(|(index, object)| (object.id.as_str(), index)).collect();
+        Self { house, nodes, roots, index }
+    }
+
+    /// Index of the object `wanted`, which `field` of `id` names.
+    fn find(&self, wanted: &str, id: &str, field: &str) -> Result<usize, Error> {
+        self.index.get(wanted).copied().ok_or_else(|| {
+            let message = format!("is {wanted:?}, which is no object of the house");
+            self.house.error(id, field, &message)
+        })
+    }
+
+    fn place(
+        &mut self,
+        index: usize,
+        id: &str,
+        [position_m, rotation_deg]: [Vec3; 2],
+    ) -> Result<(), Error> {
+        if position_m.iter().chain(&rotation_deg).any(|value| !value.is_finite()) {
+            let message =
+                format!("is {position_m:?} turned {rotation_deg:?}, expected finite numbers");
+            return Err(self.house.error(id, "position", &message));
+        }
+        for (key, [x, y, z]) in [("position", position_m), ("rotation", rotation_deg)] {
+            self.nodes[index].fields.insert(key.to_owned(), json!({"x": x, "y": y, "z": z}));
+        }
+        Ok(())
+    }
+
+    fn add(&mut self, object: &'a AddedObject) -> Result<(), Error> {
+        let AddedObject { id, asset_id, position_m, rotation_deg, parent } = object;
+        if self.index.contains_key(id.as_str()) {
+            return Err(self.house.error(id, "id", "is added, but is in the house already"));
+        }
+        let parent = parent.as_ref().map(|above| self.find(above, id, "parent")).transpose()?;
+        let index = self.nodes.len();
+        let mut fields = Map::new();
+        fields.insert("id".to_owned(), json!(id));
+        fields.insert("assetId".to_owned(), json!(asset_id));
+        fields.insert("kinematic".to_owned(), json!(false));
+        self.nodes.push(Loose { fields, parent, children: Vec::new() });
+        self.place(index, id, [*position_m, *rotation_deg])?;
+        self.children_of(parent).push(index);
+        self.index.insert(id, index);
+        Ok(())
+    }
+
+    fn move_to(&mut self, index: usize, step: &ObjectMove) -> Result<(), Error> {
+        self.place(index, &step.id, [step.position_m, step.rotation_deg])?;
+        let above = step.parent.as_ref();
+        let parent = above.map(|id| self.find(id, &step.id, "parent")).transpose()?;
+        if std::iter::successors(parent, |&above| self.nodes[above].parent)
+            .any(|above| above == index)
+        {
+            let message = format!("{:?} stands on the object itself", step.parent);
+            return Err(self.house.error(&step.id, "parent", &message));
+        }
+        let before = std::mem::replace(&mut self.nodes[index].parent, parent);
+        if before != parent {
+            self.children_of(before).retain(|&child| child != index);
+            self.children_of(parent).push(index);
+        }
+        Ok(())
+    }
+
+    fn remove(&mut self, ids: &[String]) -> Result<(), Error> {
+        let mut is_removed = vec![false; self.nodes.len()];
+        for id in ids {
+            let index = self.find(id, id, "id")?;
+            if std::mem::replace(&mut is_removed[index], true) {
+                return Err(self.house.error(id, "id", "is removed twice"));
+            }
+        }
+        for id in ids {
+            let index = self.find(id, id, "id")?;
+            if let Some(&left) = self.nodes[index].children.iter().find(|&&i| !is_removed[i]) {
+                let borne = self.nodes[left].fields.get("id").and_then(Value::as_str);
+                let message =
+                    format!("is removed, but still bears {:?}", borne.unwrap_or_default());
+                return Err(self.house.error(id, "children", &message));
+            }
+        }
+        for id in ids {
+            let index = self.find(id, id, "id")?;
+            self.index.remove(id.as_str());
+            let parent = self.nodes[index].parent;
+            self.children_of(parent).retain(|&child| child != index);
+        }
+        Ok(())
+    }
+
+    fn set_state(
+        &mut self,
+        change: &StateChange,
+        document: &mut Map<String, Value>,
+    ) -> Result<(), Error> {
+        let StateChange { id, openness, is_on } = change;
+        let fail = |field: &str, message: &str| Err(self.house.error(id, field, message));
+        if let Some(value) = openness.filter(|value| !(0.0..=1.0).contains(value)) {
+            return fail("openness", &format!("is {value}, expected 0 to 1"));
+        }
+        let fields = match self.house.doors.iter().position(|door| door.id == *id) {
+            Some(_) if is_on.is_some() => return fail("isOn", "is given for a door"),
+            Some(door) => {
+                let entry = document.get_mut("doors").and_then(|doors| doors.get_mut(door));
+                entry.and_then(Value::as_object_mut)
+            }
+            None => {
+                let index = self.find(id, id, "id")?;
+                Some(&mut self.nodes[index].fields)
+            }
+        };
+        if let Some(fields) = fields {
+            openness.map(|value| fields.insert("openness".to_owned(), json!(value)));
+            is_on.map(|value| fields.insert("isOn".to_owned(), json!(value)));
+        }
+        Ok(())
+    }
+
+    fn children_of(&mut self, parent: Option<usize>) -> &mut Vec<usize> {
+        match parent {
+            Some(parent) => &mut self.nodes[parent].children,
+            None => &mut self.roots,
+        }
     }
 }
 

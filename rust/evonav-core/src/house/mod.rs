@@ -6,7 +6,7 @@ mod node;
 mod parse;
 mod validate;
 
-pub use delta::{HouseDelta, ObjectMove};
+pub use delta::{AddedObject, HouseDelta, ObjectMove, StateChange};
 
 use crate::{
     Error,

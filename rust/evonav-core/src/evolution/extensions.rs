@@ -1,0 +1,84 @@
+//! What goes beyond the paper: things that come and go, doors and furniture that open and close,
+//! lights, and days of people. All off by default.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+
+/// Θ beyond the paper; what is `None` is off.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Extensions {
+    /// Small things that appear.
+    pub insertion: Option<Occurrence>,
+    /// Small things that vanish.
+    pub removal: Option<Occurrence>,
+    /// Doors that open or close.
+    pub doors: Option<Occurrence>,
+    /// Furniture and things that open or close.
+    pub openables: Option<Occurrence>,
+    /// Lamps and screens that go on or off.
+    pub switches: Option<Occurrence>,
+    /// People who use things, instead of the paper's independent draws of rooms.
+    pub schedule: Option<Schedule>,
+}
+
+/// How often something happens at a transition, and to how much.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Occurrence {
+    /// Chance that it happens at a transition.
+    pub probability: f64,
+    /// If it does, to how many: uniform from 1 to this.
+    pub max_count: usize,
+}
+
+/// Who lives in the house, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Schedule {
+    /// People.
+    pub num_persons: usize,
+    /// Clock time from one stage to the next.
+    pub minutes_between_stages: usize,
+    /// Chance that a used thing is brought back when its activity ends.
+    pub tidiness: f64,
+}
+
+impl Extensions {
+    /// Whether the process is the paper's alone.
+    pub fn is_off(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] naming the field.
+    pub fn check(&self) -> Result<(), Error> {
+        let is_probability = |value: f64| (0.0..=1.0).contains(&value);
+        let is_count = |value: usize| (1..=64).contains(&value);
+        let Self { insertion, removal, doors, openables, switches, schedule } = self;
+        for (names, occurrence) in [
+            (["extensions.insertion.probability", "extensions.insertion.max_count"], insertion),
+            (["extensions.removal.probability", "extensions.removal.max_count"], removal),
+            (["extensions.doors.probability", "extensions.doors.max_count"], doors),
+            (["extensions.openables.probability", "extensions.openables.max_count"], openables),
+            (["extensions.switches.probability", "extensions.switches.max_count"], switches),
+        ] {
+            if let Some(Occurrence { probability, max_count }) = *occurrence {
+                Error::require(names[0], probability, "in 0..=1", is_probability)?;
+                Error::require(names[1], max_count, "in 1..=64", is_count)?;
+            }
+        }
+        if let Some(Schedule { num_persons, minutes_between_stages, tidiness }) = *schedule {
+            let name = "extensions.schedule.num_persons";
+            Error::require(name, num_persons, "in 1..=16", |v| (1..=16).contains(&v))?;
+            let name = "extensions.schedule.minutes_between_stages";
+            let is_time = |v| (1..=10_080).contains(&v);
+            Error::require(name, minutes_between_stages, "in 1..=10080", is_time)?;
+            Error::require("extensions.schedule.tidiness", tidiness, "in 0..=1", is_probability)?;
+        }
+        Ok(())
+    }
+}
