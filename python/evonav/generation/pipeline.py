@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,11 @@ from evonav import _core
 from evonav.errors import TaskError
 from evonav.generation.describe import adjectives_of, appearance_instruction, basic_instruction, parse_relations
 from evonav.house import House
+from evonav.tasks.dataset import RejectReason
 from evonav.tasks.files import checksums_of
 from evonav.tasks.manifest import GenerationParameters, HouseSource, PublicStage, Task, TaskHeader
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.records import sha256_of
-
-RejectReason = Literal[
-    "too_few_rooms", "no_start", "start_not_free", "start_outside", "disconnected", "no_valid_goal", "unusable_house"
-]
-"""Why a house gives no task; `unusable_house` when the world cannot be built, such as for an unknown asset."""
 
 _ORACLE_KEYS = frozenset(OracleStage.model_fields) - {"schema_version", "stage", "house_sha256"}
 
@@ -64,11 +60,11 @@ def generate_task(
         InvalidArgumentError: A parameter is outside its domain.
     """
     config = GenerationParameters() if config is None else config
-    house_sha256 = sha256_of(house.to_json().encode())
+    source = house_source(house)
     text, houses, images = _core.generate_task(
         house,
         seed=seed,
-        label=house_sha256,
+        label=source.sha256,
         parameters_json=config.model_dump_json(),
         allow_unknown_assets=allow_unknown_assets,
     )
@@ -78,15 +74,14 @@ def generate_task(
         raise TaskRejectedError(house.name, rejected["reason"], rejected["stage"], rejected["detail"])
     stages = made["task"]["stages"]
     oracle = tuple(_oracle_stage(k, stage, houses[k - 1]) for k, stage in enumerate(stages, start=1))
-    name = house.name.replace("\\", "/").rsplit("/", 1)[-1]
     header = TaskHeader(
-        task_id=f"{_slug(name)}-{house_sha256[:6]}-s{seed}",
+        task_id=f"{_slug(source.name)}-{source.sha256[:6]}-s{seed}",
         dataset=dataset,
         split=split,
         generator=f"evonav {_core.__version__}",
         seed=seed,
         num_stages=len(stages),
-        house=HouseSource(name=name, sha256=house_sha256, num_rooms=len(house.rooms), num_objects=len(house.objects)),
+        house=source,
         start_pose=oracle[0].start_pose,
         parameters=config,
         checksums={},
@@ -157,6 +152,20 @@ def generate_tasks(
             rejections.messages.append(str(error))
         else:
             yield task
+
+
+def house_source(house: House) -> HouseSource:
+    """What a header says of a house."""
+    name = house.name.replace("\\", "/").rsplit("/", 1)[-1]
+    place = re.search(r":([1-9]\d*)(?:\[(\d+)\])?$", name)
+    index = None if place is None else int(place[2]) if place[2] else int(place[1]) - 1
+    return HouseSource(
+        name=name,
+        index=index,
+        sha256=sha256_of(house.to_json().encode()),
+        num_rooms=len(house.rooms),
+        num_objects=len(house.objects),
+    )
 
 
 def _oracle_stage(number: int, stage: dict[str, Any], house_json: str) -> OracleStage:

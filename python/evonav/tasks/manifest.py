@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from evonav.tasks.extensions import Extensions
 from evonav.tasks.oracle import OracleStage
@@ -52,6 +52,9 @@ class HouseSource(Record):
     """Where a task's first house comes from."""
 
     name: Annotated[str, Field(max_length=512)]
+    """File without folders (or set and split), line, and place in a list of houses."""
+    index: NonNegativeInt | None
+    """Of the line in its file, or of the house in its list, from 0; unknown for houses from elsewhere."""
     sha256: Sha256
     """Of the house JSON as evonav writes it."""
     num_rooms: PositiveInt
