@@ -44,7 +44,8 @@ fn cast(blocked: &[u8], own: usize, origin_m: Vec2, angle_rad: f64, range_m: f64
 }
 
 /// Between two neighbouring directions towards cell corners all rays cross the same cells in the
-/// same order, so rays at both ends and in the middle of each gap tell all there is.
+/// same order, so rays at both ends and in the middle of each gap tell all there is. The axes are
+/// ends too: along one, a cell straight ahead is nearest.
 fn visible_naive(
     blocked: &[u8],
     origin_m: Vec2,
@@ -59,8 +60,10 @@ fn visible_naive(
         .map(|(row, col)| {
             let x = SPEC.corner_m[0] + col as f64 * SPEC.cell_m - origin_m[0];
             let z = SPEC.corner_m[1] + row as f64 * SPEC.cell_m - origin_m[1];
-            (x.atan2(z) - first_rad).rem_euclid(TAU)
+            x.atan2(z)
         })
+        .chain((0..4).map(|quarter| f64::from(quarter) * 0.5 * PI))
+        .map(|angle_rad| (angle_rad - first_rad).rem_euclid(TAU))
         .filter(|turn| *turn < fov_rad)
         .chain([0.0, fov_rad])
         .collect();
