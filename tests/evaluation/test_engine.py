@@ -17,7 +17,8 @@ from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind
-from evonav.evaluation.store import RunStore, writing
+from evonav.evaluation.store import RunStore
+from evonav.folders import writing
 
 TOY = Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator")
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))

@@ -5,8 +5,9 @@ import sys
 import typer
 
 from evonav.cli.evaluate import demo, evaluate, report, strip
+from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
-from evonav.cli.tasks import generate, tasks_app
+from evonav.cli.tasks import tasks_app
 
 EXIT_ERROR = 1
 

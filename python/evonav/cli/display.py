@@ -1,13 +1,23 @@
 """What commands show: tables, a moving line, a bar."""
 
+import signal
+import time
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
+
+import typer
+
+EXIT_INTERRUPTED = 130
+LINE_EVERY_S = 60.0
+"""Lines of progress where there is no terminal."""
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from evonav.evaluation.engine import Progress
     from evonav.evaluation.metrics import AgentSummary
+    from evonav.generation.engine import GenerationProgress
 
 
 def print_table(summaries: "list[AgentSummary]") -> None:
@@ -78,3 +88,54 @@ def progress() -> "Iterator[Callable[[Progress], None]]":
             bar.update(stages, completed=news.num_done, total=news.num_stages, description=described)
 
         yield show
+
+
+@contextmanager
+def generation_progress() -> "Iterator[Callable[[GenerationProgress], None]]":
+    """A bar over houses on a terminal, else a line a minute."""
+    from rich import progress as bars
+    from rich.console import Console
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        told_s = time.monotonic()
+
+        def tell(news: "GenerationProgress") -> None:
+            nonlocal told_s
+            if time.monotonic() - told_s >= LINE_EVERY_S:
+                told_s = time.monotonic()
+                left_s = news.seconds * (1.0 - news.share) / news.share if news.share else float("inf")
+                typer.echo(f"{100 * news.share:.0f}%: {_counts(news)}, about {left_s / 60:.0f} min left", err=True)
+
+        yield tell
+        return
+    columns = (
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
+        bars.TaskProgressColumn(),
+        bars.TimeElapsedColumn(),
+        bars.TimeRemainingColumn(),
+    )
+    with bars.Progress(*columns, console=console) as bar:
+        houses = bar.add_task("starting", total=1.0)
+        yield lambda news: bar.update(houses, completed=news.share, description=_counts(news))
+
+
+def _counts(news: "GenerationProgress") -> str:
+    failed = f", {news.num_failed} failed" if news.num_failed else ""
+    return f"{news.num_tasks} tasks ({news.tasks_per_s:.1f}/s), {news.num_rejected} houses rejected{failed}"
+
+
+@contextmanager
+def interruptible(out: Path) -> "Iterator[None]":
+    """Says of an interrupt what it leaves; what a scheduler sends is to be as good as Ctrl-C."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted; what is finished is in {out}, the same command goes on from there", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED) from None

@@ -1,13 +1,12 @@
 """Running agents, and what comes of it: `evaluate`, `demo`, `report`, `strip`."""
 
-import signal
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.display import print_table, progress, status
+from evonav.cli.display import generation_progress, interruptible, print_table, progress, status
 from evonav.cli.options import (
     HEURISTICS,
     Agents,
@@ -37,7 +36,6 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from evonav.evaluation.metrics import AgentSummary
 
 EXIT_INCOMPLETE = 3
-EXIT_INTERRUPTED = 130
 
 
 def evaluate(
@@ -69,7 +67,7 @@ def evaluate(
     }
     host = {"gpu_device": thor_gpu, "x_display": thor_display, "timeout_s": thor_timeout}
     config = _config(seed, _backend(simulator, allow_unknown_assets, build, host))
-    with _tasks(out, houses, tasks, limit, seed, allow_unknown_assets) as task_files:
+    with _tasks(out, houses, tasks, limit, seed, allow_unknown_assets, num_workers) as task_files:
         summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored)
     print_table(summaries)
     _exit(summaries)
@@ -84,7 +82,7 @@ def demo(
 ) -> None:
     """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report."""
     num_workers = count_of(workers)
-    with _tasks(out, None, None, limit, seed, False) as task_files:
+    with _tasks(out, None, None, limit, seed, False, num_workers) as task_files:
         summaries = _evaluate(out, agents, task_files, _config(seed), num_workers, retry_errored=False)
     print_table(summaries)
     _report(out)
@@ -118,7 +116,13 @@ def strip(
 
 @contextmanager
 def _tasks(
-    out: Path, houses: Path | None, tasks: Path | None, limit: int | None, seed: int, allow_unknown_assets: bool
+    out: Path,
+    houses: Path | None,
+    tasks: Path | None,
+    limit: int | None,
+    seed: int,
+    allow_unknown_assets: bool,
+    num_workers: int,
 ) -> "Iterator[list[TaskFile]]":
     """The tasks of a run: given, generated into the run's folder, or bundled."""
     from evonav.evaluation.datasets import bundled_tasks, make_tasks
@@ -126,14 +130,15 @@ def _tasks(
 
     with ExitStack() as stack:
         if houses is not None:
-            with status("Generating tasks") as tell:
+            with interruptible(out / "tasks"), generation_progress() as show:
                 generated = make_tasks(
                     houses,
                     out / "tasks",
                     limit=limit,
                     seed=seed,
                     allow_unknown_assets=allow_unknown_assets,
-                    on_task=tell,
+                    num_workers=num_workers,
+                    on_progress=show,
                 )
             yield [task_file(root) for root in generated]
         else:
@@ -151,11 +156,7 @@ def _evaluate(
 ) -> "list[AgentSummary]":
     from evonav.evaluation.engine import evaluate
 
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    signal.signal(signal.SIGTERM, interrupt)  # what a scheduler sends is to be as good as Ctrl-C
-    try:
+    with interruptible(out):
         with status("Starting the simulator"):
             config.backend.check()
         with progress() as show:
@@ -168,9 +169,6 @@ def _evaluate(
                 retry_errored=retry_errored,
                 on_progress=show,
             )
-    except KeyboardInterrupt:
-        typer.echo(f"interrupted; finished stages are in {out}, the same command goes on from there", err=True)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
 def _config(seed: int, backend: "Backend | None" = None) -> "RunConfig":

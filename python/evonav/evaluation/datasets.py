@@ -1,18 +1,14 @@
 """Where a run's tasks come from: bundled, a folder, or generated from houses."""
 
-import hashlib
-import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from importlib.resources import as_file, files
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from evonav.errors import StoreError, TaskError
-from evonav.evaluation.store import check_same_run
-
-SOURCE_NAME = "source.json"
-"""Beside generated tasks: what they were generated from."""
+if TYPE_CHECKING:
+    from evonav.generation.engine import GenerationProgress
 
 
 def bundled_tasks() -> AbstractContextManager[Path]:
@@ -39,79 +35,32 @@ def make_tasks(
     limit: int | None = None,
     seed: int = 0,
     allow_unknown_assets: bool = False,
-    on_task: Callable[[str], None] = lambda _: None,
+    num_workers: int = 0,
+    on_progress: "Callable[[GenerationProgress], None]" = lambda _: None,
 ) -> list[Path]:
-    """Tasks of the first `limit` houses that allow one; a finished earlier call is not done again.
+    """Tasks of the first `limit` houses that allow one, as `evonav.generation.engine.generate_dataset` makes them.
 
     Returns:
         The folders of the tasks, in the order of the houses.
 
     Raises:
-        HouseError: A house is malformed, or a dataset was not fetched.
+        HouseError: The houses cannot be read, or a dataset was not fetched.
         StoreError: `out` holds tasks of another source.
         TaskError: No house gives a task; it says why.
     """
-    from evonav.generation import Rejections, generate_tasks
-    from evonav.house import house_file, load_houses, named_set
-    from evonav.tasks import write_task
+    from evonav.generation.engine import Workforce, generate_dataset
+    from evonav.generation.worker import GenerationOptions
 
-    source = {
-        "houses_sha256": _digest(house_file(houses)),
-        "seed": seed,
-        "limit": limit,
-        "allow_unknown_assets": allow_unknown_assets,
-    }
-    done = _done(out, source)
-    if done is not None:
-        return done
-    rejections = Rejections()
+    dataset, split = inherited_names(houses)
+    options = GenerationOptions(seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets)
+    workforce = Workforce(num_workers=num_workers)
+    made = generate_dataset(houses, out, options=options, limit=limit, workforce=workforce, on_progress=on_progress)
+    return list(made.roots)
+
+
+def inherited_names(houses: Path) -> tuple[str, str]:
+    """Dataset and split that tasks have from their houses."""
+    from evonav.house.files import named_set
+
     published = named_set(houses)
-    tasks = generate_tasks(
-        load_houses(houses),
-        seed=seed,
-        rejections=rejections,
-        dataset="evonav" if published is None else "procthor-10k",
-        split="none" if published is None else published.split,
-        allow_unknown_assets=allow_unknown_assets,
-    )
-    roots: list[Path] = []
-    for task in islice(tasks, limit):
-        on_task(task.task_id)
-        roots.append(write_task(task, out))
-    if not roots:
-        reasons = ", ".join(f"{count} {reason}" for reason, count in rejections.reasons.most_common())
-        raise TaskError(f"{houses}: no house gives a task ({reasons or 'no house'})")
-    source["tasks"] = [root.name for root in roots]
-    source["rejected"] = dict(sorted(rejections.reasons.items()))
-    path = out / SOURCE_NAME
-    try:
-        path.write_text(json.dumps(source, indent=2, sort_keys=True) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error
-    return roots
-
-
-def _done(out: Path, source: dict[str, object]) -> list[Path] | None:
-    """The tasks of an earlier call, if it came to its end."""
-    path = out / SOURCE_NAME
-    if not path.is_file():
-        return None
-    try:
-        there = json.loads(path.read_text(encoding="utf-8"))
-        names = [str(name) for name in there.pop("tasks")]
-        there.pop("rejected", None)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise StoreError(f"{path}: {error!r}") from error
-    check_same_run(there, source, out)
-    return [out / name for name in names]
-
-
-def _digest(path: Path) -> str:
-    try:
-        with path.open("rb") as file:
-            digest = hashlib.sha256()
-            while chunk := file.read(1 << 20):
-                digest.update(chunk)
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error
-    return digest.hexdigest()
+    return ("evonav", "none") if published is None else ("procthor-10k", published.split)

@@ -2,20 +2,20 @@
 
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from evonav._core import __version__
-from evonav.errors import InvalidArgumentError, StoreError, TaskError
+from evonav.errors import InvalidArgumentError, TaskError
 from evonav.evaluation.backend import Backend, check_agent_name
 from evonav.evaluation.metrics import AgentSummary, paired_differences, summarise, summary_json
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome, as_errored, as_not_run
 from evonav.evaluation.records import EndState, ErrorKind, StageRecord
-from evonav.evaluation.store import RunStore, check_same_run, writing
+from evonav.evaluation.store import RunStore
 from evonav.evaluation.workers import EpisodeJob, JobEvent, run_here, run_in_workers
+from evonav.folders import check_same_run, write_atomically, writing
 
 SUMMARY_NAME = "summary.json"
 
@@ -150,7 +150,7 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
         records = {agent: list(store.records(agent, is_brief=True)) for agent in agents}
     summaries = {agent: summarise(agent, records[agent], num_stages) for agent in agents}
     content = summary_json(list(summaries.values()), paired_differences(records))
-    _write_atomically(run_dir / SUMMARY_NAME, json.dumps(content, indent=2, sort_keys=True) + "\n")
+    write_atomically(run_dir / SUMMARY_NAME, json.dumps(content, indent=2, sort_keys=True) + "\n")
     return [summaries[agent] for agent in only or agents]
 
 
@@ -277,16 +277,3 @@ def _claim(store: RunStore, run_dir: Path, tasks: Sequence[TaskFile], config: Ru
         store.set_meta("num_stages", {task.task_id: task.num_stages for task in tasks})
     else:
         check_same_run(there, asked, run_dir)
-
-
-def _write_atomically(path: Path, text: str) -> None:
-    """Writes beside and renames, so that a reader sees the old file or the new one."""
-    beside = path.with_name(path.name + ".partial")
-    try:
-        with beside.open("w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        beside.replace(path)
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error

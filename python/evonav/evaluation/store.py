@@ -8,8 +8,7 @@ so that records of equal runs are equal to the byte: wall-clock figures in `timi
 
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -19,13 +18,7 @@ from pydantic import ValidationError
 from evonav.errors import StoreError
 from evonav.evaluation.records import SCHEMA_VERSION, EndState, StageMap, StageRecord
 
-try:
-    import fcntl
-except ImportError:  # Windows: SQLite's own locks still keep rows whole
-    fcntl = None  # type: ignore[assignment]
-
 FILE_NAME = "records.sqlite"
-LOCK_NAME = ".lock"
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -211,39 +204,6 @@ class RunStore:
             self._db.execute(query, values)
         except sqlite3.Error as error:
             raise StoreError(f"{self.path}: {error}") from error
-
-
-@contextmanager
-def writing(run_dir: Path) -> Iterator[None]:
-    """Keeps a second writer out of a run's folder; a writer that died keeps nobody out.
-
-    Raises:
-        StoreError: Another process is writing there, or the folder cannot be made.
-    """
-    try:
-        run_dir.mkdir(parents=True, exist_ok=True)
-        file = (run_dir / LOCK_NAME).open("w")
-    except OSError as error:
-        raise StoreError(f"{run_dir}: {error}") from error
-    with file:
-        if fcntl is not None:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                raise StoreError(f"{run_dir}: another evonav is writing to this run") from error
-        yield
-
-
-def check_same_run(stored: Mapping[str, Any], asked: Mapping[str, Any], run_dir: Path) -> None:
-    """A folder holds one run: the same configuration, or an error that names what differs.
-
-    Raises:
-        StoreError: Any entry differs.
-    """
-    differing = sorted(key for key in stored.keys() | asked.keys() if stored.get(key) != asked.get(key))
-    if differing:
-        lines = "; ".join(f"{key}: there {stored.get(key)!r}, asked {asked.get(key)!r}" for key in differing)
-        raise StoreError(f"{run_dir} holds a run of another configuration ({lines}); use another folder")
 
 
 def _json(value: Any) -> str:  # noqa: ANN401 - JSON

@@ -9,9 +9,6 @@ the stage, which no snapshot would do for every agent; of another kind of agent,
 
 import json
 import multiprocessing
-import os
-import signal
-import threading
 import time
 from collections import Counter
 from collections.abc import Generator, Iterator, Sequence
@@ -24,6 +21,7 @@ from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
 from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
 from evonav.evaluation.rollout import Episode
+from evonav.parallel import cause_of_death, end_process, end_with_parent, one_thread_each
 from evonav.world.simulator import Simulator
 
 MAX_SIMULATOR_RESTARTS = 2
@@ -167,8 +165,7 @@ class _Worker:
     def __init__(self, backend: Backend, protocol: ProtocolConfig) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, far_end = context.Pipe()
-        # One thread a worker: the parallelism is over episodes.
-        with _environment({"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}):
+        with one_thread_each():
             self._process = context.Process(
                 target=_serve, args=(far_end, json.dumps(asdict(backend)), json.dumps(asdict(protocol))), daemon=True
             )
@@ -194,10 +191,7 @@ class _Worker:
         try:
             message = json.loads(self.connection.recv_bytes())
         except (EOFError, OSError):
-            self._process.join(timeout=5.0)
-            code = self._process.exitcode
-            cause = f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
-            return self.give_up(ErrorKind.CRASH, f"the worker process died ({cause})")
+            return self.give_up(ErrorKind.CRASH, f"the worker process died ({cause_of_death(self._process)})")
         self.last_news_s = time.monotonic()
         job = self.job
         if message["kind"] == "stage":
@@ -223,20 +217,12 @@ class _Worker:
         return event
 
     def close(self) -> None:
-        self.connection.close()
-        if self._process.is_alive():
-            self._process.terminate()
-            self._process.join(timeout=2.0)
-            if self._process.is_alive():
-                self._process.kill()
-        self._process.join(timeout=5.0)
+        end_process(self._process, self.connection)
 
 
 def _serve(connection: Connection, backend_json: str, protocol_json: str) -> None:
     """A worker's life: jobs in, stages out, until the parent hangs up."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what an interrupt means
-    signal.signal(signal.SIGTERM, _end)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     workplace = Workplace(Backend(**json.loads(backend_json)), ProtocolConfig(**json.loads(protocol_json)))
     with closing(workplace), suppress(EOFError, OSError):  # of the connection: the parent hung up
         while True:
@@ -271,32 +257,5 @@ def _send_stage(connection: Connection, outcome: StageOutcome) -> None:
     )
 
 
-def _end(number: int, _: object) -> None:
-    """Leaves by way of every `finally`: a simulator may have a process and files of its own."""
-    raise SystemExit(128 + number)
-
-
-def _end_with_parent() -> None:
-    """Ends this worker when its parent was killed: it would find out only at the end of its stage."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os.kill(os.getpid(), signal.SIGTERM)
-
-
 def _send(connection: Connection, message: dict[str, object]) -> None:
     connection.send_bytes(json.dumps(message).encode())
-
-
-class _environment:  # noqa: N801 - a context manager used as a function
-    """Sets environment variables that are not set, for children started inside."""
-
-    def __init__(self, values: dict[str, str]) -> None:
-        self._values = {key: value for key, value in values.items() if key not in os.environ}
-
-    def __enter__(self) -> None:
-        os.environ.update(self._values)
-
-    def __exit__(self, *_: object) -> None:
-        for key in self._values:
-            del os.environ[key]

@@ -5,9 +5,10 @@ import json
 import zlib
 from collections.abc import Iterator
 from importlib import resources
+from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, NamedTuple
 
 from evonav._core import House
 from evonav.errors import HouseError, InvalidArgumentError
@@ -37,8 +38,82 @@ def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
     if limit is not None and limit < 0:
         message = f"argument `limit` is {limit}, expected None or at least 0"
         raise InvalidArgumentError(message)
-    file = house_file(path)
-    return islice(_houses(file, str(path if named_set(path) else file)), limit)
+    return (House(text, name=name) for name, text in islice(HouseTexts(path), limit))
+
+
+class HouseText(NamedTuple):
+    """A house as it was written, not yet read."""
+
+    name: str
+    """As `load_houses` gives it."""
+    text: str
+
+
+class HouseTexts:
+    """The houses of a file or a directory as text, one at a time, and how far the reading is."""
+
+    def __init__(self, path: str | Path) -> None:
+        """Looks where the houses are.
+
+        Args:
+            path: As for `load_houses`.
+
+        Raises:
+            HouseError: There is no such file.
+            InvalidArgumentError: As for `named_set`.
+        """
+        self._path = house_file(path)
+        self._name = str(path if named_set(path) else self._path)
+        self.files = files_of(self._path)
+        """What is read, in order."""
+        self._num_bytes = sum(file.stat().st_size for file in self.files)
+        self._num_bytes_before = 0
+        self._raw: IO[bytes] | None = None
+
+    @property
+    def share_read(self) -> float:
+        """Of the bytes of all files, 0 to 1."""
+        position = 0 if self._raw is None or self._raw.closed else self._raw.tell()
+        return min(1.0, (self._num_bytes_before + position) / max(1, self._num_bytes))
+
+    def __iter__(self) -> Iterator[HouseText]:
+        """Reads from the first house on.
+
+        Raises:
+            HouseError: A file cannot be read, or a list of houses is malformed.
+        """
+        self._num_bytes_before = 0
+        for file in self.files:
+            name = self._name if file == self._path else str(file)
+            try:
+                with file.open("rb") as self._raw, _text_of(file, self._raw) as text:
+                    yield from _lines(name, text) if ".jsonl" in file.suffixes else _document(name, text.read())
+            except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+                message = f"{file}: cannot be read: {error}"
+                raise HouseError(message) from error
+            self._num_bytes_before += file.stat().st_size
+            self._raw = None
+
+
+def files_of(path: Path) -> list[Path]:
+    """The house files of a directory, by name, or the one that the path is.
+
+    Raises:
+        HouseError: There is none, or it has another suffix.
+    """
+    if path.is_dir():
+        files = sorted(file for file in path.iterdir() if file.name.endswith(SUFFIXES) and file.is_file())
+        if not files:
+            message = f"{path}: no {', '.join(SUFFIXES)} file in this directory"
+            raise HouseError(message)
+        return files
+    if not path.name.endswith(SUFFIXES):
+        message = f"{path}: expected a directory or a file with one of {', '.join(SUFFIXES)}"
+        raise HouseError(message)
+    if not path.exists():
+        message = f"{path}: cannot be read: no such file"
+        raise HouseError(message)
+    return [path]
 
 
 def named_set(path: str | Path) -> "HouseSet | None":
@@ -84,49 +159,29 @@ def bundled_houses(limit: int | None = None) -> Iterator[House]:
             yield House(line, name=f"bundled:{number}")
 
 
-def _houses(path: Path, name: str) -> Iterator[House]:
-    if path.is_dir():
-        files = sorted(file for file in path.iterdir() if file.name.endswith(SUFFIXES) and file.is_file())
-        if not files:
-            message = f"{path}: no {', '.join(SUFFIXES)} file in this directory"
-            raise HouseError(message)
-        for file in files:
-            yield from _houses(file, str(file))
-        return
-    if not path.name.endswith(SUFFIXES):
-        message = f"{path}: expected a directory or a file with one of {', '.join(SUFFIXES)}"
-        raise HouseError(message)
-    try:
-        with _open(path) as text:
-            yield from _lines(name, text) if ".jsonl" in path.suffixes else _document(path, text.read())
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        message = f"{path}: cannot be read: {error}"
-        raise HouseError(message) from error
+def _text_of(path: Path, raw: IO[bytes]) -> IO[str]:
+    return gzip.open(raw, "rt", encoding="utf-8") if path.suffix == ".gz" else TextIOWrapper(raw, encoding="utf-8")
 
 
-def _open(path: Path) -> IO[str]:
-    return gzip.open(path, "rt", encoding="utf-8") if path.suffix == ".gz" else path.open(encoding="utf-8")
-
-
-def _lines(name: str, text: IO[str]) -> Iterator[House]:
+def _lines(name: str, text: IO[str]) -> Iterator[HouseText]:
     for number, line in enumerate(text, start=1):
         if line.strip():
-            yield House(line, name=f"{name}:{number}")
+            yield HouseText(f"{name}:{number}", line)
 
 
-def _document(path: Path, text: str) -> Iterator[House]:
+def _document(name: str, text: str) -> Iterator[HouseText]:
     """One house, or a list of houses."""
     start = _after_space(text, 0)
     if not text.startswith("[", start):
-        yield House(text, name=f"{path}:1")
+        yield HouseText(f"{name}:1", text)
         return
     line, counted = 1, 0
-    for index, (begin, end) in enumerate(_entries(path, text, start)):
+    for index, (begin, end) in enumerate(_entries(name, text, start)):
         line, counted = line + text.count("\n", counted, begin), begin
-        yield House(text[begin:end], name=f"{path}:{line}[{index}]")
+        yield HouseText(f"{name}:{line}[{index}]", text[begin:end])
 
 
-def _entries(path: Path, text: str, start: int) -> Iterator[tuple[int, int]]:
+def _entries(name: str, text: str, start: int) -> Iterator[tuple[int, int]]:
     """Where the entries of the list at `start` begin and end: cut out, their numbers stay as they were written."""
     decoder = json.JSONDecoder()
     position = _after_space(text, start + 1)
@@ -135,21 +190,21 @@ def _entries(path: Path, text: str, start: int) -> Iterator[tuple[int, int]]:
         try:
             _, end = decoder.raw_decode(text, position)
         except (ValueError, RecursionError) as error:
-            raise _list_error(path, text, position, str(error)) from error
+            raise _list_error(name, text, position, str(error)) from error
         yield position, end
         position = _after_space(text, end)
         is_closed = text.startswith("]", position)
         if not is_closed:
             if not text.startswith(",", position):
-                raise _list_error(path, text, position, "expected `,` or `]` after a house")
+                raise _list_error(name, text, position, "expected `,` or `]` after a house")
             position = _after_space(text, position + 1)
     if _after_space(text, position + 1) != len(text):
-        raise _list_error(path, text, position, "text follows the list")
+        raise _list_error(name, text, position, "text follows the list")
 
 
-def _list_error(path: Path, text: str, position: int, message: str) -> HouseError:
+def _list_error(name: str, text: str, position: int, message: str) -> HouseError:
     line = text.count("\n", 0, position) + 1
-    return HouseError(f"house {path}:{line}: document: field `JSON`: {message}")
+    return HouseError(f"house {name}:{line}: document: field `JSON`: {message}")
 
 
 def _after_space(text: str, position: int) -> int:

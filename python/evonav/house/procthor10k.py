@@ -4,7 +4,6 @@
 """
 
 import gzip
-import hashlib
 import os
 import zlib
 from collections.abc import Mapping
@@ -15,6 +14,7 @@ from typing import Literal, NamedTuple
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from evonav.errors import InvalidArgumentError
+from evonav.folders import sha256_of_file
 from evonav.house.dataset_errors import DatasetCorruptError, DatasetMissingError
 
 Split = Literal["train", "val", "test"]
@@ -156,16 +156,13 @@ def check_file(path: Path, entry: SplitFile) -> None:
         DatasetCorruptError: It differs, or is not there.
     """
     try:
-        with path.open("rb") as file:
-            digest = hashlib.sha256()
-            while chunk := file.read(1 << 20):
-                digest.update(chunk)
+        digest = sha256_of_file(path)
     except OSError as error:
         message = f"{path}: {error.strerror}. Fetch again: evonav houses fetch {NAME}. {INSTEAD}"
         raise DatasetCorruptError(message) from error
-    if digest.hexdigest() != entry.sha256:
+    if digest != entry.sha256:
         message = (
-            f"{path}: corrupt or truncated: its sha256 is {digest.hexdigest()}, expected {entry.sha256}. "
+            f"{path}: corrupt or truncated: its sha256 is {digest}, expected {entry.sha256}. "
             f"Fetch again: evonav houses fetch {NAME}. {INSTEAD}"
         )
         raise DatasetCorruptError(message)

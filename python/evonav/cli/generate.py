@@ -1,0 +1,71 @@
+"""Making tasks: `generate`."""
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evonav.cli.display import generation_progress, interruptible
+from evonav.cli.options import HOUSES, AnyAsset, Limit, Seed, Workers, count_of
+
+if TYPE_CHECKING:
+    from evonav.generation.engine import GenerationSummary
+
+
+class EngineOption(str, Enum):
+    """What the workers are."""
+
+    LOCAL = "local"
+    RAY = "ray"
+
+
+def generate(
+    houses: Annotated[Path, typer.Option(help=f"{HOUSES}.")],
+    out: Annotated[Path, typer.Option(help="Folder for the tasks; an unfinished one is gone on with.")],
+    limit: Limit = None,
+    seed: Seed = 0,
+    workers: Workers = None,
+    engine: Annotated[EngineOption, typer.Option(help="Processes here, or Ray.")] = EngineOption.LOCAL,
+    ray_address: Annotated[str | None, typer.Option(help="Of a Ray cluster that shares this file system.")] = None,
+    house_timeout: Annotated[float, typer.Option(min=1.0, help="Seconds after which a house is given up.")] = 120.0,
+    retry_failed: Annotated[
+        bool, typer.Option("--retry-failed", help="Do houses again at which the generator failed.")
+    ] = False,
+    split: Annotated[str | None, typer.Option(help="Recorded; default: of the dataset of the houses.")] = None,
+    dataset_name: Annotated[str | None, typer.Option(help="Recorded; default: of the dataset of the houses.")] = None,
+    allow_unknown_assets: AnyAsset = False,
+) -> None:
+    """Generates tasks from multi-room houses; run again to resume."""
+    from evonav.evaluation.datasets import inherited_names
+    from evonav.generation.engine import Workforce, generate_dataset
+    from evonav.generation.worker import GenerationOptions
+
+    if ray_address is not None and engine is not EngineOption.RAY:
+        raise typer.BadParameter("--ray-address is for --engine ray")
+    dataset, inherited_split = inherited_names(houses)
+    options = GenerationOptions(
+        seed=seed,
+        dataset=dataset_name or dataset,
+        split=split or inherited_split,
+        allow_unknown_assets=allow_unknown_assets,
+    )
+    workforce = Workforce(count_of(workers), engine.value, ray_address, house_timeout)
+    with interruptible(out), generation_progress() as show:
+        made = generate_dataset(
+            houses,
+            out,
+            options=options,
+            limit=limit,
+            workforce=workforce,
+            retry_failed=retry_failed,
+            on_progress=show,
+        )
+    _tell(made, out)
+
+
+def _tell(made: "GenerationSummary", out: Path) -> None:
+    rate = f" in {made.seconds:.0f} s ({made.num_new / made.seconds:.1f} tasks/s)" if made.num_new else ""
+    typer.echo(f"{len(made.roots)} tasks in {out}, from {made.num_houses} houses; {made.num_new} made now{rate}")
+    for reason, count in made.reasons.most_common():
+        typer.echo(f"  {count} houses without a task: {reason}")

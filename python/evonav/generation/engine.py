@@ -1,0 +1,279 @@
+"""Tasks from a file of houses into a folder: parallel, resumable, the same bytes for any number of workers.
+
+This process reads the houses as text, one at a time, and keeps the journal; workers do all else (`generation.worker`).
+A task's folder is there wholly or not at all, and the journal names it after it is there: killed at any moment, the
+same command goes on. `limit` takes the first houses that give a task: no house is begun that could be beyond them, so
+that how fast the workers are changes nothing.
+"""
+
+import json
+import shutil
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from evonav._core import __version__
+from evonav.errors import HouseError, InvalidArgumentError, StoreError, TaskError
+from evonav.folders import sha256_of_file, write_atomically, writing
+from evonav.generation.journal import Journal, Outcome
+from evonav.generation.worker import PARTIAL_NAME, WORK, GenerationOptions
+from evonav.house.files import HouseTexts, named_set
+from evonav.parallel import Answer, EngineName, Job, Pool, open_pool
+from evonav.tasks.records import sha256_of
+
+DATASET_NAME = "dataset.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Workforce:
+    """Who does the work: changes how long it takes, nothing else."""
+
+    num_workers: int = 0
+    """0: this process, where a house that hangs is not noticed."""
+    engine: EngineName = "local"
+    ray_address: str | None = None
+    house_timeout_s: float = 120.0
+
+
+@dataclass(frozen=True, slots=True)
+class GenerationProgress:
+    """How far a run is."""
+
+    num_houses: int
+    """Done, earlier calls included."""
+    num_tasks: int
+    num_rejected: int
+    num_failed: int
+    share: float
+    """Of the whole, 0 to 1: of the tasks asked for, or of the source's bytes."""
+    num_new: int
+    """Tasks of this call."""
+    seconds: float
+    """Since this call began."""
+
+    @property
+    def tasks_per_s(self) -> float:
+        """Of this call."""
+        return self.num_new / max(1e-9, self.seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class GenerationSummary:
+    """What a run made."""
+
+    roots: tuple[Path, ...]
+    """Folders of the tasks, in the order of their houses."""
+    num_houses: int
+    reasons: Counter[str]
+    """Houses without a task."""
+    num_new: int
+    """Tasks made by this call."""
+    seconds: float
+    """That this call took."""
+
+
+def generate_dataset(
+    houses: Path | str,
+    out: Path,
+    *,
+    options: GenerationOptions | None = None,
+    limit: int | None = None,
+    workforce: Workforce | None = None,
+    retry_failed: bool = False,
+    on_progress: Callable[[GenerationProgress], None] = lambda _: None,
+) -> GenerationSummary:
+    """Makes a task of every house that allows one; called again on the same folder, does what is left.
+
+    Args:
+        houses: As for `evonav.house.load_houses`.
+        out: Gets a folder a task, `journal.jsonl` and, when all is done, `dataset.json`.
+        options: Must be the folder's own when it already holds tasks.
+        limit: The first houses that give so many tasks; must be the folder's own too.
+        workforce: Default: this process.
+        retry_failed: Do houses again at which the generator failed.
+        on_progress: Called when it begins and after every house.
+
+    Raises:
+        HouseError: The houses cannot be read, or the dataset was not fetched.
+        InvalidArgumentError: Of the arguments.
+        StoreError: `out` holds another run, is being written to, or cannot be written.
+        TaskError: No house gives a task; it says why.
+        EngineError: Workers cannot be had.
+    """
+    options, workforce = options or GenerationOptions(), workforce or Workforce()
+    if limit is not None and limit < 1:
+        raise InvalidArgumentError(f"argument `limit` is {limit}, expected None or at least 1")
+    texts = HouseTexts(houses)
+    run = {"evonav": __version__, "houses": _source(houses, texts), "limit": limit, "options": options.as_json()}
+    out = out.resolve()  # workers of a cluster have other working directories
+    with writing(out), Journal(out, run) as journal:
+        again = [i for i, done in journal.outcomes.items() if not _is_kept(done, out, retry_failed)]
+        if again:
+            (out / DATASET_NAME).unlink(missing_ok=True)
+            journal.drop(again)
+        state = _Run(journal, texts, limit, on_progress)
+        state.tell()
+        if not (out / DATASET_NAME).exists():
+            shutil.rmtree(out / PARTIAL_NAME, ignore_errors=True)
+            with open_pool(
+                WORK,
+                json.dumps({"out": str(out), "options": options.as_json()}),
+                engine=workforce.engine,
+                num_workers=workforce.num_workers,
+                timeout_s=workforce.house_timeout_s,
+                ray_address=workforce.ray_address,
+            ) as pool:
+                state.do_all(pool)
+            shutil.rmtree(out / PARTIAL_NAME, ignore_errors=True)
+            journal.rewrite()
+            _write_dataset(out, run, journal)
+        return state.summary(out)
+
+
+class _Run:
+    """The bookkeeping of one call."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        texts: HouseTexts,
+        limit: int | None,
+        on_progress: Callable[[GenerationProgress], None],
+    ) -> None:
+        self._journal = journal
+        self._texts = texts
+        self._limit = limit
+        self._on_progress = on_progress
+        done = journal.outcomes.values()
+        self._num_tasks = sum(outcome.reason is None for outcome in done)
+        self._num_failed = sum(outcome.is_failure for outcome in done)
+        self._num_before = self._num_tasks
+        self._names: dict[int, str] = {}
+        """Of houses that are being done."""
+        self._began_s = time.monotonic()
+
+    def do_all(self, pool: Pool) -> None:
+        """Does every house that is left.
+
+        Raises:
+            StoreError: A task or the journal cannot be written.
+        """
+        left = ((index, house) for index, house in enumerate(self._texts) if index not in self._journal.outcomes)
+        is_more = True
+        while is_more or self._names:
+            while is_more and len(self._names) < pool.capacity and self._is_wanted():
+                index, house = next(left, (0, None))
+                is_more = house is not None
+                if house is not None:
+                    self._names[index] = house.name
+                    pool.submit(Job(index, f"{json.dumps([index, house.name])}\n{house.text}"))
+            if not self._names:
+                return
+            self._record(pool.next_answer())
+            self.tell()
+
+    def _is_wanted(self) -> bool:
+        """Whether the next house could be one of the first that give as many tasks as are asked for."""
+        return self._limit is None or self._num_tasks + len(self._names) < self._limit
+
+    def _record(self, answer: Answer) -> None:
+        name = self._names.pop(answer.key)
+        if answer.failure is not None:
+            outcome = Outcome(index=answer.key, house=name, reason=answer.failure, detail=answer.detail)
+        else:
+            values = json.loads(answer.text)
+            if "stop" in values:
+                raise StoreError(values["stop"])
+            outcome = Outcome.model_validate(values)
+        self._journal.add(outcome)
+        self._num_tasks += outcome.reason is None
+        self._num_failed += outcome.is_failure
+
+    def tell(self) -> None:
+        """Says how far it is."""
+        share = self._texts.share_read if self._limit is None else self._num_tasks / self._limit
+        num_houses = len(self._journal.outcomes)
+        self._on_progress(
+            GenerationProgress(
+                num_houses=num_houses,
+                num_tasks=self._num_tasks,
+                num_rejected=num_houses - self._num_tasks - self._num_failed,
+                num_failed=self._num_failed,
+                share=share,
+                num_new=self._num_tasks - self._num_before,
+                seconds=time.monotonic() - self._began_s,
+            )
+        )
+
+    def summary(self, out: Path) -> GenerationSummary:
+        """What came of it."""
+        outcomes = in_order(self._journal)
+        without = [outcome for outcome in outcomes if outcome.reason is not None]
+        return GenerationSummary(
+            roots=tuple(out / outcome.task_id for outcome in outcomes if outcome.task_id is not None),
+            num_houses=len(outcomes),
+            reasons=Counter(str(outcome.reason) for outcome in without),
+            num_new=self._num_tasks - self._num_before,
+            seconds=time.monotonic() - self._began_s,
+        )
+
+
+def in_order(journal: Journal) -> list[Outcome]:
+    """Outcomes in the order of the houses."""
+    return [journal.outcomes[index] for index in sorted(journal.outcomes)]
+
+
+def _is_kept(outcome: Outcome, out: Path, retry_failed: bool) -> bool:
+    """Whether what the journal says still holds, and is not to be done again."""
+    if outcome.task_id is None:
+        return not (retry_failed and outcome.is_failure)
+    try:
+        return sha256_of_file(out / outcome.task_id / "task.json") == outcome.task_sha256
+    except OSError:
+        return False
+
+
+def _write_dataset(out: Path, run: dict[str, Any], journal: Journal) -> None:
+    """Writes what the folder holds.
+
+    Raises:
+        TaskError: There is no task, or two have the same id.
+    """
+    outcomes = in_order(journal)
+    made = [outcome for outcome in outcomes if outcome.task_id is not None]
+    reasons = Counter(str(outcome.reason) for outcome in outcomes if outcome.reason is not None)
+    if not made:
+        counts = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())
+        first = f"; the first: {outcomes[0].detail}" if outcomes else ""
+        raise TaskError(f"{run['houses']['name']}: no house gives a task ({counts or 'no house'}){first}")
+    houses: dict[str, str] = {}
+    for outcome in made:
+        task_id = str(outcome.task_id)
+        if task_id in houses:
+            raise TaskError(f"houses {houses[task_id]} and {outcome.house} both give a task named {task_id}")
+        houses[task_id] = outcome.house
+    content = {
+        **run,
+        "num_houses": len(outcomes),
+        "tasks": [outcome.task_id for outcome in made],
+        "rejected": dict(sorted(reasons.items())),
+    }
+    write_atomically(out / DATASET_NAME, json.dumps(content, indent=2, sort_keys=True) + "\n")
+
+
+def _source(houses: Path | str, texts: HouseTexts) -> dict[str, str]:
+    """Name and checksum of the houses.
+
+    Raises:
+        HouseError: A file cannot be read.
+    """
+    try:
+        digests = [sha256_of_file(file) for file in texts.files]
+    except OSError as error:
+        raise HouseError(f"{houses}: cannot be read: {error}") from error
+    # Of a folder: of its files' checksums, in order.
+    digest = digests[0] if len(digests) == 1 else sha256_of("\n".join(digests).encode())
+    return {"name": str(houses) if named_set(houses) else Path(houses).name, "sha256": digest}

@@ -1,0 +1,136 @@
+"""What a worker does with a house: reads it, makes its task, and puts the task's folder where it belongs."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from evonav.errors import EvonavError, HouseError, InvalidArgumentError, SimulationError, TaskError
+from evonav.folders import sha256_of_file
+from evonav.generation.journal import HouseReason, Outcome
+from evonav.generation.pipeline import TaskRejectedError, generate_task
+from evonav.house import House
+from evonav.tasks.manifest import GenerationParameters, Task, write_task
+
+WORK = "evonav.generation.worker:make_worker"
+PARTIAL_NAME = ".partial"
+"""Beside the tasks: those that are being written."""
+
+
+@dataclass(frozen=True, slots=True)
+class GenerationOptions:
+    """What decides the task of a house."""
+
+    seed: int = 0
+    parameters: GenerationParameters = field(default_factory=GenerationParameters)
+    dataset: str = "evonav"
+    split: str = "none"
+    allow_unknown_assets: bool = False
+
+    def as_json(self) -> dict[str, Any]:
+        """As JSON, to be read by `from_json`."""
+        return {**asdict(self), "parameters": self.parameters.model_dump(mode="json")}
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> "GenerationOptions":
+        """What `as_json` gave."""
+        parameters = GenerationParameters.model_validate_json(json.dumps(values["parameters"]))
+        return cls(**{**values, "parameters": parameters})
+
+    def generate(self, house: House) -> Task:
+        """The task of a house.
+
+        Raises:
+            EvonavError: As `evonav.generation.generate_task`.
+        """
+        return generate_task(
+            house,
+            seed=self.seed,
+            config=self.parameters,
+            dataset=self.dataset,
+            split=self.split,
+            allow_unknown_assets=self.allow_unknown_assets,
+        )
+
+
+def make_worker(settings: str) -> Callable[[str], str]:
+    """The function from a house to its `Outcome`, as `evonav.parallel` calls it.
+
+    Args:
+        settings: `{"out": ..., "options": ...}`.
+
+    Returns:
+        It takes `[index, name]` and, after a line feed, the house; and gives an `Outcome`, or `{"stop": ...}` where
+        nothing can be written.
+    """
+    values = json.loads(settings)
+    options, out = GenerationOptions.from_json(values["options"]), Path(values["out"])
+
+    def work(text: str) -> str:
+        head, _, house = text.partition("\n")
+        index, name = json.loads(head)
+        try:
+            return do_house(index, name, house, options, out).model_dump_json()
+        except (InvalidArgumentError, TaskError, OSError) as error:
+            return json.dumps({"stop": str(error)})
+
+    return work
+
+
+def do_house(index: int, name: str, text: str, options: GenerationOptions, out: Path) -> Outcome:
+    """Makes the task of a house and writes it.
+
+    Raises:
+        TaskError: It cannot be written.
+        OSError: It cannot be written.
+        InvalidArgumentError: A parameter is outside its domain.
+    """
+
+    def without_task(reason: HouseReason, error: EvonavError) -> Outcome:
+        return Outcome(index=index, house=name, reason=reason, detail=str(error))
+
+    try:
+        house = House(text, name=name)
+    except HouseError as error:
+        return without_task("malformed_house", error)
+    try:
+        task = options.generate(house)
+    except TaskRejectedError as error:
+        return without_task(error.reason, error)
+    except (HouseError, SimulationError) as error:
+        return without_task("unusable_house", error)
+    root = put(task, out, f"{index}-{os.getpid()}")
+    return Outcome(
+        index=index,
+        house=name,
+        task_id=task.task_id,
+        house_sha256=task.header.house.sha256,
+        task_sha256=sha256_of_file(root / "task.json"),
+    )
+
+
+def put(task: Task, out: Path, label: str) -> Path:
+    """Writes a task's folder wholly or not at all.
+
+    Args:
+        task: A task.
+        out: Where its folder is to be; one of the same name is replaced.
+        label: No other process uses it.
+
+    Raises:
+        TaskError: It cannot be written.
+        OSError: It cannot be moved.
+    """
+    beside = out / PARTIAL_NAME / label
+    root = out / task.task_id
+    try:
+        written = write_task(task, beside)
+        if root.exists():
+            root.rename(beside / "replaced")
+        written.rename(root)
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+    return root
