@@ -13,18 +13,23 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from evonav._core import __version__
 from evonav.errors import HouseError, InvalidArgumentError, StoreError, TaskError
-from evonav.folders import sha256_of_file, write_atomically, writing
+from evonav.folders import sha256_of_file, writing
 from evonav.generation.journal import Journal, Outcome
-from evonav.generation.worker import PARTIAL_NAME, WORK, GenerationOptions
+from evonav.generation.pipeline import short_name
+from evonav.generation.worker import MAX_DETAIL, PARTIAL_NAME, WORK, GenerationOptions
 from evonav.house.files import HouseTexts, named_set
 from evonav.parallel import Answer, EngineName, Job, Pool, open_pool
-from evonav.tasks.records import sha256_of
-
-DATASET_NAME = "dataset.json"
+from evonav.tasks.dataset import (
+    DATASET_NAME,
+    DatasetRecord,
+    HouseRejection,
+    SourceFile,
+    TaskEntry,
+    write_dataset,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +112,13 @@ def generate_dataset(
     if limit is not None and limit < 1:
         raise InvalidArgumentError(f"argument `limit` is {limit}, expected None or at least 1")
     texts = HouseTexts(houses)
-    run = {"evonav": __version__, "houses": _source(houses, texts), "limit": limit, "options": options.as_json()}
+    sources = _sources(houses, texts)
+    run = {
+        "evonav": __version__,
+        "houses": {source.name: source.sha256 for source in sources},
+        "limit": limit,
+        "options": options.as_json(),
+    }
     out = out.resolve()  # workers of a cluster have other working directories
     with writing(out), Journal(out, run) as journal:
         again = [i for i, done in journal.outcomes.items() if not _is_kept(done, out, retry_failed)]
@@ -129,7 +140,7 @@ def generate_dataset(
                 state.do_all(pool)
             shutil.rmtree(out / PARTIAL_NAME, ignore_errors=True)
             journal.rewrite()
-            _write_dataset(out, run, journal)
+            _write_dataset(out, sources, options, limit, in_order(journal))
         return state.summary(out)
 
 
@@ -182,7 +193,9 @@ class _Run:
     def _record(self, answer: Answer) -> None:
         name = self._names.pop(answer.key)
         if answer.failure is not None:
-            outcome = Outcome(index=answer.key, house=name, reason=answer.failure, detail=answer.detail)
+            outcome = Outcome(
+                index=answer.key, house=short_name(name), reason=answer.failure, detail=answer.detail[-MAX_DETAIL:]
+            )
         else:
             values = json.loads(answer.text)
             if "stop" in values:
@@ -236,44 +249,60 @@ def _is_kept(outcome: Outcome, out: Path, retry_failed: bool) -> bool:
         return False
 
 
-def _write_dataset(out: Path, run: dict[str, Any], journal: Journal) -> None:
+def _write_dataset(
+    out: Path, sources: tuple[SourceFile, ...], options: GenerationOptions, limit: int | None, outcomes: list[Outcome]
+) -> None:
     """Writes what the folder holds.
 
     Raises:
-        TaskError: There is no task, or two have the same id.
+        TaskError: There is no task, two have the same id, or it cannot be written.
     """
-    outcomes = in_order(journal)
-    made = [outcome for outcome in outcomes if outcome.task_id is not None]
-    reasons = Counter(str(outcome.reason) for outcome in outcomes if outcome.reason is not None)
-    if not made:
-        counts = ", ".join(f"{count} {reason}" for reason, count in reasons.most_common())
-        first = f"; the first: {outcomes[0].detail}" if outcomes else ""
-        raise TaskError(f"{run['houses']['name']}: no house gives a task ({counts or 'no house'}){first}")
-    houses: dict[str, str] = {}
-    for outcome in made:
-        task_id = str(outcome.task_id)
-        if task_id in houses:
-            raise TaskError(f"houses {houses[task_id]} and {outcome.house} both give a task named {task_id}")
-        houses[task_id] = outcome.house
-    content = {
-        **run,
-        "num_houses": len(outcomes),
-        "tasks": [outcome.task_id for outcome in made],
-        "rejected": dict(sorted(reasons.items())),
-    }
-    write_atomically(out / DATASET_NAME, json.dumps(content, indent=2, sort_keys=True) + "\n")
+    entries: dict[str, TaskEntry] = {}
+    rejections: list[HouseRejection] = []
+    for done in outcomes:
+        if done.reason is not None:
+            rejections.append(
+                HouseRejection(house=done.house, reason=done.reason, stage=done.stage, detail=done.detail)
+            )
+        elif done.task_id in entries:
+            raise TaskError(f"two houses give a task named {done.task_id}; the second is {done.house}")
+        else:
+            values = {"task_id": done.task_id, "sha256": done.task_sha256, "house_sha256": done.house_sha256}
+            entry = TaskEntry.model_validate(values)
+            entries[entry.task_id] = entry
+    record = DatasetRecord(
+        name=options.dataset,
+        split=options.split,
+        generator=f"evonav {__version__}",
+        sources=sources,
+        seed=options.seed,
+        limit=limit,
+        subset=None,
+        allow_unknown_assets=options.allow_unknown_assets,
+        parameters=options.parameters,
+        num_houses=len(outcomes),
+        num_tasks=len(entries),
+        tasks=tuple(entries[task_id] for task_id in sorted(entries)),
+        rejections=tuple(rejections),
+    )
+    if not entries:
+        counts = ", ".join(f"{count} {reason}" for reason, count in record.num_rejected.most_common())
+        first = f"; the first: {rejections[0].detail}" if rejections else ""
+        raise TaskError(f"{sources[0].name}: no house gives a task ({counts or 'no house'}){first}")
+    write_dataset(record, out)
 
 
-def _source(houses: Path | str, texts: HouseTexts) -> dict[str, str]:
-    """Name and checksum of the houses.
+def _sources(houses: Path | str, texts: HouseTexts) -> tuple[SourceFile, ...]:
+    """Names and checksums of the files of houses.
 
     Raises:
         HouseError: A file cannot be read.
     """
+    published = named_set(houses) is not None
     try:
-        digests = [sha256_of_file(file) for file in texts.files]
+        return tuple(
+            SourceFile(name=str(houses) if published else file.name, sha256=sha256_of_file(file))
+            for file in texts.files
+        )
     except OSError as error:
         raise HouseError(f"{houses}: cannot be read: {error}") from error
-    # Of a folder: of its files' checksums, in order.
-    digest = digests[0] if len(digests) == 1 else sha256_of("\n".join(digests).encode())
-    return {"name": str(houses) if named_set(houses) else Path(houses).name, "sha256": digest}

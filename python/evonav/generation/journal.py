@@ -8,35 +8,34 @@ import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Annotated, Any, Literal, get_args
+from typing import Any, get_args
 
-from pydantic import Field, ValidationError
+from pydantic import NonNegativeInt, ValidationError
 
 from evonav.errors import StoreError
 from evonav.folders import check_same_run, write_atomically
-from evonav.generation.pipeline import RejectReason
 from evonav.parallel import FailureKind
+from evonav.tasks.dataset import RejectReason
 from evonav.tasks.records import Record, Sha256
 
 NAME = "journal.jsonl"
-
-HouseReason = Literal[RejectReason, "malformed_house", FailureKind]
-"""Why a house gives no task; `crash`, `timeout` and `error` are failures of the generator, not of the house."""
 
 
 class Outcome(Record):
     """What became of a house: a task, or a reason why not."""
 
-    index: Annotated[int, Field(ge=0)]
+    index: NonNegativeInt
     """Of the house in its source."""
     house: str
     task_id: str | None = None
     house_sha256: Sha256 | None = None
     task_sha256: Sha256 | None = None
     """Of `task.json`, which holds the checksums of the task's other files."""
-    reason: HouseReason | None = None
+    reason: RejectReason | None = None
+    stage: NonNegativeInt = 0
+    """Of a reason: at which it was found."""
     detail: str = ""
-    """Of a reason: a sentence, or a traceback."""
+    """Of a reason: a sentence, or the end of a traceback."""
 
     @property
     def is_failure(self) -> bool:

@@ -156,7 +156,7 @@ def generate_tasks(
 
 def house_source(house: House) -> HouseSource:
     """What a header says of a house."""
-    name = house.name.replace("\\", "/").rsplit("/", 1)[-1]
+    name = short_name(house.name)
     place = re.search(r":([1-9]\d*)(?:\[(\d+)\])?$", name)
     index = None if place is None else int(place[2]) if place[2] else int(place[1]) - 1
     return HouseSource(
@@ -195,6 +195,11 @@ def _image(data: bytes, side_px: int) -> NDArray[np.uint8]:
     coarse = pixels & np.uint8(0xFC)
     coarse.flags.writeable = False
     return coarse
+
+
+def short_name(name: str) -> str:
+    """A house's name without the folder of its file."""
+    return name.replace("\\", "/").rsplit("/", 1)[-1]
 
 
 def _slug(name: str) -> str:

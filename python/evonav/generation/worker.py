@@ -10,14 +10,18 @@ from typing import Any
 
 from evonav.errors import EvonavError, HouseError, InvalidArgumentError, SimulationError, TaskError
 from evonav.folders import sha256_of_file
-from evonav.generation.journal import HouseReason, Outcome
-from evonav.generation.pipeline import TaskRejectedError, generate_task
+from evonav.generation.journal import Outcome
+from evonav.generation.pipeline import TaskRejectedError, generate_task, short_name
 from evonav.house import House
-from evonav.tasks.manifest import GenerationParameters, Task, write_task
+from evonav.tasks import write_task
+from evonav.tasks.dataset import RejectReason
+from evonav.tasks.manifest import GenerationParameters, Task
 
 WORK = "evonav.generation.worker:make_worker"
 PARTIAL_NAME = ".partial"
 """Beside the tasks: those that are being written."""
+MAX_DETAIL = 2000
+"""Characters, as `dataset.json` has them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +93,9 @@ def do_house(index: int, name: str, text: str, options: GenerationOptions, out: 
         InvalidArgumentError: A parameter is outside its domain.
     """
 
-    def without_task(reason: HouseReason, error: EvonavError) -> Outcome:
-        return Outcome(index=index, house=name, reason=reason, detail=str(error))
+    def without_task(reason: RejectReason, error: EvonavError, stage: int = 0) -> Outcome:
+        detail = str(error)[:MAX_DETAIL]
+        return Outcome(index=index, house=short_name(name), reason=reason, stage=stage, detail=detail)
 
     try:
         house = House(text, name=name)
@@ -99,13 +104,13 @@ def do_house(index: int, name: str, text: str, options: GenerationOptions, out: 
     try:
         task = options.generate(house)
     except TaskRejectedError as error:
-        return without_task(error.reason, error)
+        return without_task(error.reason, error, error.stage)
     except (HouseError, SimulationError) as error:
         return without_task("unusable_house", error)
     root = put(task, out, f"{index}-{os.getpid()}")
     return Outcome(
         index=index,
-        house=name,
+        house=short_name(name),
         task_id=task.task_id,
         house_sha256=task.header.house.sha256,
         task_sha256=sha256_of_file(root / "task.json"),

@@ -14,9 +14,20 @@ from evonav.tasks.records import Id, Record, Sha256, field_error, parse_record, 
 DATASET_NAME = "dataset.json"
 
 RejectReason = Literal[
-    "too_few_rooms", "no_start", "start_not_free", "start_outside", "disconnected", "no_valid_goal", "unusable_house"
+    "too_few_rooms",
+    "no_start",
+    "start_not_free",
+    "start_outside",
+    "disconnected",
+    "no_valid_goal",
+    "malformed_house",
+    "unusable_house",
+    "crash",
+    "timeout",
+    "error",
 ]
-"""Why a house gives no task; `unusable_house` when the world cannot be built, such as for an unknown asset."""
+"""Why a house gives no task; `unusable_house` when the world cannot be built, such as for an unknown asset. At a
+`crash`, `timeout` or `error` it is the generator that failed."""
 
 
 class SourceFile(Record):
