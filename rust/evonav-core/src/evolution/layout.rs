@@ -8,7 +8,7 @@ use crate::{
         catalogue::{Catalogue, UnknownAssets},
         part::Part,
         placement::Place,
-        shapes::shape_of,
+        shapes::shape_in,
     },
     geometry::{Aabb, Vec2, Vec3, distance_2d_m, euler_rotation_deg},
     house::{House, HouseDelta, ObjectMove, Opening},
@@ -95,7 +95,7 @@ impl Layout {
         let mut items = Vec::with_capacity(house.objects.len());
         for object in &house.objects {
             let asset = catalogue.asset_of(house, object, unknown)?;
-            let parts = shape_of(&asset);
+            let parts = shape_in(&asset, object.condition());
             let placement = Placement {
                 position_m: object.position_m,
                 rotation_deg: object.rotation_deg,

@@ -10,6 +10,7 @@ pub use delta::{AddedObject, HouseDelta, ObjectMove, StateChange};
 
 use crate::{
     Error,
+    assets::shapes::Condition,
     geometry::{Vec2, Vec3, polygon_contains},
 };
 
@@ -131,8 +132,10 @@ pub struct Object {
     pub object_type: Option<String>,
     /// Fixed by the file.
     pub is_kinematic: bool,
-    /// `openness` of the object, if given.
+    /// `openness` of the object, if given: 0 closed, 1 open.
     pub openness: Option<f64>,
+    /// `isOn` of the object, if given.
+    pub is_on: Option<bool>,
 }
 
 /// Where the house file puts the agent.
@@ -144,6 +147,13 @@ pub struct Start {
     pub yaw_deg: f64,
     /// `metadata.agent.horizon`, degrees.
     pub horizon_deg: f64,
+}
+
+impl Object {
+    /// What the file says of its state.
+    pub fn condition(&self) -> Condition {
+        Condition { openness: self.openness, is_on: self.is_on }
+    }
 }
 
 impl House {

@@ -246,6 +246,7 @@ fn object(node: &Node<'_>, parent: Option<usize>) -> Result<Object, Error> {
             .maybe("kinematic")?
             .map_or(Ok(false), |kinematic| kinematic.boolean())?,
         openness: node.maybe("openness")?.map(|openness| openness.number(0.0, 1.0)).transpose()?,
+        is_on: node.maybe("isOn")?.map(|is_on| is_on.boolean()).transpose()?,
     })
 }
 

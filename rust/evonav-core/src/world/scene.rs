@@ -12,7 +12,7 @@ use crate::{
         Asset,
         catalogue::{Catalogue, UnknownAssets},
         part::{Part, aabb_of},
-        shapes::{lit, shape_of},
+        shapes::{lit, shape_in},
     },
     error::Error,
     geometry::{Aabb, IDENTITY, Mat3, Vec3, euler_rotation_deg},
@@ -95,7 +95,7 @@ impl Body {
     fn object(object: &Object, asset: &Asset, parent: Option<(&Self, bool)>) -> Self {
         let rotation = euler_rotation_deg(object.rotation_deg);
         let place = |part: &Part| part.placed(object.position_m, &rotation);
-        let mut parts: Vec<Part> = shape_of(asset).iter().map(place).collect();
+        let mut parts: Vec<Part> = shape_in(asset, object.condition()).iter().map(place).collect();
         let mut centre_m = object.position_m;
         let mut aabb = aabb_of(&parts);
         if let Some((parent, is_known)) = parent.filter(|_| !object.is_kinematic) {

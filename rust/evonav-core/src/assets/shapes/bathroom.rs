@@ -1,8 +1,10 @@
 //! Bathroom fixtures, laundry machines and textiles that hang.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::{
     colour::{CERAMIC, DARK, FABRICS, STEEL, WOODS, shade},
-    sketch::{Along, Sketch, between, ends, inside},
+    sketch::{Along, Motion, Sketch, between, ends, inside},
 };
 
 /// Tank at the back, bowl in front, seat and open lid.
@@ -31,7 +33,11 @@ pub fn toilet(s: &mut Sketch<'_>) {
         12,
         [120, 150, 165],
     );
-    s.cuboid(between(x, 0.12, 0.88), [rim, 0.8 * h], between(z, 0.28, 0.32), shade(white, 0.97));
+    let pivot_m = [0.0, rim + 0.004, between(z, 0.28, 0.32)[1]];
+    s.closing(Motion::Hinge { pivot_m, axis: Along::X, angle_rad: FRAC_PI_2 }, |s| {
+        let lid = between(z, 0.28, 0.32);
+        s.cuboid(between(x, 0.12, 0.88), [rim, 0.8 * h], lid, shade(white, 0.97));
+    });
 }
 
 /// A tub: bottom and four sides.
@@ -191,8 +197,15 @@ pub fn washer(s: &mut Sketch<'_>) {
         [front, front + 0.01],
         shade(white, 0.75),
     );
-    let door = [between(x, 0.2, 0.8), between(y, 0.2, 0.72), [front, z[1] - 0.01]];
-    s.round(Along::Z, 1.0, 16, door, STEEL);
-    let glass = [between(x, 0.28, 0.72), between(y, 0.27, 0.65), [z[1] - 0.01, z[1]]];
-    s.round(Along::Z, 1.0, 16, glass, DARK);
+    let pivot_m = [between(x, 0.2, 0.8)[0], 0.0, front];
+    s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {
+        let door = [between(x, 0.2, 0.8), between(y, 0.2, 0.72), [front, z[1] - 0.01]];
+        s.round(Along::Z, 1.0, 16, door, STEEL);
+        let glass = [between(x, 0.28, 0.72), between(y, 0.27, 0.65), [z[1] - 0.01, z[1]]];
+        s.round(Along::Z, 1.0, 16, glass, DARK);
+    });
+    if s.is_ajar() {
+        let drum = [between(x, 0.24, 0.76), between(y, 0.24, 0.68), [front, front + 0.001]];
+        s.round(Along::Z, 1.0, 16, drum, DARK);
+    }
 }

@@ -1,20 +1,27 @@
 //! Screens, lamps and gadgets.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::{
     colour::{DARK, STEEL, lightest, shade},
-    sketch::{Along, Sketch, between, inside},
+    sketch::{Along, Motion, Sketch, between, inside},
 };
 
 const SCREEN: [u8; 3] = [25, 28, 34];
+/// A picture, from afar.
+const LIT_SCREEN: [u8; 3] = [120, 165, 215];
+/// A lamp's shade with light in it.
+const LIT_SHADE: [u8; 3] = [255, 244, 205];
 
 /// A flat screen; on a foot, or bare where the box is too thin for one.
 pub fn television(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
     let frame = s.tint(0, DARK);
+    let screen = if s.condition().is_on == Some(true) { LIT_SCREEN } else { SCREEN };
     if d < 0.15 {
         s.cuboid(x, y, [z[0], z[1] - 0.01], frame);
-        s.cuboid(inside(x, 0.03 * w), inside(y, 0.04 * h), [z[1] - 0.01, z[1]], SCREEN);
+        s.cuboid(inside(x, 0.03 * w), inside(y, 0.04 * h), [z[1] - 0.01, z[1]], screen);
         return;
     }
     let panel = [-0.03, 0.03];
@@ -24,7 +31,7 @@ pub fn television(s: &mut Sketch<'_>) {
         inside(x, 0.03 * w),
         [bottom + 0.04 * h, 0.97 * h],
         [panel[1], panel[1] + 0.006],
-        SCREEN,
+        screen,
     );
     s.cuboid(
         between(x, 0.44, 0.56),
@@ -44,8 +51,12 @@ pub fn laptop(s: &mut Sketch<'_>) {
     let lid = between(z, 0.0, 0.06);
     s.cuboid(x, [0.0, base], z, shell);
     s.cuboid(inside(x, 0.06 * w), [base, base + 0.004], between(z, 0.15, 0.6), DARK);
-    s.cuboid(x, [base, h], lid, shell);
-    s.cuboid(inside(x, 0.04 * w), [base + 0.06 * h, 0.95 * h], [lid[1], lid[1] + 0.004], SCREEN);
+    let pivot_m = [0.0, base + 0.004, lid[1] + 0.004];
+    s.closing(Motion::Hinge { pivot_m, axis: Along::X, angle_rad: FRAC_PI_2 }, |s| {
+        s.cuboid(x, [base, h], lid, shell);
+        let screen = [base + 0.06 * h, 0.95 * h];
+        s.cuboid(inside(x, 0.04 * w), screen, [lid[1], lid[1] + 0.004], SCREEN);
+    });
 }
 
 /// A screen, a keyboard in front and a tower beside.
@@ -66,6 +77,7 @@ pub fn lamp(s: &mut Sketch<'_>) {
     let metal = s.tint(0, s.choose(&[DARK, STEEL, [150, 115, 70]], DARK));
     let cloths = [[240, 228, 200], [225, 225, 220], [215, 180, 130]];
     let cloth = lightest(s.asset(), s.choose(&cloths, cloths[0]));
+    let cloth = if s.condition().is_on == Some(true) { LIT_SHADE } else { cloth };
     let is_floor = s.asset().category == "FloorLamp";
     let (foot, shade_from) = if is_floor { (0.02, 0.82) } else { (0.07, 0.55) };
     let pole = (0.012 + 0.01 * w) / w.max(d);

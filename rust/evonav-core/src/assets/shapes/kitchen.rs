@@ -1,9 +1,14 @@
 //! Counters, the fridge, appliances and cookware.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::{
     colour::{Colour, DARK, STEEL, WOODS, shade},
-    sketch::{Along, Sketch, Span, between, ends, inside},
+    sketch::{Along, Motion, Sketch, Span, between, ends, inside},
 };
+
+/// Inside of what is open.
+const INSIDE: Colour = [48, 46, 44];
 
 /// Depth of ProcTHOR's counters and of each wing of its corner counters.
 const COUNTER_DEPTH_M: f64 = 0.61;
@@ -91,11 +96,14 @@ pub fn fridge(s: &mut Sketch<'_>) {
     }
     let split = 0.68 * h;
     for (is_upper, y) in [(false, [0.05, split - 0.005]), (true, [split + 0.005, h - 0.01])] {
-        s.cuboid(x, y, [z[1] - 0.105, z[1] - 0.06], door);
-        let reach = 0.35 * (y[1] - y[0]);
-        let low = if is_upper { y[0] + 0.05 } else { y[1] - 0.05 - reach };
-        let handle = [x[0] + 0.06 * w, x[0] + 0.06 * w + 0.03];
-        s.cuboid(handle, [low, low + reach], [z[1] - 0.06, z[1]], grip);
+        let pivot_m = [x[1], 0.0, z[1] - 0.06];
+        s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: FRAC_PI_2 }, |s| {
+            s.cuboid(x, y, [z[1] - 0.105, z[1] - 0.06], door);
+            let reach = 0.35 * (y[1] - y[0]);
+            let low = if is_upper { y[0] + 0.05 } else { y[1] - 0.05 - reach };
+            let handle = [x[0] + 0.06 * w, x[0] + 0.06 * w + 0.03];
+            s.cuboid(handle, [low, low + reach], [z[1] - 0.06, z[1]], grip);
+        });
     }
 }
 
@@ -104,14 +112,23 @@ pub fn microwave(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let body = s.tint(0, s.choose(&[[200, 200, 202], [60, 60, 64], [230, 230, 228]], STEEL));
     s.cuboid(x, y, [z[0], z[1] - 0.03], body);
-    s.cuboid(between(x, 0.03, 0.74), between(y, 0.08, 0.92), [z[1] - 0.03, z[1] - 0.015], DARK);
+    let pivot_m = [x[0], 0.0, z[1] - 0.03];
+    s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {
+        s.cuboid(between(x, 0.03, 0.74), between(y, 0.08, 0.92), [z[1] - 0.03, z[1] - 0.015], DARK);
+    });
     s.cuboid(
         between(x, 0.77, 0.98),
         between(y, 0.08, 0.92),
         [z[1] - 0.03, z[1] - 0.015],
         shade(body, 0.7),
     );
-    s.cuboid(between(x, 0.7, 0.73), between(y, 0.15, 0.85), [z[1] - 0.03, z[1]], STEEL);
+    s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {
+        s.cuboid(between(x, 0.7, 0.73), between(y, 0.15, 0.85), [z[1] - 0.03, z[1]], STEEL);
+    });
+    if s.is_ajar() {
+        let hollow = [between(x, 0.06, 0.72), between(y, 0.12, 0.88)];
+        s.cuboid(hollow[0], hollow[1], [z[1] - 0.03, z[1] - 0.029], INSIDE);
+    }
 }
 
 /// Back column, head, drip tray and pot.

@@ -28,9 +28,40 @@ use sketch::Sketch;
 /// At least one part; the box around them is `asset.size_m` about the origin, within rounding.
 /// Sizes that are not positive are taken as 1 mm.
 pub fn shape_of(asset: &Asset) -> Vec<Part> {
-    let mut sketch = Sketch::new(asset);
+    shape_in(asset, Condition::default())
+}
+
+/// What is known of a thing's state.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Condition {
+    /// 0 closed, 1 open; `None` as [`shape_of`] draws it.
+    pub openness: Option<f64>,
+    /// Whether a lamp or screen is lit; `None` as [`shape_of`] draws it.
+    pub is_on: Option<bool>,
+}
+
+/// The parts of an asset in a state, in the object frame.
+///
+/// # Returns
+/// [`shape_of`] in the default state. What is open may reach out of the asset's box.
+pub fn shape_in(asset: &Asset, condition: Condition) -> Vec<Part> {
+    let mut sketch = Sketch::new(asset, condition);
     draw(&mut sketch);
     sketch.finish()
+}
+
+/// Openness in which [`shape_of`] draws an asset; `None` if its shape has nothing that opens.
+pub fn drawn_openness(asset: &Asset) -> Option<f64> {
+    let at = |openness| shape_in(asset, Condition { openness: Some(openness), is_on: None });
+    let is_drawn_open =
+        matches!(asset.category.as_str(), "Laptop" | "Toilet" | "Box").then_some(1.0);
+    (at(0.0) != at(1.0)).then_some(is_drawn_open.unwrap_or(0.0))
+}
+
+/// Whether an asset's shape shows whether it is on.
+pub fn shows_light(asset: &Asset) -> bool {
+    let at = |is_on| shape_in(asset, Condition { openness: None, is_on: Some(is_on) });
+    at(true) != at(false)
 }
 
 /// Words in the categories of Objaverse assets, and the category whose shape fits; first match.

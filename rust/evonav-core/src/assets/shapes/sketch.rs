@@ -1,12 +1,15 @@
 //! Drawing aid: parts given by where they begin and end inside an asset's box.
 
-use super::colour::{self, Colour};
+use super::{
+    Condition,
+    colour::{self, Colour},
+};
 use crate::{
     assets::{
         Asset,
         part::{Part, Primitive, aabb_of},
     },
-    geometry::{IDENTITY, Mat3, Vec3},
+    geometry::{IDENTITY, Mat3, Vec3, add, compose, euler_rotation_deg, rotate, sub},
 };
 
 /// From where to where along one axis, metres.
@@ -20,17 +23,62 @@ pub enum Along {
     Z,
 }
 
+/// How parts move as a thing opens: turning about an axis through a point of the box (x, height, z).
+#[derive(Debug, Clone, Copy)]
+pub enum Motion {
+    /// A turn.
+    Hinge { pivot_m: Vec3, axis: Along, angle_rad: f64 },
+    /// A shift.
+    Slide { by_m: Vec3 },
+}
+
+/// Parts that move, and in which state they are drawn.
+struct Moving {
+    parts: std::ops::Range<usize>,
+    motion: Motion,
+    is_drawn_open: bool,
+}
+
 /// Parts being drawn in an asset's box. x and z run about 0, y from the floor (0) up.
 pub struct Sketch<'a> {
     asset: &'a Asset,
+    condition: Condition,
     size_m: Vec3,
     parts: Vec<Part>,
+    moving: Vec<Moving>,
 }
 
 impl<'a> Sketch<'a> {
-    pub fn new(asset: &'a Asset) -> Self {
+    pub fn new(asset: &'a Asset, condition: Condition) -> Self {
         let positive = |edge: f64| if edge.is_finite() { edge.max(1e-3) } else { 1e-3 };
-        Self { asset, size_m: asset.size_m.map(positive), parts: Vec::new() }
+        let size_m = asset.size_m.map(positive);
+        Self { asset, condition, size_m, parts: Vec::new(), moving: Vec::new() }
+    }
+
+    /// Whether it is known to be closed or open, and on or off.
+    pub fn condition(&self) -> Condition {
+        self.condition
+    }
+
+    /// Whether it is known not to be closed: what only then shows is worth drawing.
+    pub fn is_ajar(&self) -> bool {
+        self.condition.openness.is_some_and(|openness| openness > 0.0)
+    }
+
+    /// What `draw` draws closed moves by `motion` when the thing is fully open.
+    pub fn opening(&mut self, motion: Motion, draw: impl FnOnce(&mut Self)) {
+        self.record(motion, false, draw);
+    }
+
+    /// What `draw` draws open moves by `motion` when the thing is closed.
+    pub fn closing(&mut self, motion: Motion, draw: impl FnOnce(&mut Self)) {
+        self.record(motion, true, draw);
+    }
+
+    fn record(&mut self, motion: Motion, is_drawn_open: bool, draw: impl FnOnce(&mut Self)) {
+        let first = self.parts.len();
+        draw(self);
+        self.moving.push(Moving { parts: first..self.parts.len(), motion, is_drawn_open });
     }
 
     pub fn asset(&self) -> &'a Asset {
@@ -156,7 +204,8 @@ impl<'a> Sketch<'a> {
         self.parts.push(Part { primitive, centre_m, rotation, colour });
     }
 
-    /// The parts, stretched (by a little, or not at all) to fill the box.
+    /// The parts, stretched (by a little, or not at all) to fill the box as they are drawn, then
+    /// moved to where its state has them.
     pub fn finish(mut self) -> Vec<Part> {
         if self.parts.is_empty() {
             self.block([160, 150, 140]);
@@ -170,7 +219,30 @@ impl<'a> Sketch<'a> {
                 stretch(part, middle, scale);
             }
         }
+        if let Some(openness) = self.condition.openness {
+            for Moving { parts, motion, is_drawn_open } in &self.moving {
+                let share = if *is_drawn_open { 1.0 - openness } else { openness };
+                let parts = self.parts.get_mut(parts.clone()).into_iter().flatten();
+                parts.for_each(|part| move_part(part, motion, share, 0.5 * self.size_m[1]));
+            }
+        }
         self.parts
+    }
+}
+
+/// Moves a part by a share of a motion; `origin_m` is the height of the object frame's origin.
+fn move_part(part: &mut Part, motion: &Motion, share: f64, origin_m: f64) {
+    match *motion {
+        Motion::Slide { by_m } => part.centre_m = add(part.centre_m, by_m.map(|by| share * by)),
+        Motion::Hinge { pivot_m: [x, y, z], axis, angle_rad } if share != 0.0 => {
+            let pivot_m = [x, y - origin_m, z];
+            let mut angles_deg = [0.0; 3];
+            angles_deg[axis as usize] = (share * angle_rad).to_degrees();
+            let turn = euler_rotation_deg(angles_deg);
+            part.centre_m = add(pivot_m, rotate(&turn, sub(part.centre_m, pivot_m)));
+            part.rotation = compose(&turn, &part.rotation);
+        }
+        Motion::Hinge { .. } => {}
     }
 }
 

@@ -1,8 +1,10 @@
 //! Things that hold things: carcasses with drawers, doors or open boards, shelving, carts, safes.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::{
     colour::{Colour, DARK, STEEL, WOODS, shade},
-    sketch::{Along, Sketch, between, ends, inside},
+    sketch::{Along, Motion, Sketch, Span, between, ends, inside},
 };
 
 /// Dressers, television stands, nightstands: open where things were seen inside, drawers elsewhere.
@@ -56,12 +58,37 @@ fn drawers(s: &mut Sketch<'_>, [columns, rows]: [usize; 2], y: [f64; 2], colour:
                 inside(between(span, i as f64 / n, (i as f64 + 1.0) / n), 0.01)
             };
             let (x, y) = (part(x, column, columns), part(y, row, rows));
-            s.cuboid(x, y, face, colour);
-            let grip = between(x, 0.4, 0.6);
-            let level = 0.5 * (y[0] + y[1]);
-            s.cuboid(grip, [level - 0.008, level + 0.008], [face[1], z[1]], shade(colour, 0.45));
+            let front = |s: &mut Sketch<'_>| {
+                s.cuboid(x, y, face, colour);
+                let grip = between(x, 0.4, 0.6);
+                let (low, high) = (0.5 * (y[0] + y[1]) - 0.008, 0.5 * (y[0] + y[1]) + 0.008);
+                s.cuboid(grip, [low, high], [face[1], z[1]], shade(colour, 0.45));
+            };
+            if row + 1 < rows {
+                front(s);
+                continue;
+            }
+            // The upper row is the one that is pulled out.
+            let depth = 0.5 * (z[1] - z[0]);
+            s.opening(Motion::Slide { by_m: [0.0, 0.0, 0.8 * depth] }, |s| {
+                front(s);
+                tray(s, inside(x, 0.01), [y[0] + 0.01, y[1] - 0.02], [face[0] - depth, face[0]]);
+            });
         }
     }
+}
+
+/// Bottom, sides and back of a drawer, which only show when it is pulled out.
+pub fn tray(s: &mut Sketch<'_>, x: Span, y: Span, z: Span) {
+    if !s.is_ajar() {
+        return;
+    }
+    let wood = WOODS[0];
+    s.cuboid(x, [y[0], y[0] + 0.01], z, shade(wood, 0.9));
+    for side in ends(x, 0.01, 0.0) {
+        s.cuboid(side, y, z, wood);
+    }
+    s.cuboid(x, y, [z[0], z[0] + 0.01], wood);
 }
 
 /// Open shelving: sides, back and boards at the recorded heights.
@@ -110,12 +137,15 @@ pub fn safe(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let steel = s.tint(0, [90, 95, 100]);
     s.cuboid(x, y, [z[0], z[1] - 0.03], steel);
-    s.cuboid(
-        inside(x, 0.08 * w),
-        inside(y, 0.08 * h),
-        [z[1] - 0.03, z[1] - 0.015],
-        shade(steel, 1.2),
-    );
-    let dial = [between(x, 0.42, 0.58), between(y, 0.42, 0.58), [z[1] - 0.015, z[1]]];
-    s.round(Along::Z, 1.0, 8, dial, DARK);
+    let door = [inside(x, 0.08 * w), inside(y, 0.08 * h)];
+    let pivot_m = [door[0][0], 0.0, z[1] - 0.03];
+    s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {
+        s.cuboid(door[0], door[1], [z[1] - 0.03, z[1] - 0.015], shade(steel, 1.2));
+        let dial = [between(x, 0.42, 0.58), between(y, 0.42, 0.58), [z[1] - 0.015, z[1]]];
+        s.round(Along::Z, 1.0, 8, dial, DARK);
+    });
+    if s.is_ajar() {
+        let hollow = [inside(x, 0.12 * w), inside(y, 0.12 * h)];
+        s.cuboid(hollow[0], hollow[1], [z[1] - 0.03, z[1] - 0.029], shade(steel, 0.4));
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::{
     colour::{Colour, WOODS, shade},
-    sketch::{Sketch, Span, between, ends, inside},
+    sketch::{Motion, Sketch, Span, between, ends, inside},
     storage,
 };
 
@@ -141,9 +141,31 @@ pub fn desk(s: &mut Sketch<'_>) {
 fn drawer_block(s: &mut Sketch<'_>, x: Span, top: f64, colour: Colour) {
     let z = s.spans()[2];
     s.cuboid(x, [0.08, top], inside(z, 0.02), colour);
+    let third = (top - 0.08) / 3.0;
     for k in 1..4 {
-        let y = 0.08 + (top - 0.08) * (f64::from(k) - 0.5) / 3.0;
-        let grip = [z[1] - 0.025, z[1] - 0.008];
-        s.cuboid(between(x, 0.35, 0.65), [y - 0.008, y + 0.008], grip, shade(colour, 0.5));
+        let y = 0.08 + third * (f64::from(k) - 0.5);
+        let grip = |s: &mut Sketch<'_>| {
+            let z = [z[1] - 0.025, z[1] - 0.008];
+            s.cuboid(between(x, 0.35, 0.65), [y - 0.008, y + 0.008], z, shade(colour, 0.5));
+        };
+        if k < 3 {
+            grip(s);
+            continue;
+        }
+        // The upper drawer is the one that is pulled out.
+        let depth = 0.5 * (z[1] - z[0]);
+        s.opening(Motion::Slide { by_m: [0.0, 0.0, 0.8 * depth] }, |s| {
+            grip(s);
+            if s.is_ajar() {
+                let (y, front) = ([y - 0.45 * third, y + 0.45 * third], z[1] - 0.02);
+                s.cuboid(inside(x, 0.01), y, [front - 0.012, front], shade(colour, 1.05));
+                storage::tray(
+                    s,
+                    inside(x, 0.02),
+                    [y[0], y[1] - 0.02],
+                    [front - depth, front - 0.012],
+                );
+            }
+        });
     }
 }

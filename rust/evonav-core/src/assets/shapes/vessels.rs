@@ -1,8 +1,10 @@
 //! Bins, boxes, bottles, cups and other vessels.
 
+use std::f64::consts::FRAC_PI_2;
+
 use super::{
     colour::{CERAMIC, DARK, STEEL, shade},
-    sketch::{Along, Sketch, between, ends, inside},
+    sketch::{Along, Motion, Sketch, between, ends, inside},
 };
 
 /// An open bin: four sides (or a round wall where the box is square) and a dark inside.
@@ -49,18 +51,23 @@ pub fn bag(s: &mut Sketch<'_>) {
     );
 }
 
-/// An open cardboard box.
+/// An open cardboard box; with two flaps, up within its box, where it is known how open it is.
 pub fn open_box(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
     let card = s.tint(0, [176, 132, 86]);
     let wall = (0.03 * w.min(d)).min(0.012);
     s.cuboid(inside(x, wall), [0.0, 0.04 * h], inside(z, wall), shade(card, 0.8));
+    let flap = if s.condition().openness.is_some() { (0.5 * d).min(0.4 * h) } else { 0.0 };
+    let y = [y[0], y[1] - flap];
     for x in ends(x, wall, 0.0) {
         s.cuboid(x, y, z, card);
     }
-    for z in ends(z, wall, 0.0) {
+    for (z, side) in ends(z, wall, 0.0).into_iter().zip([1.0, -1.0]) {
         s.cuboid(inside(x, wall), y, z, shade(card, 0.93));
+        let pivot_m = [0.0, y[1], if side > 0.0 { z[1] } else { z[0] }];
+        let motion = Motion::Hinge { pivot_m, axis: Along::X, angle_rad: -side * FRAC_PI_2 };
+        s.closing(motion, |s| s.cuboid(x, [y[1], y[1] + flap], z, shade(card, 1.05)));
     }
 }
 

@@ -1,0 +1,63 @@
+"""Θ from a file and from options of the command line."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from evonav.errors import InvalidArgumentError, TaskError
+from evonav.tasks.manifest import GenerationParameters
+from evonav.tasks.records import parse_record, read_file
+
+
+def read_parameters(
+    path: Path | None = None, *, evolve_probability: float | None = None, num_stages: str | None = None
+) -> GenerationParameters:
+    """Θ: the paper's, what a file says otherwise, and options over both.
+
+    Args:
+        path: JSON, or TOML where its name ends in `.toml`: any of the fields of `GenerationParameters`.
+        evolve_probability: Chance that a transition evolves the house.
+        num_stages: Numbers of stages to draw from, such as `6,8`.
+
+    Raises:
+        TaskError: The file cannot be read or is no such record; it names the field.
+        InvalidArgumentError: An option is outside its domain, or TOML cannot be read by this Python.
+    """
+    parameters = GenerationParameters() if path is None else parse_record(GenerationParameters, _json_of(path), path)
+    changes: dict[str, Any] = {}
+    if evolve_probability is not None:
+        if not 0.0 <= evolve_probability <= 1.0:
+            raise InvalidArgumentError(f"evolve_probability is {evolve_probability}, expected in 0..=1")
+        changes["evolve_probability"] = evolve_probability
+    if num_stages is not None:
+        try:
+            counts = tuple(int(part) for part in num_stages.split(","))
+        except ValueError:
+            counts = ()
+        if not counts or not all(1 <= count <= 64 for count in counts):
+            raise InvalidArgumentError(f"num_stages is {num_stages!r}, expected counts of 1..=64 such as 3,4,5")
+        changes["num_stages"] = counts
+    return parameters.model_copy(update=changes)
+
+
+def _json_of(path: Path) -> bytes:
+    data = read_file(path)
+    if path.suffix.lower() != ".toml":
+        return data
+    toml = _toml()
+    try:
+        return json.dumps(toml.loads(data.decode())).encode()
+    except ValueError as error:
+        raise TaskError(f"{path}: no TOML: {error}") from None
+
+
+def _toml() -> Any:  # noqa: ANN401
+    """Python's own `tomllib` from 3.11 on, or the package `tomli`."""
+    import importlib
+
+    for name in ("tomllib", "tomli"):
+        try:
+            return importlib.import_module(name)
+        except ModuleNotFoundError:
+            continue
+    raise InvalidArgumentError("TOML needs Python 3.11 or the package tomli: write the configuration as JSON")
