@@ -17,11 +17,11 @@ from evonav.evaluation.metrics import (
     stage_soft_spl,
     stage_spl,
     summarise,
-    wilson,
 )
 from evonav.evaluation.protocol import as_errored
 from evonav.evaluation.records import EndState, ErrorKind
 from evonav.evaluation.store import RunStore
+from evonav.significance import wilson
 
 LENGTHS = st.floats(0.0, 100.0)
 

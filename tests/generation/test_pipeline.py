@@ -18,7 +18,6 @@ from evonav.generation import (
     generate_tasks,
     write_task,
 )
-from evonav.generation.statistics import statistics_of
 from evonav.house import House, bundled_houses
 from evonav.tasks import Task, load_tasks
 from evonav.tasks.language import COLOURS, SIZES, STRUCTURES, noun_of
@@ -162,29 +161,3 @@ def test_bundled_tasks_are_what_the_script_makes() -> None:
 def test_bundled_tasks_are_small() -> None:
     with as_file(files("evonav") / "data" / "tasks") as directory:
         assert sum(path.stat().st_size for path in directory.rglob("*") if path.is_file()) < 4_000_000
-
-
-def test_statistics_are_what_a_plain_count_says(tasks: list[Task]) -> None:
-    found = statistics_of(tasks)
-    later = [(task, stage) for task in tasks for stage in task.oracle_stages if stage.stage > 1]
-    assert found.num_tasks == len(tasks)
-    assert sum(k * count for k, count in found.num_stages.items()) == len(later) + len(tasks)
-    assert sum(found.outcomes.values()) == found.num_later_goals == len(later)
-    evolved = [(task, stage) for task, stage in later if stage.evolution.outcome == "evolved"]
-    assert sum(k * count for k, count in found.num_evolutions.items()) == len(evolved)
-    assert sum(found.modes.values()) == found.num_evolved_goals == len(evolved)
-    assert sum(map(sum, found.num_relocated.values())) == sum(
-        change.is_relocated for _, stage in evolved for change in stage.evolution.changes
-    )
-    moved_before = [
-        any(
-            change.id == stage.target.id and change.is_relocated
-            for earlier in task.oracle_stages[: stage.stage]
-            for change in earlier.evolution.changes
-        )
-        for task, stage in later
-    ]
-    assert found.num_relocated_goals == sum(moved_before)
-    assert found.share_relocated_goals == sum(moved_before) / len(later)
-    assert found.num_repeated_rooms <= found.num_consecutive_evolutions <= len(evolved)
-    assert statistics_of([]).median_relocated_ratio == 0.0

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from evonav.cli.options import Limit
+from evonav.cli.tasks_stats import stats
 
 tasks_app = typer.Typer(help="Task files: what is in them.", no_args_is_help=True)
 
@@ -21,3 +22,6 @@ def list_tasks(folder: Folder, limit: Limit = None) -> None:
         changed = [str(stage.stage) for stage in task.oracle_stages if stage.evolution.outcome == "evolved"]
         rooms = f"{task.header.house.num_rooms:2} rooms"
         typer.echo(f"{task.task_id}  {rooms}  {task.num_stages} stages  changed before: {', '.join(changed) or '-'}")
+
+
+tasks_app.command()(stats)

@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.evaluation.records import EndState, StageRecord
+from evonav.significance import Interval, wilson
 
 SUCCESS_RADIUS_M = 2.0
 NUM_RESAMPLES = 10_000
 MAX_RESAMPLE_CELLS = 4_000_000
 """Resampled indices held at a time, to bound memory on full splits."""
-
-Interval = tuple[float, float]
 
 
 def stage_spl(is_success: bool, path_length_m: float, reference_length_m: float) -> float:
@@ -94,17 +93,6 @@ class PairedDifference:
     num_only_a: int
     """Stages where only `a` succeeded."""
     num_only_b: int
-
-
-def wilson(num_successes: int, n: int) -> Interval | None:
-    """Wilson's 95% score interval of a rate; `None` without trials."""
-    if n == 0:
-        return None
-    z = 1.959963984540054
-    p = num_successes / n
-    centre = (p + z * z / (2 * n)) / (1 + z * z / n)
-    half = z / (1 + z * z / n) * float(np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)))
-    return (max(0.0, centre - half), min(1.0, centre + half))
 
 
 def bootstrap_means(values: NDArray[np.float64], tasks: Sequence[str], *, seed: int = 0) -> NDArray[np.float64]:

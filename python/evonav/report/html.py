@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics import AgentSummary, Interval
+from evonav.evaluation.metrics import AgentSummary
 from evonav.report import tables
 from evonav.report.cards import TaskView, filter_data, task_view
 from evonav.report.causes import Cause
@@ -19,6 +19,7 @@ from evonav.report.legend import legend
 from evonav.report.maps import map_css, map_name, outcome_words, stage_svg
 from evonav.report.run import Run, StageOutcome, load_run
 from evonav.report.svg import clean, slug
+from evonav.significance import Interval
 
 MAX_INLINE_STAGES = 400
 """Recorded stages up to which `report.html` holds every map; beyond, each task has a page of its own."""
@@ -51,7 +52,7 @@ def write_report(run_dir: Path, out_dir: Path | None = None) -> Path:
         (out_dir / "table.csv").write_text(tables.summary_csv(run.summaries), encoding="utf-8")
         is_paged = run.num_recorded > MAX_INLINE_STAGES
         views = _paged_views(run, out_dir) if is_paged else _inline_views(run, out_dir)
-        page = _environment().get_template("report.html.j2")
+        page = page_environment().get_template("report.html.j2")
         path = out_dir / REPORT_NAME
         with path.open("w", encoding="utf-8") as file:
             for part in page.generate(**_page_context(run), views=views, is_paged=is_paged):
@@ -76,8 +77,8 @@ def _paged_views(run: Run, out_dir: Path) -> Iterator[TaskView]:
     """Writes a page a task; nothing is left for the index to hold but its overview."""
     pages = out_dir / TASK_DIR
     pages.mkdir(exist_ok=True)
-    template = _environment().get_template("task.html.j2")
-    context = {"css": _text("report.css") + map_css(), "js": _text("report.js"), "legend": legend()}
+    template = page_environment().get_template("task.html.j2")
+    context = {"css": text_of("report.css") + map_css(), "js": text_of("report.js"), "legend": legend()}
     for task in run.tasks():
         view = task_view(run, task, "h")
         (pages / f"{view.anchor}.html").write_text(template.render(view=view, **context), encoding="utf-8")
@@ -109,8 +110,8 @@ def _page_context(run: Run) -> dict[str, Any]:
         "overview": overview,
         "causes": [cause for cause in Cause if cause in used],
         "facts": _run_facts(run),
-        "css": _text("report.css") + map_css(),
-        "js": _text("report.js"),
+        "css": text_of("report.css") + map_css(),
+        "js": text_of("report.js"),
         "legend": legend(),
         "task_dir": TASK_DIR,
     }
@@ -156,13 +157,14 @@ def _json(value: object) -> str:
     return value if isinstance(value, str) else json.dumps(value, sort_keys=True)
 
 
-def _text(name: str) -> Markup:
+def text_of(name: str) -> Markup:
     """A file of the package, trusted as it is."""
     text = (files("evonav.report") / "templates" / name).read_text(encoding="utf-8")
     return Markup(text)  # noqa: S704 - our own file
 
 
-def _environment() -> Environment:
+def page_environment() -> Environment:
+    """The package's templates; text is escaped, and characters that no page may hold are replaced."""
     return Environment(
         loader=PackageLoader("evonav.report"),
         autoescape=True,

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from evonav.evaluation.metrics import AgentSummary, Interval, PairedDifference, Rates, rates
+from evonav.evaluation.metrics import AgentSummary, PairedDifference, Rates, rates
 from evonav.evaluation.records import StageRecord
 from evonav.report.causes import Cause, cause_of
+from evonav.significance import Interval
 
 NONE = "–"
 """What a cell without a value says."""

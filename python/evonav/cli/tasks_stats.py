@@ -1,0 +1,170 @@
+"""`evonav tasks stats`: what a set of tasks is like, beside the paper's figures."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evonav.cli.options import Workers, count_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from evonav.tasks.statistics import Estimate, Measure, TaskStatistics, Test
+
+NUM_NAMES = 6
+"""Of a distribution in one line."""
+
+
+def stats(
+    folders: Annotated[list[Path], typer.Argument(help="Folders of tasks: in each, one folder a task.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for statistics.json, statistics.html and figures as SVG.")
+    ] = None,
+    reweight: Annotated[
+        str | None, typer.Option(help="Also weigh tasks so that houses have the rooms of a set: procthor-10k.")
+    ] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="File for the paper's three figures, .png or .pdf (needs evonav[viz]).")
+    ] = None,
+    workers: Workers = None,
+) -> None:
+    """Prints and plots statistics of tasks beside the paper's figures."""
+    from evonav.cli.display import status
+    from evonav.generation.statistics import statistics_of_folders
+    from evonav.report.dataset import write_dataset_report
+    from evonav.report.figures import check_figure, write_figure
+
+    if figure is not None:
+        check_figure(figure)
+    with status("Reading tasks") as tell:
+        found = statistics_of_folders(
+            folders,
+            mix=reweight,
+            num_workers=count_of(workers),
+            on_task=lambda done, total: tell(f"{done} of {total}") if done % 50 == 0 else None,
+        )
+    print_statistics(found)
+    if out is not None:
+        typer.echo(f"report: {write_dataset_report(found, out)}")
+    if figure is not None:
+        typer.echo(f"figure: {write_figure(found, figure)}")
+
+
+def print_statistics(found: "TaskStatistics") -> None:
+    """Tables and lines, 80 columns wide."""
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    what = f"{found.num_tasks} tasks, {found.num_stages} stages, {found.num_houses} houses"
+    console.print(f"{what}; seeds {', '.join(map(str, found.seeds))}; {', '.join(found.generators)}")
+    if found.weighting is not None:
+        weighting = found.weighting
+        console.print(
+            f"reweighted to {weighting.mix} by {weighting.by}: worth {weighting.effective_num_tasks:.0f} tasks, "
+            f"covers {100 * weighting.covered_share:.0f}% of the mix, leaves out {weighting.num_left_out} tasks"
+        )
+    console.print(_measures(found))
+    for test in found.tests:
+        console.print(_test_words(test), soft_wrap=False)
+    for measure in found.measures:
+        if measure.accepted is not None:
+            console.print(_verdict(measure))
+    console.print()
+    for one in found.distributions:
+        total = sum(one.counts)
+        parts = [f"{name} {100 * count / total:.1f}%" for name, count in zip(one.names, one.counts, strict=True)]
+        is_cut = one.key not in ("num_evolutions", "relocated_ratio", "num_rooms", "failures", "outcomes")
+        shown = parts[:NUM_NAMES] if is_cut else parts
+        more = f" and {len(parts) - len(shown)} more" if len(parts) > len(shown) else ""
+        console.print(f"{one.label} ({total}): {', '.join(shown)}{more}")
+    console.print(_quantities(found))
+    console.print(
+        "95% intervals: w Wilson; others percentile bootstrap over houses. (In brackets): not published, "
+        "worked out or tried without pictures and refusals."
+    )
+
+
+def _measures(found: "TaskStatistics") -> "Table":
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 1, 0, 0), title="Figures in %, unless they say otherwise", title_justify="left")
+    table.add_column("", no_wrap=True)
+    headings = ["paper", "here", "95%", "n"]
+    if found.weighting is not None:
+        headings += ["rewtd", "95%"]
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    group = ""
+    for measure in found.measures:
+        if measure.raw is None:
+            continue
+        if measure.group != group:
+            group = measure.group
+            table.add_row(f"[bold]{group}[/bold]")
+        mark = "w" if measure.interval == "wilson" else ""
+        row = [f" {measure.label}", _paper(measure), *_shown(measure, measure.raw, mark), str(measure.n)]
+        if found.weighting is not None:
+            row += ["-", ""] if measure.reweighted is None else _shown(measure, measure.reweighted)
+        table.add_row(*row)
+    return table
+
+
+def _scaled(measure: "Measure", value: float) -> str:
+    return f"{100 * value:.1f}" if "share" in measure.unit else f"{value:.2f}"
+
+
+def _paper(measure: "Measure") -> str:
+    if measure.paper is not None:
+        return _scaled(measure, measure.paper)
+    if measure.accepted is not None and measure.unit == "median share":
+        return "{:.0f}-{:.0f}".format(*(100 * end for end in measure.accepted))
+    return "" if measure.expected is None else f"({_scaled(measure, measure.expected)})"
+
+
+def _shown(measure: "Measure", estimate: "Estimate", mark: str = "") -> list[str]:
+    if estimate.ci95 is None:
+        return [_scaled(measure, estimate.value), ""]
+    low, high = estimate.ci95
+    return [_scaled(measure, estimate.value), f"{_scaled(measure, low)}-{_scaled(measure, high)}{mark}"]
+
+
+def _test_words(test: "Test") -> str:
+    total = sum(test.observed)
+    observed = "/".join(f"{100 * count / total:.1f}" for count in test.observed)
+    expected = "/".join(f"{100 * share:.1f}" for share in test.expected_shares)
+    again = "" if test.reweighted_p is None else f", reweighted p {test.reweighted_p:.3f}"
+    return f"{test.label}: {observed}, expected {expected}: chi-square {test.statistic:.2f}, p {test.p:.3f}{again}"
+
+
+def _verdict(measure: "Measure") -> str:
+    low, high = measure.accepted or (0.0, 1.0)
+    parts = []
+    for name, estimate in (("here", measure.raw), ("reweighted", measure.reweighted)):
+        if estimate is not None:
+            verdict = "inside" if low <= estimate.value <= high else "OUTSIDE"
+            parts.append(f"{name} {_scaled(measure, estimate.value)}% {verdict}")
+    return f"{measure.label}, to lie in {100 * low:.0f}-{100 * high:.0f}%: {', '.join(parts)}"
+
+
+def _quantities(found: "TaskStatistics") -> "Table":
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    table.add_column("", no_wrap=True)
+    headings = ["mean", "5%", "median", "95%", "n"] + (["rewtd"] if found.weighting is not None else [])
+    for heading in headings:
+        table.add_column(heading, justify="right", no_wrap=True)
+    for one in found.quantities:
+        if one.key == "relocated_ratio":
+            continue
+        row = [_number(value) for value in (one.mean, one.quantiles[1], one.quantiles[3], one.quantiles[5])]
+        row.append(str(one.n))
+        if found.weighting is not None:
+            row.append("-" if one.reweighted_mean is None else _number(one.reweighted_mean))
+        table.add_row(f"{one.label}, {one.unit}", *row)
+    return table
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}" if abs(value) < 100 else f"{value:.0f}"

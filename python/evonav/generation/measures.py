@@ -1,0 +1,96 @@
+"""The figures over tasks: what each is called, and what the paper says of it."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from evonav.tasks.statistics import Range
+
+Unit = Literal["share", "m", "stages", "median share", "goals"]
+
+
+@dataclass(frozen=True, slots=True)
+class MeasureInfo:
+    """A measure; the fields are those of `evonav.tasks.statistics.Measure`."""
+
+    key: str
+    label: str
+    group: str
+    unit: Unit = "share"
+    is_of_tasks: bool = False
+    """One trial a task: Wilson's interval holds."""
+    paper: float | None = None
+    expected: float | None = None
+    accepted: Range | None = None
+
+
+_EVOLUTION, _GOALS, _OBJECTS, _TASKS = "Evolution", "Goals of stages 2 and on", "Objects", "Tasks"
+
+# Published: Sec. 3.2 and its figure. Expected, evolutions: binomial, K uniform on {3, 4, 5}. Expected, others: a
+# trial of Algorithm 1 on 466 houses in ProcTHOR-10k's mix, without pictures and refusals (docs/parity.md).
+MEASURES = (
+    MeasureInfo("evolved_once", "tasks with an evolution", _EVOLUTION, is_of_tasks=True, paper=0.859, expected=0.8542),
+    MeasureInfo("evolved_twice", "tasks with two or more", _EVOLUTION, is_of_tasks=True, paper=0.484, expected=0.4792),
+    MeasureInfo("static", "static transitions", _EVOLUTION, paper=0.494, expected=0.5),
+    MeasureInfo("unchanged", "triggered, but nothing moved", _EVOLUTION),
+    MeasureInfo("mode_SALIENT_OBJECT", "by SALIENT_OBJECT", _EVOLUTION, paper=0.5),
+    MeasureInfo("mode_RETAIN_GROUP", "by RETAIN_GROUP", _EVOLUTION, paper=0.4),
+    MeasureInfo("mode_FULL_SHUFFLE", "by FULL_SHUFFLE", _EVOLUTION, paper=0.1),
+    MeasureInfo("room_again", "same room as just before", _EVOLUTION, expected=0.033, accepted=(0.03, 0.05)),
+    MeasureInfo("goal_relocated", "relocated before", _GOALS, paper=0.379, expected=0.377, accepted=(0.36, 0.41)),
+    MeasureInfo("goal_in_changed_room", "in the room just changed", _GOALS, expected=0.82),
+    MeasureInfo("goal_moved", "moved by the change", _GOALS, expected=0.625),
+    MeasureInfo("goal_moved_SALIENT_OBJECT", "  if SALIENT_OBJECT", _GOALS, expected=0.50),
+    MeasureInfo("goal_moved_RETAIN_GROUP", "  if RETAIN_GROUP", _GOALS, expected=0.83),
+    MeasureInfo("goal_moved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _GOALS, expected=0.81),
+    MeasureInfo("goal_is_salient", "the salient object itself", _GOALS),
+    MeasureInfo("goal_room_again", "in the previous goal's room", _GOALS),
+    MeasureInfo("goal_again", "an earlier goal of the task", _GOALS),
+    MeasureInfo("goal_relocated_all", "relocated before, all stages", _GOALS, expected=0.283),
+    MeasureInfo("relocated_ratio", "median relocated ratio", _OBJECTS, "median share", accepted=(0.1, 0.2)),
+    MeasureInfo("ratio_zero", "tasks with none relocated", _OBJECTS, is_of_tasks=True, expected=0.146),
+    MeasureInfo("ratio_above_80", "tasks above 80%", _OBJECTS, is_of_tasks=True, expected=0.02),
+    MeasureInfo("room_relocated", "of a changed room's objects", _OBJECTS),
+    MeasureInfo("room_relocated_SALIENT_OBJECT", "  if SALIENT_OBJECT", _OBJECTS),
+    MeasureInfo("room_relocated_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
+    MeasureInfo("room_relocated_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
+    MeasureInfo("unmoved", "found no other place", _OBJECTS),
+    MeasureInfo("unmoved_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
+    MeasureInfo("unmoved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
+    MeasureInfo("num_stages", "stages a task", _TASKS, "stages", paper=4.010, expected=4.0),
+    MeasureInfo("goals_refused", "goals refused a stage", _TASKS, "goals"),
+)
+
+DISTRIBUTIONS = {
+    "num_evolutions": "Evolutions a task",
+    "modes": "Modes of evolutions",
+    "modes_drawn": "Modes drawn, whether anything moved or not",
+    "relocated_ratio": "Objects relocated by the end, of a house's",
+    "outcomes": "Outcomes of transitions",
+    "failures": "Triggered, but nothing moved: why",
+    "num_stages": "Stages a task",
+    "num_rooms": "Rooms a house",
+    "goal_rooms": "Rooms of goals",
+    "goal_scores": "Target scores of goals",
+    "goal_rejections": "Goals refused: why",
+    "house_rejections": "Houses without a task: why",
+    "goal_categories": "Categories of goals",
+    "house_categories": "Categories of objects",
+}
+
+QUANTITIES = {
+    "relocated_ratio": ("Objects relocated by the end, of a house's", "share"),
+    "displacement_m": ("Displacement of relocated objects", "m"),
+    "path_m": ("Reference path of a stage", "m"),
+    "task_path_m": ("Reference path of a task", "m"),
+    "reference_distance_m": ("Reference pose to target", "m"),
+    "visible_px": ("Target in the reference image", "px"),
+    "basic_words": ("Basic instruction", "words"),
+    "appearance_words": ("Appearance instruction", "words"),
+    "unified_words": ("Unified instruction", "words"),
+    "num_rooms": ("Rooms a house", "rooms"),
+    "num_objects": ("Objects a house", "objects"),
+}
+
+PAPER_EVOLUTIONS = (0.1458, 0.3750, 0.3333, 0.1250, 0.0208)
+"""Of tasks with 0 to 4 evolutions, worked out; the paper's text gives 14.1% with none and 48.4% with two or more."""
+PAPER_MODES = (0.5, 0.4, 0.1)

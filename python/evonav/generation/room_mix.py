@@ -1,0 +1,112 @@
+"""How many houses of each room plan ProcTHOR-10k is made of, and the weights that give other houses the same mix."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.errors import InvalidArgumentError
+
+PROCTHOR_10K_PLANS = {
+    "bedroom-bathroom": (2, 2),
+    "kitchen-living-room": (2, 2),
+    "kitchen-living-bedroom-room": (3, 1),
+    "kitchen-living-bedroom-room2": (3, 1),
+    "4-room": (4, 5),
+    "2-bed-1-bath": (5, 1),
+    "5-room": (5, 1),
+    "2-bed-2-bath": (6, 1),
+    "7-room-3-bed": (7, 1),
+    "8-room-3-bed": (8, 1),
+    "12-room": (10, 1),
+    "12-room-3-bed": (10, 1),
+}
+"""Rooms and weight of its room plans with two rooms or more, by `metadata.roomSpecId`. Source: `room_specs.py` of the
+published generator (procthor 0.0.1.dev2, Apache-2.0); the four plans of one room have weight 1 each."""
+
+ROOM_MIXES = {"procthor-10k": PROCTHOR_10K_PLANS}
+
+
+@dataclass(frozen=True)
+class Reweighting:
+    """Weights of tasks, by stratum."""
+
+    mix: str
+    by: str
+    """`room plan`; `number of rooms` where a plan is unknown, or one is missing whose number of rooms is there."""
+    strata: tuple[str, ...]
+    """Of the mix, in its order."""
+    target_shares: tuple[float, ...]
+    task_shares: tuple[float, ...]
+    """As the tasks are."""
+    covered_share: float
+    """Part of the mix that the tasks have at all; the rest is left out of both sides."""
+    weights: NDArray[np.float64]
+    """`(N,)` per task, mean 1; 0 for houses that the mix has none of."""
+    task_strata: NDArray[np.int64]
+    """`(N,)` index of each task's stratum; -1 for none."""
+
+
+def check_mix(mix: str | None) -> None:
+    """Refuses names of no mix.
+
+    Raises:
+        InvalidArgumentError: It is neither `None` nor one of `ROOM_MIXES`.
+    """
+    if mix is not None and mix not in ROOM_MIXES:
+        raise InvalidArgumentError(f"argument `reweight` is {mix!r}, expected one of {', '.join(ROOM_MIXES)}")
+
+
+def reweight(mix: str, num_rooms: Sequence[int], plans: Sequence[str | None]) -> Reweighting:
+    """Weights that give tasks the rooms of a data set.
+
+    Args:
+        mix: One of `ROOM_MIXES`.
+        num_rooms: Of each task's house.
+        plans: `metadata.roomSpecId` of each task's house, if it has one.
+
+    Raises:
+        InvalidArgumentError: There is no such mix, or none of the houses is of it.
+    """
+    check_mix(mix)
+    table = ROOM_MIXES[mix]
+    rooms_of_tasks = [str(rooms) for rooms in num_rooms]
+    by_rooms = _strata({plan: str(rooms) for plan, (rooms, _) in table.items()}, table, rooms_of_tasks)
+    by_plan = _strata({plan: plan for plan in table}, table, [str(plan) for plan in plans])
+    # Houses of one room are in no mix; they do not make the others' plans unknown.
+    num_known = int(sum(plan in table and table[plan][0] == n for plan, n in zip(plans, num_rooms, strict=True)))
+    is_by_plan = num_known == int((by_rooms[2] >= 0).sum()) and _covered(by_plan) == _covered(by_rooms)
+    names, target, strata = by_plan if is_by_plan else by_rooms
+    counts = np.bincount(strata[strata >= 0], minlength=len(names)).astype(np.float64)
+    covered = float(target[counts > 0].sum())
+    if covered == 0.0:
+        raise InvalidArgumentError(f"argument `reweight` is {mix!r}, but no house has as many rooms as one of it")
+    factors = np.divide(target, counts, out=np.zeros_like(target), where=counts > 0) / covered * counts.sum()
+    return Reweighting(
+        mix=mix,
+        by="room plan" if is_by_plan else "number of rooms",
+        strata=tuple(names),
+        target_shares=tuple(target.tolist()),
+        task_shares=tuple((counts / max(1.0, counts.sum())).tolist()),
+        covered_share=covered,
+        weights=np.where(strata >= 0, factors[strata], 0.0),
+        task_strata=strata,
+    )
+
+
+_Strata = tuple[list[str], NDArray[np.float64], NDArray[np.int64]]
+"""Names, shares of the mix, and each task's index or -1."""
+
+
+def _strata(name_of: Mapping[str, str], table: Mapping[str, tuple[int, int]], keys: Sequence[str]) -> _Strata:
+    masses: dict[str, float] = {}
+    for plan, (_, weight) in table.items():
+        masses[name_of[plan]] = masses.get(name_of[plan], 0.0) + weight
+    names = list(masses)
+    target = np.array(list(masses.values())) / sum(masses.values())
+    return names, target, np.array([names.index(key) if key in masses else -1 for key in keys], dtype=np.int64)
+
+
+def _covered(strata: _Strata) -> float:
+    return round(float(strata[1][np.unique(strata[2][strata[2] >= 0])].sum()), 9)

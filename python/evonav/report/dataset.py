@@ -1,0 +1,81 @@
+"""The page of a set of tasks: its statistics beside the paper's, as HTML, SVG and JSON."""
+
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from evonav.errors import StoreError
+from evonav.report.charts import chart_css, figure_svg, legend_svg, panel_svg
+from evonav.report.html import page_environment, text_of
+from evonav.report.panels import other_panels, paper_panels
+from evonav.tasks.records import record_bytes
+from evonav.tasks.statistics import Estimate, Measure, TaskStatistics
+
+PAGE_NAME = "statistics.html"
+DATA_NAME = "statistics.json"
+FIGURE_NAME = "statistics.svg"
+
+
+def write_dataset_report(found: TaskStatistics, out_dir: Path) -> Path:
+    """Writes `statistics.html`, `statistics.json` and `statistics.svg`; the same statistics give the same bytes.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        StoreError: A file cannot be written.
+    """
+    page = page_environment().get_template("statistics.html.j2")
+    try:
+        out_dir.mkdir(parents=True, exist_ok=True)
+        (out_dir / DATA_NAME).write_bytes(record_bytes(found))
+        (out_dir / FIGURE_NAME).write_text(figure_svg(paper_panels(found)), encoding="utf-8")
+        path = out_dir / PAGE_NAME
+        path.write_text(page.render(**_context(found)), encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{out_dir}: {error}") from error
+    return path
+
+
+def _context(found: TaskStatistics) -> dict[str, Any]:
+    groups: dict[str, list[list[str]]] = {}
+    for measure in found.measures:
+        if measure.raw is not None:
+            groups.setdefault(measure.group, []).append(_row(measure))
+    return {
+        "found": found,
+        "css": text_of("report.css") + Markup(chart_css()),  # noqa: S704 - our own
+        "legend": Markup(legend_svg(found.weighting is not None)),  # noqa: S704
+        "figures": [Markup(panel_svg(panel)) for panel in paper_panels(found)],  # noqa: S704
+        "others": [Markup(panel_svg(panel)) for panel in other_panels(found)],  # noqa: S704
+        "groups": groups,
+    }
+
+
+def _row(measure: Measure) -> list[str]:
+    paper = "" if measure.paper is None else _scaled(measure, measure.paper)
+    expected = "" if measure.expected is None else _scaled(measure, measure.expected)
+    accepted = "" if measure.accepted is None else "{}–{}".format(*(_scaled(measure, end) for end in measure.accepted))
+    raw = _shown(measure, measure.raw)
+    raw[1] += " (Wilson)" if measure.interval == "wilson" else ""
+    return [
+        measure.label.strip(),
+        paper,
+        expected,
+        accepted,
+        *raw,
+        str(measure.n),
+        *_shown(measure, measure.reweighted),
+    ]
+
+
+def _shown(measure: Measure, estimate: Estimate | None) -> list[str]:
+    if estimate is None:
+        return ["", ""]
+    ends = "" if estimate.ci95 is None else "–".join(_scaled(measure, end) for end in estimate.ci95)
+    return [_scaled(measure, estimate.value), ends]
+
+
+def _scaled(measure: Measure, value: float) -> str:
+    return f"{100 * value:.1f}%" if "share" in measure.unit else f"{value:.2f}"
