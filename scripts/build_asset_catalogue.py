@@ -5,7 +5,7 @@
 DATA is a directory with
 
 * `procthor-databases/`: the databases of the package `procthor` 0.0.1.dev2 (Allen Institute for AI, Apache-2.0):
-  boxes, splits, properties and materials of 1,653 assets, placement annotations, receptacles;
+  boxes, splits, properties and materials of 1,653 assets, placement annotations, receptacles, asset groups;
 * `molmospaces-resources/material_to_textures.json` (allenai/molmospaces, Apache-2.0): albedo tint and texture name of
   1,245 materials. The textures themselves are not published with it, see `texture_mean`;
 * any house files (`.json`, `.jsonl`, `.gz` of each) in which the simulator placed children on receptacles: the heights
@@ -113,7 +113,7 @@ CATEGORY_COLOURS: dict[str, tuple[str, ...]] = {
 
 
 def main() -> None:
-    """Reads DATA, writes `assets.json`, `categories.json` and `materials.json`."""
+    """Reads DATA, writes `assets.json`, `categories.json`, `groups.json` and `materials.json`."""
     parser = argparse.ArgumentParser(description="Build evonav's asset catalogue.")
     parser.add_argument("data", type=Path, help="directory with procthor-databases/ and house files")
     parser.add_argument("--out", type=Path, default=Path("rust/evonav-core/data"))
@@ -131,6 +131,8 @@ def main() -> None:
     write(arguments.out / "assets.json", "assets", [asset_row(a, surfaces, colours) for a in rows])
     names = sorted({str(a["objectType"]) for a in rows})
     write(arguments.out / "categories.json", "categories", [category_row(n, annotations, receptacles) for n in names])
+    groups = [group_row(path.stem, read(path)) for path in sorted((databases / "asset_groups").glob("*.json"))]
+    write(arguments.out / "groups.json", "groups", groups)
     write(arguments.out / "materials.json", "materials", [[name, to_hex(rgb)] for name, rgb in materials.items()])
 
 
@@ -327,6 +329,40 @@ def category_row(category: str, annotations: dict[str, Json], receptacles: dict[
     if supports:
         row["supports"] = supports
     return row
+
+
+def group_row(name: str, group: Json) -> Json:
+    """An asset group: where it stands, and how each member is put to its parent; parents come first.
+
+    In the frame of the first member, seen from above: x right, z forward. `anchor` is the side of the parent's box that
+    a member is at (-1, 0, 1 along x and z), `align` the side of that line on which its own box lies, `offset_m` is
+    added; `turn_deg` is its yaw, give or take `spread_deg`. ProcTHOR mirrors x when it reads its files, and so do we.
+    """
+    members: list[Json] = []
+
+    def add(node: Json, parent: int | None) -> None:
+        facts = group["assetMetadata"][str(node["instanceId"])]
+        place = facts["position"]
+        row: Json = {"category": next(iter(facts["assetIds"])), "spread_deg": facts["randomness"]["dtheta"]}
+        if parent is not None:
+            anchor = int(place["relativeAnchorToParent"])
+            row |= {
+                "parent": parent,
+                "is_above": place["verticalAlignment"] == "above",
+                "anchor": [1 - anchor % 3, anchor // 3 - 1],
+                "align": [place["xAlignment"] - 1, place["zAlignment"] - 1],
+                "offset_m": [round(0.0 - place["x"], 4), round(place["z"], 4)],
+                "turn_deg": facts["rotation"],
+            }
+        members.append(row)
+        index = len(members) - 1
+        for child in node.get("children", []):
+            add(child, index)
+
+    for node in group["treeData"]:
+        add(node, None)
+    location = group["groupProperties"]["location"]
+    return {"name": name, "where": [place for place in ("corner", "middle", "edge") if location[place]], "members": members}
 
 
 if __name__ == "__main__":

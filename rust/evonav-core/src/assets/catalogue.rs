@@ -4,7 +4,7 @@ use std::{collections::HashMap, sync::OnceLock};
 
 use serde::Deserialize;
 
-use super::{Asset, Split, placement::PlacementRule, unknown};
+use super::{Asset, Split, groups::GroupDefinition, placement::PlacementRule, unknown};
 use crate::{
     Error,
     geometry::Vec3,
@@ -17,6 +17,7 @@ pub struct Catalogue {
     assets: HashMap<String, Asset>,
     categories: HashMap<String, Category>,
     materials: HashMap<String, [u8; 3]>,
+    groups: Vec<GroupDefinition>,
 }
 
 /// What to do about an asset id that the catalogue does not hold (Objaverse assets).
@@ -83,6 +84,11 @@ struct CategoryRow {
 }
 
 #[derive(Deserialize)]
+struct GroupFile {
+    groups: Vec<GroupDefinition>,
+}
+
+#[derive(Deserialize)]
 struct MaterialFile {
     materials: Vec<(String, String)>,
 }
@@ -95,16 +101,24 @@ impl Catalogue {
             let assets = include_str!("../../data/assets.json");
             let categories = include_str!("../../data/categories.json");
             let materials = include_str!("../../data/materials.json");
+            let groups = include_str!("../../data/groups.json");
             // Part of the build, and a test reads it: no input of a user can make this fail.
             #[allow(clippy::expect_used)]
-            Self::from_json(assets, categories, materials).expect("bundled catalogue is valid")
+            Self::from_json(assets, categories, materials, groups)
+                .expect("bundled catalogue is valid")
         })
     }
 
-    fn from_json(assets: &str, categories: &str, materials: &str) -> serde_json::Result<Self> {
+    fn from_json(
+        assets: &str,
+        categories: &str,
+        materials: &str,
+        groups: &str,
+    ) -> serde_json::Result<Self> {
         let assets: AssetFile = serde_json::from_str(assets)?;
         let categories: CategoryFile = serde_json::from_str(categories)?;
         let materials: MaterialFile = serde_json::from_str(materials)?;
+        let groups: GroupFile = serde_json::from_str(groups)?;
         let mut by_name: HashMap<String, Category> = HashMap::new();
         for row in categories.categories {
             let category =
@@ -123,7 +137,12 @@ impl Catalogue {
                 median_size(category.asset_ids.iter().filter_map(|id| by_id.get(id)));
         }
         let colours = materials.materials.into_iter().map(|(name, hex)| (name, rgb(&hex)));
-        Ok(Self { assets: by_id, categories: by_name, materials: colours.collect() })
+        Ok(Self {
+            assets: by_id,
+            categories: by_name,
+            materials: colours.collect(),
+            groups: groups.groups,
+        })
     }
 
     /// Facts about an asset; `None` if the catalogue does not hold it.
@@ -193,6 +212,11 @@ impl Catalogue {
     /// Where a category stands; `None` if it was never annotated.
     pub fn placement(&self, category: &str) -> Option<&PlacementRule> {
         self.categories.get(category)?.rule.as_ref()
+    }
+
+    /// ProcTHOR's asset groups, by name.
+    pub fn groups(&self) -> &[GroupDefinition] {
+        &self.groups
     }
 
     /// Share of `parent_category`'s instances on which a `child_category` was seen, 0..1.

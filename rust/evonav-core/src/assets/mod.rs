@@ -1,6 +1,7 @@
 //! What is known of ProcTHOR's assets, and the compound shapes that stand for them.
 
 pub mod catalogue;
+pub mod groups;
 pub mod part;
 pub mod placement;
 pub mod shapes;

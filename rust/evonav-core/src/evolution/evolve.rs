@@ -5,6 +5,7 @@ use super::{
     generate::Generator,
     layout::Layout,
     modify::{Blocked, Modification, Modifier},
+    reach::Reach,
     record::{
         ChangeRecord, EvolutionOutcome, EvolutionRecord, ModificationFailure, RoomWeightRecord,
     },
@@ -90,21 +91,21 @@ impl Generator<'_> {
         room: usize,
         mode: Mode,
     ) -> Result<Result<Modification, ModificationFailure>, Error> {
-        let start_m = state.position_m();
-        let reachable = world.reachable(&world.navigation, start_m)?;
-        let before = world.access(&world.layout, &reachable, self.parameters);
-        let is_navigable = |layout: &Layout| {
-            let navigation = world.navigation.with_scene(&layout.scene);
-            let reachable = navigation.and_then(|n| world.reachable(&n, start_m));
-            // An error here is a scene without geometry: not navigable.
-            reachable.is_ok_and(|r| world.access(layout, &r, self.parameters).includes(&before))
-        };
+        let reach = Reach::new(
+            &world.house,
+            &world.layout,
+            &world.navigation,
+            state.position_m(),
+            self.parameters,
+        );
+        // Every stage starts at a free pose: there is nothing to reach from one that is not.
+        let Some(reach) = reach else { return Ok(Err(ModificationFailure::CutsOff)) };
         let mut modifier = Modifier {
             house: &world.house,
             catalogue: self.catalogue,
             parameters: self.parameters,
             stream: self.stream(stage, "placement"),
-            is_navigable,
+            reach,
         };
         let mut made = modifier.modify(&world.layout, room, mode);
         for retry in 1..self.parameters.modification_tries {

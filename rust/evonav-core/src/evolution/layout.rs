@@ -1,6 +1,11 @@
 //! Objects of a house as they are moved about: poses, plan outlines, collision.
 
-use super::plan::overlap_m;
+use super::{
+    placement::{round_to, turned_deg},
+    plan::overlap_m,
+    reserve::{self, Floor},
+    unit::{Placed, ROUND_M},
+};
 use crate::{
     Error,
     assets::{
@@ -10,8 +15,8 @@ use crate::{
         placement::Place,
         shapes::shape_in,
     },
-    geometry::{Aabb, Vec2, Vec3, distance_2d_m, euler_rotation_deg},
-    house::{House, HouseDelta, ObjectMove, Opening},
+    geometry::{Aabb, Vec3, add, euler_rotation_deg, rotate, sub, yaw_rotation},
+    house::{House, HouseDelta, ObjectMove},
     world::{
         footprint::{Footprint, footprint},
         scene::{BodyKind, Scene},
@@ -22,8 +27,6 @@ use crate::{
 pub const TOUCH_M: f64 = 0.002;
 /// Gap that furniture keeps to furniture.
 const FURNITURE_GAP_M: f64 = 0.02;
-/// Depth of the floor on either side of a door that furniture is not put on.
-const DOORWAY_M: f64 = 0.5;
 /// A root whose bottom is lower stands on the floor.
 const FLOOR_M: f64 = 0.05;
 
@@ -49,6 +52,10 @@ pub struct Item {
     pub placement: Placement,
     /// Plan outlines of its parts, with their heights.
     pub solids: Vec<Footprint>,
+    /// Box around them.
+    pub bounds: Aabb,
+    /// How far below its place the scene has it: files hold some things over what they stand on.
+    sunk_m: f64,
     /// Stands on the floor by itself: furniture, and boxes and balls on the floor.
     pub is_on_floor: bool,
 }
@@ -74,8 +81,8 @@ pub struct Layout {
     pub scene: Scene,
     /// Walls, doors and windows.
     structure: Vec<(Aabb, Footprint)>,
-    /// Plan outlines of the floor in front of doors.
-    doorways: Vec<[Vec2; 4]>,
+    /// Floor that furniture keeps off.
+    passages: Vec<Floor>,
 }
 
 impl Layout {
@@ -93,7 +100,7 @@ impl Layout {
         scene: Scene,
     ) -> Result<Self, Error> {
         let mut items = Vec::with_capacity(house.objects.len());
-        for object in &house.objects {
+        for (index, object) in house.objects.iter().enumerate() {
             let asset = catalogue.asset_of(house, object, unknown)?;
             let parts = shape_in(&asset, object.condition());
             let placement = Placement {
@@ -106,7 +113,10 @@ impl Layout {
             let is_hung = rule.is_some_and(|rule| rule.is_placed(Place::Wall));
             let is_on_floor =
                 object.parent.is_none() && !is_hung && bottom_m(&solids).abs() < FLOOR_M;
-            items.push(Item { asset, parts, placement, solids, is_on_floor });
+            let bounds = box_of(&solids);
+            let body = scene.bodies.get(scene.first_object + index);
+            let sunk_m = body.map_or(0.0, |body| bounds.min_m[1] - body.aabb.min_m[1]);
+            items.push(Item { asset, parts, placement, solids, bounds, sunk_m, is_on_floor });
         }
         let is_solid = |kind| matches!(kind, BodyKind::Wall | BodyKind::Door | BodyKind::Window);
         let structure = scene.bodies[..scene.first_object.min(scene.bodies.len())]
@@ -116,8 +126,7 @@ impl Layout {
             .filter_map(|part| footprint(part, f64::NEG_INFINITY, f64::INFINITY))
             .map(|solid| (box_of(std::slice::from_ref(&solid)), solid))
             .collect();
-        let doorways = house.doors.iter().filter_map(|door| doorway(house, door)).collect();
-        Ok(Self { items, scene, structure, doorways })
+        Ok(Self { items, scene, structure, passages: reserve::passages(house) })
     }
 
     /// `root` and everything that stands on it, directly or not; parents first.
@@ -134,79 +143,111 @@ impl Layout {
         family
     }
 
+    /// An object at a place and, rigidly, all that stands on it.
+    pub fn carried(&self, index: usize, place: Placement) -> Vec<(usize, Placement)> {
+        let old = self.items[index].placement;
+        let turn_deg = place.rotation_deg[1] - old.rotation_deg[1];
+        let turn = yaw_rotation(turn_deg.to_radians());
+        let mut places = vec![(index, place)];
+        for member in self.with_supported(index).into_iter().skip(1) {
+            let mut carried = self.items[member].placement;
+            let offset = rotate(&turn, sub(carried.position_m, old.position_m));
+            carried.position_m = add(place.position_m, offset).map(|v| round_to(v, ROUND_M));
+            carried.rotation_deg[1] = turned_deg(carried.rotation_deg[1] + turn_deg);
+            places.push((member, carried));
+        }
+        places
+    }
+
+    /// Floor that furniture keeps off: before doors and along open-plan borders.
+    pub fn passages(&self) -> &[Floor] {
+        &self.passages
+    }
+
     /// Whether objects can be at `places` without touching anything but each other.
     ///
     /// Furniture is held to whole-height outlines and a gap, so that nothing is pushed under a
     /// table or stood in an arm's reach of nothing; what stands on it to its parts.
     pub fn is_clear(&self, places: &[(usize, Placement)]) -> bool {
-        let is_moved = |i: usize| places.iter().any(|&(moved, _)| moved == i);
-        places.iter().all(|(index, placement)| {
-            let item = &self.items[*index];
-            let solids = solids_of(&item.parts, placement);
-            let bounds = box_of(&solids);
-            let hits_structure = self.structure.iter().any(|(other_box, other)| {
+        let placed = |&(index, placement): &(usize, Placement)| Placed {
+            index,
+            is_root: self.items[index].is_on_floor,
+            placement,
+            solids: self.items[index].solids_at(&placement),
+        };
+        self.is_free(&places.iter().map(placed).collect::<Vec<_>>())
+    }
+
+    /// As [`Self::is_clear`], by the outlines that come with the places.
+    pub fn is_free(&self, placed: &[Placed]) -> bool {
+        let boxes: Vec<Aabb> = placed.iter().map(|member| box_of(&member.solids)).collect();
+        let is_off_passages = placed.iter().zip(&boxes).all(|(member, bounds)| {
+            !self.items[member.index].is_on_floor || self.is_off_passages(&member.solids, bounds)
+        });
+        if !is_off_passages {
+            return false;
+        }
+        let hits_structure = |(member, bounds): (&Placed, &Aabb)| {
+            self.structure.iter().any(|(other_box, other)| {
                 bounds.intersects(other_box)
-                    && solids.iter().any(|solid| collide(solid, other, 0.0))
-            });
-            let blocks_door = item.is_on_floor
-                && self.doorways.iter().any(|doorway| {
-                    solids.iter().any(|solid| overlap_m(&solid.outline_m, doorway) > TOUCH_M)
-                });
-            !hits_structure
-                && !blocks_door
-                && self
-                    .items
-                    .iter()
-                    .enumerate()
-                    .all(|(i, other)| is_moved(i) || !self.hits(item, &solids, &bounds, i, other))
+                    && member.solids.iter().any(|solid| collide(solid, other, 0.0))
+            })
+        };
+        if placed.iter().zip(&boxes).any(hits_structure) {
+            return false;
+        }
+        let mut is_moved = vec![false; self.items.len()];
+        for member in placed {
+            is_moved[member.index] = true;
+        }
+        let all = boxes.iter().fold(Aabb::EMPTY, |all, bounds| all.union(*bounds));
+        let others = self.items.iter().enumerate().filter(|(index, _)| !is_moved[*index]);
+        // Furniture is held to its whole height: no box is too high or too low to be near.
+        let is_near = |other: &Item| {
+            [0, 2].iter().all(|&axis| {
+                all.min_m[axis] - FURNITURE_GAP_M <= other.bounds.max_m[axis]
+                    && other.bounds.min_m[axis] <= all.max_m[axis] + FURNITURE_GAP_M
+            })
+        };
+        others.filter(|(_, other)| is_near(other)).all(|(_, other)| {
+            placed.iter().zip(&boxes).all(|(member, bounds)| {
+                !hits(&self.items[member.index], &member.solids, bounds, other)
+            })
         })
     }
 
-    /// Whether `item`, with `solids`, touches `other`.
-    fn hits(
-        &self,
-        item: &Item,
-        solids: &[Footprint],
-        bounds: &Aabb,
-        other_index: usize,
-        other: &Item,
-    ) -> bool {
-        let Some(body) = self.scene.bodies.get(self.scene.first_object + other_index) else {
-            return false;
-        };
-        let mut near = body.aabb;
-        for axis in [0, 2] {
-            near.min_m[axis] -= FURNITURE_GAP_M;
-            near.max_m[axis] += FURNITURE_GAP_M;
-        }
-        let are_furniture = item.is_on_floor && other.is_on_floor;
-        if are_furniture {
-            near.min_m[1] = f64::NEG_INFINITY;
-            near.max_m[1] = f64::INFINITY;
-        }
-        if !bounds.intersects(&near) {
-            return false;
-        }
-        solids.iter().any(|solid| {
-            other.solids.iter().any(|its| {
-                if are_furniture {
-                    overlap_m(&solid.outline_m, &its.outline_m) > -FURNITURE_GAP_M
-                } else {
-                    collide(solid, its, 0.0)
-                }
-            })
+    fn is_off_passages(&self, solids: &[Footprint], bounds: &Aabb) -> bool {
+        self.passages.iter().all(|floor| {
+            let is_beside = [0, 1].iter().any(|&axis| {
+                let values = floor.iter().map(|corner| corner[axis]);
+                let low = values.clone().fold(f64::INFINITY, f64::min);
+                let high = values.fold(f64::NEG_INFINITY, f64::max);
+                bounds.max_m[2 * axis] < low || high < bounds.min_m[2 * axis]
+            });
+            is_beside || !solids.iter().any(|s| overlap_m(&s.outline_m, floor) > TOUCH_M)
         })
     }
 
     /// Puts an object somewhere; what stands on it stays.
     pub fn put(&mut self, index: usize, placement: Placement) {
         let item = &mut self.items[index];
+        if placement.parent != item.placement.parent
+            || placement.position_m[1] != item.placement.position_m[1]
+        {
+            // It was put down, not carried along.
+            item.sunk_m = 0.0;
+        }
         item.placement = placement;
         item.solids = solids_of(&item.parts, &placement);
+        item.bounds = box_of(&item.solids);
         if let Some(body) = self.scene.bodies.get_mut(self.scene.first_object + index) {
-            body.parts = world_parts(&item.parts, &placement);
-            body.aabb = box_of(&item.solids);
-            body.oriented.centre_m = placement.position_m;
+            let mut sunk = placement;
+            sunk.position_m[1] -= item.sunk_m;
+            body.parts = world_parts(&item.parts, &sunk);
+            body.aabb = item.bounds;
+            body.aabb.min_m[1] -= item.sunk_m;
+            body.aabb.max_m[1] -= item.sunk_m;
+            body.oriented.centre_m = sunk.position_m;
             body.oriented.rotation = euler_rotation_deg(placement.rotation_deg);
         }
     }
@@ -229,24 +270,27 @@ impl Layout {
     }
 }
 
-/// The floor on both sides of a door; `None` if its wall is not there.
-fn doorway(house: &House, door: &Opening) -> Option<[Vec2; 4]> {
-    let wall = house.walls.iter().find(|wall| wall.id == door.wall0)?;
-    let length_m = distance_2d_m(wall.from_m, wall.to_m);
-    let along = [0, 1].map(|i| (wall.to_m[i] - wall.from_m[i]) / length_m.max(1e-9));
-    let corner = |along_m: f64, across_m: f64| {
-        [
-            wall.from_m[0] + along_m * along[0] - across_m * along[1],
-            wall.from_m[1] + along_m * along[1] + across_m * along[0],
-        ]
-    };
-    let (low, high) = (door.hole_min_m[0], door.hole_max_m[0]);
-    Some([
-        corner(low, -DOORWAY_M),
-        corner(high, -DOORWAY_M),
-        corner(high, DOORWAY_M),
-        corner(low, DOORWAY_M),
-    ])
+/// Whether `item`, with `solids`, touches `other`.
+fn hits(item: &Item, solids: &[Footprint], bounds: &Aabb, other: &Item) -> bool {
+    let are_furniture = item.is_on_floor && other.is_on_floor;
+    let gap_m = if are_furniture { FURNITURE_GAP_M } else { 0.0 };
+    let is_near = (0..3).all(|axis| {
+        (axis == 1 && are_furniture)
+            || (bounds.min_m[axis] - gap_m <= other.bounds.max_m[axis]
+                && other.bounds.min_m[axis] <= bounds.max_m[axis] + gap_m)
+    });
+    is_near
+        && solids.iter().any(|solid| {
+            other.solids.iter().any(|its| match are_furniture {
+                true => overlap_m(&solid.outline_m, &its.outline_m) > -FURNITURE_GAP_M,
+                false => collide(solid, its, 0.0),
+            })
+        })
+}
+
+/// Whether two shapes share more than a touch.
+pub fn overlap(a: &[Footprint], b: &[Footprint]) -> bool {
+    a.iter().any(|a| b.iter().any(|b| collide(a, b, 0.0)))
 }
 
 /// Whether two solids share more than a touch, `gap_m` apart or nearer in plan.

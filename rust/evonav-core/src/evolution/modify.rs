@@ -2,10 +2,14 @@
 
 use super::{
     Mode, Parameters,
+    groups::{Group, groups_of, rearranged},
     layout::{Layout, Placement},
-    placement::{RoomPlan, Unit},
+    placement::{RoomPlan, Rules, Search, placements},
+    reach::Reach,
     record::ModificationFailure,
-    surfaces::{receptacles_for, sample_surface_place},
+    reserve::Floor,
+    surfaces::{is_fitting, receptacles_for, sample_surface_place},
+    unit::Unit,
 };
 use crate::{
     assets::{catalogue::Catalogue, placement::Place},
@@ -15,8 +19,8 @@ use crate::{
 
 /// Free places of one unit that may turn out to cut the house in two before it is left alone.
 const NAVIGATION_TRIES: usize = 8;
-/// Part of what they stand on, wherever that goes.
-const FITTINGS: [&str; 3] = ["Faucet", "ShowerHead", "Sink"];
+/// Ways to put a group together anew that are tried before it is left alone.
+const REARRANGE_TRIES: usize = 20;
 
 /// A room, modified.
 #[derive(Debug, Clone)]
@@ -27,7 +31,7 @@ pub struct Modification {
     pub salient: Option<usize>,
     /// Objects that were to move, but for which no valid place was found, and why.
     pub unmoved: Vec<(usize, Blocked)>,
-    /// Furniture without the free floor around it that ProcTHOR leaves.
+    /// Furniture that stands where ProcTHOR's rules would not put it, or with less floor around it.
     pub crowded: Vec<usize>,
     /// Furniture of groups that were arranged anew.
     pub rearranged: Vec<usize>,
@@ -43,7 +47,7 @@ pub enum Blocked {
 }
 
 /// What a modification needs to know, and its random stream.
-pub struct Modifier<'a, N> {
+pub struct Modifier<'a> {
     /// The house as it is.
     pub house: &'a House,
     /// Where things may stand.
@@ -52,11 +56,33 @@ pub struct Modifier<'a, N> {
     pub parameters: &'a Parameters,
     /// Source of all draws.
     pub stream: Stream,
-    /// Whether everything that could be reached still can.
-    pub is_navigable: N,
+    /// What must stay in reach.
+    pub reach: Reach,
 }
 
-impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
+impl Modification {
+    /// Nothing done yet.
+    fn of(layout: &Layout) -> Self {
+        Self {
+            layout: layout.clone(),
+            salient: None,
+            unmoved: Vec::new(),
+            crowded: Vec::new(),
+            rearranged: Vec::new(),
+        }
+    }
+}
+
+/// A modification at work: the room's units, and what has become of them.
+struct Work {
+    plan: RoomPlan,
+    groups: Vec<Group>,
+    /// Floor that each group keeps.
+    reserves: Vec<Floor>,
+    done: Modification,
+}
+
+impl Modifier<'_> {
     /// Modifies one room.
     ///
     /// Objects are taken up and put down one unit at a time, in random order, the others staying
@@ -74,27 +100,28 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
         let house = self.house;
         let in_room: Vec<usize> =
             (0..layout.items.len()).filter(|&i| house.objects[i].room == Some(room)).collect();
+        let groups = match mode {
+            Mode::RetainGroup => groups_of(house, layout, self.catalogue, &in_room),
+            Mode::SalientObject | Mode::FullShuffle => in_room
+                .iter()
+                .filter(|&&index| layout.items[index].is_on_floor)
+                .map(|&index| Group { roots: vec![index], definition: None })
+                .collect(),
+        };
         let plan = RoomPlan::of(house, &house.rooms[room]);
-        let mut done = Modification {
-            layout: layout.clone(),
-            salient: None,
-            unmoved: Vec::new(),
-            crowded: Vec::new(),
-            rearranged: Vec::new(),
-        };
+        let mut work = Work { plan, groups, reserves: Vec::new(), done: Modification::of(layout) };
+        work.reserves = (0..work.groups.len())
+            .map(|group| self.unit(&work, group).reserve_now(&work.plan))
+            .collect();
         let is_moved = match mode {
-            Mode::SalientObject => self.move_salient(&mut done, &in_room, &plan),
-            Mode::RetainGroup => {
-                let groups = groups_of(house, layout, &in_room);
-                self.move_units(&mut done, &groups, &plan)
-            }
+            Mode::SalientObject => self.move_salient(&mut work),
+            Mode::RetainGroup => self.move_groups(&mut work),
             Mode::FullShuffle => {
-                let roots = in_room.iter().filter(|&&i| layout.items[i].is_on_floor);
-                let singles: Vec<Vec<usize>> = roots.map(|&root| vec![root]).collect();
-                let have_moved = self.move_units(&mut done, &singles, &plan);
-                self.move_small(&mut done, &in_room) || have_moved
+                let have_moved = self.move_groups(&mut work);
+                self.move_small(&mut work.done, &in_room) || have_moved
             }
         };
+        let Work { done, .. } = work;
         let cuts_off = || done.unmoved.iter().any(|&(_, why)| why == Blocked::CutsOff);
         match is_moved {
             true => Ok(done),
@@ -109,128 +136,174 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
     ///
     /// The paper does not say how the salient object is drawn; this weight reproduces its
     /// relocated-object ratio (uniform over furniture does not).
-    fn move_salient(
-        &mut self,
-        done: &mut Modification,
-        in_room: &[usize],
-        plan: &RoomPlan,
-    ) -> bool {
-        let layout = &done.layout;
-        let mut weights: Vec<f64> = in_room
-            .iter()
-            .map(|&i| match layout.items[i].is_on_floor {
-                true => layout.with_supported(i).len() as f64,
-                false => 0.0,
-            })
-            .collect();
+    fn move_salient(&mut self, work: &mut Work) -> bool {
+        let layout = &work.done.layout;
+        let roots: Vec<usize> = work.groups.iter().map(|group| group.roots[0]).collect();
+        let mut weights: Vec<f64> =
+            roots.iter().map(|&root| layout.with_supported(root).len() as f64).collect();
         while let Some(drawn) = self.stream.choose_weighted(&weights) {
-            let root = in_room[drawn];
-            match self.move_unit(&mut done.layout, &[root], plan) {
+            match self.move_group(work, drawn) {
                 Ok(()) => {
                     // It was drawn without replacement: nothing else was to move.
-                    done.unmoved.clear();
-                    done.salient = Some(root);
+                    work.done.unmoved.clear();
+                    work.done.salient = Some(roots[drawn]);
                     return true;
                 }
-                Err(why) => done.unmoved.push((root, why)),
+                Err(why) => work.done.unmoved.push((roots[drawn], why)),
             }
             weights[drawn] = 0.0;
         }
         false
     }
 
-    /// Moves groups of furniture, each rigidly, with what stands on them.
-    fn move_units(
-        &mut self,
-        done: &mut Modification,
-        units: &[Vec<usize>],
-        plan: &RoomPlan,
-    ) -> bool {
-        let mut order: Vec<usize> = (0..units.len()).collect();
+    /// Moves groups of furniture with what stands on them.
+    fn move_groups(&mut self, work: &mut Work) -> bool {
+        let num_groups = work.groups.len();
+        let mut order: Vec<usize> = (0..num_groups).collect();
         self.stream.shuffle(&mut order);
-        let mut reasons = vec![Blocked::NoFreePlace; units.len()];
+        let mut reasons = vec![Blocked::NoFreePlace; num_groups];
         for _ in 0..2 {
-            order.retain(|&unit| match self.move_unit(&mut done.layout, &units[unit], plan) {
+            order.retain(|&group| match self.move_group(work, group) {
                 Ok(()) => false,
                 Err(why) => {
-                    reasons[unit] = why;
+                    reasons[group] = why;
                     true
                 }
             });
         }
-        for &unit in &order {
-            let layout = &done.layout;
-            let members = units[unit].iter().flat_map(|&root| layout.with_supported(root));
-            done.unmoved.extend(members.map(|member| (member, reasons[unit])));
+        for &group in &order {
+            let layout = &work.done.layout;
+            let roots = work.groups[group].roots.iter();
+            let members = roots.flat_map(|&root| layout.with_supported(root));
+            work.done.unmoved.extend(members.map(|member| (member, reasons[group])));
         }
-        order.len() < units.len()
+        order.len() < num_groups
+    }
+
+    /// Moves one group: as it is, by all of ProcTHOR's rules or, where the room is too full for
+    /// that, without the floor that they keep free; put together anew where it fits nowhere as it is.
+    fn move_group(&mut self, work: &mut Work, group: usize) -> Result<(), Blocked> {
+        let unit = self.unit(work, group);
+        let tries = self.parameters.placement_tries;
+        let mut num_cut = 0;
+        for rules in [Rules::All, Rules::Relaxed] {
+            if self.place(work, group, &unit, rules, tries, &mut num_cut) {
+                return Ok(());
+            }
+        }
+        let num_anew = if unit.roots.len() > 1 { REARRANGE_TRIES } else { 0 };
+        for rules in [Rules::All, Rules::Relaxed] {
+            for _ in 0..num_anew {
+                let layout = &work.done.layout;
+                let anew = rearranged(&unit, layout, self.catalogue, &mut self.stream);
+                let tries = tries.div_ceil(REARRANGE_TRIES);
+                if anew.is_some_and(|u| self.place(work, group, &u, rules, tries, &mut num_cut)) {
+                    work.done.rearranged.extend(&unit.roots);
+                    return Ok(());
+                }
+            }
+        }
+        Err(if num_cut > 0 { Blocked::CutsOff } else { Blocked::NoFreePlace })
+    }
+
+    /// Draws places for a unit until one is free and cuts nothing off, and puts it there.
+    fn place(
+        &mut self,
+        work: &mut Work,
+        group: usize,
+        unit: &Unit,
+        rules: Rules,
+        tries: usize,
+        num_cut: &mut usize,
+    ) -> bool {
+        let most_cut = *num_cut + NAVIGATION_TRIES;
+        for _ in 0..tries {
+            let search = Search {
+                layout: &work.done.layout,
+                plan: &work.plan,
+                reserves: &work.reserves,
+                own: group,
+                min_move_m: self.parameters.relocated_min_m,
+            };
+            let Some((placed, reserve)) = search.draw(unit, rules, &mut self.stream) else {
+                continue;
+            };
+            if self.put(&mut work.done.layout, &placements(&placed)) {
+                work.reserves[group] = reserve;
+                if rules == Rules::Relaxed {
+                    work.done.crowded.extend(&unit.roots);
+                }
+                return true;
+            }
+            *num_cut += 1;
+            if *num_cut == most_cut {
+                break;
+            }
+        }
+        false
+    }
+
+    /// Puts objects somewhere, unless that cuts something off.
+    fn put(&mut self, layout: &mut Layout, places: &[(usize, Placement)]) -> bool {
+        let moved = || places.iter().map(|(index, _)| *index);
+        let before: Vec<Placement> = moved().map(|index| layout.items[index].placement).collect();
+        for &(index, placement) in places {
+            layout.put(index, placement);
+        }
+        let is_kept = self.reach.still_reaches(layout, moved());
+        if !is_kept {
+            for (index, placement) in moved().zip(before) {
+                layout.put(index, placement);
+            }
+            self.reach.take_in(layout, moved());
+        }
+        is_kept
     }
 
     /// Moves each small thing of the room to a receptacle of the room.
     fn move_small(&mut self, done: &mut Modification, in_room: &[usize]) -> bool {
-        let is_small = |&&i: &&usize| {
-            let item = &done.layout.items[i];
-            item.placement.parent.is_some() && !FITTINGS.contains(&item.asset.category.as_str())
+        let items = &done.layout.items;
+        let is_small = |&&index: &&usize| {
+            items[index].placement.parent.is_some() && !is_fitting(&items[index])
         };
         let mut order: Vec<usize> = in_room.iter().filter(is_small).copied().collect();
         let num_small = order.len();
         self.stream.shuffle(&mut order);
+        let mut reasons = vec![Blocked::NoFreePlace; done.layout.items.len()];
         for _ in 0..2 {
-            order.retain(|&index| !self.move_small_one(&mut done.layout, index, in_room));
+            order.retain(|&index| match self.move_small_one(&mut done.layout, index, in_room) {
+                Ok(()) => false,
+                Err(why) => {
+                    reasons[index] = why;
+                    true
+                }
+            });
         }
         let num_moved = num_small - order.len();
-        done.unmoved.extend(order.into_iter().map(|index| (index, Blocked::NoFreePlace)));
+        done.unmoved.extend(order.into_iter().map(|index| (index, reasons[index])));
         num_moved > 0
     }
 
-    fn move_small_one(&mut self, layout: &mut Layout, index: usize, in_room: &[usize]) -> bool {
-        let receptacles = receptacles_for(layout, self.catalogue, index, in_room);
-        let least_m = self.parameters.relocated_min_m;
-        let drawn = (0..self.parameters.placement_tries).find_map(|_| {
-            sample_surface_place(layout, index, &receptacles, least_m, &mut self.stream)
-        });
-        if let Some(placement) = drawn {
-            // Small things have nothing on them, bar a rare plate: that goes along.
-            let old = layout.items[index].placement;
-            for member in layout.with_supported(index).into_iter().skip(1) {
-                let mut carried = layout.items[member].placement;
-                for axis in 0..3 {
-                    carried.position_m[axis] += placement.position_m[axis] - old.position_m[axis];
-                }
-                layout.put(member, carried);
-            }
-            layout.put(index, placement);
-        }
-        drawn.is_some()
-    }
-
-    fn move_unit(
+    fn move_small_one(
         &mut self,
         layout: &mut Layout,
-        roots: &[usize],
-        plan: &RoomPlan,
+        index: usize,
+        in_room: &[usize],
     ) -> Result<(), Blocked> {
-        let places = match roots {
-            [root] => self.places_for(&layout.items[*root].asset.category),
-            _ => Vec::new(),
-        };
-        let unit = Unit::new(layout, roots, &places, plan);
-        let before: Vec<(usize, Placement)> =
-            unit.members.iter().map(|&i| (i, layout.items[i].placement)).collect();
+        let (receptacles, weights) = receptacles_for(layout, self.catalogue, index, in_room);
+        let least_m = self.parameters.relocated_min_m;
         let mut num_cut = 0;
         for _ in 0..self.parameters.placement_tries {
-            let least_m = self.parameters.relocated_min_m;
-            let Some(drawn) = unit.sample_places(layout, plan, least_m, &mut self.stream) else {
+            let Some(drawn) = self.stream.choose_weighted(&weights) else { break };
+            let on = [receptacles[drawn]];
+            let place = sample_surface_place(layout, index, &on, least_m, &mut self.stream);
+            let Some(place) = place else { continue };
+            let places = layout.carried(index, place);
+            if !layout.is_clear(&places) {
                 continue;
-            };
-            for (index, placement) in drawn {
-                layout.put(index, placement);
             }
-            if (self.is_navigable)(layout) {
+            if self.put(layout, &places) {
                 return Ok(());
-            }
-            for &(index, placement) in &before {
-                layout.put(index, placement);
             }
             num_cut += 1;
             if num_cut == NAVIGATION_TRIES {
@@ -240,32 +313,22 @@ impl<N: FnMut(&Layout) -> bool> Modifier<'_, N> {
         Err(if num_cut > 0 { Blocked::CutsOff } else { Blocked::NoFreePlace })
     }
 
+    /// A group as it stands, with the ways in which it may stand.
+    fn unit(&self, work: &Work, group: usize) -> Unit {
+        let layout = &work.done.layout;
+        let Group { roots, definition } = &work.groups[group];
+        let definition = definition.map(|index| (index, &self.catalogue.groups()[index]));
+        let anchors = match roots[..] {
+            [root] => self.places_for(&layout.items[root].asset.category),
+            _ => Vec::new(),
+        };
+        Unit::new(layout, roots, definition, &anchors, &work.plan)
+    }
+
     /// Where a category may stand on the floor, by ProcTHOR's annotations.
     fn places_for(&self, category: &str) -> Vec<Place> {
         let rule = self.catalogue.placement(category);
         let all = [Place::Corner, Place::Edge, Place::Middle];
         all.into_iter().filter(|&place| rule.is_some_and(|r| r.is_placed(place))).collect()
     }
-}
-
-/// Furniture of a room by asset group, as ProcTHOR numbers a group's members: `room|group|member`,
-/// in some of its versions with a name before it (`chair-diningtable|7|2|0`).
-fn groups_of(house: &House, layout: &Layout, in_room: &[usize]) -> Vec<Vec<usize>> {
-    let mut groups: Vec<(Option<[&str; 2]>, Vec<usize>)> = Vec::new();
-    for &index in in_room.iter().filter(|&&i| layout.items[i].is_on_floor) {
-        let key = group_key(&house.objects[index].id);
-        match groups.iter_mut().find(|(other, _)| key.is_some() && *other == key) {
-            Some((_, members)) => members.push(index),
-            None => groups.push((key, vec![index])),
-        }
-    }
-    groups.into_iter().map(|(_, members)| members).collect()
-}
-
-/// Room and group by which an id's last numbers name a member of an asset group.
-fn group_key(id: &str) -> Option<[&str; 2]> {
-    let is_number = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
-    let mut parts = id.rsplit('|');
-    let [member, group, room] = [parts.next()?, parts.next()?, parts.next()?];
-    [member, group, room].into_iter().all(is_number).then_some([room, group])
 }

@@ -8,13 +8,13 @@ use serde::Deserialize;
 
 use super::{
     layout::{Layout, Placement, bottom_m},
-    placement::{round_to, turned_deg},
+    placement::round_to,
     surfaces::sample_surface_place,
 };
 use crate::{
     Error,
     assets::catalogue::{Catalogue, UnknownAssets},
-    geometry::{Vec2, add, polygon_area_m2, polygon_contains, rotate, sub, yaw_rotation},
+    geometry::{Vec2, polygon_area_m2, polygon_contains},
     house::{House, HouseDelta},
     rng::Stream,
     world::scene::Scene,
@@ -142,7 +142,11 @@ pub fn random_spawn(
             })
         });
         match place {
-            Some(place) => put_with_supported(&mut layout, index, place),
+            Some(place) => {
+                for (member, place) in layout.carried(index, place) {
+                    layout.put(member, place);
+                }
+            }
             None => unplaced.push(house.objects[index].id.clone()),
         }
     }
@@ -211,19 +215,4 @@ fn sample_floor_place(
         && solids.iter().all(|solid| solid.outline_m.iter().all(is_inside))
         && layout.is_clear(&[(index, place)]);
     is_valid.then_some(place)
-}
-
-/// Moves an object and, rigidly, all that stands on it.
-fn put_with_supported(layout: &mut Layout, index: usize, place: Placement) {
-    let old = layout.items[index].placement;
-    let turn_deg = place.rotation_deg[1] - old.rotation_deg[1];
-    let turn = yaw_rotation(turn_deg.to_radians());
-    for member in layout.with_supported(index).into_iter().skip(1) {
-        let mut carried = layout.items[member].placement;
-        let offset = rotate(&turn, sub(carried.position_m, old.position_m));
-        carried.position_m = add(place.position_m, offset).map(|value| round_to(value, ROUND_M));
-        carried.rotation_deg[1] = turned_deg(carried.rotation_deg[1] + turn_deg);
-        layout.put(member, carried);
-    }
-    layout.put(index, place);
 }

@@ -53,14 +53,6 @@ pub struct Access {
     pub objects: Vec<bool>,
 }
 
-impl Access {
-    /// Whether all that `before` reaches is reached.
-    pub fn includes(&self, before: &Self) -> bool {
-        let covers = |now: &[bool], then: &[bool]| now.iter().zip(then).all(|(n, t)| *n || !*t);
-        covers(&self.rooms, &before.rooms) && covers(&self.objects, &before.objects)
-    }
-}
-
 /// A goal's reference view.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {

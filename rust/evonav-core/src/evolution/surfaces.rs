@@ -1,7 +1,7 @@
 //! Where small things can go: the surfaces of receptacles, as the shapes have them.
 
 use super::{
-    layout::{Layout, Placement, TOUCH_M, bottom_m},
+    layout::{Item, Layout, Placement, TOUCH_M, bottom_m},
     placement::{round_to, turned_deg},
 };
 use crate::{
@@ -18,14 +18,22 @@ const SURFACE_M: f64 = 0.02;
 /// Rounding of places.
 const ROUND_M: f64 = 1e-4;
 
-/// Receptacles among `room_items` on which an object may stand, by what was recorded of
-/// categories (`receptacles.json` of the `procthor` package).
+/// Part of what they stand on, wherever that goes.
+const FITTINGS: [&str; 3] = ["Faucet", "ShowerHead", "Sink"];
+
+/// Whether something never leaves what it stands on.
+pub fn is_fitting(item: &Item) -> bool {
+    FITTINGS.contains(&item.asset.category.as_str())
+}
+
+/// Receptacles among `room_items` on which an object may stand, and how often its category was seen
+/// on theirs (`receptacles.json` of the `procthor` package).
 pub fn receptacles_for(
     layout: &Layout,
     catalogue: &Catalogue,
     index: usize,
     room_items: &[usize],
-) -> Vec<usize> {
+) -> (Vec<usize>, Vec<f64>) {
     let category = &layout.items[index].asset.category;
     let can_bear = |&other: &usize| {
         let receptacle = &layout.items[other];
@@ -33,7 +41,12 @@ pub fn receptacles_for(
             && !receptacle.asset.surfaces_m.is_empty()
             && catalogue.can_rest_on(category, &receptacle.asset.category)
     };
-    room_items.iter().copied().filter(|other| *other != index).filter(can_bear).collect()
+    let found: Vec<usize> =
+        room_items.iter().copied().filter(|other| *other != index).filter(can_bear).collect();
+    let share =
+        |&on: &usize| catalogue.rest_probability(category, &layout.items[on].asset.category);
+    let weights = found.iter().map(share).collect();
+    (found, weights)
 }
 
 /// Draws a place for one small object on one of `receptacles`; `None` when this draw overhangs,

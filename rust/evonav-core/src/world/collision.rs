@@ -93,20 +93,7 @@ impl Obstacles {
             if matches!(body.kind, BodyKind::Floor | BodyKind::Ceiling) {
                 continue;
             }
-            let from = obstacles.len();
-            for part in &body.parts {
-                let Some(shadow) = footprint(part, step_height_m, agent.height_m) else {
-                    continue;
-                };
-                if !shadow.outline_m.iter().flatten().all(|v| v.is_finite()) {
-                    return Err(Error::Simulation {
-                        message: format!("{}: a part of its shape is not finite", body.id),
-                    });
-                }
-                let radius_m = agent.radius_between_m(shadow.bottom_m, shadow.top_m);
-                obstacles.push(Obstacle::new(shadow, radius_m, index));
-            }
-            drop_covered(&mut obstacles, from);
+            obstacles.extend(obstacles_of(body, index, agent, step_height_m)?);
         }
         let mut obstacles = Self::with_buckets(obstacles);
         obstacles.drop_covered_by_others();
@@ -274,12 +261,34 @@ impl Obstacles {
     }
 }
 
-/// Removes from `obstacles[from..]`, the parts of one body, those that another part covers.
-fn drop_covered(obstacles: &mut Vec<Obstacle>, from: usize) {
-    let mut i = from;
+/// Obstacles that the parts of one body are, less those that another of them covers.
+///
+/// # Errors
+/// As [`Obstacles::build`].
+pub(crate) fn obstacles_of(
+    body: &Body,
+    index: usize,
+    agent: AgentBody,
+    step_height_m: f64,
+) -> Result<Vec<Obstacle>, Error> {
+    let mut obstacles = Vec::with_capacity(body.parts.len());
+    for part in &body.parts {
+        let Some(shadow) = footprint(part, step_height_m, agent.height_m) else { continue };
+        if !shadow.outline_m.iter().flatten().all(|v| v.is_finite()) {
+            let message = format!("{}: a part of its shape is not finite", body.id);
+            return Err(Error::Simulation { message });
+        }
+        let radius_m = agent.radius_between_m(shadow.bottom_m, shadow.top_m);
+        obstacles.push(Obstacle::new(shadow, radius_m, index));
+    }
+    drop_covered(&mut obstacles);
+    Ok(obstacles)
+}
+
+fn drop_covered(obstacles: &mut Vec<Obstacle>) {
+    let mut i = 0;
     while i < obstacles.len() {
-        let is_covered =
-            (from..obstacles.len()).any(|j| j != i && obstacles[j].covers(&obstacles[i]));
+        let is_covered = (0..obstacles.len()).any(|j| j != i && obstacles[j].covers(&obstacles[i]));
         if is_covered {
             obstacles.remove(i);
         } else {
@@ -289,7 +298,7 @@ fn drop_covered(obstacles: &mut Vec<Obstacle>, from: usize) {
 }
 
 /// A straight move of a point.
-struct Sweep {
+pub(crate) struct Sweep {
     a: Vec2,
     b: Vec2,
     length_m: f64,
@@ -298,7 +307,8 @@ struct Sweep {
 }
 
 impl Sweep {
-    fn new(a: Vec2, b: Vec2) -> Self {
+    /// From `a` to `b`.
+    pub(crate) fn new(a: Vec2, b: Vec2) -> Self {
         let length_m = (b[0] - a[0]).hypot(b[1] - a[1]);
         let along = [(b[0] - a[0]) / length_m, (b[1] - a[1]) / length_m];
         Self { a, b, length_m, along: if length_m > 0.0 { along } else { [1.0, 0.0] } }
@@ -319,6 +329,11 @@ impl Obstacle {
         Self { outline_m: footprint.outline_m, radius_m, body, min_m, max_m }
     }
 
+    /// Smallest and largest corner of a box that holds all points that it blocks.
+    pub(crate) fn extent_m(&self) -> [Vec2; 2] {
+        [self.min_m, self.max_m]
+    }
+
     /// Whether whatever the other blocks, this one blocks too (sufficient, not necessary).
     fn covers(&self, other: &Self) -> bool {
         self.radius_m >= other.radius_m
@@ -327,7 +342,7 @@ impl Obstacle {
     }
 
     /// Whether the agent's axis at `point_m` is too close.
-    pub(super) fn blocks(&self, point_m: Vec2) -> bool {
+    pub(crate) fn blocks(&self, point_m: Vec2) -> bool {
         let is_near = (0..2).all(|i| self.min_m[i] < point_m[i] && point_m[i] < self.max_m[i]);
         is_near && distance_squared(&self.outline_m, point_m) < self.radius_m * self.radius_m
     }
@@ -336,7 +351,7 @@ impl Obstacle {
     ///
     /// The least distance between a segment and a convex polygon that do not meet is taken at an
     /// end of the segment or at a corner of the polygon.
-    fn blocks_sweep(&self, sweep: &Sweep) -> bool {
+    pub(crate) fn blocks_sweep(&self, sweep: &Sweep) -> bool {
         let reach = self.radius_m;
         let Sweep { a, b, length_m, along } = *sweep;
         let is_near =

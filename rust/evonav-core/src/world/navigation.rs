@@ -277,7 +277,19 @@ impl Navigation {
         centres_m.into_iter().find(|&centre_m| self.is_free(centre_m))
     }
 
-    fn is_indoors(&self, point_m: Vec2) -> bool {
+    /// Smallest and largest corner of a box that holds every point of the floors, with the slack.
+    pub(crate) fn extent_m(&self) -> [Vec2; 2] {
+        [self.min_m.map(|v| v - FLOOR_SLACK_M), self.max_m.map(|v| v + FLOOR_SLACK_M)]
+    }
+
+    /// The agent's body as collisions take it, thinner by the tolerance, and the step height.
+    pub(crate) fn thinner(&self) -> (AgentBody, f64) {
+        let radius_m = self.agent.radius_m - self.config.tolerance_m;
+        (AgentBody { radius_m, ..self.agent }, self.config.step_height_m)
+    }
+
+    /// Whether a point is over a floor, up to a slack.
+    pub(crate) fn is_indoors(&self, point_m: Vec2) -> bool {
         self.floors.iter().any(|floor| floor.blocks(point_m))
     }
 

@@ -1,0 +1,105 @@
+//! ProcTHOR's asset groups: what belongs together, and how it is put together.
+
+use serde::Deserialize;
+
+use super::placement::Place;
+use crate::geometry::{Vec2, Vec3};
+
+/// One of ProcTHOR's 18 asset groups, in the frame of its first member, which looks along +z.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct GroupDefinition {
+    /// For example `chair-diningtable-2`.
+    pub name: String,
+    /// Where in a room it is placed.
+    #[serde(rename = "where")]
+    pub places: Vec<Place>,
+    /// Parents before what is put to them; the first has no parent.
+    pub members: Vec<GroupMember>,
+}
+
+/// A member of a group, and how it is put to another.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct GroupMember {
+    /// What it is.
+    pub category: String,
+    /// Index of the member that it is put to; `None` for the first.
+    #[serde(default)]
+    pub parent: Option<usize>,
+    /// On top of it, not next to it.
+    #[serde(default)]
+    pub is_above: bool,
+    /// Side of the parent's box, along x and z: -1, 0 or 1.
+    #[serde(default)]
+    anchor: Vec2,
+    /// Side of that line on which its own box lies: -1, 0 (centred) or 1.
+    #[serde(default)]
+    align: Vec2,
+    /// Added.
+    #[serde(default)]
+    offset_m: Vec2,
+    /// Its yaw ...
+    #[serde(default)]
+    pub turn_deg: f64,
+    /// ... give or take as much.
+    pub spread_deg: f64,
+}
+
+/// Where a member is in the frame of the group's first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MemberPose {
+    /// Centre, `[x, z]`.
+    pub centre_m: Vec2,
+    /// Yaw.
+    pub yaw_deg: f64,
+    /// Edges of the box around its turned box.
+    extent_m: Vec2,
+}
+
+impl GroupDefinition {
+    /// Places the members next to each other, as `AssetGroupGenerator.sample_object_placement` of
+    /// the package `procthor` does: side to side, by the boxes of what has been turned.
+    ///
+    /// # Arguments
+    /// * `sizes_m` - box per member; `None` leaves it out, and what is put to it.
+    /// * `turns_deg` - per member, how far it is turned from its yaw.
+    ///
+    /// # Returns
+    /// One pose per member; `None` for those left out.
+    pub fn arrange(&self, sizes_m: &[Option<Vec3>], turns_deg: &[f64]) -> Vec<Option<MemberPose>> {
+        let mut poses: Vec<Option<MemberPose>> = Vec::with_capacity(self.members.len());
+        for (index, member) in self.members.iter().enumerate() {
+            let size_m = sizes_m.get(index).copied().flatten();
+            let turn_deg = turns_deg.get(index).copied().unwrap_or(0.0);
+            let pose = size_m.and_then(|size_m| {
+                let yaw_deg = member.turn_deg + turn_deg;
+                let extent_m = turned_extent(size_m, yaw_deg);
+                let centre_m = match member.parent {
+                    None => [0.0; 2],
+                    Some(parent) => {
+                        let parent = (*poses.get(parent)?)?;
+                        [0, 1].map(|i| {
+                            parent.centre_m[i]
+                                + member.offset_m[i]
+                                + 0.5 * member.anchor[i] * parent.extent_m[i]
+                                + 0.5 * member.align[i] * extent_m[i]
+                        })
+                    }
+                };
+                Some(MemberPose { centre_m, yaw_deg, extent_m })
+            });
+            poses.push(pose);
+        }
+        poses
+    }
+
+    /// Categories of the members that stand on the floor, the first member's first.
+    pub fn floor_categories(&self) -> impl Iterator<Item = &str> {
+        self.members.iter().filter(|m| !m.is_above).map(|m| m.category.as_str())
+    }
+}
+
+/// Edges of the box around a box that is turned about the vertical.
+fn turned_extent([x_m, _, z_m]: Vec3, yaw_deg: f64) -> Vec2 {
+    let (sin, cos) = yaw_deg.to_radians().sin_cos();
+    [x_m * cos.abs() + z_m * sin.abs(), x_m * sin.abs() + z_m * cos.abs()]
+}
