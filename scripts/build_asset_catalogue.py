@@ -5,7 +5,8 @@
 DATA is a directory with
 
 * `procthor-databases/`: the databases of the package `procthor` 0.0.1.dev2 (Allen Institute for AI, Apache-2.0):
-  boxes, splits, properties and materials of 1,653 assets, placement annotations, receptacles, asset groups;
+  boxes, splits, properties and materials of 1,653 assets, what AI2-THOR says they are made of, placement annotations,
+  receptacles, asset groups;
 * `molmospaces-resources/material_to_textures.json` (allenai/molmospaces, Apache-2.0): albedo tint and texture name of
   1,245 materials. The textures themselves are not published with it, see `texture_mean`;
 * any house files (`.json`, `.jsonl`, `.gz` of each) in which the simulator placed children on receptacles: the heights
@@ -111,6 +112,24 @@ CATEGORY_COLOURS: dict[str, tuple[str, ...]] = {
     "TissueBox": ("7fa3bf f2efe8",),
 }
 
+# What an asset is made of where AI2-THOR says nothing: words in the names of its materials, or the group of ProcTHOR's
+# material database that they are in; first match counts.
+MATERIAL_WORDS: tuple[tuple[str, str], ...] = (
+    ("leather", "leather"),
+    ("fabr?ic|fabirc|velvet|cloth|cotton|blanket|sheet|pillow|carpet|cus[h]?ions|sofa", "fabric"),
+    ("wood|oak|plank|wicker", "wood"),
+    ("glass", "glass"),
+    ("ceramic|porcelain", "ceramic"),
+    ("metal|meta$|steel|alumin|iron|chrome|brass|copper|bronze|foil|gold|silver|tin$", "metal"),
+    ("plastic|plasitc|rubber", "plastic"),
+    ("marble|granite|concrete|stone", "stone"),
+    ("cardboard|paper", "paper"),
+    ("wax", "wax"),
+)
+MATERIAL_GROUPS = {"Fabric", "Glass", "Metal", "Paper", "Plastic", "Wax", "Wood"}
+# Details that say little of the whole.
+MATERIAL_DETAILS = "decal|logo|readout|screen|hole|screw|label|placeable|button|interior|transparen"
+
 
 def main() -> None:
     """Reads DATA, writes `assets.json`, `categories.json`, `groups.json` and `materials.json`."""
@@ -123,12 +142,13 @@ def main() -> None:
     albedo = read(arguments.data / "molmospaces-resources" / "material_to_textures.json")
     materials = {name: material_colour(name, facts) for name, facts in sorted(albedo.items())}
     surfaces = surface_heights(assets, houses(arguments.data))
+    salient = salient_materials(databases / "ai2thor-object-metadata.json.gz")
     annotations = read(databases / "placement-annotations.json")
     receptacles = read(databases / "receptacles.json")
 
     rows = sorted(assets, key=lambda asset: str(asset["assetId"]))
     colours = asset_colours(rows, materials)
-    write(arguments.out / "assets.json", "assets", [asset_row(a, surfaces, colours) for a in rows])
+    write(arguments.out / "assets.json", "assets", [asset_row(a, surfaces, colours, salient) for a in rows])
     names = sorted({str(a["objectType"]) for a in rows})
     write(arguments.out / "categories.json", "categories", [category_row(n, annotations, receptacles) for n in names])
     groups = [group_row(path.stem, read(path)) for path in sorted((databases / "asset_groups").glob("*.json"))]
@@ -294,10 +314,39 @@ def own_colours(asset: Json, materials: dict[str, Rgb]) -> list[str]:
     return list(dict.fromkeys(to_hex(materials[name]) for name in sorted(names, key=rank)))
 
 
+# --- materials -------------------------------------------------------------------------------------------------------
+
+
+def salient_materials(path: Path) -> dict[str, list[str]]:
+    """What AI2-THOR's metadata says that assets are made of, by asset id, the most important first."""
+    found: dict[str, list[str]] = {}
+    for scenes in json.loads(gzip.decompress(path.read_bytes())).values():
+        for entry in (entry for scene in scenes for entry in scene):
+            if entry["assetId"] and entry.get("salientMaterials"):
+                found[str(entry["assetId"])] = [str(word).lower() for word in entry["salientMaterials"]]
+    return found
+
+
+def materials_named(materials: Iterable[tuple[str, str]]) -> list[str]:
+    """What an asset is made of by its materials, given as pairs of group and name; at most two words, each once."""
+    words: list[str] = []
+    for group, name in materials:
+        plain = name.lower()
+        if re.search(MATERIAL_DETAILS, plain):
+            continue
+        by_group = group.lower() if group in MATERIAL_GROUPS else None
+        word = next((word for pattern, word in MATERIAL_WORDS if re.search(pattern, plain)), by_group)
+        if word is not None and word not in words:
+            words.append(word)
+    return words[:2]
+
+
 # --- rows ------------------------------------------------------------------------------------------------------------
 
 
-def asset_row(asset: Json, surfaces: dict[str, list[float]], colours: dict[str, list[str]]) -> Json:
+def asset_row(
+    asset: Json, surfaces: dict[str, list[float]], colours: dict[str, list[str]], salient: dict[str, list[str]]
+) -> Json:
     """Facts about one asset."""
     name = str(asset["assetId"])
     owned = [asset.get("primaryProperty"), *asset.get("secondaryProperties", [])]
@@ -309,6 +358,7 @@ def asset_row(asset: Json, surfaces: dict[str, list[float]], colours: dict[str, 
         "surfaces_m": surfaces[name],
         "colours": colours[name],
         "materials": [material for _, material in asset.get("materials") or []],
+        "made_of": salient.get(name) or materials_named(asset.get("materials") or []),
     }
     row.update({flag: True for fact, flag in PROPERTIES.items() if fact in owned})
     return {key: value for key, value in row.items() if value not in (None, [])}

@@ -5,7 +5,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from evonav.decision.language import Goal, Relation, canonical, parse_goal, similarity
-from evonav.tasks.language import COLOURS, SIZES, noun_of
+from evonav.generation.describe import Anchor, Relations, unified_instruction
+from evonav.generation.looks import Appearance, Detail, Tint, looks_of
+from evonav.tasks.language import MATERIALS, STRUCTURES
 
 TYPES = [
     "AlarmClock",
@@ -78,10 +80,14 @@ def relation(kind, noun):
         (
             "Find the tall green potted plant standing beside the couch, near the large window.",
             None,
-            Goal("house plant", (relation("near", "sofa"), relation("near", "window")), ("green",)),
+            Goal("house plant", (relation("near", "sofa"), relation("near", "window")), ("tall", "green")),
         ),
         ("Go to the refrigerator.", "Fridge", Goal("fridge")),
-        ("Locate the brown wooden dresser with six drawers against the wall.", None, Goal("dresser", (), ("brown",))),
+        (
+            "Locate the brown wooden dresser with six drawers against the wall.",
+            None,
+            Goal("dresser", (), ("brown", "wooden")),
+        ),
         (
             "Navigate to the trash can inside the washroom, close to the bathtub.",
             None,
@@ -95,37 +101,56 @@ def test_reads(text, category, goal):
     assert parse_goal(text, category) == goal
 
 
-@given(
-    target=st.sampled_from(TYPES),
-    room=st.none() | st.sampled_from(ROOMS),
-    support=st.none() | st.sampled_from(TYPES),
-    anchors=st.lists(st.sampled_from(TYPES), max_size=2, unique=True),
-    structure=st.none() | st.sampled_from(("doorway", "window")),
-    size=st.none() | st.sampled_from(SIZES),
-    colour=st.none() | st.sampled_from(COLOURS),
+ANCHORS = st.builds(Anchor, category=st.sampled_from(TYPES), determiner=st.sampled_from(("the", "a", "some")))
+PARTS = st.builds(Anchor, category=st.sampled_from(STRUCTURES), determiner=st.sampled_from(("the", "a")))
+RELATIONS = st.builds(
+    Relations,
+    room_type=st.sampled_from(ROOMS),
+    is_category_unique=st.booleans(),
+    is_room_type_unique=st.booleans(),
+    support=st.none() | ANCHORS,
+    is_in_support=st.booleans(),
+    neighbours=st.lists(ANCHORS, max_size=2).map(tuple),
+    structure=st.none() | PARTS,
+    wall_object=st.none() | ANCHORS,
+    is_below_wall_object=st.booleans(),
 )
-def test_reads_back_the_grammar(target, room, support, anchors, structure, size, colour):
-    """What `evonav.tasks.language` lets the generator say is understood in full."""
-    said = [noun for noun in (target, support, *anchors) if noun]
-    assume(len(set(said)) == len(said))  # the generator never names a thing twice
-    words = [f"Please navigate to the {' '.join(filter(None, (size, colour, noun_of(target))))}"]
+APPEARANCES = st.builds(
+    Appearance,
+    size_m=st.tuples(*[st.floats(0.05, 2.0)] * 3),
+    tints=st.lists(
+        st.builds(Tint, colour=st.tuples(*[st.integers(0, 255)] * 3), share=st.floats(0.0, 1.0)), max_size=3
+    ).map(tuple),
+    form=st.sampled_from((None, "round", "L-shaped", "U-shaped")),
+    details=st.lists(
+        st.builds(Detail, noun=st.sampled_from(("drawer", "open lid", "armrest")), count=st.integers(1, 20)), max_size=3
+    ).map(tuple),
+    made_of=st.lists(st.sampled_from((*MATERIALS, "food")), max_size=2).map(tuple),
+)
+
+
+@given(target=st.sampled_from(TYPES), relations=RELATIONS, appearance=APPEARANCES)
+def test_reads_back_the_grammar(target, relations, appearance):
+    """What `evonav.tasks.language` lets the describer say is understood in full."""
+    things = [relations.support, *relations.neighbours, relations.wall_object]
+    said = [target, *(thing.category for thing in things if thing)]
+    assume(len({canonical(noun) for noun in said}) == len(said))  # the describer never names a thing twice
     expected = []
-    if room:
-        words.append(f"in the {noun_of(room)}")
-        expected.append(relation("in", canonical(room)))
-    if support:
-        words.append(f"on the {noun_of(support)}")
-        expected.append(relation("on", canonical(support)))
-    if anchors:
-        words.append("next to " + " and ".join(f"the {noun_of(anchor)}" for anchor in anchors))
-        expected.extend(relation("near", canonical(anchor)) for anchor in anchors)
-    if structure:
-        words.append(f"near the {structure}")
-        expected.append(relation("near", structure))
-    goal = parse_goal(" ".join(words) + ".")
-    assert goal.noun == canonical(target)
-    assert list(goal.relations) == expected
-    assert goal.adjectives == tuple(filter(None, (size, colour)))
+    if not relations.is_category_unique:
+        expected.append(relation("in", canonical(relations.room_type)))
+    if relations.support:
+        expected.append(relation("on", canonical(relations.support.category)))
+    expected.extend(relation("near", canonical(anchor.category)) for anchor in relations.neighbours)
+    if relations.structure and relations.structure.category != "corner":
+        expected.append(relation("near", relations.structure.category))
+    if relations.wall_object:
+        expected.append(relation("near", canonical(relations.wall_object.category)))
+    for category in (None, target):
+        goal = parse_goal(unified_instruction(target, relations, appearance), category)
+        assert goal.noun == canonical(target)
+        assert list(goal.relations) == expected
+        words = {word for phrase in looks_of(target, appearance) for word in phrase.split(" and ")}
+        assert set(goal.adjectives) == words
 
 
 @given(st.text(max_size=200), st.none() | st.text(max_size=20))

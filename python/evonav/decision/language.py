@@ -12,7 +12,7 @@ from functools import lru_cache
 from itertools import zip_longest
 from typing import Literal
 
-from evonav.tasks.language import COLOURS, SIZES, noun_of
+from evonav.tasks.language import COLOURS, MATERIALS, SHAPES, SIZES, noun_of, plural_of
 
 RelationKind = Literal["in", "on", "near"]
 
@@ -89,7 +89,10 @@ _NOUNS = frozenset(
 )
 """ProcTHOR's types and rooms, canonical: common knowledge of the benchmark, used to tell nouns from adjectives."""
 
+_SINGULARS = {plural_of(noun): noun for noun in _NOUNS}
+
 _ARTICLES = {"a", "an", "the", "its", "some", "any", "that", "this"}
+_ADJECTIVES = {word.lower(): word for word in (*SIZES, *SHAPES, *COLOURS, *MATERIALS, *MATERIALS.values())}
 _RELATIONS: tuple[tuple[RelationKind, str], ...] = (
     ("near", r"in front of|to the (?:left|right) of|left of|right of"),
     ("on", r"on top of|atop|resting on|placed on|sitting on|standing on|lying on|located on|on|upon"),
@@ -104,6 +107,7 @@ _GOAL = re.compile(
     r"|\b(?:find|locate|reach|approach|search for|look for|looking for|visit)\b"
 )
 _STOP = re.compile(r"[.;:!?,]|\b(?:and|which|that is|that has|with|where|made|featuring|has|is|are)\b")
+_COLOUR_PAIR = re.compile(rf"\b({'|'.join(COLOURS)}) and ({'|'.join(COLOURS)})\b")
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +127,7 @@ class Goal:
     """Canonical name of what to find."""
     relations: tuple[Relation, ...] = ()
     adjectives: tuple[str, ...] = ()
-    """Size and colour words said of it."""
+    """Words of `evonav.tasks.language` for its size, form, colours and material."""
 
     @property
     def room(self) -> str | None:
@@ -148,6 +152,8 @@ def canonical(words: str) -> str:
 def _singular(noun: str) -> str:
     if noun.endswith("shelves"):
         return noun
+    if noun in _SINGULARS:
+        return _SINGULARS[noun]
     return noun[:-1] if noun.endswith("s") and not noun.endswith("ss") else noun
 
 
@@ -182,7 +188,8 @@ def parse_goal(instruction: str, category: str | None = None) -> Goal:
     start = _GOAL.search(text)
     text = text[start.end() :] if start else text
     matches = list(_RELATION.finditer(text))
-    head = _phrase(text[: matches[0].start()] if matches else text)
+    # Before the noun "and" joins colours: "the black and white mug".
+    head = _phrase(re.sub(_COLOUR_PAIR, r"\1 \2", text[: matches[0].start()] if matches else text))
     noun = canonical(category) if category else canonical(_without_adjectives(head))
     relations: list[Relation] = []
     for match, following in zip_longest(matches, matches[1:]):
@@ -192,8 +199,10 @@ def parse_goal(instruction: str, category: str | None = None) -> Goal:
             relation = _relation(kind, thing)
             if relation is not None and relation.noun != noun and relation not in relations:
                 relations.append(relation)
-    tokens = re.findall(r"[a-z]+", text[: matches[0].start()] if matches else text)
-    adjectives = tuple(dict.fromkeys(token for token in tokens if token in COLOURS or token in SIZES))
+    # Up to the parts, whose colours are not its own.
+    looks = re.split(r"\bwith\b", text[: matches[0].start()] if matches else text)[0]
+    words = [word for word in re.findall(r"[a-z]+(?:-[a-z]+)?", looks) if word not in noun.split()]
+    adjectives = tuple(dict.fromkeys(_ADJECTIVES[word] for word in words if word in _ADJECTIVES))
     return Goal(noun, tuple(relations), adjectives)
 
 
@@ -223,11 +232,11 @@ def _phrase(said: str) -> str:
 
 
 def _without_adjectives(phrase: str) -> str:
-    """The last known noun of the phrase, or all of it without articles, sizes and colours."""
+    """The last known noun of the phrase, or all of it without articles and adjectives."""
     tokens = [t for t in re.findall(r"[a-z0-9']+", phrase) if t not in _ARTICLES]
     for end in range(len(tokens), 0, -1):
         for length in range(min(3, end), 0, -1):
             words = " ".join(tokens[end - length : end])
             if canonical(words) in _NOUNS:
                 return words
-    return " ".join(t for t in tokens if t not in COLOURS and t not in SIZES)
+    return " ".join(t for t in tokens if t not in _ADJECTIVES)

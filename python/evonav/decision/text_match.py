@@ -156,10 +156,14 @@ class TextMatch:
 
     def _fit(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
         """Share of the relations that hold, a hair more if the size is as said: that settles ties alone."""
-        sizes = {"tiny": (0.0, 0.12), "small": (0.0, 0.45), "large": (1.2, math.inf)}
-        largest_m = max(entry.size_m)
-        fits = all(low <= largest_m <= high for low, high in (sizes[word] for word in goal.adjectives if word in sizes))
-        return self._relations_held(goal, entry, around) + (0.001 if fits else 0.0)
+        return self._relations_held(goal, entry, around) + (0.001 if self._is_size_said(goal, entry, around) else 0.0)
+
+    def _is_size_said(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> bool:
+        """Whether a thing said to be large or small is so among those of its name; sizes are said for its kind."""
+        sizes_m = [max(other.size_m) for other in around if self._names_goal(goal, other)]
+        middle_m = sum(sizes_m) / len(sizes_m) if sizes_m else 0.0
+        signs = {"large": 1.0, "small": -1.0}
+        return all(signs[word] * (max(entry.size_m) - middle_m) >= 0.0 for word in goal.adjectives if word in signs)
 
     def _relations_held(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
         """Share of the relations that hold, 1 if there is none. Doors and windows are in no object memory."""

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.errors import TaskError
-from evonav.generation.describe import adjectives_of, appearance_instruction, basic_instruction, parse_relations
+from evonav.generation.describe import (
+    WRITER,
+    appearance_instruction,
+    basic_instruction,
+    parse_relations,
+    unified_instruction,
+)
+from evonav.generation.looks import parse_appearance
 from evonav.house import House
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.files import checksums_of
@@ -179,22 +186,20 @@ def _public_stage(number: int, stage: dict[str, Any]) -> PublicStage:
     target = stage["target"]
     category = cast("str", target["category"])
     relations = parse_relations(stage["relations"])
-    adjectives = adjectives_of(tuple(target["size_m"]), tuple(stage["reference_colour"]))
+    appearance = parse_appearance(stage["appearance"], target["size_m"])
     return PublicStage(
         stage=number,
         category=category,
         basic_instruction=basic_instruction(category, relations),
-        appearance_instruction=appearance_instruction(category, adjectives),
-        unified_instruction=basic_instruction(category, relations, adjectives),
+        appearance_instruction=appearance_instruction(category, appearance),
+        unified_instruction=unified_instruction(category, relations, appearance),
+        writer=WRITER,
     )
 
 
 def _image(data: bytes, side_px: int) -> NDArray[np.uint8]:
-    """RGB bytes as a read-only image, in 64 shades a channel: nobody sees the rest, and it is half of a PNG file."""
-    pixels = np.frombuffer(data, dtype=np.uint8).reshape(side_px, side_px, 3)
-    coarse = pixels & np.uint8(0xFC)
-    coarse.flags.writeable = False
-    return coarse
+    """RGB bytes as a read-only image."""
+    return np.frombuffer(data, dtype=np.uint8).reshape(side_px, side_px, 3)
 
 
 def short_name(name: str) -> str:

@@ -1,25 +1,37 @@
 """The words of instructions, and their grammar.
 
-A `basic_instruction` (paper, Sec. A.4) is one sentence, made by `evonav.generation.describe` and readable by rule:
+All three instructions of `evonav.generation.describe` are one sentence each and readable by rule; those that a language
+model writes (`PublicStage.writer` says so) are free English.
 
-    instruction := "Please navigate to the " NOUN {" " RELATION} "."
-    RELATION    := "in the " ROOM                       the room, when the category is not unique in the house
-                 | "on the " NOUN                       what it stands on or in
-                 | "next to the " NOUN [" and the " NOUN]   at most two nearby objects
-                 | "near the " STRUCTURE                a door or a window
-                 | "below the " NOUN | "near the " NOUN     something on a wall
-    STRUCTURE   := "doorway" | "window"
+    basic_instruction      := "Please navigate to the " NOUN {" " RELATION} "."
+    appearance_instruction := "Please navigate to the " LOOKS "."
+    unified_instruction    := "Please navigate to the " LOOKS {" " RELATION} "."
 
-Relations come in this order, each at most once but "near". `NOUN` is `noun_of` a ProcTHOR object type, `ROOM` is
-`noun_of` a room type. An `appearance_instruction` is "Please navigate to the ADJECTIVES NOUN.", a
-`unified_instruction` is the basic one with the same adjectives before its first noun; adjectives are the words of
-`SIZES` and `COLOURS`, separated by spaces, size first.
+    LOOKS    := [SIZE " "] [SHAPE " "] [COLOUR [" and " COLOUR] " "] [MATERIAL " "] NOUN
+                [" with " DETAIL [" and " DETAIL]]
+    DETAIL   := "a " PART | NUMBER " " PARTS | PARTS
+    RELATION := ROOM | SUPPORT | NEAR | [","] EXTRA [" and " EXTRA]
+    ROOM     := "in the " NOUN | "in one of the " NOUNS         when the category is not unique in the house
+    SUPPORT  := "on " THING | "in " THING                       what it stands on, or the basin or cupboard it is in
+    NEAR     := "next to " THING [" and " THING]                at most two nearby objects
+    EXTRA    := "near " PLACE [" and " THING] | "in a corner"   a door, a window, or a corner of the room
+              | "below " THING | "near " THING                  something on a wall
+    THING    := "the " NOUN | "a " NOUN | "some " NOUNS
+    PLACE    := "the " STRUCTURE | "a " STRUCTURE
+
+Relations come in this order, each at most once; "the" is said of what the room has one of, "some" of several that are
+all near. `NOUN` is `noun_of` a ProcTHOR object or room type, `NOUNS` its plural, `SIZE` says how large a thing is for
+its kind, and the other words are those of `SHAPES`, `COLOURS` (two if the second colour covers much of it) and
+`MATERIALS`. A comma stands before the extras if a support or a neighbour comes before them.
 """
 
 import re
 
-SIZES = ("tiny", "small", "large")
-"""Words for the largest edge of a target: under 0.12 m, under 0.45 m, over 1.2 m; none in between."""
+SIZES = ("small", "large")
+"""Words for the size of a target among the catalogue's assets of its category; none for the middle."""
+
+SHAPES = ("round", "square", "rectangular", "L-shaped", "U-shaped", "long", "tall", "slim", "wide", "low")
+"""Words for a target's form and proportions."""
 
 COLOURS = (
     "black",
@@ -35,12 +47,32 @@ COLOURS = (
     "brown",
     "beige",
 )
-"""Words for the colour that a target has in its reference image."""
+"""Words for the colours that a target shows in its reference image."""
 
-STRUCTURES = ("doorway", "window")
+MATERIALS = {
+    "ceramic": "ceramic",
+    "fabric": "fabric",
+    "glass": "glass",
+    "leather": "leather",
+    "metal": "metal",
+    "paper": "paper",
+    "plastic": "plastic",
+    "rubber": "rubber",
+    "stone": "stone",
+    "wax": "wax",
+    "wood": "wooden",
+}
+"""Adjectives for what a target is made of."""
+
+STRUCTURES = ("doorway", "window", "corner")
 """Parts of the house that instructions refer to."""
 
+NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+"""Words for counts of parts."""
+
 _IRREGULAR = {"ArmChair": "armchair", "CD": "CD", "CounterTop": "countertop", "TVStand": "TV stand"}
+_PLURALS = {"decor": "decor", "foil": "foil", "knife": "knives", "paper": "paper", "shelf": "shelves"}
+_UNCOUNTED = {"aluminum foil", "blinds", "boots", "bread", "lettuce", "room decor", "table top decor", "toilet paper"}
 
 
 def noun_of(category: str) -> str:
@@ -51,3 +83,31 @@ def noun_of(category: str) -> str:
     if category in _IRREGULAR:
         return _IRREGULAR[category]
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", category).lower()
+
+
+def plural_of(noun: str) -> str:
+    """Several of a noun: `plural_of("wine bottle")` is `wine bottles`."""
+    head, _, last = noun.rpartition(" ")
+    if noun in _UNCOUNTED:
+        return noun
+    if last in _PLURALS:
+        last = _PLURALS[last]
+    elif re.search(r"(s|x|z|ch|sh|[^aeiou]o)$", last):
+        last += "es"
+    elif re.search(r"[^aeiou]y$", last):
+        last = last[:-1] + "ies"
+    else:
+        last += "s"
+    return f"{head} {last}" if head else last
+
+
+def with_article(noun: str) -> str:
+    """One of several: `an armchair`, `a mug`, `some bread`."""
+    if noun in _UNCOUNTED:
+        return f"some {noun}"
+    return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
+
+
+def listed(words: list[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)

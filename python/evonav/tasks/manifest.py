@@ -88,6 +88,8 @@ class PublicStage(Record):
     basic_instruction: Annotated[str, Field(min_length=1, max_length=2000)]
     appearance_instruction: Annotated[str, Field(min_length=1, max_length=2000)]
     unified_instruction: Annotated[str, Field(min_length=1, max_length=2000)]
+    writer: Id
+    """Who wrote the appearance and unified instructions: `evonav-describer 1`, or `vlm:` and a model's name."""
 
 
 @dataclass(frozen=True)

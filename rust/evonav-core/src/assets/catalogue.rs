@@ -60,6 +60,8 @@ struct AssetRow {
     #[serde(default)]
     materials: Vec<String>,
     #[serde(default)]
+    made_of: Vec<String>,
+    #[serde(default)]
     pickupable: bool,
     #[serde(default)]
     moveable: bool,
@@ -251,6 +253,7 @@ impl From<AssetRow> for Asset {
             surfaces_m: row.surfaces_m,
             colours: row.colours.iter().map(|hex| rgb(hex)).collect(),
             materials: row.materials,
+            made_of: row.made_of,
             split: row.split,
             is_pickupable: row.pickupable,
             is_moveable: row.moveable,

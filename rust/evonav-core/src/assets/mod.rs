@@ -28,6 +28,8 @@ pub struct Asset {
     pub colours: Vec<[u8; 3]>,
     /// Names of its materials, as ProcTHOR lists them; see [`Catalogue::material_colour`].
     pub materials: Vec<String>,
+    /// What it is made of (`wood`, `metal`, `fabric` ...), the most important first; may be empty.
+    pub made_of: Vec<String>,
     /// Split of ProcTHOR's dataset that it belongs to; `None` for those used in all.
     pub split: Option<Split>,
     /// Can be carried by a robot (AI2-THOR's `CanPickup`).

@@ -100,7 +100,7 @@ pub fn generate_task(
             rejections,
             reference_pose: reference.pose,
             reference_visible_px: reference.visible_px,
-            reference_colour: reference.colour,
+            appearance: reference.appearance.clone(),
             reference_path_length_m: length_m(&reference.path_m),
             reference_path_m: reference.path_m.clone(),
             ever_relocated_ids: state.relocated.iter().cloned().collect(),

@@ -1,6 +1,7 @@
 //! Task generation: which room evolves, what moves where, and which object is the goal
 //! (paper, Sec. 3.2 and A.1-A.4).
 
+mod appearance;
 mod evolve;
 mod extensions;
 mod generate;

@@ -2,9 +2,10 @@
 
 use super::{
     Parameters,
+    appearance::appearance_of,
     layout::Layout,
     placement::round_to,
-    record::{GoalRejection, PoseRecord},
+    record::{Appearance, GoalRejection, PoseRecord},
 };
 use crate::{
     Error,
@@ -60,8 +61,8 @@ pub struct Reference {
     pub pose: PoseRecord,
     /// Pixels of the target.
     pub visible_px: usize,
-    /// Their mean colour.
-    pub colour: [u8; 3],
+    /// What they show.
+    pub appearance: Appearance,
     /// RGB, row by row.
     pub image: Vec<u8>,
     /// Shortest path to it.
@@ -181,9 +182,14 @@ impl StageWorld {
                 return Ok(Err(GoalRejection::Unreachable));
             };
             render(&self.mesh, &camera, Want { rgb: true, instances: true }, &mut frame)?;
-            let colour = mean_colour(&frame, body);
+            let appearance = appearance_of(
+                &self.layout.items[index].asset,
+                self.house.objects[index].condition(),
+                &frame,
+                body,
+            );
             let image = std::mem::take(&mut frame.rgb);
-            return Ok(Ok(Reference { pose, visible_px, colour, image, path_m }));
+            return Ok(Ok(Reference { pose, visible_px, appearance, image, path_m }));
         }
         Ok(Err(GoalRejection::NotVisible))
     }
@@ -197,18 +203,4 @@ fn camera_at(pose: &PoseRecord, side_px: usize) -> Camera {
         horizon_rad: pose.horizon_deg.to_radians(),
     };
     Camera::at(&pose, [side_px; 2], FIELD_OF_VIEW_DEG.to_radians(), CAMERA_HEIGHT_M)
-}
-
-/// Mean colour of a body's pixels.
-fn mean_colour(frame: &FrameBuffer, body: i32) -> [u8; 3] {
-    let mut sums = [0_u64; 3];
-    let mut count = 0_u64;
-    for (pixel, _) in frame.rgb.chunks_exact(3).zip(&frame.instances).filter(|(_, id)| **id == body)
-    {
-        for (sum, &value) in sums.iter_mut().zip(pixel) {
-            *sum += u64::from(value);
-        }
-        count += 1;
-    }
-    sums.map(|sum| (sum / count.max(1)) as u8)
 }

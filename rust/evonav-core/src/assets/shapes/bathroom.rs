@@ -65,8 +65,10 @@ pub fn sink(s: &mut Sketch<'_>) {
     let basin = rim - (0.6 * rim).min(0.14);
     if h > 0.4 {
         if s.choose(&[true, false], true) {
+            s.detail("pedestal", 1);
             s.column(between(x, 0.3, 0.7), [0.0, basin], between(z, 0.1, 0.6), 0.8, 12, white);
         } else {
+            s.detail("cabinet door", 2);
             let wood = s.tint(1, s.choose(&WOODS, WOODS[1]));
             s.cuboid(inside(x, 0.03), [0.0, basin], [z[0], z[1] - 0.05], wood);
             for half in [between(x, 0.07, 0.49), between(x, 0.51, 0.93)] {
@@ -106,6 +108,7 @@ pub fn faucet(s: &mut Sketch<'_>) {
     s.cuboid(middle, between(y, 0.85, 1.0), between(z, 0.18, 1.0), metal);
     s.cuboid(middle, between(y, 0.7, 0.85), between(z, 0.86, 1.0), metal);
     if w > 0.15 {
+        s.detail("handle", 2);
         for end in ends(x, 0.04, 0.0) {
             s.cuboid(end, between(y, 0.12, 0.5), between(z, 0.02, 0.22), metal);
         }
@@ -197,6 +200,7 @@ pub fn washer(s: &mut Sketch<'_>) {
         [front, front + 0.01],
         shade(white, 0.75),
     );
+    s.detail("round door", 1);
     let pivot_m = [between(x, 0.2, 0.8)[0], 0.0, front];
     s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {
         let door = [between(x, 0.2, 0.8), between(y, 0.2, 0.72), [front, z[1] - 0.01]];

@@ -28,10 +28,15 @@ pub fn bed(s: &mut Sketch<'_>) {
     let foot = mattress.min(mattress - 0.04 + 0.08 * h).min(h);
     let board = 0.05;
     let [head_z, foot_z] = ends(z, board, 0.0);
+    if head - mattress > 0.15 {
+        s.detail("headboard", 1);
+    }
+    s.detail("pillow", if x[1] - x[0] > 1.25 { 2 } else { 1 });
     s.cuboid(x, [0.0, head], head_z, wood);
     s.cuboid(x, [0.0, foot], foot_z, wood);
     bunk(s, [wood, linen], mattress, x);
     if is_tall {
+        s.detail("tall post", 4);
         s.legs([0.0, h], 0.06, 0.0, wood);
         let upper = levels.iter().copied().find(|&y| y > 1.0 && y < h);
         if let Some(y) = upper.filter(|_| w < 1.4) {
@@ -68,6 +73,7 @@ pub fn dog_bed(s: &mut Sketch<'_>) {
     let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[2]));
     let rim = 0.15 * w.min(d);
     if (w - d).abs() < 0.03 {
+        s.form("round");
         // Round ones: recorded agents stand in the corners of their boxes.
         s.column(x, [0.0, 0.7 * h], z, 1.0, 16, fabric);
         s.column(

@@ -12,6 +12,7 @@ pub fn plant(s: &mut Sketch<'_>) {
     let pots = [[180, 100, 70], [225, 220, 212], [80, 85, 90], [150, 125, 100]];
     let pot = s.choose(&pots, pots[0]);
     let leaf = s.choose(&[[70, 120, 60], [55, 100, 55], [95, 135, 70]], [70, 120, 60]);
+    s.detail("pot", 1);
     let pot_top = (0.32 * h).min(0.5);
     let radius = (0.32 * w.min(d)).min(0.5 * pot_top + 0.05);
     let around = |span| inside(span, 0.5 * (span_length(span) - 2.0 * radius));

@@ -24,6 +24,7 @@ pub fn television(s: &mut Sketch<'_>) {
         s.cuboid(inside(x, 0.03 * w), inside(y, 0.04 * h), [z[1] - 0.01, z[1]], screen);
         return;
     }
+    s.detail("stand", 1);
     let panel = [-0.03, 0.03];
     let bottom = 0.1 * h;
     s.cuboid(x, [bottom, h], panel, frame);
@@ -51,6 +52,8 @@ pub fn laptop(s: &mut Sketch<'_>) {
     let lid = between(z, 0.0, 0.06);
     s.cuboid(x, [0.0, base], z, shell);
     s.cuboid(inside(x, 0.06 * w), [base, base + 0.004], between(z, 0.15, 0.6), DARK);
+    let is_closed = s.condition().openness.is_some_and(|openness| openness < 0.2);
+    s.detail(if is_closed { "closed lid" } else { "open lid" }, 1);
     let pivot_m = [0.0, base + 0.004, lid[1] + 0.004];
     s.closing(Motion::Hinge { pivot_m, axis: Along::X, angle_rad: FRAC_PI_2 }, |s| {
         s.cuboid(x, [base, h], lid, shell);
@@ -76,6 +79,7 @@ pub fn lamp(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let metal = s.tint(0, s.choose(&[DARK, STEEL, [150, 115, 70]], DARK));
     let cloths = [[240, 228, 200], [225, 225, 220], [215, 180, 130]];
+    s.detail("lampshade", 1);
     let cloth = lightest(s.asset(), s.choose(&cloths, cloths[0]));
     let cloth = if s.condition().is_on == Some(true) { LIT_SHADE } else { cloth };
     let is_floor = s.asset().category == "FloorLamp";

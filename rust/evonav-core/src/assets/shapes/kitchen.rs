@@ -24,9 +24,11 @@ pub fn counter(s: &mut Sketch<'_>) {
     let back = [z[0], (z[0] + depth).min(z[1])];
     let front = [back[1], z[1]];
     if is_l && w > depth && d > depth {
+        s.form("L-shaped");
         cabinets(s, x, back, Face::Front([x[0], x[1] - depth]));
         cabinets(s, [x[1] - depth, x[1]], front, Face::Left);
     } else if is_c && w > 2.0 * depth && d > depth {
+        s.form("U-shaped");
         cabinets(s, x, back, Face::Front(inside(x, depth)));
         cabinets(s, [x[0], x[0] + depth], front, Face::Right);
         cabinets(s, [x[1] - depth, x[1]], front, Face::Left);
@@ -95,6 +97,7 @@ pub fn fridge(s: &mut Sketch<'_>) {
         s.cuboid(width, [level - 0.01, level], body, [215, 225, 230]);
     }
     let split = 0.68 * h;
+    s.detail("door", 2);
     for (is_upper, y) in [(false, [0.05, split - 0.005]), (true, [split + 0.005, h - 0.01])] {
         let pivot_m = [x[1], 0.0, z[1] - 0.06];
         s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: FRAC_PI_2 }, |s| {
@@ -166,6 +169,7 @@ pub fn pan(s: &mut Sketch<'_>) {
     let metal = s.tint(0, DARK);
     let handle = shade(metal, 0.7);
     let (rim, grip) = (between(y, 0.0, 0.7), between(y, 0.55, 1.0));
+    s.detail("long handle", 1);
     if d >= w {
         let dish = [z[0], z[0] + w.min(d)];
         s.column(x, rim, dish, 1.15, 12, metal);
@@ -186,6 +190,7 @@ pub fn pot(s: &mut Sketch<'_>) {
     let middle = between(long, 0.5 - 0.5 * body.clamp(0.5, 1.0), 0.5 + 0.5 * body.clamp(0.5, 1.0));
     let ear = [long, [0.0; 2]][0];
     let y_ear = between(y, 0.55, 0.68);
+    s.detail("handle", 2);
     if d >= w {
         s.column(x, between(y, 0.0, 0.9), middle, 1.0, 12, metal);
         s.cuboid(between(x, 0.35, 0.65), y_ear, ear, shade(metal, 0.5));
@@ -207,6 +212,7 @@ pub fn kettle(s: &mut Sketch<'_>) {
     for end in ends(between(z, 0.1, 0.8), 0.015, 0.0) {
         s.cuboid(between(x, 0.45, 0.55), between(y, 0.6, 0.92), end, DARK);
     }
+    s.detail("spout", 1);
     let spout = [between(x, 0.42, 0.58), between(y, 0.5, 0.68), between(z, 0.7, 1.0)];
     s.round(Along::Z, 0.6, 8, spout, metal);
     s.cuboid(x, [0.0, 0.01], between(z, 0.0, 0.8), shade(metal, 0.6));

@@ -21,6 +21,7 @@ mod vessels;
 use crate::assets::{Asset, part::Part};
 pub(crate) use colour::lit;
 use sketch::Sketch;
+pub use sketch::{Detail, Looks};
 
 /// The parts of an asset, in the object frame.
 ///
@@ -48,6 +49,13 @@ pub fn shape_in(asset: &Asset, condition: Condition) -> Vec<Part> {
     let mut sketch = Sketch::new(asset, condition);
     draw(&mut sketch);
     sketch.finish()
+}
+
+/// Form and parts of the shape that [`shape_in`] gives an asset in a state.
+pub fn looks_in(asset: &Asset, condition: Condition) -> Looks {
+    let mut sketch = Sketch::new(asset, condition);
+    draw(&mut sketch);
+    sketch.into_looks()
 }
 
 /// Openness in which [`shape_of`] draws an asset; `None` if its shape has nothing that opens.

@@ -30,6 +30,7 @@ pub fn chair(s: &mut Sketch<'_>) {
         s.cuboid(inside(x, 0.08 * w), [seat - 0.06, seat], between(z, 0.08, 0.95), cushion);
         s.cuboid(inside(x, 0.12 * w), [seat + 0.1, h], [z[0] + 0.02 * d, z[0] + 0.12 * d], cushion);
         s.cuboid(between(x, 0.46, 0.54), [seat - 0.05, seat + 0.2], back, DARK);
+        s.detail("swivel base", 1);
         return;
     }
     let leg = (0.08 * w.min(d)).clamp(0.02, 0.045);
@@ -41,13 +42,16 @@ pub fn chair(s: &mut Sketch<'_>) {
     let is_slatted = s.choose(&[true, false], true);
     let inner = inside(x, leg);
     if is_slatted {
+        s.detail("slatted back", 1);
         let rise = h - seat;
         s.cuboid(inner, [h - 0.25 * rise, h], back, wood);
         s.cuboid(inner, [seat + 0.35 * rise, seat + 0.5 * rise], back, wood);
     } else {
+        s.detail("solid back", 1);
         s.cuboid(inner, [seat + 0.15 * (h - seat), h], back, cushion);
     }
     if w > 0.58 && h > 0.7 {
+        s.detail("armrest", 2);
         let arm = seat + 0.45 * (h - seat);
         for side in [left, right] {
             s.cuboid(side, [arm - 0.03, arm], between(z, 0.05, 0.9), wood);
@@ -63,11 +67,13 @@ pub fn stool(s: &mut Sketch<'_>) {
     let wood = s.tint(0, s.choose(&WOODS, WOODS[1]));
     let leg = (0.1 * w.min(d)).clamp(0.02, 0.04);
     if (w - d).abs() < 0.03 {
+        s.form("round");
         s.column(x, [h - 0.05, h], z, 1.0, 12, s.tint(1, wood));
     } else {
         s.cuboid(x, [h - 0.05, h], z, s.tint(1, wood));
     }
     s.legs([0.0, h - 0.05], leg, 0.15 * w.min(d), wood);
+    s.detail("leg", 4);
     let rung = inside(x, 0.15 * w.min(d));
     for z in ends(z, 0.02, 0.15 * w.min(d)) {
         s.cuboid(rung, [0.3 * h, 0.3 * h + 0.02], z, wood);
@@ -99,6 +105,8 @@ pub fn sofa(s: &mut Sketch<'_>) {
     s.cuboid(left, [foot, arm_top], z, fabric);
     s.cuboid(right, [foot, arm_top], z, fabric);
     let count = (if is_sofa { (w / 0.8).round() } else { 1.0 }).clamp(1.0, 4.0) as usize;
+    s.detail("seat cushion", count);
+    s.detail("armrest", 2);
     for i in 0..count {
         let cushion = slot(inner, i, count);
         s.cuboid(cushion, [seat - pad, seat], [back[1], front], soft);

@@ -1,5 +1,7 @@
 //! Drawing aid: parts given by where they begin and end inside an asset's box.
 
+use serde::Serialize;
+
 use super::{
     Condition,
     colour::{self, Colour},
@@ -14,6 +16,24 @@ use crate::{
 
 /// From where to where along one axis, metres.
 pub type Span = [f64; 2];
+
+/// What one would say of a drawn shape.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Looks {
+    /// `round`, `L-shaped` or `U-shaped`, where its category has other forms too.
+    pub form: Option<&'static str>,
+    /// Parts by which it can be told, the most striking first.
+    pub details: Vec<Detail>,
+}
+
+/// A part that people have a word for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Detail {
+    /// Singular, with its own adjectives: `open shelf`.
+    pub noun: &'static str,
+    /// How many there are.
+    pub count: usize,
+}
 
 /// Axis of a round part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,13 +66,21 @@ pub struct Sketch<'a> {
     size_m: Vec3,
     parts: Vec<Part>,
     moving: Vec<Moving>,
+    looks: Looks,
 }
 
 impl<'a> Sketch<'a> {
     pub fn new(asset: &'a Asset, condition: Condition) -> Self {
         let positive = |edge: f64| if edge.is_finite() { edge.max(1e-3) } else { 1e-3 };
         let size_m = asset.size_m.map(positive);
-        Self { asset, condition, size_m, parts: Vec::new(), moving: Vec::new() }
+        Self {
+            asset,
+            condition,
+            size_m,
+            parts: Vec::new(),
+            moving: Vec::new(),
+            looks: Looks::default(),
+        }
     }
 
     /// Whether it is known to be closed or open, and on or off.
@@ -202,6 +230,23 @@ impl<'a> Sketch<'a> {
         let centre_m = [x, y - 0.5 * self.size_m[1], z];
         let colour = colour::lit(colour);
         self.parts.push(Part { primitive, centre_m, rotation, colour });
+    }
+
+    /// Notes the form.
+    pub fn form(&mut self, form: &'static str) {
+        self.looks.form = Some(form);
+    }
+
+    /// Notes a part that was drawn, if any was.
+    pub fn detail(&mut self, noun: &'static str, count: usize) {
+        if count > 0 {
+            self.looks.details.push(Detail { noun, count });
+        }
+    }
+
+    /// What was noted.
+    pub fn into_looks(self) -> Looks {
+        self.looks
     }
 
     /// The parts, stretched (by a little, or not at all) to fill the box as they are drawn, then

@@ -17,6 +17,7 @@ pub fn carcass(s: &mut Sketch<'_>) {
     let front = s.tint(1, shade(wood, 1.12));
     let board = (0.03_f64).min(0.08 * h);
     let inner: Vec<f64> = s.levels().into_iter().filter(|&y| y < h - 0.06).collect();
+    s.detail("open shelf", inner.len());
     let shell = [z[0], z[1] - 0.012];
     if inner.is_empty() {
         let foot = if h > 0.4 { 0.06 } else { 0.02 };
@@ -51,6 +52,7 @@ pub fn carcass(s: &mut Sketch<'_>) {
 fn drawers(s: &mut Sketch<'_>, [columns, rows]: [usize; 2], y: [f64; 2], colour: Colour) {
     let [x, _, z] = s.spans();
     let face = [z[1] - 0.012, z[1] - 0.004];
+    s.detail("drawer", columns * rows);
     for column in 0..columns {
         for row in 0..rows {
             let part = |span, i: usize, n: usize| {
@@ -110,6 +112,7 @@ pub fn shelves(s: &mut Sketch<'_>) {
         levels.push(h);
     }
     let width = inside(x, side);
+    s.detail("open shelf", levels.len());
     for level in levels {
         s.cuboid(width, [(level - board).max(0.0), level], z, wood);
     }
@@ -126,6 +129,7 @@ pub fn cart(s: &mut Sketch<'_>) {
     if levels.len() < 2 {
         levels.extend([0.15 * h, 0.5 * h]);
     }
+    s.detail("shelf", levels.len());
     for level in levels {
         s.cuboid(x, [level - 0.025, level], z, wood);
     }
@@ -137,6 +141,7 @@ pub fn safe(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let steel = s.tint(0, [90, 95, 100]);
     s.cuboid(x, y, [z[0], z[1] - 0.03], steel);
+    s.detail("dial", 1);
     let door = [inside(x, 0.08 * w), inside(y, 0.08 * h)];
     let pivot_m = [door[0][0], 0.0, z[1] - 0.03];
     s.opening(Motion::Hinge { pivot_m, axis: Along::Y, angle_rad: -FRAC_PI_2 }, |s| {

@@ -40,6 +40,8 @@ pub fn table(s: &mut Sketch<'_>) {
     let top = (0.06 * h).clamp(0.02, 0.045).min(h);
     let is_round = ROUND.contains(&s.asset().id.as_str());
     if is_round {
+        s.form("round");
+        s.detail("central pedestal", 1);
         let radius = 0.5 * w.min(d);
         s.column(x, [h - top, h], z, 1.0, 16, wood);
         s.pole([0.0, 0.0], (0.12 * radius).max(0.015), [0.03, h - top], 8, support);
@@ -49,6 +51,9 @@ pub fn table(s: &mut Sketch<'_>) {
     let thick = (0.05 * w.min(d)).clamp(0.02, 0.08);
     s.cuboid(x, [h - top, h], z, wood);
     s.legs([0.0, h - top], thick, 0.02 * w.min(d), support);
+    let num_lower = s.levels().iter().filter(|&&y| y > 0.04 && y < h - 0.06).count();
+    s.detail("lower shelf", num_lower);
+    s.detail("leg", 4);
     let apron = (0.1 * h).min(0.08);
     if h > 0.3 {
         for z in ends(z, 0.02, 0.5 * thick) {
@@ -88,6 +93,7 @@ pub fn desk(s: &mut Sketch<'_>) {
     let leg_y = [0.0, desk_top - top];
     let [left, right] = ends(x, side, 0.0);
     if d > 1.1 && w > 1.5 {
+        s.form("L-shaped");
         let (wing, back) = (between(x, 1.0 - 0.62 / w, 1.0), between(z, 0.0, 0.65 / d));
         s.cuboid(x, [desk_top - top, desk_top], back, wood);
         s.cuboid(wing, [desk_top - top, desk_top], [back[1], z[1]], wood);
@@ -126,6 +132,7 @@ pub fn desk(s: &mut Sketch<'_>) {
     }
     if h > desk_top + 0.05 {
         // Shelf over the back of the desk.
+        s.detail("raised shelf", 1);
         let back = between(z, 0.0, 0.42);
         s.cuboid(x, [h - 0.025, h], back, wood);
         s.cuboid(left, [desk_top, h - 0.025], back, front);
@@ -140,6 +147,7 @@ pub fn desk(s: &mut Sketch<'_>) {
 /// Three closed drawers over each other.
 fn drawer_block(s: &mut Sketch<'_>, x: Span, top: f64, colour: Colour) {
     let z = s.spans()[2];
+    s.detail("drawer", 3);
     s.cuboid(x, [0.08, top], inside(z, 0.02), colour);
     let third = (top - 0.08) / 3.0;
     for k in 1..4 {

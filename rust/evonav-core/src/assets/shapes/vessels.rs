@@ -15,6 +15,7 @@ pub fn bin(s: &mut Sketch<'_>) {
         s.tint(0, s.choose(&[[110, 112, 115], [70, 85, 80], [60, 62, 66], [180, 175, 165]], DARK));
     let floor = s.levels().first().copied().unwrap_or(0.04 * h).min(0.6 * h);
     if (w - d).abs() < 0.02 {
+        s.form("round");
         s.column(x, between(y, 0.0, 0.97), z, 1.12, 12, plastic);
         s.column(
             between(x, 0.06, 0.94),
@@ -83,6 +84,7 @@ pub fn bottle(s: &mut Sketch<'_>) {
     let cap = if is_pump { [230, 230, 230] } else { shade(glass, 0.5) };
     s.column(between(x, 0.28, 0.72), between(y, 0.9, 1.0), between(z, 0.28, 0.72), 1.0, 8, cap);
     if is_pump {
+        s.detail("pump", 1);
         s.cuboid(between(x, 0.42, 0.58), between(y, 0.94, 1.0), between(z, 0.5, 1.0), cap);
     }
 }
@@ -110,6 +112,7 @@ pub fn mug(s: &mut Sketch<'_>) {
     let inner = |span: [f64; 2]| between(span, 0.1, 0.9);
     s.column(inner(x_body), between(y, 0.97, 1.0), inner(z_body), 1.0, 10, [85, 60, 45]);
     if body < 0.92 {
+        s.detail("handle", 1);
         let (x, z) = if w >= d {
             ([x_body[1] - 0.005, x[1]], between(z, 0.42, 0.58))
         } else {
