@@ -412,7 +412,11 @@ def group_row(name: str, group: Json) -> Json:
     for node in group["treeData"]:
         add(node, None)
     location = group["groupProperties"]["location"]
-    return {"name": name, "where": [place for place in ("corner", "middle", "edge") if location[place]], "members": members}
+    return {
+        "name": name,
+        "where": [place for place in ("corner", "middle", "edge") if location[place]],
+        "members": members,
+    }
 
 
 if __name__ == "__main__":
