@@ -10,6 +10,7 @@ use evonav_core::{
     sensors::{
         camera::{Camera, View},
         raster::{FrameBuffer, Want, render},
+        raster_count::visible_px,
         raycast3d::RayCaster,
         visibility::visible_bodies,
     },
@@ -54,6 +55,15 @@ fn bench_raster(c: &mut Criterion) {
             });
         }
     }
+    // What a candidate for a reference pose costs: bodies in turn, seen or not.
+    let mut frame = FrameBuffer::default();
+    let cameras_300 = cameras(&scene, [300, 300]);
+    let mut next = cameras_300.iter().zip(scene.first_object..scene.bodies.len()).cycle();
+    c.bench_function("raster_count/visible_px_300x300", |b| {
+        b.iter(|| {
+            next.next().map(|(camera, body)| visible_px(&mesh, camera, body, 50, &mut frame))
+        });
+    });
     // The twin that shares no idea with it: a ray a pixel.
     let caster = RayCaster::build(&mesh);
     let cameras = cameras(&scene, [300, 300]);

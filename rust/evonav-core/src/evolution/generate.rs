@@ -1,5 +1,7 @@
 //! Algorithm 1 of the paper (Sec. A.1): a task from a house, stage by stage.
 
+use std::cell::RefCell;
+
 use serde::Serialize;
 
 use super::{
@@ -16,6 +18,7 @@ use crate::{
     geometry::{Vec2, distance_2d_m},
     house::{House, HouseDelta},
     rng::Stream,
+    sensors::raster::FrameBuffer,
 };
 
 /// What became of a house.
@@ -63,7 +66,8 @@ pub fn generate_task(
         let detail = format!("{num_rooms} room(s)");
         return Ok(reject(RejectReason::TooFewRooms, 0, detail));
     }
-    let generator = Generator { catalogue, seed, label, parameters };
+    let frame = RefCell::default();
+    let generator = Generator { catalogue, seed, label, parameters, frame };
     let choices = &parameters.num_stages;
     let drawn = generator.stream(0, "num_stages").below(choices.len());
     let num_stages = choices.get(drawn).copied().unwrap_or(1);
@@ -116,6 +120,8 @@ pub(super) struct Generator<'a> {
     seed: u64,
     label: &'a str,
     pub(super) parameters: &'a Parameters,
+    /// Working memory of the renderer.
+    pub(super) frame: RefCell<FrameBuffer>,
 }
 
 impl Generator<'_> {

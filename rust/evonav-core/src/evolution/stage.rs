@@ -16,6 +16,7 @@ use crate::{
     sensors::{
         camera::Camera,
         raster::{FrameBuffer, Want, render},
+        raster_count::visible_px,
     },
     world::{
         collision::AgentBody,
@@ -149,6 +150,7 @@ impl StageWorld {
         reachable: &[(Vec2, Option<usize>)],
         parameters: &Parameters,
         stream: &mut Stream,
+        frame: &mut FrameBuffer,
     ) -> Result<Result<Reference, GoalRejection>, Error> {
         let mut positions: Vec<Vec2> =
             self.is_near(&self.layout, index, reachable, parameters).collect();
@@ -157,9 +159,8 @@ impl StageWorld {
         }
         stream.shuffle(&mut positions);
         let [x, _, z] = self.layout.items[index].placement.position_m;
-        let body = (self.layout.scene.first_object + index + 1) as i32;
+        let body = self.layout.scene.first_object + index;
         let side_px = parameters.reference_image_px;
-        let mut frame = FrameBuffer::default();
         for position in positions {
             let yaw_deg = (x - position[0]).atan2(z - position[1]).to_degrees();
             let yaw_deg = round_to(yaw_deg.rem_euclid(360.0), 1.0) % 360.0;
@@ -173,20 +174,19 @@ impl StageWorld {
                 horizon_deg: HORIZON_DEG,
             };
             let camera = camera_at(&pose, side_px);
-            render(&self.mesh, &camera, Want { rgb: false, instances: true }, &mut frame)?;
-            let visible_px = frame.instances.iter().filter(|&&id| id == body).count();
-            if visible_px < parameters.reference_min_visible_px {
+            let least_px = parameters.reference_min_visible_px;
+            let Some(visible_px) = visible_px(&self.mesh, &camera, body, least_px, frame)? else {
                 continue;
-            }
+            };
             let Some(path_m) = self.navigation.shortest_path(start_m, position) else {
                 return Ok(Err(GoalRejection::Unreachable));
             };
-            render(&self.mesh, &camera, Want { rgb: true, instances: true }, &mut frame)?;
+            render(&self.mesh, &camera, Want { rgb: true, instances: true }, frame)?;
             let appearance = appearance_of(
                 &self.layout.items[index].asset,
                 self.house.objects[index].condition(),
-                &frame,
-                body,
+                frame,
+                body as i32 + 1,
             );
             let image = std::mem::take(&mut frame.rgb);
             return Ok(Ok(Reference { pose, visible_px, appearance, image, path_m }));

@@ -60,12 +60,19 @@ impl Generator<'_> {
         let mut rejections = Vec::new();
         let mut failure = None;
         let mut stream = self.stream(stage, "goal");
+        let mut frame = self.frame.borrow_mut();
         let mut draw_reference = |candidate: usize| {
             let index = indices[candidate];
             let id = house.objects[index].id.clone();
             let mut stream = self.stream(stage, &format!("reference {id}"));
-            let drawn =
-                world.sample_reference(index, start_m, &reachable, self.parameters, &mut stream);
+            let drawn = world.sample_reference(
+                index,
+                start_m,
+                &reachable,
+                self.parameters,
+                &mut stream,
+                &mut frame,
+            );
             match drawn {
                 Ok(Ok(reference)) => return Some(reference),
                 Ok(Err(reason)) => rejections.push(RejectionRecord { id, reason }),

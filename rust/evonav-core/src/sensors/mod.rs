@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod ground_truth;
 pub mod raster;
+pub mod raster_count;
 mod raster_fill;
 mod raster_shade;
 pub mod raycast;

@@ -4,6 +4,8 @@
 //! faces turned away are never drawn, and a face's inverse depth is the exact plane equation
 //! instead of an interpolation between corners. Colours come after visibility.
 
+use std::ops::Range;
+
 use crate::{
     Error,
     geometry::{Aabb, Mat3, Vec2, Vec3, rotate, sub},
@@ -33,9 +35,9 @@ pub struct FrameBuffer {
     pub instances: Vec<i32>,
     /// `(H, W, 3)` sRGB; empty if not wanted.
     pub rgb: Vec<u8>,
-    canvas: Canvas,
+    pub(super) canvas: Canvas,
     shader: Shader,
-    scratch: Scratch,
+    pub(super) scratch: Scratch,
 }
 
 impl FrameBuffer {
@@ -48,10 +50,10 @@ impl FrameBuffer {
 
 /// Vertices of the part and corners of the face at hand.
 #[derive(Debug, Clone, Default)]
-struct Scratch {
-    visible: Vec<(f64, u32)>,
-    local_m: Vec<Vec3>,
-    projected_px: Vec<Vec2>,
+pub(super) struct Scratch {
+    pub visible: Vec<(f64, u32)>,
+    pub local_m: Vec<Vec3>,
+    pub projected_px: Vec<Vec2>,
     clipped_m: Vec<Vec3>,
     polygon_px: Vec<Vec2>,
 }
@@ -102,7 +104,13 @@ pub fn render_view(
     Ok(())
 }
 
-fn draw_part(mesh: &SceneMesh, part: &PartMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
+pub(super) fn draw_part(
+    mesh: &SceneMesh,
+    part: &PartMesh,
+    lens: &Lens,
+    want: Want,
+    out: &mut FrameBuffer,
+) {
     let FrameBuffer { canvas, shader, scratch, .. } = out;
     let is_clipped = lens.transform(&mesh.vertices_m[part.vertices.clone()], scratch);
     for index in part.faces.clone() {
@@ -162,7 +170,7 @@ pub(super) enum Optics {
 }
 
 /// A view, ready for use.
-struct Lens {
+pub(super) struct Lens {
     axes: Mat3,
     eye_m: Vec3,
     optics: Optics,
@@ -174,7 +182,7 @@ struct Lens {
 }
 
 impl Lens {
-    fn new(view: &View) -> Self {
+    pub fn new(view: &View) -> Self {
         let axes = view.axes();
         let Camera { height_px, position_m: eye_m, .. } = view.camera;
         let ([near_m, far_m], [u, v]) = (view.clip_m, view.camera.centre_px());
@@ -196,15 +204,39 @@ impl Lens {
             ([0.0, scale, slope_v], least_v),
             ([0.0, -scale, slope_v], least_v),
         ];
-        let to_world =
-            |n: Vec3| std::array::from_fn(|i| (0..3).map(|j| axes[j][i] * n[j]).sum::<f64>());
-        Self {
+        let mut lens = Self {
             axes,
             eye_m,
             optics,
             centre_px: [u, v],
             clip_m: view.clip_m,
-            frustum: local.map(|(normal, least)| (to_world(normal), least)),
+            frustum: [([0.0; 3], 0.0); 6],
+        };
+        lens.frustum = local.map(|(normal, least)| (lens.to_world(normal), least));
+        lens
+    }
+
+    fn to_world(&self, local: Vec3) -> Vec3 {
+        std::array::from_fn(|i| (0..3).map(|j| self.axes[j][i] * local[j]).sum::<f64>())
+    }
+
+    /// Leaves out of view what is outside some pixels or beyond a depth, in a perspective view.
+    pub fn narrow(&mut self, columns: &Range<usize>, rows: &Range<usize>, far_m: f64) {
+        let Optics::Perspective { focal_px } = self.optics else { return };
+        // The first and the last pixel's outer borders, and a pixel more for rounding.
+        let [low, high] = [[columns.start, rows.start], [columns.end, rows.end]];
+        let slope = |axis: usize, at_px: f64| at_px - self.centre_px[axis];
+        let low = [0, 1].map(|axis| slope(axis, low[axis] as f64 - 1.0));
+        let high = [0, 1].map(|axis| slope(axis, high[axis] as f64 + 1.0));
+        let local = [
+            ([0.0, 0.0, -1.0], -far_m.min(self.clip_m[1])),
+            ([focal_px, 0.0, -low[0]], 0.0),
+            ([-focal_px, 0.0, high[0]], 0.0),
+            ([0.0, focal_px, -low[1]], 0.0),
+            ([0.0, -focal_px, high[1]], 0.0),
+        ];
+        for (index, (normal, least)) in local.into_iter().enumerate() {
+            self.frustum[index + 1] = (self.to_world(normal), least);
         }
     }
 
@@ -214,7 +246,7 @@ impl Lens {
     }
 
     /// Nearness of the far plane.
-    fn far_nearness(&self) -> f32 {
+    pub fn far_nearness(&self) -> f32 {
         match self.optics {
             Optics::Perspective { .. } => (1.0 / self.clip_m[1]) as f32,
             Optics::Orthographic { .. } => (self.horizon_m() - self.clip_m[1]) as f32,
@@ -230,7 +262,7 @@ impl Lens {
     }
 
     /// Whether some of the box may be in view.
-    fn may_see(&self, aabb: &Aabb) -> bool {
+    pub fn may_see(&self, aabb: &Aabb) -> bool {
         let (centre, size) = (sub(aabb.centre_m(), self.eye_m), aabb.size_m());
         self.frustum.iter().all(|(n, least)| {
             let reach: f64 = (0..3).map(|k| 0.5 * size[k] * n[k].abs()).sum();
@@ -239,7 +271,7 @@ impl Lens {
     }
 
     /// Parts in view, nearest first.
-    fn collect_visible(&self, mesh: &SceneMesh, visible: &mut Vec<(f64, u32)>) {
+    pub fn collect_visible(&self, mesh: &SceneMesh, visible: &mut Vec<(f64, u32)>) {
         visible.clear();
         visible.extend(
             mesh.parts
@@ -260,7 +292,7 @@ impl Lens {
     }
 
     /// Takes a part's vertices to the camera's frame and the image; whether the near plane cuts it.
-    fn transform(&self, vertices_m: &[Vec3], scratch: &mut Scratch) -> bool {
+    pub fn transform(&self, vertices_m: &[Vec3], scratch: &mut Scratch) -> bool {
         scratch.local_m.clear();
         scratch.projected_px.clear();
         let mut is_clipped = false;

@@ -16,6 +16,8 @@ pub(super) struct Canvas {
     pub height_px: usize,
     pub nearness: Vec<[f32; LANES]>,
     pub tags: Vec<[u32; LANES]>,
+    /// Rows, and blocks of a row, that are drawn on.
+    drawn: [Range<usize>; 2],
     /// First pixel of the polygon at hand, and the one after its last, by row.
     left: Vec<u32>,
     right: Vec<u32>,
@@ -32,6 +34,30 @@ impl Canvas {
         self.tags.resize(num_blocks, [0; LANES]);
         self.left.resize(height_px, 0);
         self.right.resize(height_px, 0);
+        self.drawn = [0..height_px, 0..self.blocks_per_row()];
+    }
+
+    /// Empties some rows and blocks, and draws on nothing else until it is emptied again; there,
+    /// every pixel becomes what it becomes on the whole canvas.
+    pub fn clear_within(
+        &mut self,
+        [width_px, height_px]: [usize; 2],
+        empty: f32,
+        rows: Range<usize>,
+        blocks: Range<usize>,
+    ) {
+        (self.width_px, self.height_px) = (width_px, height_px);
+        let num_blocks = self.blocks_per_row() * height_px;
+        self.nearness.resize(num_blocks, [empty; LANES]);
+        self.tags.resize(num_blocks, [0; LANES]);
+        self.left.resize(height_px, 0);
+        self.right.resize(height_px, 0);
+        for row in rows.clone() {
+            let first = self.row_blocks(row).start;
+            self.nearness[first + blocks.start..first + blocks.end].fill([empty; LANES]);
+            self.tags[first + blocks.start..first + blocks.end].fill([0; LANES]);
+        }
+        self.drawn = [rows, blocks];
     }
 
     pub fn blocks_per_row(&self) -> usize {
@@ -63,6 +89,11 @@ impl Canvas {
                 continue;
             }
             let blocks = left / LANES..(right - 1) / LANES + 1;
+            let [_, drawn] = &self.drawn;
+            let (first, end) = (blocks.start.max(drawn.start), blocks.end.min(drawn.end));
+            if first >= end {
+                continue;
+            }
             let u = (blocks.start * LANES) as f64 + 0.5;
             let start = plane[0] * u + plane[1] * (row as f64 + 0.5) + plane[2];
             let span = Span {
@@ -71,8 +102,10 @@ impl Canvas {
                 start: start as f32,
                 step,
                 tag,
+                first_drawn: first - blocks.start,
+                last: blocks.len() - 1,
             };
-            let blocks = row * blocks_per_row + blocks.start..row * blocks_per_row + blocks.end;
+            let blocks = row * blocks_per_row + first..row * blocks_per_row + end;
             span.draw(&mut self.nearness[blocks.clone()], &mut self.tags[blocks]);
         }
     }
@@ -84,7 +117,7 @@ impl Canvas {
             top = top.min(corner[1]);
             bottom = bottom.max(corner[1]);
         }
-        let rows = first_centre(top, self.height_px)..first_centre(bottom, self.height_px);
+        let rows = self.rows_between(top, bottom);
         if rows.is_empty() {
             return 0..0;
         }
@@ -105,8 +138,15 @@ impl Canvas {
         rows
     }
 
+    /// Rows that are drawn on with a centre between two heights.
+    fn rows_between(&self, top_px: f64, bottom_px: f64) -> Range<usize> {
+        let [drawn, _] = &self.drawn;
+        first_centre(top_px, self.height_px).max(drawn.start)
+            ..first_centre(bottom_px, self.height_px).min(drawn.end)
+    }
+
     fn edge(&mut self, upper: Vec2, lower: Vec2, is_right: bool) {
-        let rows = first_centre(upper[1], self.height_px)..first_centre(lower[1], self.height_px);
+        let rows = self.rows_between(upper[1], lower[1]);
         let columns = if is_right { &mut self.right } else { &mut self.left };
         let slope = (lower[0] - upper[0]) / (lower[1] - upper[1]);
         for row in rows {
@@ -131,18 +171,21 @@ struct Span {
     start: f32,
     step: f32,
     tag: u32,
+    /// Block that is drawn first.
+    first_drawn: usize,
+    /// Last block, drawn or not.
+    last: usize,
 }
 
 impl Span {
     fn draw(&self, nearness: &mut [[f32; LANES]], tags: &mut [[u32; LANES]]) {
         let in_block = LANE_INDEX.map(|lane| lane * self.step);
         let block_step = LANES as f32 * self.step;
-        let last = nearness.len().saturating_sub(1);
-        for (block, (stored, tags)) in nearness.iter_mut().zip(tags).enumerate() {
+        for (block, (stored, tags)) in (self.first_drawn..).zip(nearness.iter_mut().zip(tags)) {
             let base = self.start + block as f32 * block_step;
             let candidate = in_block.map(|offset| base + offset);
             // Where only some pixels of a block are covered, the others get what is never nearer.
-            let candidate = if block == 0 || block == last {
+            let candidate = if block == 0 || block == self.last {
                 self.covered((block * LANES) as u32, candidate)
             } else {
                 candidate
