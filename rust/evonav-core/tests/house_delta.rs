@@ -76,17 +76,6 @@ fn apply_naive(document: &Value, delta: &HouseDelta) -> Option<Value> {
             object["isOn"] = json!(is_on);
         }
     }
-    for new in &delta.added {
-        let ([x, y, z], [a, b, c]) = (new.position_m, new.rotation_deg);
-        let made = json!({"id": new.id, "assetId": new.asset_id, "kinematic": false,
-            "position": {"x": x, "y": y, "z": z}, "rotation": {"x": a, "y": b, "z": c}});
-        let roots = document["objects"].as_array_mut()?;
-        match &new.parent {
-            None => roots,
-            Some(parent) => children(roots, parent)?,
-        }
-        .push(made);
-    }
     for step in &delta.moves {
         let roots = document["objects"].as_array_mut()?;
         let (mut object, holder, index) = take(roots, &step.id, None)?;
@@ -116,6 +105,17 @@ fn apply_naive(document: &Value, delta: &HouseDelta) -> Option<Value> {
             return None;
         }
     }
+    for new in &delta.added {
+        let ([x, y, z], [a, b, c]) = (new.position_m, new.rotation_deg);
+        let made = json!({"id": new.id, "assetId": new.asset_id, "kinematic": false,
+            "position": {"x": x, "y": y, "z": z}, "rotation": {"x": a, "y": b, "z": c}});
+        let roots = document["objects"].as_array_mut()?;
+        match &new.parent {
+            None => roots,
+            Some(parent) => children(roots, parent)?,
+        }
+        .push(made);
+    }
     prune(&mut document["objects"], &mut before["objects"]);
     Some(document)
 }
@@ -143,6 +143,7 @@ proptest! {
                 delta.moves.push(ObjectMove { id: id(index), position_m, rotation_deg, parent: parent.map(id) });
             }
         }
+        let removed: BTreeSet<String> = removed.into_iter().map(id).collect();
         for (number, (parent, x)) in added.into_iter().enumerate() {
             delta.added.push(AddedObject {
                 id: format!("new|2|{number}"),
@@ -152,11 +153,10 @@ proptest! {
                 // Every other one stands on the one before.
                 parent: match number {
                     1 | 3 => Some(format!("new|2|{}", number - 1)),
-                    _ => parent.map(id),
+                    _ => parent.map(id).filter(|parent| !removed.contains(parent)),
                 },
             });
         }
-        let removed: BTreeSet<String> = removed.into_iter().map(id).collect();
         delta.removed = removed.into_iter().collect();
         for (index, openness, is_on) in states {
             let object = id(index);

@@ -66,7 +66,8 @@ impl Generator<'_> {
             }
         };
         let delta = layout.delta_from(house);
-        record.changes = changes_of(house, &layout, parameters.relocated_min_m, mode.name());
+        record.changes =
+            changes_of(house, &layout, parameters.relocated_min_m, |_| mode.name().to_owned());
         record.outcome = EvolutionOutcome::Evolved;
         let id_of = |index: usize| house.objects[index].id.clone();
         record.salient_id = salient.map(id_of);
@@ -120,20 +121,21 @@ impl Generator<'_> {
 }
 
 /// Every object whose pose or support differs between house and layout.
-fn changes_of(
+pub(super) fn changes_of(
     house: &House,
     layout: &Layout,
     relocated_min_m: f64,
-    cause: &str,
+    cause_of: impl Fn(usize) -> String,
 ) -> Vec<ChangeRecord> {
     let id_of = |index: Option<usize>| index.map(|i| house.objects[i].id.clone());
-    let changed = house.objects.iter().zip(&layout.items).filter(|(object, item)| {
+    let objects = house.objects.iter().zip(&layout.items).enumerate();
+    let changed = objects.filter(|(_, (object, item))| {
         let now = item.placement;
         (object.position_m, object.rotation_deg, object.parent)
             != (now.position_m, now.rotation_deg, now.parent)
     });
     changed
-        .map(|(object, item)| {
+        .map(|(index, (object, item))| {
             let now = item.placement;
             let squares =
                 (0..3).map(|axis| (now.position_m[axis] - object.position_m[axis]).powi(2));
@@ -149,7 +151,7 @@ fn changes_of(
                 to_support_id: id_of(now.parent),
                 displacement_m,
                 is_relocated: displacement_m > relocated_min_m || now.parent != object.parent,
-                cause: cause.to_owned(),
+                cause: cause_of(index),
             }
         })
         .collect()

@@ -6,9 +6,11 @@ use serde::Serialize;
 
 use super::{
     Parameters,
+    beyond::Transition,
     evolve::no_evolution,
     record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason, Rejected},
     relations::relations_of,
+    schedule::Household,
     stage::StageWorld,
     state::State,
 };
@@ -77,14 +79,22 @@ pub fn generate_task(
         Err(rejected) => return Ok(Generation::Rejected(rejected)),
     };
     let mut task = GeneratedTask { stages: vec![], houses: vec![], images: vec![] };
+    let of_schedule = |name: &str| generator.stream(0, &format!("schedule {name}"));
+    let schedule = parameters.extensions.schedule;
+    let mut household = schedule.map(|people| Household::new(people, house, of_schedule));
     for stage in 1..=num_stages {
-        let (evolution, delta) = if stage == 1 {
-            (no_evolution(EvolutionOutcome::FirstStage), HouseDelta::default())
-        } else {
-            generator.sample_scene_evolution(&world, &state, stage)?
+        let transition = Transition { generator: &generator, unknown, state: &state, stage };
+        let (mut evolution, delta) = match &mut household {
+            _ if stage == 1 => (no_evolution(EvolutionOutcome::FirstStage), HouseDelta::default()),
+            Some(household) => transition.follow_schedule(&world, household)?,
+            None => generator.sample_scene_evolution(&world, &state, stage)?,
         };
-        if !delta.moves.is_empty() {
+        if !delta.is_empty() {
             world = StageWorld::build(world.house.apply(&delta)?, catalogue, unknown)?;
+        }
+        evolution.clock_min = household.as_ref().map(|people| people.time_of_day_min(stage));
+        if stage > 1 {
+            world = transition.extend(world, &mut evolution)?;
         }
         state.note_evolution(&evolution, &world.house, stage);
         let made = match generator.sample_stage_task(&world, &state, &evolution, stage)? {
@@ -98,7 +108,6 @@ pub fn generate_task(
             relations: relations_of(&world.house, &world.layout, target.index),
             target: target.record,
             evolution,
-            delta,
             state: state.record(&world.house),
             start_pose: state.pose,
             rejections,

@@ -1,7 +1,9 @@
 //! Task generation: which room evolves, what moves where, and which object is the goal
 //! (paper, Sec. 3.2 and A.1-A.4).
 
+mod activities;
 mod appearance;
+mod beyond;
 mod evolve;
 mod extensions;
 mod generate;
@@ -17,10 +19,12 @@ pub mod record;
 mod relations;
 mod reserve;
 mod rooms;
+mod schedule;
 mod settle;
 mod spawn;
 mod stage;
 mod state;
+mod states;
 mod surfaces;
 mod target;
 mod unit;

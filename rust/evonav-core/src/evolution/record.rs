@@ -6,7 +6,7 @@ use super::Mode;
 use crate::{
     assets::shapes::Detail,
     geometry::{Vec2, Vec3},
-    house::HouseDelta,
+    house::{AddedObject, HouseDelta, ObjectMove, StateChange},
 };
 
 /// A generated task.
@@ -56,8 +56,6 @@ pub enum RejectReason {
 pub struct GeneratedStage {
     /// ΔH_k, with its history.
     pub evolution: EvolutionRecord,
-    /// ΔH_k, as it is applied.
-    pub delta: HouseDelta,
     /// S before the stage.
     pub state: StateRecord,
     /// Reference start s_k.
@@ -145,6 +143,36 @@ pub struct EvolutionRecord {
     pub clock_min: Option<usize>,
     /// What people did since the stage before.
     pub activities: Vec<ActivityRecord>,
+}
+
+impl EvolutionRecord {
+    /// The change as it is applied to the house of the stage before.
+    pub fn delta(&self) -> HouseDelta {
+        let moves = self.changes.iter().map(|change| ObjectMove {
+            id: change.id.clone(),
+            position_m: change.to_position_m,
+            rotation_deg: change.to_rotation_deg,
+            parent: change.to_support_id.clone(),
+        });
+        let added = self.additions.iter().map(|object| AddedObject {
+            id: object.id.clone(),
+            asset_id: object.asset_id.clone(),
+            position_m: object.position_m,
+            rotation_deg: object.rotation_deg,
+            parent: object.support_id.clone(),
+        });
+        let states = self.states.iter().map(|change| StateChange {
+            id: change.id.clone(),
+            openness: (change.field == "openness").then_some(change.after),
+            is_on: (change.field == "isOn").then_some(change.after > 0.0),
+        });
+        HouseDelta {
+            moves: moves.collect(),
+            removed: self.removals.iter().map(|object| object.id.clone()).collect(),
+            added: added.collect(),
+            states: states.collect(),
+        }
+    }
 }
 
 /// Why nothing in a room could be moved.

@@ -14,15 +14,15 @@ use crate::{Error, geometry::Vec3};
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HouseDelta {
-    /// New objects.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub added: Vec<AddedObject>,
     /// Moves. What stands on a moved object keeps its own position unless it is listed too.
     #[serde(default)]
     pub moves: Vec<ObjectMove>,
     /// Ids of objects that vanish; what still stands on one must be listed too.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub removed: Vec<String>,
+    /// New objects.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub added: Vec<AddedObject>,
     /// Doors and objects that open, close, go on or off.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub states: Vec<StateChange>,
@@ -93,8 +93,8 @@ impl HouseDelta {
 
     /// Whether it changes nothing.
     pub fn is_empty(&self) -> bool {
-        let Self { added, moves, removed, states } = self;
-        added.is_empty() && moves.is_empty() && removed.is_empty() && states.is_empty()
+        let Self { moves, removed, added, states } = self;
+        moves.is_empty() && removed.is_empty() && added.is_empty() && states.is_empty()
     }
 }
 
@@ -127,7 +127,6 @@ impl House {
     /// is no valid house.
     pub fn apply(&self, delta: &HouseDelta) -> Result<Self, Error> {
         let mut tree = Tree::of(self);
-        delta.added.iter().try_for_each(|object| tree.add(object))?;
         let mut is_moved = vec![false; tree.nodes.len()];
         for step in &delta.moves {
             let index = tree.find(&step.id, &step.id, "id")?;
@@ -137,6 +136,7 @@ impl House {
             tree.move_to(index, step)?;
         }
         tree.remove(&delta.removed)?;
+        delta.added.iter().try_for_each(|object| tree.add(object))?;
         let mut document = self.document_without_objects();
         for change in &delta.states {
             tree.set_state(change, &mut document)?;

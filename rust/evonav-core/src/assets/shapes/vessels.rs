@@ -64,7 +64,7 @@ pub fn open_box(s: &mut Sketch<'_>) {
     for x in ends(x, wall, 0.0) {
         s.cuboid(x, y, z, card);
     }
-    for (z, side) in ends(z, wall, 0.0).into_iter().zip([1.0, -1.0]) {
+    for (z, side) in ends(z, wall, 0.0).into_iter().zip([-1.0, 1.0]) {
         s.cuboid(inside(x, wall), y, z, shade(card, 0.93));
         let pivot_m = [0.0, y[1], if side > 0.0 { z[1] } else { z[0] }];
         let motion = Motion::Hinge { pivot_m, axis: Along::X, angle_rad: -side * FRAC_PI_2 };

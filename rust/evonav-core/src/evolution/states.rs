@@ -1,0 +1,192 @@
+//! Doors and furniture that open and close, lamps and screens that go on and off.
+
+use super::{
+    beyond::Transition,
+    layout::TOUCH_M,
+    plan::overlap_m,
+    record::{EvolutionRecord, StateChangeRecord},
+    stage::StageWorld,
+};
+use crate::{
+    Error,
+    assets::{
+        part::Part,
+        shapes::{drawn_openness, shows_light},
+    },
+    house::{HouseDelta, StateChange},
+    world::{
+        footprint::{Footprint, footprint},
+        scene::{BodyKind, Scene},
+    },
+};
+
+/// Opennesses that are drawn from.
+const LEVELS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// A smaller change of openness is none.
+const LEAST_CHANGE: f64 = 0.125;
+
+/// Something that can open: its index in the scene, id, category and openness.
+struct Openable {
+    body: usize,
+    id: String,
+    category: String,
+    openness: f64,
+}
+
+impl Transition<'_> {
+    /// Opens or closes furniture and things, as far as there is room for what swings out.
+    pub(super) fn open_objects(
+        &self,
+        world: StageWorld,
+        count: usize,
+        record: &mut EvolutionRecord,
+    ) -> Result<StageWorld, Error> {
+        let house = &world.house;
+        let objects = house.objects.iter().zip(&world.layout.items).enumerate();
+        let openables = objects.filter(|(_, (object, _))| self.is_free(house, object.room));
+        let openables = openables.filter_map(|(index, (object, item))| {
+            Some(Openable {
+                body: world.layout.scene.first_object + index,
+                id: object.id.clone(),
+                category: item.asset.category.clone(),
+                openness: object.openness.or(drawn_openness(&item.asset)).filter(|_| {
+                    // An openness that the shape does not show would be no change.
+                    drawn_openness(&item.asset).is_some()
+                })?,
+            })
+        });
+        let openables = openables.collect();
+        self.open(world, openables, count, "OPENABLES", record)
+    }
+
+    /// Opens or closes doors with a leaf between two rooms, as long as everything can be reached.
+    pub(super) fn open_doors(
+        &self,
+        world: StageWorld,
+        count: usize,
+        record: &mut EvolutionRecord,
+    ) -> Result<StageWorld, Error> {
+        let house = &world.house;
+        let room_of = |id: &String| house.rooms.iter().position(|room| room.id == *id);
+        let doors = house.doors.iter().filter(|door| {
+            door.asset_id.starts_with("Doorway")
+                && door.room_ids[0] != door.room_ids[1]
+                && door.room_ids.iter().all(|id| self.is_free(house, room_of(id)))
+        });
+        let bodies = &world.layout.scene.bodies;
+        let openables = doors.filter_map(|door| {
+            Some(Openable {
+                body: bodies.iter().position(|body| body.id == door.id)?,
+                id: door.id.clone(),
+                category: "Doorway".to_owned(),
+                openness: door.openness,
+            })
+        });
+        let openables = openables.collect();
+        self.open(world, openables, count, "DOORS", record)
+    }
+
+    fn open(
+        &self,
+        mut world: StageWorld,
+        mut openables: Vec<Openable>,
+        count: usize,
+        cause: &str,
+        record: &mut EvolutionRecord,
+    ) -> Result<StageWorld, Error> {
+        let mut stream = self.stream(cause);
+        stream.shuffle(&mut openables);
+        let mut num_changed = 0;
+        for one in openables {
+            if num_changed == count {
+                break;
+            }
+            let is_other = |level: &f64| (level - one.openness).abs() >= LEAST_CHANGE;
+            let mut levels: Vec<f64> = LEVELS.into_iter().filter(is_other).collect();
+            stream.shuffle(&mut levels);
+            for level in levels {
+                let change = StateChange { id: one.id.clone(), openness: Some(level), is_on: None };
+                let delta = HouseDelta { states: vec![change], ..HouseDelta::default() };
+                let next = self.rebuilt(world.house.apply(&delta)?)?;
+                let [old, new] = [&world, &next].map(|world| &world.layout.scene);
+                if has_room(old, new, one.body) && self.reaches_as_much(&world, &next)? {
+                    record.states.push(StateChangeRecord {
+                        id: one.id.clone(),
+                        category: one.category.clone(),
+                        field: "openness",
+                        before: one.openness,
+                        after: level,
+                        cause: cause.to_owned(),
+                    });
+                    world = next;
+                    num_changed += 1;
+                    break;
+                }
+            }
+        }
+        Ok(world)
+    }
+
+    /// Turns lamps and screens on that are off, and the other way round.
+    pub(super) fn switch_objects(
+        &self,
+        world: StageWorld,
+        count: usize,
+        record: &mut EvolutionRecord,
+    ) -> Result<StageWorld, Error> {
+        let house = &world.house;
+        let shows = |&index: &usize| {
+            self.is_free(house, house.objects[index].room)
+                && shows_light(&world.layout.items[index].asset)
+        };
+        let mut lights: Vec<usize> = (0..house.objects.len()).filter(shows).collect();
+        self.stream("SWITCHES").shuffle(&mut lights);
+        lights.truncate(count);
+        if lights.is_empty() {
+            return Ok(world);
+        }
+        let mut delta = HouseDelta::default();
+        for index in lights {
+            let object = &house.objects[index];
+            let is_on = object.is_on.unwrap_or(false);
+            let id = object.id.clone();
+            delta.states.push(StateChange { id: id.clone(), openness: None, is_on: Some(!is_on) });
+            record.states.push(StateChangeRecord {
+                id,
+                category: world.layout.items[index].asset.category.clone(),
+                field: "isOn",
+                before: f64::from(u8::from(is_on)),
+                after: f64::from(u8::from(!is_on)),
+                cause: "SWITCHES".to_owned(),
+            });
+        }
+        self.rebuilt(house.apply(&delta)?)
+    }
+}
+
+/// Whether the parts of a body that are elsewhere in `new` than in `old` touch no other body; a
+/// door's leaf may touch walls, in one of which it hangs.
+fn has_room(old: &Scene, new: &Scene, body: usize) -> bool {
+    let (before, after) = (&old.bodies[body], &new.bodies[body]);
+    let moved: Vec<Footprint> =
+        after.parts.iter().filter(|part| !before.parts.contains(part)).filter_map(solid).collect();
+    let is_obstacle = |kind: BodyKind| match kind {
+        BodyKind::Floor | BodyKind::Ceiling => false,
+        BodyKind::Object => true,
+        BodyKind::Wall | BodyKind::Door | BodyKind::Window => after.kind != BodyKind::Door,
+    };
+    let others = new.bodies.iter().enumerate().filter(|(index, other)| {
+        *index != body && is_obstacle(other.kind) && other.aabb.intersects(&after.aabb)
+    });
+    let others: Vec<Footprint> =
+        others.flat_map(|(_, other)| other.parts.iter().filter_map(solid)).collect();
+    let touch = |a: &Footprint, b: &Footprint| {
+        a.top_m.min(b.top_m) - a.bottom_m.max(b.bottom_m) > TOUCH_M
+            && overlap_m(&a.outline_m, &b.outline_m) > TOUCH_M
+    };
+    moved.iter().all(|part| others.iter().all(|other| !touch(part, other)))
+}
+
+fn solid(part: &Part) -> Option<Footprint> {
+    footprint(part, f64::NEG_INFINITY, f64::INFINITY)
+}
