@@ -25,6 +25,15 @@ def generate(
     out: Annotated[Path, typer.Option(help="Folder for the tasks; an unfinished one is gone on with.")],
     limit: Limit = None,
     seed: Seed = 0,
+    config: Annotated[
+        Path | None, typer.Option(help="JSON or TOML with any of the generator's parameters (docs/extensions.md).")
+    ] = None,
+    evolve_probability: Annotated[
+        float | None, typer.Option(help="Chance that a transition changes the house; the paper's: 0.5.")
+    ] = None,
+    num_stages: Annotated[
+        str | None, typer.Option(help="Numbers of stages to draw from, comma-separated; the paper's: 3,4,5.")
+    ] = None,
     workers: Workers = None,
     engine: Annotated[EngineOption, typer.Option(help="Processes here, or Ray.")] = EngineOption.LOCAL,
     ray_address: Annotated[str | None, typer.Option(help="Of a Ray cluster that shares this file system.")] = None,
@@ -38,6 +47,7 @@ def generate(
 ) -> None:
     """Generates tasks from multi-room houses; run again to resume."""
     from evonav.evaluation.datasets import inherited_names
+    from evonav.generation.config import read_parameters
     from evonav.generation.engine import Workforce, generate_dataset
     from evonav.generation.worker import GenerationOptions
 
@@ -46,6 +56,7 @@ def generate(
     dataset, inherited_split = inherited_names(houses)
     options = GenerationOptions(
         seed=seed,
+        parameters=read_parameters(config, evolve_probability=evolve_probability, num_stages=num_stages),
         dataset=dataset_name or dataset,
         split=split or inherited_split,
         allow_unknown_assets=allow_unknown_assets,
