@@ -197,8 +197,9 @@ fn check(task: &GeneratedTask) -> [usize; 4] {
         }
         for change in evolution.states.iter().filter(|change| change.field == "openness") {
             assert!((0.0..=1.0).contains(&change.after) && change.before != change.after);
-            let [old, new] = [k - 1, k]
-                .map(|k| scenes[k].bodies.iter().find(|body| body.id == change.id).unwrap());
+            let body = |k: usize| scenes[k].bodies.iter().find(|body| body.id == change.id);
+            // What has just come may be open: then it is checked with all its parts.
+            let (Some(old), Some(new)) = (body(k - 1), body(k)) else { continue };
             let is_moved = |part: &&Part| !old.parts.contains(part);
             let moved: Vec<Part> = new.parts.iter().filter(is_moved).copied().collect();
             assert!(!moved.is_empty(), "{} shows that it is {}", change.id, change.after);
@@ -255,7 +256,7 @@ fn extensions_that_never_happen_change_nothing() {
 fn things_come_go_open_and_light_up_validly() {
     let mut counts = [0; 4];
     for house in houses() {
-        for seed in 0..6 {
+        for seed in 0..3 {
             let task = generate(&house, seed, all_on());
             assert!(task == generate(&house, seed, all_on()));
             for (total, found) in counts.iter_mut().zip(check(&task)) {
@@ -263,8 +264,8 @@ fn things_come_go_open_and_light_up_validly() {
             }
         }
     }
-    // 48 transitions, 3.5 things each on the average, where there is room for them.
-    assert!(counts[0] > 60 && counts[1] > 60 && counts[2] > 60, "{counts:?}");
+    // 24 transitions, 3.5 things each on the average, where there is room for them.
+    assert!(counts[0] > 30 && counts[1] > 30 && counts[2] > 30, "{counts:?}");
 }
 
 #[test]
@@ -290,7 +291,7 @@ fn people_carry_things_where_they_use_them() {
     };
     let (mut num_moved, mut num_across) = (0, 0);
     for house in houses() {
-        for seed in 0..6 {
+        for seed in 0..3 {
             let task = generate(&house, seed, people());
             assert!(task == generate(&house, seed, people()));
             num_moved += check(&task)[3];
@@ -321,7 +322,7 @@ fn people_carry_things_where_they_use_them() {
             }
         }
     }
-    assert!(num_moved > 40 && num_across > 10, "{num_moved} moved, {num_across} across rooms");
+    assert!(num_moved > 20 && num_across > 5, "{num_moved} moved, {num_across} across rooms");
 }
 
 #[test]
@@ -329,7 +330,7 @@ fn the_tidy_bring_things_back() {
     let schedule = |tidiness| Schedule { num_persons: 4, minutes_between_stages: 1440, tidiness };
     let left_over = |tidiness: f64| -> usize {
         let extensions = Extensions { schedule: Some(schedule(tidiness)), ..Extensions::default() };
-        (0..6)
+        (0..3)
             .map(|seed| {
                 let task = generate(&houses()[1], seed, extensions.clone());
                 let houses = stage_houses(&task);

@@ -9,6 +9,7 @@ use super::{
     record::{EvolutionRecord, ObjectRecord},
     stage::StageWorld,
     state::State,
+    states::has_room,
     surfaces::sample_surface_place,
 };
 use crate::{
@@ -135,8 +136,10 @@ impl Transition<'_> {
                 let Some(added) = self.arrival(&world, &id, &mut stream)? else { continue };
                 let delta = HouseDelta { added: vec![added], ..HouseDelta::default() };
                 let next = self.rebuilt(world.house.apply(&delta)?)?;
-                // It may overhang its support by a little, where somebody has to pass.
-                if self.reaches_as_much(&world, &next)? {
+                // It may overhang its support by a little, where somebody has to pass, or be under
+                // something that the file has in the air and the scene lets down.
+                let [old, new] = [&world, &next].map(|world| &world.layout.scene);
+                if has_room(old, new, &id) && self.reaches_as_much(&world, &next)? {
                     if let Some(index) = next.house.object_index(&id) {
                         record.additions.push(object_record(
                             &next.house,

@@ -11,6 +11,7 @@ use super::{
     layout::{Layout, Placement},
     record::{ActivityRecord, ChangeRecord, EvolutionOutcome, EvolutionRecord},
     stage::{Access, StageWorld},
+    states::has_room,
     surfaces::sample_surface_place,
 };
 use crate::{
@@ -175,7 +176,7 @@ impl Transition<'_> {
                 work.causes.insert(index, cause.clone());
             }
         }
-        let delta = work.layout.delta_from(house);
+        let delta = work.valid_delta()?;
         let least_m = self.generator.parameters.relocated_min_m;
         let cause_of = |index: usize| work.causes.get(&index).cloned().unwrap_or_default();
         record.changes = changes_of(house, &work.layout, least_m, cause_of);
@@ -321,6 +322,25 @@ impl Work<'_, '_> {
             }
         }
         brought
+    }
+
+    /// What has changed, as far as it holds in a scene of the house after it: files have things in
+    /// the air that the scene lets down, under which something may have been put.
+    fn valid_delta(&mut self) -> Result<HouseDelta, Error> {
+        let (house, old) = (&self.world.house, &self.world.layout.scene);
+        loop {
+            let delta = self.layout.delta_from(house);
+            if delta.is_empty() {
+                return Ok(delta);
+            }
+            let next = self.transition.rebuilt(house.apply(&delta)?)?;
+            let new = &next.layout.scene;
+            let clash = delta.moves.iter().find(|step| !has_room(old, new, &step.id));
+            let Some(index) = clash.and_then(|step| house.object_index(&step.id)) else {
+                return Ok(delta);
+            };
+            self.layout.put(index, self.world.layout.items[index].placement);
+        }
     }
 
     /// Whether everything can be reached that could be before.

@@ -25,9 +25,8 @@ const LEVELS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 /// A smaller change of openness is none.
 const LEAST_CHANGE: f64 = 0.125;
 
-/// Something that can open: its index in the scene, id, category and openness.
+/// Something that can open.
 struct Openable {
-    body: usize,
     id: String,
     category: String,
     openness: f64,
@@ -42,17 +41,15 @@ impl Transition<'_> {
         record: &mut EvolutionRecord,
     ) -> Result<StageWorld, Error> {
         let house = &world.house;
-        let objects = house.objects.iter().zip(&world.layout.items).enumerate();
-        let openables = objects.filter(|(_, (object, _))| self.is_free(house, object.room));
-        let openables = openables.filter_map(|(index, (object, item))| {
+        let objects = house.objects.iter().zip(&world.layout.items);
+        let openables = objects.filter(|(object, _)| self.is_free(house, object.room));
+        let openables = openables.filter_map(|(object, item)| {
             Some(Openable {
-                body: world.layout.scene.first_object + index,
                 id: object.id.clone(),
                 category: item.asset.category.clone(),
-                openness: object.openness.or(drawn_openness(&item.asset)).filter(|_| {
-                    // An openness that the shape does not show would be no change.
-                    drawn_openness(&item.asset).is_some()
-                })?,
+                // An openness that the shape does not show would be no change.
+                openness: drawn_openness(&item.asset)
+                    .map(|drawn| object.openness.unwrap_or(drawn))?,
             })
         });
         let openables = openables.collect();
@@ -73,10 +70,8 @@ impl Transition<'_> {
                 && door.room_ids[0] != door.room_ids[1]
                 && door.room_ids.iter().all(|id| self.is_free(house, room_of(id)))
         });
-        let bodies = &world.layout.scene.bodies;
         let openables = doors.filter_map(|door| {
             Some(Openable {
-                body: bodies.iter().position(|body| body.id == door.id)?,
                 id: door.id.clone(),
                 category: "Doorway".to_owned(),
                 openness: door.openness,
@@ -109,7 +104,7 @@ impl Transition<'_> {
                 let delta = HouseDelta { states: vec![change], ..HouseDelta::default() };
                 let next = self.rebuilt(world.house.apply(&delta)?)?;
                 let [old, new] = [&world, &next].map(|world| &world.layout.scene);
-                if has_room(old, new, one.body) && self.reaches_as_much(&world, &next)? {
+                if has_room(old, new, &one.id) && self.reaches_as_much(&world, &next)? {
                     record.states.push(StateChangeRecord {
                         id: one.id.clone(),
                         category: one.category.clone(),
@@ -166,20 +161,21 @@ impl Transition<'_> {
 
 /// Whether the parts of a body that are elsewhere in `new` than in `old` touch no other body; a
 /// door's leaf may touch walls, in one of which it hangs.
-fn has_room(old: &Scene, new: &Scene, body: usize) -> bool {
-    let (before, after) = (&old.bodies[body], &new.bodies[body]);
-    let moved: Vec<Footprint> =
-        after.parts.iter().filter(|part| !before.parts.contains(part)).filter_map(solid).collect();
+pub(super) fn has_room(old: &Scene, new: &Scene, id: &str) -> bool {
+    let Some(after) = new.bodies.iter().find(|body| body.id == id) else { return false };
+    let before = old.bodies.iter().find(|body| body.id == id);
+    let is_moved = |part: &&Part| before.is_none_or(|before| !before.parts.contains(part));
+    let moved: Vec<Footprint> = after.parts.iter().filter(is_moved).filter_map(solid).collect();
     let is_obstacle = |kind: BodyKind| match kind {
         BodyKind::Floor | BodyKind::Ceiling => false,
         BodyKind::Object => true,
         BodyKind::Wall | BodyKind::Door | BodyKind::Window => after.kind != BodyKind::Door,
     };
-    let others = new.bodies.iter().enumerate().filter(|(index, other)| {
-        *index != body && is_obstacle(other.kind) && other.aabb.intersects(&after.aabb)
+    let others = new.bodies.iter().filter(|other| {
+        other.id != id && is_obstacle(other.kind) && other.aabb.intersects(&after.aabb)
     });
     let others: Vec<Footprint> =
-        others.flat_map(|(_, other)| other.parts.iter().filter_map(solid)).collect();
+        others.flat_map(|other| other.parts.iter().filter_map(solid)).collect();
     let touch = |a: &Footprint, b: &Footprint| {
         a.top_m.min(b.top_m) - a.bottom_m.max(b.bottom_m) > TOUCH_M
             && overlap_m(&a.outline_m, &b.outline_m) > TOUCH_M
