@@ -180,7 +180,7 @@ fn check(task: &GeneratedTask) -> [usize; 4] {
         );
         assert!(was.is_subset(&is), "{was:?} {is:?}");
         for object in &evolution.removals {
-            assert!(now.get(&object.id).is_none() && then.contains_key(&object.id));
+            assert!(!now.contains_key(&object.id) && then.contains_key(&object.id));
         }
         assert!(now.contains_key(&stage.target.id));
         for object in &evolution.additions {

@@ -70,12 +70,10 @@ impl Transition<'_> {
                 && door.room_ids[0] != door.room_ids[1]
                 && door.room_ids.iter().all(|id| self.is_free(house, room_of(id)))
         });
-        let openables = doors.filter_map(|door| {
-            Some(Openable {
-                id: door.id.clone(),
-                category: "Doorway".to_owned(),
-                openness: door.openness,
-            })
+        let openables = doors.map(|door| Openable {
+            id: door.id.clone(),
+            category: "Doorway".to_owned(),
+            openness: door.openness,
         });
         let openables = openables.collect();
         self.open(world, openables, count, "DOORS", record)
