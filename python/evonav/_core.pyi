@@ -67,6 +67,15 @@ class House:
     def apply(self, delta_json: str) -> House:
         """The house after `{"moves": [{"id", "position_m", "rotation_deg", "parent"}]}`."""
 
+    def footprints(
+        self, *, allow_unknown_assets: bool
+    ) -> list[tuple[str, str, list[tuple[list[_Vec2], float, float]]]]:
+        """What each object covers of the floor plan, in order of `objects`.
+
+        Id, category, and for each of its convex parts the outline `(x, z)`, the lowest and the highest point.
+        `HouseError` if an asset is unknown, unless allowed: then it has the size and shape of its category.
+        """
+
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __getnewargs_ex__(self) -> tuple[tuple[str], dict[str, Any]]: ...

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from evonav.cli.options import Limit
+from evonav.cli.tasks_show import show
 from evonav.cli.tasks_stats import stats
 
 tasks_app = typer.Typer(help="Task files: what is in them.", no_args_is_help=True)
@@ -24,4 +25,5 @@ def list_tasks(folder: Folder, limit: Limit = None) -> None:
         typer.echo(f"{task.task_id}  {rooms}  {task.num_stages} stages  changed before: {', '.join(changed) or '-'}")
 
 
+tasks_app.command()(show)
 tasks_app.command()(stats)

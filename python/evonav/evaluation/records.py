@@ -230,6 +230,8 @@ class ObjectFootprint(_Record):
     """Of the axis-aligned box."""
     polygon_m: tuple[Point2, ...]
     """Corners of the footprint, turned with the object."""
+    outlines_m: tuple[tuple[Point2, ...], ...] = ()
+    """Convex outlines of its parts, lower ones first, where they are known: drawn instead of `polygon_m`."""
 
 
 OpeningKind = Literal["door", "window"]

@@ -1,5 +1,7 @@
 """What the marks of a map mean, drawn by the code that draws the maps."""
 
+from collections.abc import Iterable
+
 from markupsafe import Markup
 
 from evonav.report.svg import arrow_head, escape, join, star
@@ -66,13 +68,22 @@ _ENTRIES = (
 
 def legend() -> Markup:
     """The legend as HTML."""
+    return legend_html(_ENTRIES)
+
+
+def legend_html(entries: Iterable[tuple[str, str, int]]) -> Markup:
+    """Marks and what they mean, as HTML.
+
+    Args:
+        entries: Words, drawing in a box 24 px high, and its width in pixels.
+    """
     items = [
         Markup(
             '<span class="key"><svg class="map" width="{}" height="24" viewBox="0 0 {} 24" aria-hidden="true">'
         ).format(width, width)
         + Markup(drawing)  # noqa: S704 - our own SVG
         + Markup("</svg>{}</span>").format(words)
-        for words, drawing, width in _ENTRIES
+        for words, drawing, width in entries
     ]
     return Markup("").join(items)
 

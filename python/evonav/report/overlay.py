@@ -12,6 +12,7 @@ from evonav.evaluation.records import (
     RoundRecord,
     StageMap,
     StageRecord,
+    TargetRecord,
     TransitionRecord,
 )
 from evonav.report.plan import Frame, distance_m, furniture
@@ -34,7 +35,7 @@ def course(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
         _ring(record, frame, success_radius_m)
         + _path(record, frame)
         + _stale_entries(record, frame)
-        + _target(record, frame)
+        + target_mark(record.target, frame)
         + _ends(record, frame)
     )
 
@@ -54,12 +55,20 @@ def change(
     before = _by_id(previous_map)
     ghosts = furniture([before[name] for name in sorted(names) if name in before], frame, "items ghost")
     stressed = furniture([now[name] for name in sorted(names) if name in now], frame, "items moved")
-    arrows = join(
+    arrows = relocation_arrows(relocations, frame, stage_map=stage_map, previous_map=previous_map)
+    return f'<g class="change">{ghosts}{stressed}{arrows}</g>'
+
+
+def relocation_arrows(
+    relocations: Sequence[Relocation], frame: Frame, *, stage_map: StageMap | None, previous_map: StageMap | None
+) -> str:
+    """An arrow for each object that was not carried along by a larger one."""
+    now, before = _by_id(stage_map), _by_id(previous_map)
+    return join(
         _relocation_arrow(relocation, frame, is_large=_area_m2(now.get(relocation.object_id)) >= LARGE_M2)
         for relocation in relocations
         if not _is_carried(relocation, relocations, before, now)
     )
-    return f'<g class="change">{ghosts}{stressed}{arrows}</g>'
 
 
 def rounds(trace: Sequence[RoundRecord]) -> list[str]:
@@ -137,9 +146,9 @@ def _ring(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
     return f'<circle class="ring" cx="{x}" cy="{y}" r="{radius_cm}" stroke-width="{width}">{hint}</circle>'
 
 
-def _target(record: StageRecord, frame: Frame) -> str:
+def target_mark(target: TargetRecord, frame: Frame) -> str:
+    """A star where the target is, and an empty one where it stood in stage 1."""
     u = frame.unit
-    target = record.target
     centre = cm(_ground(target.position_m))
     first = ""
     if target.first_position_m is not None and distance_m(target.first_position_m, target.position_m) > 0.1:
@@ -192,16 +201,18 @@ def _direction_arrow(piece: Sequence[tuple[int, int]], gone: float, frame: Frame
     return "", gone
 
 
+def start_mark(at: tuple[int, int], frame: Frame, words: str) -> str:
+    """A ring where a way begins."""
+    size = f'r="{1.5 * frame.unit:.0f}" stroke-width="{0.7 * frame.unit:.1f}"'
+    return f'<circle class="start" cx="{at[0]}" cy="{at[1]}" {size}>{title(words)}</circle>'
+
+
 def _ends(record: StageRecord, frame: Frame) -> str:
     u = frame.unit
     marks = []
     if (start := record.effective_start) is not None:
-        x, y = cm((start.x_m, start.z_m))
-        hint = title(
-            "start" if not record.is_snapped else "start, moved here since the carried pose was no longer free"
-        )
-        size = f'r="{1.5 * u:.0f}" stroke-width="{0.7 * u:.1f}"'
-        marks.append(f'<circle class="start" cx="{x}" cy="{y}" {size}>{hint}</circle>')
+        words = "start, moved here since the carried pose was no longer free" if record.is_snapped else "start"
+        marks.append(start_mark(cm((start.x_m, start.z_m)), frame, words))
     if (end := record.terminal) is not None:
         marks.append(_end_mark(cm((end.x_m, end.z_m)), record.state is EndState.SUCCESS, u))
     elif record.state is EndState.ERRORED and record.trace:

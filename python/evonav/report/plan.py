@@ -93,18 +93,27 @@ def moving_ids(maps: Sequence[StageMap]) -> frozenset[str]:
 
 def ground(stage_map: StageMap, frame: Frame, without: frozenset[str] = frozenset()) -> str:
     """Floors, furniture, walls and openings; `without` names objects to leave out."""
-    u = frame.unit
-    floors = join(
-        f'<path class="floor {FLOORS.get(room.room_type, "other")}" d="{_outline(room.polygon_m)}"/>'
+    items = furniture([item for item in stage_map.objects if item.object_id not in without], frame)
+    return floors(stage_map) + items + structure(stage_map, frame)
+
+
+def floors(stage_map: StageMap) -> str:
+    """Rooms, coloured by type."""
+    return join(
+        f'<path class="floor {FLOORS.get(room.room_type, "other")}" d="{outline(room.polygon_m)}"/>'
         for room in stage_map.rooms
     )
-    items = furniture([item for item in stage_map.objects if item.object_id not in without], frame)
+
+
+def structure(stage_map: StageMap, frame: Frame) -> str:
+    """Walls, doors and windows."""
+    u = frame.unit
     walls = join(f'<path d="{polyline([cm(a), cm(b)])}"/>' for a, b in _distinct(stage_map.walls))
     doors = [(o.from_m, o.to_m) for o in stage_map.openings if o.kind == "door"]
     windows = [(o.from_m, o.to_m) for o in stage_map.openings if o.kind == "window"]
     wall_cm = max(9.0, 1.1 * u)
     return (
-        f'{floors}{items}<g class="walls" stroke-width="{wall_cm:.0f}">{walls}</g>'
+        f'<g class="walls" stroke-width="{wall_cm:.0f}">{walls}</g>'
         f'<g class="doors" stroke-width="{wall_cm * 1.15:.0f}">{_lines(doors)}</g>'
         f'<g class="windows" stroke-width="{wall_cm * 0.45:.0f}">{_lines(windows)}</g>'
     )
@@ -157,11 +166,23 @@ def _footprint(item: ObjectFootprint) -> str:
     if max(item.size_m[0], item.size_m[2]) < SMALL_M:
         css = "item small"
     hint = title(noun_of(item.category))
+    if item.outlines_m:
+        return _shape(item, css, hint)
     if item.category in ROUND_CATEGORIES:
         x, y = cm((item.centre_m[0], item.centre_m[2]))
         rx, ry = round(50 * item.size_m[0]), round(50 * item.size_m[2])
         return f'<ellipse class="{css}" cx="{x}" cy="{y}" rx="{rx}" ry="{ry}">{hint}</ellipse>'
-    return f'<path class="{css}" d="{_outline(item.polygon_m)}">{hint}</path>'
+    return f'<path class="{css}" d="{outline(item.polygon_m)}">{hint}</path>'
+
+
+def _shape(item: ObjectFootprint, css: str, hint: str) -> str:
+    """All parts as one outline, and in what is large the parts themselves, higher ones over lower ones."""
+    parts = [outline(part) for part in item.outlines_m]
+    # The fill hides the inner half of every stroke (`paint-order`): what is left is the outline of the union.
+    union = f'<path class="{css}" d="{join(parts)}">{hint}</path>'
+    if css != "item" or len(parts) == 1:
+        return union
+    return union + join(f'<path class="part" d="{part}"/>' for part in dict.fromkeys(parts))
 
 
 def _room_label(room: RoomFootprint, unit: float) -> str:
@@ -186,7 +207,8 @@ def _item_label(item: ObjectFootprint, font_cm: float) -> str:
     return ""
 
 
-def _outline(polygon_m: Sequence[Point]) -> str:
+def outline(polygon_m: Sequence[Point]) -> str:
+    """Path data of a closed polygon."""
     return polyline([cm(point) for point in polygon_m], closed=True)
 
 

@@ -1,13 +1,17 @@
 //! Houses.
 
 use evonav_core::{
-    assets::Catalogue,
-    geometry::Vec3,
+    assets::{Catalogue, UnknownAssets},
+    geometry::{Vec2, Vec3},
     house::{self, HouseDelta},
+    world::footprint::{Footprint, object_footprints},
 };
 use pyo3::prelude::*;
 
 use crate::error;
+
+/// Id, category, and outline, lowest and highest height of each convex part.
+type ObjectFootprints = (String, String, Vec<(Vec<Vec2>, f64, f64)>);
 
 /// Shapes, units and errors: `_core.pyi` and `evonav_core::house`.
 #[pyclass(frozen, eq, module = "evonav._core")]
@@ -110,6 +114,28 @@ impl House {
 
     fn room_of(&self, x_m: f64, z_m: f64) -> Option<&str> {
         Some(self.inner.rooms[self.inner.room_of([x_m, z_m])?].id.as_str())
+    }
+
+    #[pyo3(signature = (*, allow_unknown_assets))]
+    fn footprints(
+        &self,
+        py: Python<'_>,
+        allow_unknown_assets: bool,
+    ) -> PyResult<Vec<ObjectFootprints>> {
+        let unknown = match allow_unknown_assets {
+            true => UnknownAssets::CategoryDefault,
+            false => UnknownAssets::Error,
+        };
+        let found = py
+            .detach(|| object_footprints(&self.inner, Catalogue::bundled(), unknown))
+            .map_err(error::to_py)?;
+        let part = |Footprint { outline_m, bottom_m, top_m }| (outline_m, bottom_m, top_m);
+        let objects = self.inner.objects.iter().zip(found);
+        Ok(objects
+            .map(|(object, (category, parts))| {
+                (object.id.clone(), category, parts.into_iter().map(part).collect())
+            })
+            .collect())
     }
 
     /// Position `(x, y, z)`, yaw and horizon of `metadata.agent`.

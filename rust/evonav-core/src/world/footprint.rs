@@ -1,9 +1,14 @@
 //! What a body covers of the ground plane, seen by an agent of some height.
 
 use crate::{
-    assets::part::Part,
+    assets::{
+        catalogue::{Catalogue, UnknownAssets},
+        part::Part,
+    },
+    error::Error,
     geometry::{Vec2, Vec3, add, rotate},
-    world::mesh::outline,
+    house::House,
+    world::{mesh::outline, scene::Scene},
 };
 
 /// Points nearer than this are one.
@@ -53,6 +58,24 @@ pub fn footprint(part: &Part, low_m: f64, high_m: f64) -> Option<Footprint> {
         }
     }
     (!shadow.is_empty()).then(|| Footprint { outline_m: convex_hull(shadow), bottom_m, top_m })
+}
+
+/// What every object of a house covers of the floor plan, part by part: a house as a drawing shows it.
+///
+/// # Returns
+/// Category and footprints of each object, in [`House::objects`] order, at rest on what it stands on.
+///
+/// # Errors
+/// Those of [`Scene::build`].
+pub fn object_footprints(
+    house: &House,
+    catalogue: &Catalogue,
+    unknown: UnknownAssets,
+) -> Result<Vec<(String, Vec<Footprint>)>, Error> {
+    let scene = Scene::build(house, catalogue, unknown)?;
+    let whole = |part: &Part| footprint(part, f64::NEG_INFINITY, f64::INFINITY);
+    let objects = scene.bodies.into_iter().skip(scene.first_object);
+    Ok(objects.map(|body| (body.category, body.parts.iter().filter_map(whole).collect())).collect())
 }
 
 /// Convex hull, counter-clockwise when x turns towards z, collinear points left out.

@@ -1,0 +1,61 @@
+"""`tasks show`: pictures of what tasks ask and of what changes in them."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evonav.cli.options import Limit
+
+if TYPE_CHECKING:
+    from evonav.tasks import Task
+
+
+def show(
+    folder: Annotated[Path, typer.Argument(help="Folder of a task, or of a data set.")],
+    task: Annotated[str | None, typer.Option(help="Of a data set: this task only.")] = None,
+    stage: Annotated[int | None, typer.Option(help="This stage only.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Page (.html), picture (.svg, with --stage), or folder.")] = None,
+    limit: Limit = None,
+) -> None:
+    """Draws tasks with their hidden changes: a page a task, or a gallery of a data set. It tells the answers."""
+    from evonav.report.task_pages import write_gallery, write_stage_svg, write_task_page
+    from evonav.tasks import load_tasks
+
+    one = _one_task(folder, task, stage)
+    if one is None:
+        if stage is not None or (out is not None and out.suffix in (".svg", ".html")):
+            raise typer.BadParameter("--stage and single files are for one task: give its folder, or --task")
+        target = out or Path(f"{folder.resolve().name}-pictures")
+        path = write_gallery(load_tasks(folder, limit), target, folder.resolve().name, on_task=typer.echo)
+    elif out is not None and out.suffix == ".svg":
+        if stage is None:
+            raise typer.BadParameter("a picture shows one stage: give --stage, too")
+        path = write_stage_svg(one, stage, out)
+    else:
+        name = f"{one.task_id}.html"
+        target = Path(name) if out is None else out if out.suffix == ".html" else out / name
+        path = write_task_page(one, target, stages=None if stage is None else [stage])
+    typer.echo(f"pictures: {path}")
+
+
+def _one_task(folder: Path, task_id: str | None, stage: int | None) -> "Task | None":
+    """The task that the options mean; `None` for all of a data set.
+
+    Raises:
+        InvalidArgumentError: There is no such task or stage.
+        TaskError: It is malformed.
+    """
+    from evonav.errors import InvalidArgumentError
+    from evonav.tasks import load_task
+
+    is_task = (folder / "task.json").is_file()
+    if task_id is None and not is_task:
+        return None
+    root = folder if task_id is None else folder / task_id
+    if task_id is not None and (is_task or Path(task_id).name != task_id or not (root / "task.json").is_file()):
+        raise InvalidArgumentError(f"{folder}: holds no task {task_id!r}")
+    task = load_task(root)
+    if stage is not None and not 1 <= stage <= task.num_stages:
+        raise InvalidArgumentError(f"task {task.task_id}: argument `stage` is {stage}, expected 1 to {task.num_stages}")
+    return task

@@ -1,0 +1,208 @@
+"""Pages of tasks: every stage before and after its hidden change, and a gallery of a data set. They show the oracle."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from markupsafe import Markup
+
+from evonav.errors import StoreError
+from evonav.report.html import page_environment, text_of
+from evonav.report.maps import file_css, map_css
+from evonav.report.svg import escape, slug
+from evonav.report.task_legend import task_legend
+from evonav.report.task_plans import TaskDrawing, after_svg, before_svg, definitions, task_drawing, thumbnail_svg
+from evonav.report.task_words import changed_words, move_rows, stage_facts
+from evonav.tasks import Task
+
+INDEX_NAME = "index.html"
+PLAN_WIDTH_PX = 900
+
+
+@dataclass(frozen=True, slots=True)
+class StageView:
+    """A stage as the template shows it."""
+
+    number: int
+    has_changed: bool
+    changed: str
+    plans: list[tuple[str, Markup]]
+    image: str
+    instructions: list[tuple[str, str]]
+    facts: list[tuple[str, str]]
+    moves: list[tuple[str, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """A task in the gallery."""
+
+    href: str
+    task_id: str
+    num_rooms: int
+    num_stages: int
+    modes: list[str]
+    words: str
+    view_box: str
+    svg: Markup
+
+
+def write_task_page(task: Task, path: Path, *, stages: Sequence[int] | None = None, index: str | None = None) -> Path:
+    """Writes a task as one HTML file that needs no other.
+
+    Args:
+        task: The task.
+        path: The file.
+        stages: Which stages; default all.
+        index: Address of the gallery that links here.
+
+    Returns:
+        `path`.
+
+    Raises:
+        HouseError: A stage house is malformed.
+        StoreError: The file cannot be written.
+    """
+    return _write(path, _task_page(task_drawing(task), stages or range(1, task.num_stages + 1), index))
+
+
+def write_stage_svg(task: Task, stage: int, path: Path) -> Path:
+    """Writes a stage as an SVG file: the house before (if it changed) and after, side by side.
+
+    Raises:
+        HouseError: A stage house is malformed.
+        StoreError: The file cannot be written.
+    """
+    return _write(path, stage_svg(task_drawing(task), stage))
+
+
+def write_gallery(
+    tasks: Iterable[Task], out_dir: Path, name: str, *, on_task: Callable[[str], None] | None = None
+) -> Path:
+    """Writes a page a task, and `index.html` with a card for each.
+
+    Args:
+        tasks: Any number, taken one at a time.
+        out_dir: Folder of the pages.
+        name: Heading.
+        on_task: Told of each task as its page is written.
+
+    Returns:
+        Path of the index.
+
+    Raises:
+        HouseError: A stage house is malformed.
+        StoreError: A file cannot be written.
+    """
+    cards = []
+    for i, task in enumerate(tasks):
+        drawing = task_drawing(task, f"p{i}")
+        page = f"{slug(task.task_id)}.html"
+        _write(out_dir / page, _task_page(drawing, range(1, task.num_stages + 1), INDEX_NAME))
+        cards.append(_card(drawing, page))
+        if on_task is not None:
+            on_task(task.task_id)
+    num_stages = sum(card.num_stages for card in cards)
+    context = {
+        "name": name,
+        "summary": f"{len(cards)} tasks, {num_stages} stages",
+        "cards": cards,
+        "modes": sorted({mode for card in cards for mode in card.modes}),
+        "rooms": sorted({card.num_rooms for card in cards}),
+        "css": _css(),
+    }
+    return _write(out_dir / INDEX_NAME, page_environment().get_template("tasks.html.j2").render(context))
+
+
+def stage_svg(drawing: TaskDrawing, stage: int) -> str:
+    """A stage as an SVG document."""
+    frame = drawing.frame
+    height_px = round(PLAN_WIDTH_PX * frame.height / frame.width)
+    plans = _plans(drawing, stage)
+    panels = "".join(
+        f'<svg x="{i * PLAN_WIDTH_PX}" width="{PLAN_WIDTH_PX}" height="{height_px}" '
+        f'viewBox="{frame.view_box}">{svg}</svg>'
+        for i, (_, svg) in enumerate(plans)
+    )
+    width_px = PLAN_WIDTH_PX * len(plans)
+    changed = changed_words(drawing.maps[stage], drawing.task.oracle(stage).evolution)
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="0 0 {width_px} {height_px}" width="{width_px}" '
+        f'height="{height_px}" role="img"><title>{escape(drawing.task.task_id)}, stage {stage}</title>'
+        f"<desc>{escape(changed)}</desc><style>{file_css()}</style><defs>{definitions(drawing)}</defs>"
+        f'<rect class="page" width="100%" height="100%"/>{panels}</svg>\n'
+    )
+
+
+def _task_page(drawing: TaskDrawing, stages: Iterable[int], index: str | None) -> str:
+    return (
+        page_environment()
+        .get_template("stages.html.j2")
+        .render(
+            header=drawing.task.header,
+            index=index,
+            css=_css(),
+            legend=task_legend(),
+            defs=Markup(definitions(drawing)),  # noqa: S704 - our own SVG
+            view_box=drawing.frame.view_box,
+            stages=[_stage_view(drawing, stage) for stage in stages],
+        )
+    )
+
+
+def _stage_view(drawing: TaskDrawing, stage: int) -> StageView:
+    task, stage_map = drawing.task, drawing.maps[stage]
+    public, oracle = task.public_stages[stage - 1], task.oracle(stage)
+    plans = _plans(drawing, stage)
+    return StageView(
+        number=stage,
+        has_changed=len(plans) > 1,
+        changed=changed_words(stage_map, oracle.evolution),
+        plans=[(words, Markup(svg)) for words, svg in plans],  # noqa: S704 - our own SVG
+        image=stage_map.reference_image or "",
+        instructions=[
+            ("basic instruction", public.basic_instruction),
+            ("appearance instruction", public.appearance_instruction),
+            ("unified instruction", public.unified_instruction),
+        ],
+        facts=stage_facts(stage_map, oracle),
+        moves=move_rows(stage_map, oracle.evolution),
+    )
+
+
+def _plans(drawing: TaskDrawing, stage: int) -> list[tuple[str, str]]:
+    """Caption and content of each of a stage's plans: two if the house changed."""
+    evolution = drawing.task.oracle(stage).evolution
+    has_changed = any((evolution.changes, evolution.additions, evolution.removals, evolution.states))
+    before = [(f"before (stage {stage - 1})", before_svg(drawing, stage))] if has_changed and stage > 1 else []
+    return [*before, (f"after (stage {stage})" if before else "the house", after_svg(drawing, stage))]
+
+
+def _card(drawing: TaskDrawing, href: str) -> Card:
+    task = drawing.task
+    evolutions = [stage.evolution for stage in task.oracle_stages]
+    most = max(range(1, task.num_stages + 1), key=lambda k: (len(evolutions[k - 1].changes), -k))
+    words = [task.task_id, task.header.house.name, *(stage.category for stage in task.public_stages)]
+    return Card(
+        href=href,
+        task_id=task.task_id,
+        num_rooms=task.header.house.num_rooms,
+        num_stages=task.num_stages,
+        modes=sorted({evolution.mode for evolution in evolutions if evolution.outcome == "evolved" and evolution.mode}),
+        words=" ".join(words).lower(),
+        view_box=drawing.frame.view_box,
+        svg=Markup(thumbnail_svg(drawing, most)),  # noqa: S704 - our own SVG
+    )
+
+
+def _css() -> Markup:
+    return text_of("report.css") + text_of("tasks.css") + Markup(map_css())  # noqa: S704 - our own file
+
+
+def _write(path: Path, text: str) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from error
+    return path

@@ -1,0 +1,223 @@
+"""A task's stages as drawings: the house before and after the hidden change, the reference course, the target."""
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from evonav.evaluation.plans import house_map, image_uri, target_record, transition_record, true_footprints
+from evonav.evaluation.records import ObjectFootprint, RoomFootprint, StageMap
+from evonav.house import House
+from evonav.report.overlay import relocation_arrows, start_mark, target_mark
+from evonav.report.plan import (
+    FLAT_CATEGORIES,
+    Frame,
+    floors,
+    frame_of,
+    furniture,
+    item_labels,
+    labels,
+    moving_ids,
+    outline,
+    structure,
+)
+from evonav.report.svg import Point, cm, join, polyline, title
+from evonav.tasks import Task
+from evonav.tasks.language import noun_of
+from evonav.tasks.oracle import Evolution, OracleStage
+
+IMAGE_PX = 240
+THUMBNAIL_MIN_M = 0.5
+"""Edge from which furniture is drawn in a gallery."""
+VIEW_M = 1.1
+"""How far the view cone of the reference pose is drawn."""
+HALF_VIEW_RAD = math.pi / 4
+"""Half of the reference image's field of view."""
+_MEMBER = re.compile(r"(?:^|\|)(\d+)\|(\d+)\|\d+$")
+
+
+@dataclass(frozen=True, slots=True)
+class TaskDrawing:
+    """What the pictures of a task share."""
+
+    task: Task
+    prefix: str
+    """Of the ids of shared groups, different for every task of a page."""
+    frame: Frame
+    maps: Mapping[int, StageMap]
+    """By stage."""
+    moving: frozenset[str]
+    """Ids of what does not stand in the same place in all stages."""
+
+
+def task_drawing(task: Task, prefix: str = "p") -> TaskDrawing:
+    """Reads a task's houses.
+
+    Raises:
+        HouseError: One is malformed.
+    """
+    maps = {}
+    for stage in range(1, task.num_stages + 1):
+        house = House(task.house_json(stage), name=f"{task.task_id}/houses/stage_{stage}.json.gz")
+        image = image_uri(task.reference_images[stage - 1], IMAGE_PX)
+        objects = true_footprints(house)
+        maps[stage] = house_map(house, task_id=task.task_id, stage=stage, objects=objects, reference_image=image)
+    moving = moving_ids(list(maps.values()))
+    return TaskDrawing(task, prefix, frame_of(maps.values()), maps, moving)
+
+
+def definitions(drawing: TaskDrawing) -> str:
+    """What is the same in all of a task's pictures, as groups that they refer to."""
+    first, frame = drawing.maps[1], drawing.frame
+    fixed = [item for item in first.objects if item.object_id not in drawing.moving]
+    shared = {
+        "floors": floors(first),
+        "fixed": furniture(fixed, frame),
+        "walls": structure(first, frame),
+        "rooms": labels(first, frame),
+        "names": item_labels(fixed, frame),
+    }
+    return join(f'<g class="map" id="{drawing.prefix}-{name}">{content}</g>' for name, content in shared.items())
+
+
+def before_svg(drawing: TaskDrawing, stage: int) -> str:
+    """The house of the stage before, with what is about to move, go or open stressed: content of an `svg` element."""
+    oracle = drawing.task.oracle(stage)
+    leaving = {change.id for change in oracle.evolution.changes}
+    removed = {record.id for record in oracle.evolution.removals}
+    return _plan(drawing, stage - 1, oracle.evolution, {"moved": leaving - removed, "gone": removed}, ghosts="")
+
+
+def after_svg(drawing: TaskDrawing, stage: int) -> str:
+    """The house of a stage with what was changed, the reference course and the target: content of an `svg` element."""
+    oracle, frame = drawing.task.oracle(stage), drawing.frame
+    evolution = oracle.evolution
+    previous = drawing.maps.get(stage - 1)
+    moved = {change.id for change in evolution.changes}
+    added = {record.id for record in evolution.additions}
+    old = [] if previous is None else [item for item in previous.objects if item.object_id in moved]
+    plan = _plan(
+        drawing, stage, evolution, {"moved": moved - added, "new": added}, ghosts=furniture(old, frame, "items ghost")
+    )
+    arrows = relocation_arrows(
+        transition_record(oracle).relocations, frame, stage_map=drawing.maps[stage], previous_map=previous
+    )
+    course = _course(oracle, frame) + target_mark(target_record(drawing.task, stage), frame)
+    return f'{plan}<g class="change">{arrows}</g>{course}'
+
+
+def thumbnail_svg(drawing: TaskDrawing, stage: int) -> str:
+    """A stage's house with nothing but large furniture and what moved: content of an `svg` element."""
+    oracle, frame, stage_map = drawing.task.oracle(stage), drawing.frame, drawing.maps[stage]
+    moved = {change.id for change in oracle.evolution.changes}
+    large = [item for item in stage_map.objects if max(item.size_m[0], item.size_m[2]) >= THUMBNAIL_MIN_M]
+    arrows = relocation_arrows(
+        transition_record(oracle).relocations, frame, stage_map=stage_map, previous_map=drawing.maps.get(stage - 1)
+    )
+    return join(
+        [
+            floors(stage_map),
+            furniture([item for item in large if item.object_id not in moved], frame),
+            furniture([item for item in large if item.object_id in moved], frame, "items moved"),
+            structure(stage_map, frame),
+            f'<g class="change">{arrows}</g>',
+        ]
+    )
+
+
+def _plan(
+    drawing: TaskDrawing, stage: int, evolution: Evolution, stressed: Mapping[str, set[str]], *, ghosts: str
+) -> str:
+    """A stage's house; `stressed` has the CSS class of what is drawn in other colours."""
+    frame, stage_map = drawing.frame, drawing.maps[stage]
+
+    def use(name: str) -> str:
+        return f'<use href="#{drawing.prefix}-{name}"/>'
+
+    movable = [item for item in stage_map.objects if item.object_id in drawing.moving]
+    css_of = {name: css for css, names in stressed.items() for name in names}
+    plain = furniture([item for item in movable if item.object_id not in css_of], frame)
+    coloured = join(
+        furniture([item for item in movable if css_of.get(item.object_id) == css], frame, f"items {css}")
+        for css in stressed
+    )
+    unmoved = [item for item in stage_map.objects if item.object_id in evolution.unmoved_ids]
+    states = {state.id: f"{state.field} {state.before:g} to {state.after:g}" for state in evolution.states}
+    opened = [item for item in stage_map.objects if item.object_id in states]
+    return join(
+        [
+            use("floors"),
+            join(_tint(room, frame) for room in stage_map.rooms if room.room_id == evolution.room_id),
+            _groups(stage_map.objects, frame),
+            ghosts,
+            use("fixed"),
+            plain,
+            coloured,
+            furniture(unmoved, frame, "items unmoved"),
+            furniture(opened, frame, "items opened"),
+            use("walls"),
+            use("names"),
+            item_labels(movable, frame),
+            use("rooms"),
+        ]
+    )
+
+
+def _tint(room: RoomFootprint, frame: Frame) -> str:
+    hint = title(f"{noun_of(room.room_type)}: the room that changed")
+    return f'<path class="tint" stroke-width="{2.2 * frame.unit:.0f}" d="{outline(room.polygon_m)}">{hint}</path>'
+
+
+def _groups(objects: Iterable[ObjectFootprint], frame: Frame) -> str:
+    """A soft shape around the members of every asset group, which ProcTHOR's ids number `room|group|member`."""
+    members: dict[tuple[str, str], list[ObjectFootprint]] = {}
+    for item in objects:
+        if (match := _MEMBER.search(item.object_id)) and item.category not in FLAT_CATEGORIES:
+            members.setdefault((match[1], match[2]), []).append(item)
+    shapes = join(
+        f'<path d="{outline(_hull(items))}">{title("group: " + ", ".join(noun_of(i.category) for i in items))}</path>'
+        for items in members.values()
+        if len(items) > 1
+    )
+    return f'<g class="groups" stroke-width="{2.4 * frame.unit:.0f}">{shapes}</g>' if shapes else ""
+
+
+def _hull(items: Sequence[ObjectFootprint]) -> list[Point]:
+    """Convex hull of footprints (Andrew's monotone chain)."""
+    points = sorted({point for item in items for part in item.outlines_m or (item.polygon_m,) for point in part})
+    hull: list[Point] = []
+    for chain in (points, points[::-1]):
+        floor = len(hull)
+        for point in chain:
+            while len(hull) - floor >= 2 and _turn(hull[-2], hull[-1], point) <= 0.0:
+                hull.pop()
+            hull.append(point)
+        hull.pop()
+    return hull
+
+
+def _turn(a: Point, b: Point, c: Point) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _course(oracle: OracleStage, frame: Frame) -> str:
+    """Reference trajectory, start, and the reference pose with what it sees."""
+    u = frame.unit
+    path = polyline([cm(point) for point in oracle.reference_path_m])
+    start_m, pose = oracle.start_pose.position_m, oracle.reference_pose
+    x, y = cm((pose.position_m[0], pose.position_m[2]))
+    reach_cm = 100 * VIEW_M
+    rays = [
+        (x + reach_cm * math.sin(yaw_rad), y - reach_cm * math.cos(yaw_rad))
+        for yaw_rad in (math.radians(pose.yaw_deg) + side * HALF_VIEW_RAD for side in (-1, 1))
+    ]
+    (ax, ay), (bx, by) = rays
+    cone = f"M{x} {y}L{ax:.0f} {ay:.0f}A{reach_cm:.0f} {reach_cm:.0f} 0 0 1 {bx:.0f} {by:.0f}Z"
+    hint = title(f"reference pose, {oracle.reference_path_length_m:.1f} m from the start")
+    return (
+        f'<path class="cone" stroke-width="{0.25 * u:.1f}" d="{cone}"/>'
+        f'<path class="casing" stroke-width="{1.5 * u:.1f}" d="{path}"/>'
+        f'<path class="trajectory" stroke-width="{0.75 * u:.1f}" d="{path}"/>'
+        f"{start_mark(cm((start_m[0], start_m[2])), frame, 'start')}"
+        f'<circle class="eye" cx="{x}" cy="{y}" r="{1.1 * u:.0f}" stroke-width="{0.4 * u:.1f}">{hint}</circle>'
+    )

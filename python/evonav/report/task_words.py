@@ -1,0 +1,116 @@
+"""A stage of a task in words: what changed before it, what is asked, what was refused."""
+
+from collections import Counter
+from collections.abc import Callable
+
+from evonav.evaluation.records import StageMap
+from evonav.tasks.language import noun_of
+from evonav.tasks.oracle import Evolution, OracleStage
+
+OUTCOMES = {
+    "first_stage": "The first stage: the house as its file has it.",
+    "not_triggered": "Nothing changed before this stage.",
+    "no_room": "A change was drawn, but no room could take one.",
+    "no_placement": "A change was drawn, but nothing could be moved",
+    "evolved": "",
+}
+FAILURES = {
+    "nothing_movable": "the room holds nothing that moves",
+    "no_free_place": "no free place was found",
+    "cuts_off": "every free place would have cut something off",
+}
+
+
+def stage_facts(stage_map: StageMap, oracle: OracleStage) -> list[tuple[str, str]]:
+    """Name and value of what a stage's page lists."""
+    nouns = {item.object_id: noun_of(item.category) for item in stage_map.objects}
+    rooms = room_namer(stage_map)
+    target, evolution = oracle.target, oracle.evolution
+    others = f", {len(target.same_category_ids)} more of its kind" if target.same_category_ids else ", the only one"
+    where = f" on the {nouns.get(target.support_id, target.support_id)}" if target.support_id else ""
+    moved = (
+        "moved just now" if target.is_relocated_now else "moved earlier" if target.is_relocated_ever else "never moved"
+    )
+    facts = [
+        ("target", f"{noun_of(target.category)} {target.id}{where}, {rooms(target.room_id)}{others}; {moved}"),
+        ("reference", f"{oracle.reference_path_length_m:.1f} m, {oracle.reference_visible_px} px of the target seen"),
+    ]
+    if oracle.state.transition_room_id is not None:
+        facts.append(("transition room", rooms(oracle.state.transition_room_id)))
+    if oracle.rejections:
+        words = [f"{nouns.get(item.id, item.id)} ({item.reason.replace('_', ' ')})" for item in oracle.rejections]
+        facts.append(("goals refused", ", ".join(words)))
+    for name, ids in _lists(evolution):
+        if ids:
+            facts.append((name, ", ".join(f"{nouns.get(i, '')} {i}".strip() for i in ids)))
+    if evolution.room_weights:
+        weights = (f"{rooms(weight.room_id)} {weight.weight:g}" for weight in evolution.room_weights)
+        facts.append(("rooms' weights", ", ".join(weights)))
+    return facts
+
+
+def changed_words(stage_map: StageMap, evolution: Evolution) -> str:
+    """What changed before a stage, in a sentence."""
+    words = OUTCOMES[evolution.outcome]
+    if evolution.outcome == "no_placement":
+        words += f": {FAILURES[evolution.failure]}." if evolution.failure else "."
+    if evolution.outcome == "evolved" and evolution.mode is not None:
+        words = f"{evolution.mode} in the {room_namer(stage_map)(evolution.room_id or '')}: {_moved_words(evolution)}."
+    extra = [
+        (len(evolution.additions), "came"),
+        (len(evolution.removals), "went"),
+        (len(evolution.states), "opened, closed or switched"),
+    ]
+    more = ", ".join(f"{num} {what}" for num, what in extra if num)
+    return f"{words} By extensions: {more}.".strip() if more else words
+
+
+def move_rows(stage_map: StageMap, evolution: Evolution) -> list[tuple[str, ...]]:
+    """Moved objects, the farthest first: object, id, distance, turn, from and to what, cause."""
+    nouns = {item.object_id: noun_of(item.category) for item in stage_map.objects}
+    rows: list[tuple[str, ...]] = []
+    for change in sorted(evolution.changes, key=lambda change: (-change.displacement_m, change.id)):
+        turn_deg = (change.to_rotation_deg[1] - change.from_rotation_deg[1]) % 360.0
+        supports = (change.from_support_id, change.to_support_id)
+        stood, stands = (nouns.get(support, support) if support else "floor" for support in supports)
+        on = stood if supports[0] == supports[1] else f"{stood} to {stands}"
+        turn = f"{turn_deg:.0f}°"
+        noun = noun_of(change.category)
+        rows.append((noun, change.id, f"{change.displacement_m:.2f} m", turn, on, change.cause or ""))
+    for what, records in (("came", evolution.additions), ("went", evolution.removals)):
+        for record in records:
+            support = nouns.get(record.support_id or "", "floor")
+            rows.append((noun_of(record.category), record.id, what, "", support, record.cause))
+    rows += [
+        (noun_of(s.category), s.id, f"{s.field} {s.before:g} to {s.after:g}", "", "", s.cause) for s in evolution.states
+    ]
+    return rows
+
+
+def room_namer(stage_map: StageMap) -> Callable[[str], str]:
+    """How rooms are called: their type, with the number of the room where several are of that type."""
+    types = Counter(room.room_type for room in stage_map.rooms)
+    names = {}
+    for room in stage_map.rooms:
+        number = room.room_id.rsplit("|", 1)[-1]
+        names[room.room_id] = noun_of(room.room_type) + (f" {number}" if types[room.room_type] > 1 else "")
+    return lambda room_id: names.get(room_id, room_id)
+
+
+def _moved_words(evolution: Evolution) -> str:
+    """How many objects moved, and how far."""
+    num = len(evolution.changes)
+    words = f"{num} object{'' if num == 1 else 's'} moved"
+    if evolution.changes:
+        farthest = max(evolution.changes, key=lambda change: (change.displacement_m, change.id))
+        words += f", farthest the {noun_of(farthest.category)}, by {farthest.displacement_m:.1f} m"
+    return words
+
+
+def _lists(evolution: Evolution) -> list[tuple[str, tuple[str, ...]]]:
+    return [
+        ("found no place", evolution.unmoved_ids),
+        ("would have cut something off", evolution.blocking_ids),
+        ("stand closer than usual", evolution.crowded_ids),
+        ("arranged anew", evolution.rearranged_ids),
+    ]
