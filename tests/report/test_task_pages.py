@@ -1,0 +1,164 @@
+"""Pictures of tasks, from a generated task with a change before each stage."""
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.generation import GenerationParameters, generate_task
+from evonav.house import House, bundled_houses
+from evonav.report.task_pages import stage_svg, write_task_page
+from evonav.report.task_plans import TaskDrawing, task_drawing
+from evonav.report.task_words import changed_words, move_rows
+from evonav.tasks import Task, write_task
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    house = next(iter(bundled_houses(1)))
+    parameters = GenerationParameters(
+        num_stages=(3,),
+        evolve_probability=1.0,
+        salient_object_probability=0.0,
+        retain_group_probability=0.0,
+        full_shuffle_probability=1.0,
+    )
+    return generate_task(house, seed=3, config=parameters)
+
+
+@pytest.fixture(scope="module")
+def drawing(task: Task) -> TaskDrawing:
+    return task_drawing(task)
+
+
+def with_class(root: ElementTree.Element, name: str) -> list[ElementTree.Element]:
+    return [element for element in root.iter() if name in element.get("class", "").split()]
+
+
+def evolved_stage(task: Task) -> int:
+    return next(stage.stage for stage in task.oracle_stages if stage.evolution.outcome == "evolved")
+
+
+def test_before_and_after_stress_what_the_oracle_says_moved(task: Task, drawing: TaskDrawing) -> None:
+    stage = evolved_stage(task)
+    moved = {change.id for change in task.oracle(stage).evolution.changes}
+    root = ElementTree.fromstring(stage_svg(drawing, stage))
+    panels = root.findall(f"{SVG}svg")
+    assert len(panels) == 2
+    for panel in panels:
+        assert sum(len(with_class(group, "item")) for group in with_class(panel, "moved")) == len(moved)
+        assert len(with_class(panel, "tint")) == 1
+    before, after = panels
+    assert with_class(before, "arrow") == with_class(before, "star") == []
+    assert sum(len(with_class(group, "item")) for group in with_class(after, "ghost")) == len(moved)
+    assert len(with_class(after, "trajectory")) == len(with_class(after, "cone")) == 1
+    assert [star for star in with_class(after, "star") if "old" not in star.get("class", "")] != []
+    # A stage whose house did not change is one plan.
+    assert len(ElementTree.fromstring(stage_svg(drawing, 1)).findall(f"{SVG}svg")) == 1
+
+
+def test_objects_stand_where_the_stage_house_has_them(task: Task, drawing: TaskDrawing) -> None:
+    stage = evolved_stage(task)
+    for number in (stage - 1, stage):
+        house = House(task.house_json(number), name="h")
+        places = {entry.id: entry.position_m for entry in house.objects}
+        drawn = {item.object_id: item for item in drawing.maps[number].objects}
+        for change in task.oracle(stage).evolution.changes:
+            centre = drawn[change.id].centre_m
+            assert (centre[0], centre[2]) == pytest.approx((places[change.id][0], places[change.id][2]), abs=0.25)
+
+
+def test_words_count_the_moved_and_name_the_farthest(task: Task, drawing: TaskDrawing) -> None:
+    stage = evolved_stage(task)
+    evolution = task.oracle(stage).evolution
+    words = changed_words(drawing.maps[stage], evolution)
+    far_m = max(change.displacement_m for change in evolution.changes)
+    assert re.fullmatch(rf"FULL_SHUFFLE in the .+: {len(evolution.changes)} objects? moved, .+ {far_m:.1f} m\.", words)
+    rows = move_rows(drawing.maps[stage], evolution)
+    assert rows[0][2] == f"{far_m:.2f} m"
+    assert {row[1] for row in rows} == {change.id for change in evolution.changes}
+    assert changed_words(drawing.maps[1], task.oracle(1).evolution).startswith("The first stage")
+
+
+class _Page(HTMLParser):
+    """Ids, references and text of a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ids: list[str] = []
+        self.refs: list[str] = []
+        self.tags: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(str(value))
+            if name in ("href", "src"):
+                self.refs.append(str(value))
+
+
+def test_a_page_needs_no_other_file_and_escapes_all_text(task: Task, tmp_path: Path) -> None:
+    hostile = '<script>alert("x")</script>'
+    public = tuple(stage.model_copy(update={"basic_instruction": hostile}) for stage in task.public_stages)
+    houses = list(task.houses_json)
+    for k, text in enumerate(houses):
+        house = json.loads(text)
+        house["rooms"][0]["roomType"] = hostile
+        houses[k] = json.dumps(house)
+    source = task.header.house.model_copy(update={"name": hostile})
+    header = task.header.model_copy(update={"house": source})
+    wild = Task(header, public, task.reference_images, task.oracle_stages, tuple(houses))
+    text = write_task_page(wild, tmp_path / "page.html").read_text(encoding="utf-8")
+    page = _Page()
+    page.feed(text)
+    assert "script" not in page.tags
+    assert len(page.ids) == len(set(page.ids))
+    for ref in page.refs:
+        assert ref.startswith("data:image/webp") or ref[1:] in page.ids
+
+
+def test_the_command_draws_a_task_a_stage_and_a_gallery(task: Task, tmp_path: Path) -> None:
+    run = CliRunner().invoke
+    root = write_task(task, tmp_path / "set")
+    page = tmp_path / "one.html"
+    assert run(app, ["tasks", "show", str(root), "--out", str(page)]).exit_code == 0
+    assert page.read_text(encoding="utf-8").count('class="task stage-plan"') == 3
+    picture = tmp_path / "stage.svg"
+    arguments = ["tasks", "show", str(root.parent), "--task", task.task_id, "--stage", "2", "--out", str(picture)]
+    assert run(app, arguments).exit_code == 0
+    ElementTree.parse(picture)
+    gallery = tmp_path / "gallery"
+    assert run(app, ["tasks", "show", str(root.parent), "--out", str(gallery)]).exit_code == 0
+    index = (gallery / "index.html").read_text(encoding="utf-8")
+    assert f'href="{task.task_id}.html"' in index
+    assert 'data-modes="FULL_SHUFFLE"' in index
+    assert (gallery / f"{task.task_id}.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["{set}", "--task", "nope"], "holds no task 'nope'"),
+        (["{set}", "--task", "../x"], "holds no task"),
+        (["{root}", "--stage", "4"], "argument `stage` is 4, expected 1 to 3"),
+        (["{set}/nothing"], "holds no task"),
+        (["{broken}"], "task.json: field"),
+    ],
+)
+def test_wrong_input_is_a_line_that_names_it(task: Task, tmp_path: Path, arguments: list[str], message: str) -> None:
+    root = write_task(task, tmp_path / "set")
+    broken = tmp_path / "broken"
+    broken.mkdir()
+    (broken / "task.json").write_text('{"schema_version": 2}', encoding="utf-8")
+    places = {"set": str(root.parent), "root": str(root), "broken": str(broken)}
+    result = CliRunner().invoke(app, ["tasks", "show", *(argument.format(**places) for argument in arguments)])
+    assert result.exit_code == 1
+    assert message in str(result.exception)
