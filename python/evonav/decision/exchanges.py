@@ -1,0 +1,141 @@
+"""Exchanges with a model, kept: what was asked and what came back, so that it can be had again without asking.
+
+An exchange is found by its question alone: the SHA-256 of the request as canonical JSON, each image replaced by the
+SHA-256 of its pixels. Images are kept once. No key, address or time is kept, so the same exchanges make the same rows.
+"""
+
+import hashlib
+import json
+import sqlite3
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.errors import StoreError
+
+JsonObject = dict[str, Any]
+
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS exchanges (key TEXT PRIMARY KEY, request TEXT NOT NULL, response TEXT NOT NULL) STRICT;
+CREATE TABLE IF NOT EXISTS images (name TEXT PRIMARY KEY, png BLOB NOT NULL) STRICT;
+"""
+
+
+def canonical(value: Any) -> str:  # noqa: ANN401
+    """JSON with sorted keys and no spaces: one spelling a value."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def image_name(pixels: NDArray[np.uint8]) -> str:
+    """Stands for an image in a kept request: `sha256:` and the hash of its shape and values.
+
+    Not of its file, whose bytes depend on who compressed it.
+
+    Args:
+        pixels: `(H, W, 3)` RGB.
+    """
+    height, width = pixels.shape[:2]
+    return "sha256:" + hashlib.sha256(f"{width}x{height} RGB\n".encode() + pixels.tobytes()).hexdigest()
+
+
+def key_of(request: JsonObject) -> str:
+    """What an exchange is found by: SHA-256 of a request with names in place of its images."""
+    return hashlib.sha256(canonical(request).encode()).hexdigest()
+
+
+class ExchangeStore:
+    """Exchanges in one SQLite file (WAL); any number of threads and processes may use it."""
+
+    def __init__(self, path: Path | str) -> None:
+        """Opens or makes the file.
+
+        Raises:
+            StoreError: It cannot be opened or is no such file.
+        """
+        self.path = Path(path)
+        self._lock = threading.Lock()
+        with self._told():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(self.path, timeout=60.0, check_same_thread=False, isolation_level=None)
+            self._db.execute("PRAGMA journal_mode = WAL")
+            self._db.executescript(_SCHEMA)
+
+    def __len__(self) -> int:
+        """Number of exchanges."""
+        with self._lock, self._told():
+            return int(self._db.execute("SELECT count(*) FROM exchanges").fetchone()[0])
+
+    def get(self, key: str) -> JsonObject | None:
+        """The response kept for a key.
+
+        Raises:
+            StoreError: The file cannot be read, or the response in it is no JSON object.
+        """
+        with self._lock, self._told():
+            row = self._db.execute("SELECT response FROM exchanges WHERE key = ?", (key,)).fetchone()
+        if row is None:
+            return None
+        try:
+            response = json.loads(row[0])
+        except ValueError as error:
+            raise StoreError(f"{self.path}: response of {key}: {error}") from error
+        if not isinstance(response, dict):
+            raise StoreError(f"{self.path}: response of {key}: expected an object, got {str(row[0])[:80]!r}")
+        return response
+
+    def put(self, request: JsonObject, images: Mapping[str, bytes], response: JsonObject) -> str:
+        """Keeps an exchange in place of an older one of the same question; all of it or nothing.
+
+        Args:
+            request: With names in place of its images.
+            images: PNG files by `image_name`.
+            response: What came back.
+
+        Returns:
+            Its key.
+
+        Raises:
+            StoreError: The file cannot be written.
+        """
+        key = key_of(request)
+        with self._lock, self._told():
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                self._db.executemany("INSERT OR IGNORE INTO images VALUES (?, ?)", images.items())
+                row = (key, canonical(request), canonical(response))
+                self._db.execute("INSERT OR REPLACE INTO exchanges VALUES (?, ?, ?)", row)
+                self._db.execute("COMMIT")
+            except BaseException:
+                self._db.execute("ROLLBACK")
+                raise
+        return key
+
+    def image(self, name: str) -> bytes | None:
+        """An image's PNG file."""
+        with self._lock, self._told():
+            row = self._db.execute("SELECT png FROM images WHERE name = ?", (name,)).fetchone()
+        return None if row is None else bytes(row[0])
+
+    def requests(self) -> Iterator[JsonObject]:
+        """What was asked, in order of key; images as hashes."""
+        with self._lock, self._told():
+            rows = self._db.execute("SELECT request FROM exchanges ORDER BY key").fetchall()
+        for (text,) in rows:
+            yield json.loads(text)
+
+    def close(self) -> None:
+        """Closes the file."""
+        with self._lock, self._told():
+            self._db.close()
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except (sqlite3.Error, OSError) as error:
+            raise StoreError(f"{self.path}: exchanges: {error}") from error
