@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import socket
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -107,7 +108,7 @@ def do_house(index: int, name: str, text: str, options: GenerationOptions, out: 
         return without_task(error.reason, error, error.stage)
     except (HouseError, SimulationError) as error:
         return without_task("unusable_house", error)
-    root = put(task, out, f"{index}-{os.getpid()}")
+    root = put(task, out, f"{socket.gethostname()}-{os.getpid()}")
     return Outcome(
         index=index,
         house=short_name(name),
@@ -123,7 +124,7 @@ def put(task: Task, out: Path, label: str) -> Path:
     Args:
         task: A task.
         out: Where its folder is to be; one of the same name is replaced.
-        label: No other process uses it.
+        label: Of this process alone.
 
     Raises:
         TaskError: It cannot be written.
@@ -131,11 +132,13 @@ def put(task: Task, out: Path, label: str) -> Path:
     """
     beside = out / PARTIAL_NAME / label
     root = out / task.task_id
-    try:
-        written = write_task(task, beside)
-        if root.exists():
-            root.rename(beside / "replaced")
-        written.rename(root)
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
+    replaced = beside / "replaced"
+    for left in (beside / task.task_id, replaced):  # by an attempt that was not finished
+        if left.exists():
+            shutil.rmtree(left)
+    written = write_task(task, beside)
+    if root.exists():
+        root.rename(replaced)
+        shutil.rmtree(replaced)
+    written.rename(root)
     return root
