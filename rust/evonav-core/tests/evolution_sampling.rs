@@ -81,7 +81,8 @@ fn scores_tell_unique_categories_from_common_ones() {
     let of = |category, room| Candidate { category, room };
     let candidates = [of("Mug", 0), of("Bed", 1), of("Bed", 2), of("Book", 1), of("Book", 1)];
     assert_eq!(target_scores(&candidates), [2.0, 1.5, 1.5, 1.0, 1.0]);
-    let bias = GoalBias { changed_room: Some(1), previous_goal_room: Some(2), moved_object: None };
+    let bias =
+        GoalBias { changed_room: Some(1), previous_goal_room: Some(2), ..GoalBias::default() };
     let weights = goal_room_weights(
         &candidates,
         &target_scores(&candidates),
@@ -93,22 +94,31 @@ fn scores_tell_unique_categories_from_common_ones() {
 }
 
 #[test]
-fn goals_are_drawn_room_first_and_the_moved_object_nine_times_as_often() {
+fn goals_are_drawn_room_first_and_what_moved_as_often_as_its_weight_says() {
     let of = |category, room| Candidate { category, room };
-    let candidates = [of("Mug", 0), of("Bed", 1), of("Lamp", 1), of("Sofa", 1)];
-    let bias =
-        GoalBias { changed_room: Some(1), previous_goal_room: Some(0), moved_object: Some(2) };
-    let mut stream = Stream::new(3, &["goals"]);
-    let mut counts = [0; 4];
-    for _ in 0..NUM_DRAWS {
-        let drawn =
-            sample_goal(&candidates, 2, bias, &Parameters::default(), &mut stream, |_| Some(()));
-        counts[drawn.unwrap().0] += 1;
+    let candidates = [of("Mug", 0), of("Bed", 1), of("Lamp", 1), of("Sofa", 1), of("Vase", 1)];
+    for (moved_children_multiplier, weights) in
+        [(1.0, [1.0, 9.0, 1.0, 1.0]), (4.0, [1.0, 9.0, 1.0, 4.0]), (9.0, [1.0, 9.0, 1.0, 9.0])]
+    {
+        let parameters = Parameters { moved_children_multiplier, ..Parameters::default() };
+        let bias = GoalBias {
+            changed_room: Some(1),
+            previous_goal_room: Some(0),
+            moved_object: Some(2),
+            moved_children: &[4],
+        };
+        let mut stream = Stream::new(3, &["goals"]);
+        let mut counts = [0; 5];
+        for _ in 0..NUM_DRAWS {
+            let drawn = sample_goal(&candidates, 2, bias, &parameters, &mut stream, |_| Some(()));
+            counts[drawn.unwrap().0] += 1;
+        }
+        let (kitchen, bedroom) = (2.0 * 0.2, 8.0 * 9.0);
+        let total: f64 = weights.iter().sum();
+        let mut expected = vec![kitchen / (kitchen + bedroom)];
+        expected.extend(weights.map(|w| bedroom / (kitchen + bedroom) * w / total));
+        assert!(chi_square(&counts, &expected) < 18.5, "{counts:?}");
     }
-    let (kitchen, bedroom) = (2.0 * 0.2, 6.0 * 9.0);
-    let in_bedroom = bedroom / (kitchen + bedroom) / 11.0;
-    let expected = [kitchen / (kitchen + bedroom), in_bedroom, 9.0 * in_bedroom, in_bedroom];
-    assert!(chi_square(&counts, &expected) < 16.3, "{counts:?}");
 }
 
 proptest! {

@@ -31,14 +31,16 @@ pub fn target_scores(candidates: &[Candidate<'_>]) -> Vec<f64> {
 
 /// What biases the choice of a goal.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct GoalBias {
+pub struct GoalBias<'a> {
     /// Room modified for this stage.
     pub changed_room: Option<usize>,
     /// Goal room of the stage before; only that one, though the generation state keeps two
     /// (paper, Sec. 3.2 against Sec. A.2: penalising both misses the published share of relocated goals).
     pub previous_goal_room: Option<usize>,
-    /// Candidate that `SALIENT_OBJECT` moved for this stage; what stands on it weighs 1.
+    /// Candidate that `SALIENT_OBJECT` moved for this stage.
     pub moved_object: Option<usize>,
+    /// Candidates that stood on it and moved with it.
+    pub moved_children: &'a [usize],
 }
 
 /// Goal weight of each of `num_rooms` rooms: the sum of its candidates' scores, times the biases.
@@ -46,7 +48,7 @@ pub fn goal_room_weights(
     candidates: &[Candidate<'_>],
     scores: &[f64],
     num_rooms: usize,
-    bias: GoalBias,
+    bias: GoalBias<'_>,
     parameters: &Parameters,
 ) -> Vec<f64> {
     let mut weights = vec![0.0; num_rooms];
@@ -77,18 +79,22 @@ pub fn goal_room_weights(
 pub fn sample_goal<T>(
     candidates: &[Candidate<'_>],
     num_rooms: usize,
-    bias: GoalBias,
+    bias: GoalBias<'_>,
     parameters: &Parameters,
     stream: &mut Stream,
     mut accept: impl FnMut(usize) -> Option<T>,
 ) -> Option<(usize, T)> {
     let scores = target_scores(candidates);
     let mut room_weights = goal_room_weights(candidates, &scores, num_rooms, bias, parameters);
-    let mut object_weights: Vec<f64> = (0..candidates.len())
-        .map(
-            |i| if bias.moved_object == Some(i) { parameters.moved_object_multiplier } else { 1.0 },
-        )
-        .collect();
+    let mut object_weights = vec![1.0; candidates.len()];
+    for &child in bias.moved_children {
+        if let Some(weight) = object_weights.get_mut(child) {
+            *weight = parameters.moved_children_multiplier;
+        }
+    }
+    if let Some(weight) = bias.moved_object.and_then(|i| object_weights.get_mut(i)) {
+        *weight = parameters.moved_object_multiplier;
+    }
     while let Some(room) = stream.choose_weighted(&room_weights) {
         let in_room: Vec<f64> = candidates
             .iter()

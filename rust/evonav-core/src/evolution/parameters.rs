@@ -31,6 +31,8 @@ pub struct Parameters {
     pub previous_goal_room_multiplier: f64,
     /// Weight of the salient object that just moved among its room's objects, which weigh 1.
     pub moved_object_multiplier: f64,
+    /// Weight of each object that stood on it and moved with it.
+    pub moved_children_multiplier: f64,
     /// Whether what hangs on walls, which no modification moves, may be a goal. The paper uses it
     /// as an anchor of instructions; leaving it out of the goals brings the share of relocated
     /// goals to the published one.
@@ -68,6 +70,7 @@ impl Default for Parameters {
             changed_room_multiplier: 9.0,
             previous_goal_room_multiplier: 0.2,
             moved_object_multiplier: 9.0,
+            moved_children_multiplier: 9.0,
             goals_on_walls: false,
             reference_min_m: 1.0,
             reference_max_m: 1.5,
@@ -113,6 +116,7 @@ impl Parameters {
             ("changed_room_multiplier", self.changed_room_multiplier),
             ("previous_goal_room_multiplier", self.previous_goal_room_multiplier),
             ("moved_object_multiplier", self.moved_object_multiplier),
+            ("moved_children_multiplier", self.moved_children_multiplier),
             ("relocated_min_m", self.relocated_min_m),
             ("reference_min_m", self.reference_min_m),
             ("reference_max_m", self.reference_max_m),

@@ -9,7 +9,7 @@ use super::{
     state::State,
     target_scores,
 };
-use crate::Error;
+use crate::{Error, house::House};
 
 /// A sampled target.
 pub(super) struct Goal {
@@ -50,7 +50,9 @@ impl Generator<'_> {
                 Some((index, Candidate { category, room }))
             })
             .unzip();
+        let moved_children = moved_with_salient(house, &indices, evolution);
         let bias = GoalBias {
+            moved_children: &moved_children,
             changed_room: state.changed.last().copied().flatten(),
             previous_goal_room: state.goals.last().copied(),
             moved_object: indices
@@ -101,6 +103,15 @@ impl Generator<'_> {
         let record = target_record(world, state, evolution, index, room, score);
         Ok(Ok((Goal { index, room, record }, reference, rejections)))
     }
+}
+
+/// Candidates that stood on the salient object and moved with it.
+fn moved_with_salient(house: &House, indices: &[usize], evolution: &EvolutionRecord) -> Vec<usize> {
+    let Some(salient) = &evolution.salient_id else { return vec![] };
+    let is_moved = |id: &String| {
+        id != salient && evolution.changes.iter().any(|c| c.is_relocated && c.id == *id)
+    };
+    (0..indices.len()).filter(|&i| is_moved(&house.objects[indices[i]].id)).collect()
 }
 
 fn target_record(
