@@ -3,21 +3,18 @@
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
+mod points;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use evonav_core::{
-    assets::{
-        Catalogue, UnknownAssets,
-        part::{Part, Primitive},
-        placement::Place,
-        shapes::shape_in,
-    },
+    assets::{Catalogue, UnknownAssets, part::Part, placement::Place},
     evolution::{
-        Generation, Mode, Parameters, generate_task,
+        Generation, Group, Mode, Parameters, asset_groups, generate_task,
         record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason},
     },
-    geometry::{Vec2, Vec3, add, euler_rotation_deg, polygon_contains, rotate, sub},
-    house::{House, Object},
+    geometry::{Vec2, Vec3, polygon_contains, sub},
+    house::House,
     sensors::{
         camera::Camera,
         raster::{FrameBuffer, Want, render},
@@ -29,6 +26,7 @@ use evonav_core::{
         scene::Scene,
     },
 };
+use points::{contains, interpenetrate, object, parts_of, points_in};
 
 const UNKNOWN: UnknownAssets = UnknownAssets::Error;
 
@@ -61,86 +59,6 @@ fn always(mode: Mode) -> Parameters {
 
 fn stage_houses(task: &GeneratedTask) -> Vec<House> {
     task.houses.iter().map(|json| House::from_json("stage", json).unwrap()).collect()
-}
-
-fn object<'a>(house: &'a House, id: &str) -> &'a Object {
-    &house.objects[house.object_index(id).unwrap()]
-}
-
-fn parts_of(house: &House, id: &str) -> Vec<Part> {
-    let object = object(house, id);
-    let asset = Catalogue::bundled().asset_of(house, object, UNKNOWN).unwrap();
-    let rotation = euler_rotation_deg(object.rotation_deg);
-    let parts = shape_in(&asset, object.condition());
-    parts.iter().map(|part| part.placed(object.position_m, &rotation)).collect()
-}
-
-/// Half edges of a part's own box.
-fn half_of(part: &Part) -> Vec3 {
-    match part.primitive {
-        Primitive::Cuboid { half_m } | Primitive::Ellipsoid { half_m } => half_m,
-        Primitive::Frustum { bottom_m, top_m, half_height_m, .. } => {
-            [bottom_m[0].max(top_m[0]), half_height_m, bottom_m[1].max(top_m[1])]
-        }
-    }
-}
-
-/// Points throughout a part, `share` of the way out.
-fn points_in(part: &Part, share: f64) -> Vec<Vec3> {
-    let half = half_of(part);
-    let steps = [-1.0, -0.6, -0.2, 0.2, 0.6, 1.0].map(|t| share * t);
-    let mut points = Vec::new();
-    for x in steps {
-        for y in steps {
-            for z in steps {
-                let local = [x * half[0], y * half[1], z * half[2]];
-                if contains_local(&part.primitive, local, 0.0) {
-                    points.push(add(rotate(&part.rotation, local), part.centre_m));
-                }
-            }
-        }
-    }
-    points
-}
-
-/// Whether a point lies in a primitive, `inset_m` from its surface or deeper (roughly).
-fn contains_local(primitive: &Primitive, p: Vec3, inset_m: f64) -> bool {
-    match *primitive {
-        Primitive::Cuboid { half_m } => (0..3).all(|i| p[i].abs() <= half_m[i] - inset_m),
-        Primitive::Ellipsoid { half_m } => {
-            let terms = (0..3).map(|i| (p[i] / (half_m[i] - inset_m).max(1e-9)).powi(2));
-            terms.sum::<f64>() <= 1.0
-        }
-        Primitive::Frustum { bottom_m, top_m, half_height_m, sides } => {
-            if p[1].abs() > half_height_m - inset_m {
-                return false;
-            }
-            let t = 0.5 * (p[1] / half_height_m + 1.0);
-            // Within the circle that the polygon goes around.
-            let inner = (std::f64::consts::PI / f64::from(sides)).cos();
-            let half =
-                [0, 1].map(|i| inner * (bottom_m[i] + t * (top_m[i] - bottom_m[i])) - inset_m);
-            half.iter().all(|h| *h > 0.0)
-                && (p[0] / half[0]).powi(2) + (p[2] / half[1]).powi(2) <= 1.0
-        }
-    }
-}
-
-fn contains(part: &Part, point: Vec3, inset_m: f64) -> bool {
-    let offset = sub(point, part.centre_m);
-    let local = [0, 1, 2].map(|i| (0..3).map(|j| part.rotation[j][i] * offset[j]).sum());
-    contains_local(&part.primitive, local, inset_m)
-}
-
-/// Whether solids share points that lie more than 5 mm inside.
-fn interpenetrate(a: &[Part], b: &[Part]) -> bool {
-    let radius = |part: &Part| half_of(part).iter().map(|h| h * h).sum::<f64>().sqrt();
-    let are_near = |p: &Part, q: &Part| {
-        let offset = sub(p.centre_m, q.centre_m);
-        offset.iter().map(|v| v * v).sum::<f64>().sqrt() < radius(p) + radius(q)
-    };
-    let holds = |p: &Part, q: &Part| points_in(p, 0.98).iter().any(|&x| contains(q, x, 0.005));
-    a.iter().any(|p| b.iter().any(|q| are_near(p, q) && (holds(p, q) || holds(q, p))))
 }
 
 fn relocated(stage: &GeneratedStage) -> BTreeSet<&str> {
@@ -280,19 +198,37 @@ fn retained_groups_keep_their_shape() {
         let stages = stage_houses(&task);
         for (k, stage) in task.stages.iter().enumerate().skip(1) {
             let (before, after) = (&stages[k - 1], &stages[k]);
-            let mut groups: BTreeMap<String, BTreeSet<&str>> = BTreeMap::new();
-            for change in &stage.evolution.changes {
-                assert_eq!(change.from_support_id, change.to_support_id);
-                let root = change.from_support_id.as_ref().unwrap_or(&change.id);
-                let key = match root.split('|').collect::<Vec<_>>()[..] {
-                    [room, group, _] => format!("{room}|{group}"),
-                    _ => root.clone(),
+            let moved: BTreeSet<&str> =
+                stage.evolution.changes.iter().map(|c| c.id.as_str()).collect();
+            let groups = asset_groups(before, Catalogue::bundled(), UNKNOWN).unwrap();
+            let after_groups = asset_groups(after, Catalogue::bundled(), UNKNOWN).unwrap();
+            for Group { roots, definition } in groups {
+                let id = |&root: &usize| before.objects[root].id.as_str();
+                let ids: BTreeSet<&str> = roots.iter().map(id).collect();
+                let family = |root: &usize| -> BTreeSet<&str> {
+                    let children = &before.objects[*root].children;
+                    children.iter().map(id).chain([id(root)]).collect()
                 };
-                groups.entry(key).or_default().insert(change.id.as_str());
+                let members: BTreeSet<&str> = roots.iter().flat_map(family).collect();
+                // All of a group moves, or none.
+                assert!(members.is_subset(&moved) || members.is_disjoint(&moved), "{members:?}");
+                if stage.evolution.rearranged_ids.iter().any(|r| ids.contains(r.as_str())) {
+                    roots.iter().for_each(|root| check_rigid(before, after, &family(root)));
+                    let is_same = |other: &Group| {
+                        other
+                            .roots
+                            .iter()
+                            .map(|&i| after.objects[i].id.as_str())
+                            .collect::<BTreeSet<_>>()
+                            == ids
+                    };
+                    assert!(definition.is_some() && after_groups.iter().any(is_same), "{ids:?}");
+                } else {
+                    check_rigid(before, after, &members);
+                }
             }
-            for members in groups.values() {
-                check_rigid(before, after, members);
-            }
+            let changes = &stage.evolution.changes;
+            assert!(changes.iter().all(|c| c.from_support_id == c.to_support_id));
         }
     }
 }

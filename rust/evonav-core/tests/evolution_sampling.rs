@@ -30,6 +30,26 @@ fn modes_are_drawn_as_half_two_fifths_one_tenth() {
     assert!(chi_square(&counts, &[0.5, 0.4, 0.1]) < 13.8, "{counts:?}"); // p = 0.001, 2 d.o.f.
 }
 
+/// Each transition of each task has streams of its own, of which only the first draws count: they
+/// must be as even over labels as one stream is over draws, and the mode not follow the trigger.
+#[test]
+fn first_draws_of_named_streams_are_even_over_tasks_and_stages() {
+    let parameters = Parameters::default();
+    let mut counts = [[0; 3]; 2];
+    for seed in 0..10 {
+        for (task, stage) in (0..2_000).flat_map(|t| (2..6).map(move |s| (t, s))) {
+            let (label, stage) = (format!("{task:08x}"), format!("stage {stage}"));
+            let stream = |what| Stream::new(seed, &[&label, &stage, what]);
+            let is_evolved = stream("trigger").uniform() < parameters.evolve_probability;
+            let mode = Mode::sample(&parameters, &mut stream("mode")).unwrap();
+            let mode = Mode::ALL.iter().position(|&m| m == mode).unwrap();
+            counts[usize::from(is_evolved)][mode] += 1;
+        }
+    }
+    let expected = [0.25, 0.2, 0.05, 0.25, 0.2, 0.05];
+    assert!(chi_square(&counts.concat(), &expected) < 20.5, "{counts:?}"); // p = 0.001, 5 d.o.f.
+}
+
 /// A house with one room of each kind: the weights by hand, and the draws by chi-square.
 #[test]
 fn rooms_are_drawn_by_assets_visits_transition_and_recent_change() {

@@ -2,21 +2,35 @@
 //!
 //! House files name the members of a group by number, `room|group|member`, some of ProcTHOR's
 //! versions with a name before it (`chair-diningtable|7|2|0`). Where ids say nothing, furniture that
-//! stands to each other as one of ProcTHOR's definitions puts it is a group.
+//! stands to each other as one of ProcTHOR's definitions puts it is a group; in recorded houses both
+//! ways find the same. What an earlier change took away from its group is on its own.
 
 use super::{layout::Layout, unit::Unit};
 use crate::{
-    assets::{catalogue::Catalogue, groups::GroupDefinition},
+    Error,
+    assets::{
+        catalogue::{Catalogue, UnknownAssets},
+        groups::GroupDefinition,
+    },
     geometry::{Vec2, Vec3, distance_2d_m, rotate, yaw_rotation},
     house::House,
     rng::Stream,
+    world::scene::Scene,
 };
 
-/// Distance of a member from the place that a definition gives it: what the generator's rounding
-/// and our shapes leave, and less than the way to the next seat of a table.
-const NEAR_M: f64 = 0.25;
-/// As much for its yaw, on top of the definition's own spread.
-const NEAR_DEG: f64 = 15.0;
+/// How well furniture must stand as a definition puts it.
+#[derive(Debug, Clone, Copy)]
+struct Slack {
+    /// Distance of a member from its place.
+    near_m: f64,
+    /// Turn from its yaw, on top of the definition's own spread.
+    near_deg: f64,
+}
+
+/// To be taken for a group: less than the way to the next seat of a table.
+const GROUPED: Slack = Slack { near_m: 0.25, near_deg: 15.0 };
+/// To be the group that the ids say it is.
+const TOGETHER: Slack = Slack { near_m: 0.75, near_deg: 180.0 };
 
 /// Furniture that moves together, the main piece first, and the definition that it follows.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,8 +52,26 @@ enum Key<'a> {
     Unknown,
 }
 
+/// Furniture of a house by what moves together under `RETAIN_GROUP`.
+///
+/// # Errors
+/// [`Error::House`] for an unknown asset, if `unknown` says so.
+pub fn asset_groups(
+    house: &House,
+    catalogue: &Catalogue,
+    unknown: UnknownAssets,
+) -> Result<Vec<Group>, Error> {
+    let layout = Layout::new(house, catalogue, unknown, Scene::build(house, catalogue, unknown)?)?;
+    let of_room = |room: usize| {
+        let in_room: Vec<usize> =
+            (0..house.objects.len()).filter(|&i| house.objects[i].room == Some(room)).collect();
+        groups_of(house, &layout, catalogue, &in_room)
+    };
+    Ok((0..house.rooms.len()).flat_map(of_room).collect())
+}
+
 /// Furniture of a room by group; alone where it belongs to none.
-pub fn groups_of(
+pub(super) fn groups_of(
     house: &House,
     layout: &Layout,
     catalogue: &Catalogue,
@@ -58,10 +90,14 @@ pub fn groups_of(
         }
     }
     let mut groups: Vec<Group> = groups.into_iter().map(|(_, group)| group).collect();
-    groups.extend(inferred(layout, catalogue, unknown));
-    for group in &mut groups {
-        name(group, layout, catalogue);
-    }
+    groups.iter_mut().for_each(|group| name(group, layout, catalogue));
+    let groups = groups.into_iter().flat_map(|group| match group.definition {
+        Some(_) if group.roots.len() > 1 => standing(layout, catalogue, group.roots, TOGETHER),
+        _ => vec![group],
+    });
+    let mut groups: Vec<Group> =
+        groups.chain(standing(layout, catalogue, unknown, GROUPED)).collect();
+    groups.iter_mut().for_each(|group| name(group, layout, catalogue));
     groups
 }
 
@@ -101,14 +137,19 @@ fn sorted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     names
 }
 
-/// Groups among furniture of which ids say nothing: the largest that each main piece has.
-fn inferred(layout: &Layout, catalogue: &Catalogue, mut alone: Vec<usize>) -> Vec<Group> {
+/// Groups among furniture by how it stands: the largest that each main piece has.
+fn standing(
+    layout: &Layout,
+    catalogue: &Catalogue,
+    mut alone: Vec<usize>,
+    slack: Slack,
+) -> Vec<Group> {
     let mut groups = Vec::new();
     for main in alone.clone() {
         let best = catalogue
             .groups()
             .iter()
-            .map(|definition| members_about(layout, definition, main, &alone))
+            .map(|definition| members_about(layout, definition, main, &alone, slack))
             .max_by_key(Vec::len);
         if let Some(roots) = best.filter(|roots| roots.len() > 1) {
             alone.retain(|index| !roots.contains(index));
@@ -125,6 +166,7 @@ fn members_about(
     definition: &GroupDefinition,
     main: usize,
     others: &[usize],
+    slack: Slack,
 ) -> Vec<usize> {
     let item = |index: usize| &layout.items[index];
     if !others.contains(&main) || item(main).asset.category != definition.members[0].category {
@@ -147,7 +189,8 @@ fn members_about(
             let pose = poses(layout, definition, &slots, &turns_deg)[slot];
             slots[slot] = None;
             let distance_m = distance_2d_m(pose?, centre_m);
-            let is_near = distance_m < NEAR_M && turn_deg.abs() < member.spread_deg + NEAR_DEG;
+            let is_near =
+                distance_m < slack.near_m && turn_deg.abs() <= member.spread_deg + slack.near_deg;
             is_near.then_some((distance_m, index, turn_deg))
         });
         if let Some((_, index, turn_deg)) = near.min_by(|a, b| a.0.total_cmp(&b.0)) {
@@ -188,7 +231,7 @@ fn signed_deg(angle_deg: f64) -> f64 {
 ///
 /// # Returns
 /// `None` for what is no group, or where this draw has pieces in each other.
-pub fn rearranged(
+pub(super) fn rearranged(
     unit: &Unit,
     layout: &Layout,
     catalogue: &Catalogue,

@@ -32,6 +32,7 @@ mod unit;
 pub use extensions::{Extensions, Occurrence, Schedule};
 pub use generate::{Generation, generate_task};
 pub use goals::{Candidate, GoalBias, goal_room_weights, sample_goal, target_scores};
+pub use groups::{Group, asset_groups};
 pub use parameters::Parameters;
 pub use rooms::{Mode, RoomHistory, evolved_room_weight, sample_evolved_room};
 pub use settle::settled;
