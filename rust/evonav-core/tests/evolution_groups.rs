@@ -83,7 +83,7 @@ fn ids_of_recorded_houses_name_procthors_groups() {
         num_groups += found.len();
         num_named += found.values().filter(|name| name.is_some()).count();
     }
-    println!("{num_groups} groups, {num_named} named");
+    eprintln!("{num_groups} groups, {num_named} named");
     assert!(num_groups > 300, "{num_groups}");
     assert!(num_named as f64 > 0.99 * num_groups as f64, "{num_named} of {num_groups}");
 }
@@ -111,7 +111,7 @@ fn furniture_without_ids_is_grouped_as_the_generator_grouped_it() {
             *missed.entry(name.clone().unwrap_or_default()).or_default() += 1;
         }
     }
-    println!("{num_ids} groups, {num_found} found, {num_right} of them right; missed: {missed:?}");
+    eprintln!("{num_ids} groups, {num_found} found, {num_right} of them right; missed: {missed:?}");
     assert!(num_right as f64 > 0.9 * num_ids as f64, "{num_right} of {num_ids}");
     assert!(num_right as f64 > 0.9 * num_found as f64, "{num_right} of {num_found}");
 }

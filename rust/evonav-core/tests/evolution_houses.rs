@@ -88,7 +88,7 @@ fn modifications_of_recorded_houses_keep_what_they_must() {
             }
         }
     }
-    println!("{num_houses} houses: {num_moved} moved, {num_unmoved} not, {num_crowded} crowded");
+    eprintln!("{num_houses} houses: {num_moved} moved, {num_unmoved} not, {num_crowded} crowded");
     assert!(num_houses > 120 && num_moved > 1000, "{num_houses} {num_moved}");
 }
 
