@@ -218,7 +218,7 @@ def _splits(scored: Sequence[StageRecord]) -> dict[str, list[StageRecord]]:
             splits["stage_1"].append(record)
             continue
         splits["relocated" if record.target.is_relocated else "not_relocated"].append(record)
-        splits[(record.transition.mode or "static").lower()].append(record)
+        splits[record.transition.kind].append(record)
     return dict(sorted(splits.items()))
 
 

@@ -106,11 +106,13 @@ def target_record(task: Task, stage: int) -> TargetRecord:
 def transition_record(oracle: OracleStage) -> TransitionRecord:
     """The change before a stage."""
     evolution = oracle.evolution
-    if evolution.outcome != "evolved":
-        return TransitionRecord()
+    is_evolved = evolution.outcome == "evolved"
     return TransitionRecord(
-        mode=evolution.mode,
-        room_id=evolution.room_id,
+        mode=evolution.mode if is_evolved else None,
+        room_id=evolution.room_id if is_evolved else None,
+        num_added=len(evolution.additions),
+        num_removed=len(evolution.removals),
+        num_states=len(evolution.states),
         relocations=tuple(
             Relocation(
                 object_id=change.id,

@@ -109,11 +109,25 @@ class TransitionRecord(_Record):
     """What happened between the previous stage and this one. Oracle."""
 
     mode: Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"] | None = None
-    """`None` when the transition is static."""
+    """`None` when the paper's process changed nothing."""
     room_id: str | None = None
     is_agent_in_room: bool = False
     """Whether the carried pose lies in the evolved room, where change can happen under the agent's eyes."""
     relocations: tuple[Relocation, ...] = ()
+    num_added: int = 0
+    """Objects that came; by an extension, as those below."""
+    num_removed: int = 0
+    num_states: int = 0
+    """Doors and objects that opened, closed, or went on or off."""
+
+    @property
+    def kind(self) -> str:
+        """The mode in lower case, `activities` where people moved things, `extensions` where others did, `static`."""
+        if self.mode is not None:
+            return self.mode.lower()
+        if self.relocations:
+            return "activities"
+        return "extensions" if self.num_added or self.num_removed or self.num_states else "static"
 
 
 class EntryRecord(_Record):

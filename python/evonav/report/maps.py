@@ -67,12 +67,21 @@ def change_words(record: StageRecord, maps: Mapping[int, StageMap]) -> str:
     transition = record.transition
     if record.stage == 1:
         return "first stage"
-    if transition.mode is None:
+    if transition.kind == "static":
         return "nothing changed"
     rooms = {room.room_id: noun_of(room.room_type) for m in maps.values() for room in m.rooms}
     room = rooms.get(transition.room_id or "", transition.room_id or "a room")
-    num = len(transition.relocations)
-    return f"{transition.mode} in the {room}: {num} object{'' if num == 1 else 's'} moved"
+    moved = f"{_objects(len(transition.relocations))} moved"
+    words = [f"{transition.mode} in the {room}: {moved}"] if transition.mode is not None else []
+    if transition.kind == "activities":
+        words.append(f"daily activities, most in the {room}: {moved}")
+    counts = {"came": transition.num_added, "went": transition.num_removed, "opened or switched": transition.num_states}
+    words.extend(f"{_objects(count)} {what}" for what, count in counts.items() if count)
+    return ", ".join(words)
+
+
+def _objects(count: int) -> str:
+    return f"{count} object{'' if count == 1 else 's'}"
 
 
 def outcome_words(record: StageRecord) -> str:

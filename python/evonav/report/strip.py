@@ -105,7 +105,7 @@ def _telling(run: Run, agents: Sequence[str], task_id: str, stages: Sequence[int
     score = 6.0 * (is_misled and has_success) + 4.0 * (hero.stale_path_m > 0 and has_success)
     score += 2.0 * hero.record.target.is_relocated_now + 2.0 * has_success + len(stages)
     window = [run.outcomes[agents[-1], task_id, k].record for k in stages]
-    score += sum(record.transition.mode is not None for record in window)
+    score += sum(record.transition.kind != "static" for record in window)
     return score + sum(record.state is EndState.SUCCESS for record in window)
 
 
@@ -144,7 +144,7 @@ def _head(record: StageRecord, maps: Mapping[int, StageMap], left_px: int) -> st
         for i, line in enumerate(text_lines(record.goal.instruction, width, 3))
     )
     changed = text_lines(change_words(record, maps), 56, 1)[0]
-    css = "change-words" if record.transition.mode else "quiet"
+    css = "quiet" if record.transition.kind == "static" else "change-words"
     shown = (
         ""
         if image is None

@@ -112,6 +112,8 @@ SPLIT_TITLES = {
     "salient_object": "SALIENT_OBJECT",
     "retain_group": "RETAIN_GROUP",
     "full_shuffle": "FULL_SHUFFLE",
+    "activities": "daily activities",
+    "extensions": "other extensions",
 }
 """The splits of `AgentSummary`, in reading order."""
 
@@ -125,7 +127,7 @@ def relocation_table(summaries: Sequence[AgentSummary]) -> Table:
 
 def mode_table(summaries: Sequence[AgentSummary]) -> Table:
     """SR by what happened in the transition before the stage."""
-    names = ("static", "salient_object", "retain_group", "full_shuffle")
+    names = ("static", "salient_object", "retain_group", "full_shuffle", "activities", "extensions")
     return _split_table("By evolution before the stage", summaries, names, ("Stages 2 and on.",))
 
 

@@ -31,7 +31,7 @@ class Change(Record):
     """Distance between the box centres, 3-D."""
     is_relocated: bool
     """Moved more than 0.1 m, or stands on another support."""
-    cause: Id | None = None
+    cause: Id
     """The process that moved it: the mode, or an extension such as `ACTIVITY:cook`."""
 
 

@@ -105,11 +105,14 @@ impl Generator<'_> {
     }
 }
 
-/// Candidates that stood on the salient object and moved with it.
+/// Candidates that stood on the salient object and moved with it, or that people have carried.
 fn moved_with_salient(house: &House, indices: &[usize], evolution: &EvolutionRecord) -> Vec<usize> {
-    let Some(salient) = &evolution.salient_id else { return vec![] };
+    let salient = evolution.salient_id.as_ref();
+    if salient.is_none() && evolution.clock_min.is_none() {
+        return vec![];
+    }
     let is_moved = |id: &String| {
-        id != salient && evolution.changes.iter().any(|c| c.is_relocated && c.id == *id)
+        Some(id) != salient && evolution.changes.iter().any(|c| c.is_relocated && c.id == *id)
     };
     (0..indices.len()).filter(|&i| is_moved(&house.objects[indices[i]].id)).collect()
 }
