@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from vlm_stub import KEY, Stub, images_in, serving
 
 from evonav.decision.account import Account, Price, Usage, image_tokens, read_prices
 from evonav.decision.exchanges import ExchangeStore
 from evonav.decision.vlm import Answer, Picture, Question, Text, Turn, VlmClient, VlmConfig
 from evonav.decision.vlm_errors import VlmError
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError
+from vlm_stub import KEY, Stub, images_in, serving
 
 IMAGE = np.random.default_rng(0).integers(0, 256, (30, 40, 3), dtype=np.uint8)
 QUESTION = Question.of(Text("What is this?"), Picture(IMAGE), Text("One word."))

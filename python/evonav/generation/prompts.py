@@ -1,0 +1,90 @@
+"""What a model is asked to write of a target (paper, Sec. A.4), and what of its answers may stand in a task."""
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.decision.vlm import Picture, Question, Text
+from evonav.tasks.language import noun_of
+
+APPEARANCE_PROMPT = (
+    "Given the target category, the basic instruction, and the reference image, write one short navigation instruction "
+    "that identifies the target mainly by visible appearance, including shape and color first, and material, texture, "
+    "size, or distinctive parts when helpful.\n"
+    "Do not mention coordinates, object IDs, simulator terms, or invisible attributes."
+)
+"""As the paper prints it."""
+UNIFIED_PROMPT = (
+    "Given the basic instruction, the appearance instruction, and the reference image, write one concise navigation "
+    "instruction that combines spatial relations with visual appearance.\n"
+    "Keep relations such as on, next to, near, or below only when they are supported by the image."
+)
+"""As the paper prints it."""
+
+MAX_CHARACTERS = 2000
+MAX_SENTENCES = 2
+
+_FAULTS: tuple[tuple[str, str], ...] = (
+    (r"[\w.]\|[+-]?\w", "names an object id"),
+    (r"\b[A-Za-z]+_[A-Za-z0-9_]+\b", "names an object id"),
+    (r"\b(?:object|instance|asset)[ -]?ids?\b", "names an object id"),
+    (r"\(\s*-?\d+(?:\.\d+)?\s*,\s*-?\d", "gives coordinates"),
+    (r"\b[xyz]\s*[=:]\s*-?\d", "gives coordinates"),
+    (r"\bcoordinates?\b", "gives coordinates"),
+    (r"\b(?:simulat\w+|ai2[- ]?thor|procthor|ithor|unity|prefab|asset|rendered|rendering|3d model|bounding box)\b",
+     "uses words of the simulator"),
+)  # fmt: skip
+
+
+def appearance_question(category: str, basic: str, image: NDArray[np.uint8]) -> Question:
+    """Asks for the appearance instruction.
+
+    Args:
+        category: Of the target, as ProcTHOR spells it.
+        basic: Its basic instruction.
+        image: `(H, W, 3)` RGB reference image.
+    """
+    inputs = f"Target category: {noun_of(category)}\nBasic instruction: {basic}\nReference image:"
+    return Question.of(Text(f"{APPEARANCE_PROMPT}\n\n{inputs}"), Picture(image))
+
+
+def unified_question(basic: str, appearance: str, image: NDArray[np.uint8]) -> Question:
+    """Asks for the unified instruction.
+
+    Args:
+        basic: Of the target.
+        appearance: Of the target.
+        image: `(H, W, 3)` RGB reference image.
+    """
+    inputs = f"Basic instruction: {basic}\nAppearance instruction: {appearance}\nReference image:"
+    return Question.of(Text(f"{UNIFIED_PROMPT}\n\n{inputs}"), Picture(image))
+
+
+def repair_request(fault: str) -> str:
+    """What is said to an answer that cannot stand."""
+    return f"This {fault}. Write it again as one or two plain sentences, and nothing else."
+
+
+def cleaned(answer: str) -> str:
+    """An answer on one line, without the quotes, labels and marks that models put around it."""
+    line = " ".join(answer.split()).strip()
+    line = re.sub(r"^(?:\*\*|__)?[A-Za-z ]{0,30}instruction(?:\*\*|__)?\s*:\s*(?:\*\*|__)?\s*", "", line, flags=re.I)
+    line = line.strip("*` ")
+    if len(line) > 1 and line[0] in "\"'“‘" and line[-1] in "\"'”’":
+        line = line[1:-1].strip()
+    return line
+
+
+def fault_of(text: str) -> str | None:
+    """What keeps a text from being an instruction; `None` if nothing does."""
+    if not re.search(r"[A-Za-z]{2}", text):
+        return "has no words"
+    if len(text) > MAX_CHARACTERS:
+        return f"is {len(text)} characters long"
+    num_sentences = len([part for part in re.split(r"(?<=[.!?])[\"'”’)]*\s+(?=[A-Z\"'“(])", text) if part.strip()])
+    if num_sentences > MAX_SENTENCES:
+        return f"has {num_sentences} sentences"
+    if any(ord(character) < 32 for character in text):
+        return "has control characters"
+    return next((fault for pattern, fault in _FAULTS if re.search(pattern, text, re.IGNORECASE)), None)
