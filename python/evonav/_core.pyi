@@ -452,3 +452,8 @@ def map_spec(house_json: str, *, name: str, cell_m: float) -> tuple[tuple[int, i
 def generate_task(
     house: House, *, seed: int, label: str, parameters_json: str, allow_unknown_assets: bool
 ) -> tuple[str, list[str], list[bytes]]: ...
+
+# validation
+
+def inspect_house(source: House, stage: House, *, touch_m: float, rest_m: float, allow_unknown_assets: bool) -> str:
+    """Findings (JSON): `kind`, `id`, `other_id`, `amount_m`, `is_own` (the source house has it just so)."""

@@ -133,7 +133,7 @@ def resigned(root: Path) -> None:
 
 def load_without_checks(root: Path) -> Task:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("evonav.tasks.files._check", lambda *_: None)
+        patch.setattr("evonav.tasks.files.inconsistencies", lambda *_: ())
         return load_task(root)
 
 

@@ -8,6 +8,7 @@ import typer
 from evonav.cli.options import Limit
 from evonav.cli.tasks_show import show
 from evonav.cli.tasks_stats import stats
+from evonav.cli.tasks_validate import validate
 from evonav.cli.tasks_write import write
 
 tasks_app = typer.Typer(help="Task files: what is in them.", no_args_is_help=True)
@@ -29,3 +30,4 @@ def list_tasks(folder: Folder, limit: Limit = None) -> None:
 tasks_app.command()(show)
 tasks_app.command()(stats)
 tasks_app.command()(write)
+tasks_app.command()(validate)

@@ -5,6 +5,7 @@ import zlib
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,47 +133,65 @@ def load_task(root: Path | str) -> Task:
             decode_png(path.with_suffix(".png"), header.parameters.reference_image_px) for path in public
         ),
         oracle_stages=tuple(parse_record(OracleStage, read_file(path), path) for path in oracle),
-        houses_json=tuple(_read_house(root / f"houses/stage_{number}.json.gz") for number in numbers),
+        houses_json=tuple(read_house(root / f"houses/stage_{number}.json.gz") for number in numbers),
     )
-    _check(task, root)
+    for found in inconsistencies(task, root):
+        raise found.error
     return task
 
 
-def _read_house(path: Path) -> str:
+def read_house(path: Path) -> str:
+    """A stage's house, ProcTHOR JSON.
+
+    Raises:
+        TaskError: The file is missing, damaged or not text.
+    """
     try:
         return read_gzip(path).decode()
     except UnicodeDecodeError as error:
         raise TaskError(f"{path}: not UTF-8: {error}") from error
 
 
-def _check(task: Task, root: Path) -> None:
-    """What no single file can tell.
+class Inconsistency(NamedTuple):
+    """Two files that do not go together."""
 
-    Raises:
-        TaskError: Files contradict each other or their checksums.
-    """
+    kind: Literal["checksum", "contradiction"]
+    stage: int
+    """0: the header."""
+    error: TaskError
+
+
+def inconsistencies(task: Task, root: Path) -> Iterator[Inconsistency]:
+    """What no single file of a task can tell."""
     header_path = root / "task.json"
     for number, (public, oracle) in enumerate(zip(task.public_stages, task.oracle_stages, strict=True), start=1):
         public_path, oracle_path = root / f"public/stage_{number}.json", root / f"oracle/stage_{number}.json"
-        if public.stage != number:
-            raise field_error(public_path, "stage", public.stage, f"expected {number}")
-        if oracle.stage != number:
-            raise field_error(oracle_path, "stage", oracle.stage, f"expected {number}")
-        if public.category != oracle.target.category:
-            raise field_error(public_path, "category", public.category, f"expected {oracle.target.category!r}")
+        places = (
+            (public_path, "stage", public.stage, number),
+            (oracle_path, "stage", oracle.stage, number),
+            (public_path, "category", public.category, oracle.target.category),
+        )
+        for path, place, found, expected in places:
+            if found != expected:
+                error = field_error(path, place, found, f"expected {expected!r}")
+                yield Inconsistency("contradiction", number, error)
         if sha256_of(task.houses_json[number - 1].encode()) != oracle.house_sha256:
             message = f"does not match houses/stage_{number}.json.gz"
-            raise field_error(oracle_path, "house_sha256", oracle.house_sha256, message)
+            error = field_error(oracle_path, "house_sha256", oracle.house_sha256, message)
+            yield Inconsistency("checksum", number, error)
     if task.header.start_pose != task.oracle_stages[0].start_pose:
-        raise field_error(header_path, "start_pose", task.header.start_pose, "expected that of oracle stage 1")
+        error = field_error(header_path, "start_pose", task.header.start_pose, "expected that of oracle stage 1")
+        yield Inconsistency("contradiction", 0, error)
     if task.oracle_stages[0].house_sha256 != task.header.house.sha256:
         message = "does not match houses/stage_1.json.gz"
-        raise field_error(header_path, "house.sha256", task.header.house.sha256, message)
-    expected = checksums_of(task)
-    for name in sorted(expected.keys() | task.header.checksums.keys()):
-        if expected.get(name) != task.header.checksums.get(name):
-            found = task.header.checksums.get(name)
-            raise field_error(header_path, f"checksums.{name}", found, "does not match the file's contents")
+        error = field_error(header_path, "house.sha256", task.header.house.sha256, message)
+        yield Inconsistency("checksum", 0, error)
+    expected_sums = checksums_of(task)
+    for name in sorted(expected_sums.keys() | task.header.checksums.keys()):
+        found_sum = task.header.checksums.get(name)
+        if expected_sums.get(name) != found_sum:
+            error = field_error(header_path, f"checksums.{name}", found_sum, "does not match the file's contents")
+            yield Inconsistency("checksum", 0, error)
 
 
 def load_tasks(directory: Path | str, limit: int | None = None) -> Iterator[Task]:

@@ -58,12 +58,22 @@ def parse_record(model: type[RecordT], data: bytes, path: Path) -> RecordT:
     Raises:
         TaskError: The first thing wrong, with file, field and value.
     """
+    record, errors = record_errors(model, data, path)
+    if record is None:
+        raise errors[0]
+    return record
+
+
+def record_errors(model: type[RecordT], data: bytes, path: Path) -> tuple[RecordT | None, list[TaskError]]:
+    """Reads a record from JSON; where that fails, all that is wrong with it, each with file, field and value."""
     try:
-        return model.model_validate_json(data)
+        return model.model_validate_json(data), []
     except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        place = ".".join(str(part) for part in first["loc"]) or "(whole file)"
-        raise field_error(path, place, first.get("input"), first["msg"]) from None
+        found = error.errors(include_url=False, include_context=False)
+    places = [".".join(str(part) for part in one["loc"]) or "(whole file)" for one in found]
+    return None, [
+        field_error(path, place, one.get("input"), one["msg"]) for place, one in zip(places, found, strict=True)
+    ]
 
 
 def field_error(path: Path, place: str, value: Any, message: str) -> TaskError:  # noqa: ANN401

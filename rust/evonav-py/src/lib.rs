@@ -5,6 +5,7 @@ mod camera;
 mod error;
 mod evolution;
 mod house;
+mod inspect;
 mod memory;
 mod objects;
 mod sensors;
@@ -17,6 +18,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     error::register(module)?;
     house::register(module)?;
+    inspect::register(module)?;
     sensors::register(module)?;
     memory::register(module)?;
     camera::register(module)?;

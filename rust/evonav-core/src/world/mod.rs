@@ -2,6 +2,7 @@
 
 pub mod collision;
 pub mod footprint;
+pub mod inspect;
 pub mod mesh;
 pub mod navigation;
 mod openings;

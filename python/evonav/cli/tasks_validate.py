@@ -1,0 +1,93 @@
+"""`evonav tasks validate`."""
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evonav.cli.options import AnyAsset, Limit, Workers, count_of
+
+if TYPE_CHECKING:
+    from evonav.generation.validation import FolderReport
+
+NUM_EXAMPLES = 3
+"""Of each kind of problem, in the table."""
+
+
+def validate(
+    folder: Annotated[Path, typer.Argument(help="Folder of tasks, one folder each.")],
+    limit: Limit = None,
+    workers: Workers = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="File for all problems, JSON.")] = None,
+    allow_unknown_assets: AnyAsset = False,
+) -> None:
+    """Checks tasks: files, records, physics, reference views, ways, and that nothing of the oracle is public."""
+    from rich import progress as bars
+    from rich.console import Console
+
+    from evonav.generation.validation import validate_folder
+
+    columns = (bars.TextColumn("tasks"), bars.BarColumn(), bars.MofNCompleteColumn(), bars.TimeRemainingColumn())
+    with bars.Progress(*columns, console=Console(stderr=True)) as bar:
+        tasks = bar.add_task("tasks")
+        report = validate_folder(
+            folder,
+            limit=limit,
+            num_workers=count_of(workers),
+            allow_unknown_assets=allow_unknown_assets,
+            on_progress=lambda done, total: bar.update(tasks, completed=done, total=total),
+        )
+    if json_file is not None:
+        write_json(report, json_file)
+    print_report(report)
+    if report.problems:
+        raise typer.Exit(1)
+
+
+def print_report(report: "FolderReport") -> None:
+    """A table of problems by kind, and what source houses have of themselves."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from evonav.generation.validation import KINDS
+
+    console = Console()
+    num_stages = sum(one.num_stages for one in report.reports)
+    if report.problems:
+        table = Table(title="Problems")
+        for heading in ("kind", "problems", "tasks", "which"):
+            table.add_column(heading, justify="right" if heading in ("problems", "tasks") else "left")
+        for kind, num in Counter(problem.kind for problem in report.problems).most_common():
+            found = [problem for problem in report.problems if problem.kind == kind]
+            examples = [f"{one.task_id} {one.stage or ''}: {one.detail[:200]}" for one in found[:NUM_EXAMPLES]]
+            which = "\n".join([KINDS[kind], *examples])
+            table.add_row(kind, str(num), str(len({problem.task_id for problem in found})), which)
+        console.print(table, markup=False)
+    if report.own:
+        counts = ", ".join(f"{num} {kind}" for kind, num in report.own.most_common())
+        console.print(f"as in the source houses, and no problem: {counts}", markup=False)
+    num_valid = len(report.reports) - report.num_invalid
+    console.print(f"{num_valid} of {len(report.reports)} tasks valid, {num_stages} stages")
+
+
+def write_json(report: "FolderReport", path: Path) -> None:
+    """All problems, and what source houses have of themselves.
+
+    Raises:
+        TaskError: It cannot be written.
+    """
+    import json
+
+    from evonav.errors import TaskError
+
+    document = {
+        "num_tasks": len(report.reports),
+        "num_invalid": report.num_invalid,
+        "problems": [problem.model_dump() for problem in report.problems],
+        "own": dict(sorted(report.own.items())),
+    }
+    try:
+        path.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise TaskError(f"{path}: cannot be written: {error.strerror or error}") from error

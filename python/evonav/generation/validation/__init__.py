@@ -1,0 +1,16 @@
+"""Whether tasks are what they claim to be: files, records, physics, views and ways, all found anew."""
+
+from evonav.generation.validation.folder import FolderReport, validate_folder
+from evonav.generation.validation.problems import KINDS, Problem, ProblemKind, Report
+from evonav.generation.validation.task import validate_files, validate_task
+
+__all__ = [
+    "KINDS",
+    "FolderReport",
+    "Problem",
+    "ProblemKind",
+    "Report",
+    "validate_files",
+    "validate_folder",
+    "validate_task",
+]

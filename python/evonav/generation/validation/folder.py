@@ -1,0 +1,109 @@
+"""A folder of tasks, by any number of workers."""
+
+import json
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+from evonav.errors import TaskError
+from evonav.generation.validation.problems import Problem, Report
+from evonav.generation.validation.task import validate_files
+from evonav.parallel import Answer, Job, open_pool
+from evonav.tasks.dataset import DATASET_NAME, check_dataset, read_dataset
+
+WORK = "evonav.generation.validation.folder:make_worker"
+TASK_TIMEOUT_S = 300.0
+
+
+@dataclass(frozen=True, slots=True)
+class FolderReport:
+    """All about a folder."""
+
+    reports: tuple[Report, ...]
+    """In order of task id."""
+    problems: tuple[Problem, ...]
+    """Of all tasks, and of `dataset.json`."""
+
+    @property
+    def own(self) -> Counter[str]:
+        """What source houses have of themselves, by kind."""
+        total: Counter[str] = Counter()
+        for report in self.reports:
+            total.update(report.own)
+        return total
+
+    @property
+    def num_invalid(self) -> int:
+        """Tasks with a problem."""
+        return len({problem.task_id for problem in self.problems if problem.task_id})
+
+
+def validate_folder(
+    folder: Path | str,
+    *,
+    limit: int | None = None,
+    num_workers: int = 0,
+    allow_unknown_assets: bool = False,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+) -> FolderReport:
+    """Checks tasks, and `dataset.json` where there is one.
+
+    Args:
+        folder: Holds one folder a task.
+        limit: Only the first tasks by id.
+        num_workers: Processes; 0: this one.
+        allow_unknown_assets: Also where `dataset.json` does not say so.
+        on_progress: Called with tasks done and all tasks, when it begins and after every task.
+
+    Raises:
+        TaskError: There is no task in the folder.
+        EngineError: Workers cannot be had.
+    """
+    folder = Path(folder).resolve()
+    roots = sorted(path.parent for path in folder.glob("*/task.json"))
+    problems: list[Problem] = []
+    if (folder / DATASET_NAME).exists():
+        try:
+            record = read_dataset(folder)
+            allow_unknown_assets |= record.allow_unknown_assets
+            problems += [_dataset_problem(task_id, detail) for task_id, detail in check_dataset(record, folder)]
+        except TaskError as error:
+            problems.append(_dataset_problem("", str(error)))
+    if not roots:
+        raise TaskError(f"{folder}: holds no task (expected */task.json)")
+    roots = roots[:limit]
+    on_progress(0, len(roots))
+    reports: dict[int, Report] = {}
+    settings = json.dumps({"allow_unknown_assets": allow_unknown_assets})
+    jobs = (Job(index, str(root)) for index, root in enumerate(roots))
+    with open_pool(WORK, settings, num_workers=num_workers, timeout_s=TASK_TIMEOUT_S) as pool:
+        num_open = 0
+        while len(reports) < len(roots):
+            for job in islice(jobs, pool.capacity - num_open):
+                pool.submit(job)
+                num_open += 1
+            answer = pool.next_answer()
+            num_open -= 1
+            reports[answer.key] = _report_of(answer, roots[answer.key].name)
+            on_progress(len(reports), len(roots))
+    ordered = tuple(reports[index] for index in sorted(reports))
+    return FolderReport(ordered, (*problems, *(problem for report in ordered for problem in report.problems)))
+
+
+def make_worker(settings: str) -> Callable[[str], str]:
+    """The function from a task's folder to its `Report`, as `evonav.parallel` calls it."""
+    allow = bool(json.loads(settings)["allow_unknown_assets"])
+    return lambda root: validate_files(root, allow_unknown_assets=allow).model_dump_json()
+
+
+def _report_of(answer: Answer, task_id: str) -> Report:
+    if answer.failure is None:
+        return Report.model_validate_json(answer.text)
+    problem = Problem(task_id=task_id, stage=0, kind="crash", detail=f"{answer.failure}: {answer.detail}")
+    return Report(task_id=task_id, num_stages=0, problems=(problem,), own={})
+
+
+def _dataset_problem(task_id: str, detail: str) -> Problem:
+    return Problem(task_id=task_id, stage=0, kind="dataset", detail=detail)

@@ -1,0 +1,33 @@
+//! Physics of a changed house.
+
+use evonav_core::{
+    assets::{Catalogue, UnknownAssets},
+    world::inspect::{Tolerances, inspect_houses},
+};
+use pyo3::prelude::*;
+
+use crate::{error, house::House};
+
+/// Units and errors: `_core.pyi` and `evonav_core::world::inspect`.
+#[pyfunction]
+#[pyo3(signature = (source, stage, *, touch_m, rest_m, allow_unknown_assets))]
+fn inspect_house(
+    py: Python<'_>,
+    source: &House,
+    stage: &House,
+    touch_m: f64,
+    rest_m: f64,
+    allow_unknown_assets: bool,
+) -> PyResult<String> {
+    let unknown =
+        if allow_unknown_assets { UnknownAssets::CategoryDefault } else { UnknownAssets::Error };
+    let (catalogue, tolerances) = (Catalogue::bundled(), Tolerances { touch_m, rest_m });
+    let found =
+        py.detach(|| inspect_houses(&source.inner, &stage.inner, catalogue, unknown, tolerances));
+    Ok(serde_json::json!(found.map_err(error::to_py)?).to_string())
+}
+
+/// Adds the function to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(inspect_house, module)?)
+}
