@@ -28,6 +28,7 @@ from evonav.tasks.dataset import (
     HouseRejection,
     SourceFile,
     TaskEntry,
+    read_dataset,
     write_dataset,
 )
 
@@ -122,12 +123,11 @@ def generate_dataset(
     out = out.resolve()  # workers of a cluster have other working directories
     with writing(out), Journal(out, run) as journal:
         again = [i for i, done in journal.outcomes.items() if not _is_kept(done, out, retry_failed)]
-        if again:
-            (out / DATASET_NAME).unlink(missing_ok=True)
-            journal.drop(again)
+        journal.drop(again)
         state = _Run(journal, texts, limit, on_progress)
         state.tell()
-        if not (out / DATASET_NAME).exists():
+        if not _is_done(out, journal):
+            (out / DATASET_NAME).unlink(missing_ok=True)
             shutil.rmtree(out / PARTIAL_NAME, ignore_errors=True)
             with open_pool(
                 WORK,
@@ -172,7 +172,8 @@ class _Run:
         Raises:
             StoreError: A task or the journal cannot be written.
         """
-        left = ((index, house) for index, house in enumerate(self._texts) if index not in self._journal.outcomes)
+        done = self._journal.outcomes
+        left = ((index, house) for index, house in enumerate(self._texts) if index not in done)
         is_more = True
         while is_more or self._names:
             while is_more and len(self._names) < pool.capacity and self._is_wanted():
@@ -237,6 +238,16 @@ class _Run:
 def in_order(journal: Journal) -> list[Outcome]:
     """Outcomes in the order of the houses."""
     return [journal.outcomes[index] for index in sorted(journal.outcomes)]
+
+
+def _is_done(out: Path, journal: Journal) -> bool:
+    """Whether `dataset.json` tells of all that the journal does: it is written last."""
+    try:
+        record = read_dataset(out)
+    except TaskError:
+        return False
+    tasks = {outcome.task_id for outcome in journal.outcomes.values() if outcome.task_id is not None}
+    return record.num_houses == len(journal.outcomes) and {entry.task_id for entry in record.tasks} == tasks
 
 
 def _is_kept(outcome: Outcome, out: Path, retry_failed: bool) -> bool:

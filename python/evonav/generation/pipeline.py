@@ -67,11 +67,11 @@ def generate_task(
         InvalidArgumentError: A parameter is outside its domain.
     """
     config = GenerationParameters() if config is None else config
-    source = house_source(house)
+    house_sha256 = sha256_of(house.to_json().encode())
     text, houses, images = _core.generate_task(
         house,
         seed=seed,
-        label=source.sha256,
+        label=house_sha256,
         parameters_json=config.model_dump_json(),
         allow_unknown_assets=allow_unknown_assets,
     )
@@ -79,6 +79,7 @@ def generate_task(
     if "rejected" in made:
         rejected = made["rejected"]
         raise TaskRejectedError(house.name, rejected["reason"], rejected["stage"], rejected["detail"])
+    source = house_source(house, house_sha256)
     stages = made["task"]["stages"]
     oracle = tuple(_oracle_stage(k, stage, houses[k - 1]) for k, stage in enumerate(stages, start=1))
     header = TaskHeader(
@@ -161,15 +162,15 @@ def generate_tasks(
             yield task
 
 
-def house_source(house: House) -> HouseSource:
-    """What a header says of a house."""
+def house_source(house: House, sha256: str) -> HouseSource:
+    """What a header says of a house, whose JSON has this checksum."""
     name = short_name(house.name)
     place = re.search(r":([1-9]\d*)(?:\[(\d+)\])?$", name)
     index = None if place is None else int(place[2]) if place[2] else int(place[1]) - 1
     return HouseSource(
         name=name,
         index=index,
-        sha256=sha256_of(house.to_json().encode()),
+        sha256=sha256,
         num_rooms=len(house.rooms),
         num_objects=len(house.objects),
     )

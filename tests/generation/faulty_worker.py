@@ -1,0 +1,32 @@
+"""A generation worker that fails on purpose: what it does at which house stands in `$EVONAV_TEST_FAULTS`."""
+
+import json
+import os
+import time
+from pathlib import Path
+
+from evonav.generation import worker
+
+
+def make_worker(settings):
+    """As `evonav.generation.worker.make_worker`."""
+    faults = json.loads(os.environ["EVONAV_TEST_FAULTS"])
+    work = worker.make_worker(settings)
+
+    def faulty(text):
+        index, _ = json.loads(text.partition("\n")[0])
+        fault = faults.get(str(index))
+        if fault == "die":
+            os._exit(7)
+        if fault is not None and fault.startswith("die once "):
+            flag = Path(fault.removeprefix("die once "))
+            if not flag.exists():
+                flag.touch()
+                os._exit(7)
+        if fault == "hang":
+            time.sleep(600.0)
+        if fault == "raise":
+            raise RuntimeError("a defect")
+        return work(text)
+
+    return faulty
