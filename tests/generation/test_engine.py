@@ -350,19 +350,21 @@ def test_killed_a_dozen_times_it_ends_as_if_it_was_not(many_houses, many_clean, 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc to find the workers")
 def test_workers_killed_a_dozen_times_cost_nothing(many_houses, many_clean, tmp_path):
-    draws, out, num_kills = random.Random(1), tmp_path / "out", 0
-    process = subprocess.Popen(command(many_houses, out, "--workers", 3), stdout=subprocess.PIPE, text=True)
-    while num_kills < 12 and process.poll() is None:
-        wait_for_lines(process, out, num_lines(out) + 1)
-        workers = children_of(process.pid)
-        if workers:
-            os.kill(draws.choice(workers), signal.SIGKILL)
-            num_kills += 1
-    stdout, _ = process.communicate()
-    assert num_kills >= 10
-    assert process.returncode == 0
-    assert "50 tasks" in stdout
-    assert_same(out, many_clean)
+    draws, num_kills = random.Random(1), 0
+    for attempt in range(4):
+        out = tmp_path / str(attempt)
+        process = subprocess.Popen(command(many_houses, out, "--workers", 3), stdout=subprocess.DEVNULL)
+        while process.poll() is None:
+            wait_for_lines(process, out, num_lines(out) + 1)
+            workers = children_of(process.pid)
+            if workers and num_kills < 12:
+                os.kill(draws.choice(workers), signal.SIGKILL)
+                num_kills += 1
+        assert process.returncode == 0
+        assert_same(out, many_clean)
+        if num_kills == 12:
+            return
+    pytest.fail(f"only {num_kills} workers were found to be killed")
 
 
 @pytest.mark.parametrize("signal_", [signal.SIGINT, signal.SIGTERM])
