@@ -50,6 +50,30 @@ fn first_draws_of_named_streams_are_even_over_tasks_and_stages() {
     assert!(chi_square(&counts.concat(), &expected) < 20.5, "{counts:?}"); // p = 0.001, 5 d.o.f.
 }
 
+/// Stages and triggers of 40,000 houses, from streams as the generator names them.
+#[test]
+fn evolutions_a_task_are_as_likely_as_stated() {
+    let parameters = Parameters::default();
+    let mut by_evolutions = [0; 5];
+    let mut by_pairs = [0; 4];
+    for house in 0..NUM_DRAWS {
+        let label = format!("{:064x}", (house as u128).wrapping_mul(0x9e37_79b9_7f4a_7c15_f39c));
+        let first = |stage: usize, what: &str| {
+            Stream::new((house % 5) as u64, &[&label, &format!("stage {stage}"), what])
+        };
+        let num_stages = parameters.num_stages[first(0, "num_stages").below(3)];
+        let is_triggered: Vec<bool> = (2..=num_stages)
+            .map(|k| first(k, "trigger").uniform() < parameters.evolve_probability)
+            .collect();
+        by_evolutions[is_triggered.iter().filter(|&&is| is).count()] += 1;
+        by_pairs[2 * usize::from(is_triggered[0]) + usize::from(is_triggered[1])] += 1;
+    }
+    // p = 0.001 with 4 and 3 degrees of freedom.
+    let shares = [7.0 / 48.0, 18.0 / 48.0, 16.0 / 48.0, 6.0 / 48.0, 1.0 / 48.0];
+    assert!(chi_square(&by_evolutions, &shares) < 18.5, "{by_evolutions:?}");
+    assert!(chi_square(&by_pairs, &[0.25; 4]) < 16.3, "{by_pairs:?}");
+}
+
 /// A house with one room of each kind: the weights by hand, and the draws by chi-square.
 #[test]
 fn rooms_are_drawn_by_assets_visits_transition_and_recent_change() {
