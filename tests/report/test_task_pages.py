@@ -1,5 +1,6 @@
 """Pictures of tasks, from a generated task with a change before each stage."""
 
+import dataclasses
 import json
 import re
 from html.parser import HTMLParser
@@ -12,10 +13,13 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.generation import GenerationParameters, generate_task
 from evonav.house import House, bundled_houses
+from evonav.report.plan import item_labels, label_point
+from evonav.report.svg import cm
 from evonav.report.task_pages import stage_svg, write_task_page
-from evonav.report.task_plans import TaskDrawing, task_drawing
+from evonav.report.task_plans import TaskDrawing, change_frame, task_drawing
 from evonav.report.task_words import changed_words, move_rows
 from evonav.tasks import Task, write_task
+from evonav.tasks.oracle import StateChange
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -51,17 +55,64 @@ def test_before_and_after_stress_what_the_oracle_says_moved(task: Task, drawing:
     moved = {change.id for change in task.oracle(stage).evolution.changes}
     root = ElementTree.fromstring(stage_svg(drawing, stage))
     panels = root.findall(f"{SVG}svg")
-    assert len(panels) == 2
+    assert len(panels) == 3
     for panel in panels:
         assert sum(len(with_class(group, "item")) for group in with_class(panel, "moved")) == len(moved)
         assert len(with_class(panel, "tint")) == 1
-    before, after = panels
+    before, after, whole = panels
     assert with_class(before, "arrow") == with_class(before, "star") == []
     assert sum(len(with_class(group, "item")) for group in with_class(after, "ghost")) == len(moved)
-    assert len(with_class(after, "trajectory")) == len(with_class(after, "cone")) == 1
+    assert (
+        len(with_class(whole, "trajectory")) == len(with_class(whole, "cone")) == len(with_class(whole, "between")) == 1
+    )
+    assert with_class(whole, "ghost") == []
     assert [star for star in with_class(after, "star") if "old" not in star.get("class", "")] != []
     # A stage whose house did not change is one plan.
     assert len(ElementTree.fromstring(stage_svg(drawing, 1)).findall(f"{SVG}svg")) == 1
+
+
+def test_the_close_up_holds_the_room_that_changed_and_all_that_moved(task: Task, drawing: TaskDrawing) -> None:
+    stage = evolved_stage(task)
+    frame = change_frame(drawing, stage)
+    evolution = task.oracle(stage).evolution
+    room = next(room for room in drawing.maps[stage].rooms if room.room_id == evolution.room_id)
+    places = [(p[0], p[2]) for change in evolution.changes for p in (change.from_position_m, change.to_position_m)]
+    for x, y in map(cm, (*room.polygon_m, *places)):
+        assert frame.left <= x <= frame.left + frame.width
+        assert frame.top <= y <= frame.top + frame.height
+    assert frame.width * frame.height < drawing.frame.width * drawing.frame.height
+
+
+def test_no_two_names_of_furniture_overlap(drawing: TaskDrawing) -> None:
+    stage_map = drawing.maps[1]
+    stacked = [
+        *stage_map.objects,
+        *(item.model_copy(update={"object_id": f"{item.object_id}'"}) for item in stage_map.objects),
+    ]
+    once, twice = (item_labels(items, drawing.frame).count("<text") for items in (stage_map.objects, stacked))
+    assert 0 < once == twice
+
+
+def test_a_room_is_named_where_no_furniture_stands() -> None:
+    square = [(0.0, 0.0), (0.0, 4.0), (4.0, 4.0), (4.0, 0.0)]
+    x, z = label_point(square, taken_m=[(0.0, 0.0, 4.0, 2.9)], size_m=(1.5, 0.3))
+    assert 0.7 < x < 3.3
+    assert z - 0.15 + 0.1 > 2.9
+    assert label_point(square) == pytest.approx((2.0, 2.0), abs=0.2)
+
+
+def test_an_opened_door_is_marked(task: Task) -> None:
+    stage = evolved_stage(task)
+    first = task.oracle(stage)
+    house = House(task.house_json(stage), name="h")
+    state = StateChange(id=house.doors[0].id, category="Doorway", field="openness", before=0.0, after=1.0, cause="X")
+    evolution = first.evolution.model_copy(update={"states": (state,)})
+    oracle = list(task.oracle_stages)
+    oracle[stage - 1] = first.model_copy(update={"evolution": evolution})
+    drawing = task_drawing(dataclasses.replace(task, oracle_stages=tuple(oracle)))
+    root = ElementTree.fromstring(stage_svg(drawing, stage))
+    assert [len(list(group)) for group in with_class(root, "opened-doors")] == [1, 1, 1]
+    assert "1 opened, closed or switched" in changed_words(drawing.maps[stage], evolution)
 
 
 def test_objects_stand_where_the_stage_house_has_them(task: Task, drawing: TaskDrawing) -> None:

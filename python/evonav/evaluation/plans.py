@@ -73,6 +73,14 @@ def true_footprints(house: House) -> tuple[ObjectFootprint, ...]:
     )
 
 
+def door_ends(house: House) -> dict[str, tuple[Point2, Point2]]:
+    """Both sides of every door, by its id."""
+    walls = {wall.id: wall for wall in house.walls}
+    doors = [door for door in house.doors if door.wall_ids[0] in walls]
+    ends = {door.id: _opening("door", door, walls[door.wall_ids[0]]) for door in doors}
+    return {name: (door.from_m, door.to_m) for name, door in ends.items()}
+
+
 def image_uri(image: NDArray[np.uint8], side_px: int) -> str:
     """An RGB image, made `side_px` high and wide, as a `data:` URI."""
     buffer = BytesIO()

@@ -44,6 +44,10 @@ ROOM_LETTERS = 3.0
 ITEM_LETTERS = 1.75
 
 
+Box = tuple[float, float, float, float]
+"""Smallest and largest coordinates: left, low, right, high."""
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """The part of the page that a map fills, in centimetres."""
@@ -119,28 +123,55 @@ def structure(stage_map: StageMap, frame: Frame) -> str:
     )
 
 
-def furniture(items: Iterable[ObjectFootprint], frame: Frame, css: str = "items") -> str:
-    """Footprints, lower ones first, each with its category as tooltip."""
+def furniture(items: Iterable[ObjectFootprint], frame: Frame, css: str = "items", *, has_parts: bool = True) -> str:
+    """Footprints, lower ones first, each with its category as tooltip; `has_parts` draws what is large in detail."""
     ordered = sorted(items, key=lambda item: (item.centre_m[1] + item.size_m[1] / 2, item.object_id))
-    return f'<g class="{css}" stroke-width="{max(1.0, 0.2 * frame.unit):.1f}">{join(map(_footprint, ordered))}</g>'
+    drawn = join(_footprint(item, has_parts=has_parts) for item in ordered)
+    return f'<g class="{css}" stroke-width="{max(1.0, 0.2 * frame.unit):.1f}">{drawn}</g>'
 
 
 def labels(stage_map: StageMap, frame: Frame) -> str:
-    """Names of rooms."""
+    """Names of rooms, where there is least furniture."""
     u = frame.unit
-    rooms = join(_room_label(room, u) for room in stage_map.rooms)
+    taken = [_box(item) for item in stage_map.objects if item.category not in FLAT_CATEGORIES]
+    rooms = join(_room_label(room, u, taken) for room in stage_map.rooms)
     return f'<g class="rooms" font-size="{ROOM_LETTERS * u:.0f}" stroke-width="{0.9 * u:.1f}">{rooms}</g>'
 
 
-def item_labels(items: Iterable[ObjectFootprint], frame: Frame) -> str:
-    """Names of the furniture large enough to hold them."""
-    size = ITEM_LETTERS * frame.unit
-    named = join(_item_label(item, size) for item in items)
-    return f'<g class="names" font-size="{size:.0f}">{named}</g>'
+def item_labels(
+    items: Iterable[ObjectFootprint], frame: Frame, min_m2: float = LABEL_MIN_M2, letters: float = ITEM_LETTERS
+) -> str:
+    """Names of the furniture large enough to hold them, none over another.
+
+    Args:
+        items: Furniture.
+        frame: Of the picture.
+        min_m2: Footprint from which furniture is named.
+        letters: Their height, in units of the frame.
+    """
+    size = letters * frame.unit
+    placed: list[Box] = []
+    named = []
+    for item in sorted(items, key=lambda item: (-item.size_m[0] * item.size_m[2], item.object_id)):
+        if item.size_m[0] * item.size_m[2] < min_m2 or item.category in FLAT_CATEGORIES:
+            continue
+        if (label := _item_label(item, size)) is not None and not any(_meet(label[0], other) for other in placed):
+            placed.append(label[0])
+            named.append(label[1])
+    return f'<g class="names" font-size="{size:.0f}">{join(named)}</g>'
 
 
-def label_point(polygon_m: Sequence[Point], num: int = 24) -> Point:
-    """The point inside a polygon that is farthest from its edges, to about a `num`-th of its size."""
+def label_point(
+    polygon_m: Sequence[Point], num: int = 24, *, taken_m: Sequence[Box] = (), size_m: Point = (0.0, 0.0)
+) -> Point:
+    """Where in a polygon a label stands best: over little, and far from the edges; to about a `num`-th of its size.
+
+    Args:
+        polygon_m: The room.
+        num: Places tried, along each axis.
+        taken_m: Boxes that it should not cover.
+        size_m: Width and height of the label.
+    """
     corners = np.asarray(polygon_m, dtype=np.float64)
     low, high = corners.min(axis=0), corners.max(axis=0)
     steps = (np.arange(num) + 0.5) / num
@@ -156,18 +187,26 @@ def label_point(polygon_m: Sequence[Point], num: int = 24) -> Point:
     at_x = a[:, 0] + (points[:, None, 1] - a[:, 1]) / slope * edge[:, 0]
     inside = (crosses & (points[:, None, 0] < at_x)).sum(axis=1) % 2 == 1
     # Among points that are about as good, the one nearest to the middle of the room looks right.
-    middle_m = np.linalg.norm(points - corners.mean(axis=0), axis=1)
-    best = int(np.argmax(np.where(inside, gap_m - 0.15 * middle_m, -np.inf)))
+    score = gap_m - 0.15 * np.linalg.norm(points - corners.mean(axis=0), axis=1)
+    if taken_m and size_m[0] > 0.0:
+        half = np.asarray(size_m) / 2
+        boxes = np.asarray(taken_m)
+        over = np.minimum(points[:, None] + half, boxes[:, 2:]) - np.maximum(points[:, None] - half, boxes[:, :2])
+        covered = (np.clip(over, 0.0, None).prod(axis=2)).sum(axis=1) / (size_m[0] * size_m[1])
+        # A label that reaches over an edge is as bad as one over furniture.
+        reach = np.clip(half[1] - gap_m, 0.0, None) / half[1] + np.clip(half[0] - gap_m, 0.0, None) / half[0]
+        score = 0.3 * score - 2.0 * covered - 0.5 * reach
+    best = int(np.argmax(np.where(inside, score, -np.inf)))
     return (float(points[best, 0]), float(points[best, 1]))
 
 
-def _footprint(item: ObjectFootprint) -> str:
+def _footprint(item: ObjectFootprint, *, has_parts: bool) -> str:
     css = "item flat" if item.category in FLAT_CATEGORIES else "item"
     if max(item.size_m[0], item.size_m[2]) < SMALL_M:
         css = "item small"
     hint = title(noun_of(item.category))
     if item.outlines_m:
-        return _shape(item, css, hint)
+        return _shape(item, css, hint, has_parts=has_parts)
     if item.category in ROUND_CATEGORIES:
         x, y = cm((item.centre_m[0], item.centre_m[2]))
         rx, ry = round(50 * item.size_m[0]), round(50 * item.size_m[2])
@@ -175,36 +214,65 @@ def _footprint(item: ObjectFootprint) -> str:
     return f'<path class="{css}" d="{outline(item.polygon_m)}">{hint}</path>'
 
 
-def _shape(item: ObjectFootprint, css: str, hint: str) -> str:
+def _shape(item: ObjectFootprint, css: str, hint: str, *, has_parts: bool) -> str:
     """All parts as one outline, and in what is large the parts themselves, higher ones over lower ones."""
     parts = [outline(part) for part in item.outlines_m]
     # The fill hides the inner half of every stroke (`paint-order`): what is left is the outline of the union.
     union = f'<path class="{css}" d="{join(parts)}">{hint}</path>'
-    if css != "item" or len(parts) == 1:
+    if css != "item" or len(parts) == 1 or not has_parts:
         return union
     return union + join(f'<path class="part" d="{part}"/>' for part in dict.fromkeys(parts))
 
 
-def _room_label(room: RoomFootprint, unit: float) -> str:
+def _room_label(room: RoomFootprint, unit: float, taken_m: Sequence[Box]) -> str:
     if len(room.polygon_m) < 3:
         return ""
-    x, y = cm(label_point(room.polygon_m))
     name = noun_of(room.room_type)
-    return f'<text x="{x}" y="{y + 0.9 * unit:.0f}">{escape(name)}</text>'
+    low, high = np.min(room.polygon_m, axis=0), np.max(room.polygon_m, axis=0)
+    # A name that is wider than its room is written smaller.
+    full_cm = ROOM_LETTERS * unit
+    font_cm = full_cm * max(0.55, min(1.0, 100 * float(high[0] - low[0]) / (0.62 * full_cm * len(name))))
+    size_m = (0.006 * font_cm * len(name), 0.01 * font_cm)
+    near = [box for box in taken_m if _meet(box, (low[0], low[1], high[0], high[1]))]
+    x, y = cm(label_point(room.polygon_m, taken_m=near, size_m=size_m))
+    size = "" if font_cm == full_cm else f' font-size="{font_cm:.0f}"'
+    return f'<text{size} x="{x}" y="{y + 0.3 * font_cm:.0f}">{escape(name)}</text>'
 
 
-def _item_label(item: ObjectFootprint, font_cm: float) -> str:
-    if item.size_m[0] * item.size_m[2] < LABEL_MIN_M2 or item.category in FLAT_CATEGORIES:
-        return ""
+def _item_label(item: ObjectFootprint, font_cm: float) -> tuple[Box, str] | None:
+    """Box and text of a label that fits into the largest part of an object."""
+    x0, z0, x1, z1 = max((_box_of(part) for part in item.outlines_m), key=_area_m2, default=_box(item))
     name = noun_of(item.category)
-    x, y = cm((item.centre_m[0], item.centre_m[2]))
+    x, y = cm(((x0 + x1) / 2, (z0 + z1) / 2))
     need_cm = 0.56 * font_cm * len(name)
-    width_cm, depth_cm = 100 * item.size_m[0], 100 * item.size_m[2]
+    width_cm, depth_cm = 100 * (x1 - x0), 100 * (z1 - z0)
     if need_cm <= width_cm and 1.1 * font_cm <= depth_cm:
-        return f'<text x="{x}" y="{y + 0.35 * font_cm:.0f}">{escape(name)}</text>'
+        box = (x - need_cm / 2, y - font_cm / 2, x + need_cm / 2, y + font_cm / 2)
+        return box, f'<text x="{x}" y="{y + 0.35 * font_cm:.0f}">{escape(name)}</text>'
     if need_cm <= depth_cm and 1.1 * font_cm <= width_cm:
-        return f'<text transform="translate({x + 0.35 * font_cm:.0f} {y})rotate(-90)">{escape(name)}</text>'
-    return ""
+        box = (x - font_cm / 2, y - need_cm / 2, x + font_cm / 2, y + need_cm / 2)
+        turned = f"translate({x + 0.35 * font_cm:.0f} {y})rotate(-90)"
+        return box, f'<text transform="{turned}">{escape(name)}</text>'
+    return None
+
+
+def _box(item: ObjectFootprint) -> Box:
+    """Around an object, metres."""
+    (x, _, z), (width_m, _, depth_m) = item.centre_m, item.size_m
+    return (x - width_m / 2, z - depth_m / 2, x + width_m / 2, z + depth_m / 2)
+
+
+def _box_of(outline_m: Sequence[Point]) -> Box:
+    xs, zs = [x for x, _ in outline_m], [z for _, z in outline_m]
+    return (min(xs), min(zs), max(xs), max(zs))
+
+
+def _area_m2(box: Box) -> float:
+    return (box[2] - box[0]) * (box[3] - box[1])
+
+
+def _meet(a: Box, b: Box) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
 def outline(polygon_m: Sequence[Point]) -> str:

@@ -14,6 +14,7 @@ def _items(css: str) -> str:
 
 _ENTRIES = (
     ("room that changed", f'<rect class="tint" {_RECT}/>', 24),
+    ("transition room", f'<rect class="between" {_RECT}/>', 24),
     ("moved, or about to", _items("moved"), 24),
     (
         "from where to where",

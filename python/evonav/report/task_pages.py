@@ -9,14 +9,25 @@ from markupsafe import Markup
 from evonav.errors import StoreError
 from evonav.report.html import page_environment, text_of
 from evonav.report.maps import file_css, map_css
-from evonav.report.svg import escape, slug
+from evonav.report.plan import Frame
+from evonav.report.svg import escape, join, slug
 from evonav.report.task_legend import task_legend
-from evonav.report.task_plans import TaskDrawing, after_svg, before_svg, definitions, task_drawing, thumbnail_svg
+from evonav.report.task_plans import (
+    TaskDrawing,
+    after_svg,
+    before_svg,
+    change_frame,
+    course_svg,
+    definitions,
+    task_drawing,
+    thumbnail_svg,
+)
 from evonav.report.task_words import changed_words, move_rows, stage_facts
 from evonav.tasks import Task
 
 INDEX_NAME = "index.html"
-PLAN_WIDTH_PX = 900
+PLAN_HEIGHT_PX = 700
+CAPTION_PX = 40
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +37,8 @@ class StageView:
     number: int
     has_changed: bool
     changed: str
-    plans: list[tuple[str, Markup]]
+    plans: list[tuple[str, str, Markup]]
+    """Caption, view box and content."""
     image: str
     instructions: list[tuple[str, str]]
     facts: list[tuple[str, str]]
@@ -115,22 +127,23 @@ def write_gallery(
 
 
 def stage_svg(drawing: TaskDrawing, stage: int) -> str:
-    """A stage as an SVG document."""
-    frame = drawing.frame
-    height_px = round(PLAN_WIDTH_PX * frame.height / frame.width)
-    plans = _plans(drawing, stage)
-    panels = "".join(
-        f'<svg x="{i * PLAN_WIDTH_PX}" width="{PLAN_WIDTH_PX}" height="{height_px}" '
-        f'viewBox="{frame.view_box}">{svg}</svg>'
-        for i, (_, svg) in enumerate(plans)
-    )
-    width_px = PLAN_WIDTH_PX * len(plans)
+    """A stage as an SVG document: its plans side by side."""
+    panels, left_px = [], 0
+    for words, frame, content in _plans(drawing, stage):
+        width_px = round(PLAN_HEIGHT_PX * min(1.6, frame.width / frame.height))
+        panels.append(
+            f'<text class="stage" x="{left_px + 12}" y="28">{escape(words)}</text>'
+            f'<svg x="{left_px}" y="{CAPTION_PX}" width="{width_px}" height="{PLAN_HEIGHT_PX}" '
+            f'viewBox="{frame.view_box}">{content}</svg>'
+        )
+        left_px += width_px
+    height_px = CAPTION_PX + PLAN_HEIGHT_PX
     changed = changed_words(drawing.maps[stage], drawing.task.oracle(stage).evolution)
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="0 0 {width_px} {height_px}" width="{width_px}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="0 0 {left_px} {height_px}" width="{left_px}" '
         f'height="{height_px}" role="img"><title>{escape(drawing.task.task_id)}, stage {stage}</title>'
         f"<desc>{escape(changed)}</desc><style>{file_css()}</style><defs>{definitions(drawing)}</defs>"
-        f'<rect class="page" width="100%" height="100%"/>{panels}</svg>\n'
+        f'<rect class="page" width="100%" height="100%"/>{join(panels)}</svg>\n'
     )
 
 
@@ -158,7 +171,7 @@ def _stage_view(drawing: TaskDrawing, stage: int) -> StageView:
         number=stage,
         has_changed=len(plans) > 1,
         changed=changed_words(stage_map, oracle.evolution),
-        plans=[(words, Markup(svg)) for words, svg in plans],  # noqa: S704 - our own SVG
+        plans=[(words, frame.view_box, Markup(svg)) for words, frame, svg in plans],  # noqa: S704 - our own SVG
         image=stage_map.reference_image or "",
         instructions=[
             ("basic instruction", public.basic_instruction),
@@ -170,12 +183,15 @@ def _stage_view(drawing: TaskDrawing, stage: int) -> StageView:
     )
 
 
-def _plans(drawing: TaskDrawing, stage: int) -> list[tuple[str, str]]:
-    """Caption and content of each of a stage's plans: two if the house changed."""
+def _plans(drawing: TaskDrawing, stage: int) -> list[tuple[str, Frame, str]]:
+    """Caption, frame and content of each of a stage's plans: where it changed, before and after, and the whole."""
     evolution = drawing.task.oracle(stage).evolution
-    has_changed = any((evolution.changes, evolution.additions, evolution.removals, evolution.states))
-    before = [(f"before (stage {stage - 1})", before_svg(drawing, stage))] if has_changed and stage > 1 else []
-    return [*before, (f"after (stage {stage})" if before else "the house", after_svg(drawing, stage))]
+    plans = []
+    if stage > 1 and any((evolution.changes, evolution.additions, evolution.removals, evolution.states)):
+        frame = change_frame(drawing, stage)
+        plans.append((f"before (stage {stage - 1})", frame, before_svg(drawing, stage, frame)))
+        plans.append((f"after (stage {stage})", frame, after_svg(drawing, stage, frame)))
+    return [*plans, ("the house, and the reference course", drawing.frame, course_svg(drawing, stage))]
 
 
 def _card(drawing: TaskDrawing, href: str) -> Card:

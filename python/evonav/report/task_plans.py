@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from evonav.evaluation.plans import house_map, image_uri, target_record, transition_record, true_footprints
+from evonav.evaluation.plans import door_ends, house_map, image_uri, target_record, transition_record, true_footprints
 from evonav.evaluation.records import ObjectFootprint, RoomFootprint, StageMap
 from evonav.house import House
 from evonav.report.overlay import relocation_arrows, start_mark, target_mark
@@ -27,6 +27,9 @@ from evonav.tasks.language import noun_of
 from evonav.tasks.oracle import Evolution, OracleStage
 
 IMAGE_PX = 240
+CLOSE_LABEL_MIN_M2 = 0.06
+"""Footprint from which furniture is named in a close-up."""
+CLOSE_LETTERS = 2.3
 THUMBNAIL_MIN_M = 0.5
 """Edge from which furniture is drawn in a gallery."""
 VIEW_M = 1.1
@@ -46,6 +49,8 @@ class TaskDrawing:
     frame: Frame
     maps: Mapping[int, StageMap]
     """By stage."""
+    doors: Mapping[str, tuple[Point, Point]]
+    """Ends of doors on the floor plan, by id."""
     moving: frozenset[str]
     """Ids of what does not stand in the same place in all stages."""
 
@@ -63,7 +68,7 @@ def task_drawing(task: Task, prefix: str = "p") -> TaskDrawing:
         objects = true_footprints(house)
         maps[stage] = house_map(house, task_id=task.task_id, stage=stage, objects=objects, reference_image=image)
     moving = moving_ids(list(maps.values()))
-    return TaskDrawing(task, prefix, frame_of(maps.values()), maps, moving)
+    return TaskDrawing(task, prefix, frame_of(maps.values()), maps, door_ends(house), moving)
 
 
 def definitions(drawing: TaskDrawing) -> str:
@@ -74,36 +79,60 @@ def definitions(drawing: TaskDrawing) -> str:
         "floors": floors(first),
         "fixed": furniture(fixed, frame),
         "walls": structure(first, frame),
-        "rooms": labels(first, frame),
-        "names": item_labels(fixed, frame),
     }
     return join(f'<g class="map" id="{drawing.prefix}-{name}">{content}</g>' for name, content in shared.items())
 
 
-def before_svg(drawing: TaskDrawing, stage: int) -> str:
+def before_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
     """The house of the stage before, with what is about to move, go or open stressed: content of an `svg` element."""
-    oracle = drawing.task.oracle(stage)
-    leaving = {change.id for change in oracle.evolution.changes}
-    removed = {record.id for record in oracle.evolution.removals}
-    return _plan(drawing, stage - 1, oracle.evolution, {"moved": leaving - removed, "gone": removed}, ghosts="")
+    evolution = drawing.task.oracle(stage).evolution
+    removed = {record.id for record in evolution.removals}
+    leaving = {change.id for change in evolution.changes} - removed
+    return _plan(drawing, stage - 1, evolution, frame, {"moved": leaving, "gone": removed})
 
 
-def after_svg(drawing: TaskDrawing, stage: int) -> str:
-    """The house of a stage with what was changed, the reference course and the target: content of an `svg` element."""
-    oracle, frame = drawing.task.oracle(stage), drawing.frame
+def after_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
+    """The house of a stage with what was changed, and from where: content of an `svg` element."""
+    oracle, previous = drawing.task.oracle(stage), drawing.maps.get(stage - 1)
     evolution = oracle.evolution
-    previous = drawing.maps.get(stage - 1)
     moved = {change.id for change in evolution.changes}
     added = {record.id for record in evolution.additions}
     old = [] if previous is None else [item for item in previous.objects if item.object_id in moved]
-    plan = _plan(
-        drawing, stage, evolution, {"moved": moved - added, "new": added}, ghosts=furniture(old, frame, "items ghost")
-    )
+    ghosts = furniture(old, frame, "items ghost")
+    plan = _plan(drawing, stage, evolution, frame, {"moved": moved - added, "new": added}, ghosts)
     arrows = relocation_arrows(
         transition_record(oracle).relocations, frame, stage_map=drawing.maps[stage], previous_map=previous
     )
-    course = _course(oracle, frame) + target_mark(target_record(drawing.task, stage), frame)
-    return f'{plan}<g class="change">{arrows}</g>{course}'
+    return f'{plan}<g class="change">{arrows}</g>{target_mark(target_record(drawing.task, stage), frame)}'
+
+
+def course_svg(drawing: TaskDrawing, stage: int) -> str:
+    """The whole house of a stage, with the reference course and the target: content of an `svg` element."""
+    oracle, frame = drawing.task.oracle(stage), drawing.frame
+    evolution = oracle.evolution
+    stressed = {"moved": {change.id for change in evolution.changes}}
+    plan = _plan(drawing, stage, evolution, frame, stressed)
+    between = join(
+        f'<path class="between" stroke-width="{0.6 * frame.unit:.1f}" d="{outline(room.polygon_m)}">'
+        f"{title('transition room')}</path>"
+        for room in drawing.maps[stage].rooms
+        if room.room_id == oracle.state.transition_room_id
+    )
+    return plan + between + _course(oracle, frame) + target_mark(target_record(drawing.task, stage), frame)
+
+
+def change_frame(drawing: TaskDrawing, stage: int) -> Frame:
+    """The part of the house in which a stage's change happened."""
+    evolution = drawing.task.oracle(stage).evolution
+    changed = {change.id for change in evolution.changes}
+    changed |= {record.id for record in (*evolution.additions, *evolution.removals)}
+    changed |= {state.id for state in evolution.states}
+    points: list[Point] = []
+    for stage_map in (drawing.maps[stage - 1], drawing.maps[stage]):
+        points += [p for room in stage_map.rooms if room.room_id == evolution.room_id for p in room.polygon_m]
+        points += [p for item in stage_map.objects if item.object_id in changed for p in item.polygon_m]
+        points += [p for name, ends in drawing.doors.items() if name in changed for p in ends]
+    return Frame.around(points)
 
 
 def thumbnail_svg(drawing: TaskDrawing, stage: int) -> str:
@@ -117,8 +146,8 @@ def thumbnail_svg(drawing: TaskDrawing, stage: int) -> str:
     return join(
         [
             floors(stage_map),
-            furniture([item for item in large if item.object_id not in moved], frame),
-            furniture([item for item in large if item.object_id in moved], frame, "items moved"),
+            furniture([item for item in large if item.object_id not in moved], frame, has_parts=False),
+            furniture([item for item in large if item.object_id in moved], frame, "items moved", has_parts=False),
             structure(stage_map, frame),
             f'<g class="change">{arrows}</g>',
         ]
@@ -126,10 +155,15 @@ def thumbnail_svg(drawing: TaskDrawing, stage: int) -> str:
 
 
 def _plan(
-    drawing: TaskDrawing, stage: int, evolution: Evolution, stressed: Mapping[str, set[str]], *, ghosts: str
+    drawing: TaskDrawing,
+    stage: int,
+    evolution: Evolution,
+    frame: Frame,
+    stressed: Mapping[str, set[str]],
+    ghosts: str = "",
 ) -> str:
-    """A stage's house; `stressed` has the CSS class of what is drawn in other colours."""
-    frame, stage_map = drawing.frame, drawing.maps[stage]
+    """A stage's house; `stressed` has the ids that are drawn in a CSS class of their own."""
+    stage_map = drawing.maps[stage]
 
     def use(name: str) -> str:
         return f'<use href="#{drawing.prefix}-{name}"/>'
@@ -142,8 +176,9 @@ def _plan(
         for css in stressed
     )
     unmoved = [item for item in stage_map.objects if item.object_id in evolution.unmoved_ids]
-    states = {state.id: f"{state.field} {state.before:g} to {state.after:g}" for state in evolution.states}
+    states = {state.id for state in evolution.states}
     opened = [item for item in stage_map.objects if item.object_id in states]
+    is_whole = frame == drawing.frame
     return join(
         [
             use("floors"),
@@ -156,11 +191,17 @@ def _plan(
             furniture(unmoved, frame, "items unmoved"),
             furniture(opened, frame, "items opened"),
             use("walls"),
-            use("names"),
-            item_labels(movable, frame),
-            use("rooms"),
+            _opened_doors(drawing, states, frame),
+            item_labels(stage_map.objects, frame, *(() if is_whole else (CLOSE_LABEL_MIN_M2, CLOSE_LETTERS))),
+            labels(stage_map, frame) if is_whole else "",
         ]
     )
+
+
+def _opened_doors(drawing: TaskDrawing, states: set[str], frame: Frame) -> str:
+    found = [ends for name, ends in sorted(drawing.doors.items()) if name in states]
+    lines = join(f'<path d="{polyline([cm(a), cm(b)])}"/>' for a, b in found)
+    return f'<g class="opened-doors" stroke-width="{1.2 * frame.unit:.1f}">{lines}</g>' if found else ""
 
 
 def _tint(room: RoomFootprint, frame: Frame) -> str:
