@@ -55,9 +55,10 @@ bench: setup
 wheel: $(VENV)/.dependencies
 	$(BIN)/maturin build --release --out dist
 
-# The bundled tasks, made again from the bundled houses.
+# The bundled tasks, made again from the bundled houses, and the JSON Schema of their files from the records.
 data: setup
 	$(BIN)/python scripts/build_tasks.py
+	$(BIN)/evonav tasks schema --out python/evonav/tasks/schema
 
 # The results and the picture of the README, from a fresh demo.
 readme: setup

@@ -5,6 +5,7 @@ this list, of `python/evonav/data/houses.jsonl.gz` and of the code; `--check` sa
 """
 
 import argparse
+import hashlib
 import shutil
 import sys
 from collections import Counter
@@ -13,8 +14,10 @@ from pathlib import Path
 from evonav.generation import Rejections, generate_tasks
 from evonav.house import House, bundled_houses
 from evonav.tasks import Task, load_tasks, write_task
+from evonav.tasks.dataset import DatasetRecord, SourceFile, entry_of, write_dataset
 
 ROOT = Path(__file__).resolve().parents[1] / "python" / "evonav" / "data" / "tasks"
+HOUSES = ROOT.parent / "houses.jsonl.gz"
 SEED = 0
 FIRST_TEST_HOUSE = 84
 """Line of the first house with test assets."""
@@ -44,6 +47,26 @@ def build_tasks() -> list[Task]:
     return sorted(tasks, key=lambda task: task.task_id)
 
 
+def record_of(tasks: list[Task]) -> DatasetRecord:
+    """`dataset.json`."""
+    sha256 = hashlib.sha256(HOUSES.read_bytes()).hexdigest()
+    return DatasetRecord(
+        name="evonav-mini",
+        split="test",
+        generator=tasks[0].header.generator,
+        sources=(SourceFile(name=HOUSES.name, sha256=sha256),),
+        seed=SEED,
+        limit=None,
+        subset=None,
+        allow_unknown_assets=False,
+        parameters=tasks[0].header.parameters,
+        num_houses=len(tasks),
+        num_tasks=len(tasks),
+        tasks=tuple(entry_of(task) for task in tasks),
+        rejections=(),
+    )
+
+
 def main() -> int:
     """Writes the tasks, or compares them with those there."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -59,6 +82,7 @@ def main() -> int:
         shutil.rmtree(ROOT)
     for task in tasks:
         write_task(task, ROOT)
+    write_dataset(record_of(tasks), ROOT)
     num_bytes = sum(path.stat().st_size for path in ROOT.rglob("*") if path.is_file())
     num_stages = sum(task.num_stages for task in tasks)
     sys.stdout.write(f"{len(tasks)} tasks, {num_stages} stages, {num_bytes / 1e6:.2f} MB in {ROOT}\n")

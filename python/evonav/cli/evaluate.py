@@ -16,6 +16,7 @@ from evonav.cli.options import (
     Out,
     Seed,
     SimulatorName,
+    Subset,
     Tasks,
     ThorCommit,
     ThorDisplay,
@@ -44,6 +45,7 @@ def evaluate(
     houses: Houses = None,
     tasks: Tasks = None,
     limit: Limit = None,
+    subset: Subset = None,
     seed: Seed = 0,
     workers: Workers = None,
     retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
@@ -59,6 +61,8 @@ def evaluate(
     """Evaluates agents on tasks; run again to resume. Leaves records.sqlite and summary.json in OUT."""
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
+    if limit is not None and subset is not None:
+        raise typer.BadParameter("give --limit or --subset, not both")
     num_workers = count_of(workers)
     build = {
         "executable": thor_executable,
@@ -67,7 +71,7 @@ def evaluate(
     }
     host = {"gpu_device": thor_gpu, "x_display": thor_display, "timeout_s": thor_timeout}
     config = _config(seed, _backend(simulator, allow_unknown_assets, build, host))
-    with _tasks(out, houses, tasks, limit, seed, allow_unknown_assets, num_workers) as task_files:
+    with _tasks(out, houses, tasks, limit, subset, seed, allow_unknown_assets, num_workers) as task_files:
         summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored)
     print_table(summaries)
     _exit(summaries)
@@ -82,7 +86,7 @@ def demo(
 ) -> None:
     """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report."""
     num_workers = count_of(workers)
-    with _tasks(out, None, None, limit, seed, False, num_workers) as task_files:
+    with _tasks(out, None, None, limit, None, seed, False, num_workers) as task_files:
         summaries = _evaluate(out, agents, task_files, _config(seed), num_workers, retry_errored=False)
     print_table(summaries)
     _report(out)
@@ -120,6 +124,7 @@ def _tasks(
     houses: Path | None,
     tasks: Path | None,
     limit: int | None,
+    subset: str | None,
     seed: int,
     allow_unknown_assets: bool,
     num_workers: int,
@@ -127,6 +132,7 @@ def _tasks(
     """The tasks of a run: given, generated into the run's folder, or bundled."""
     from evonav.evaluation.datasets import bundled_tasks, make_tasks
     from evonav.evaluation.engine import task_file, task_files
+    from evonav.tasks.subsets import subset_roots
 
     with ExitStack() as stack:
         if houses is not None:
@@ -135,6 +141,7 @@ def _tasks(
                     houses,
                     out / "tasks",
                     limit=limit,
+                    subset=subset,
                     seed=seed,
                     allow_unknown_assets=allow_unknown_assets,
                     num_workers=num_workers,
@@ -143,7 +150,10 @@ def _tasks(
             yield [task_file(root) for root in generated]
         else:
             directory = tasks if tasks is not None else stack.enter_context(bundled_tasks())
-            yield task_files(directory, limit)
+            if subset is None:
+                yield task_files(directory, limit)
+            else:
+                yield [task_file(root) for root in subset_roots(directory, subset)]
 
 
 def _evaluate(

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import generation_progress, interruptible
-from evonav.cli.options import HOUSES, AnyAsset, Limit, Seed, Workers, count_of
+from evonav.cli.options import HOUSES, AnyAsset, Limit, Seed, Subset, Workers, count_of
 
 if TYPE_CHECKING:
     from evonav.generation.engine import GenerationSummary
@@ -24,6 +24,7 @@ def generate(
     houses: Annotated[Path, typer.Option(help=f"{HOUSES}.")],
     out: Annotated[Path, typer.Option(help="Folder for the tasks; an unfinished one is gone on with.")],
     limit: Limit = None,
+    subset: Subset = None,
     seed: Seed = 0,
     config: Annotated[
         Path | None, typer.Option(help="JSON or TOML with any of the generator's parameters (docs/extensions.md).")
@@ -68,6 +69,7 @@ def generate(
             out,
             options=options,
             limit=limit,
+            subset=subset,
             workforce=workforce,
             retry_failed=retry_failed,
             on_progress=show,

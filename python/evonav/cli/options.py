@@ -14,6 +14,7 @@ HOUSES = "ProcTHOR JSON, JSONL, JSONL.gz, or procthor-10k:SPLIT"
 Houses = Annotated[Path | None, typer.Option(help=f"{HOUSES} to generate tasks from.")]
 Tasks = Annotated[Path | None, typer.Option(help="Folder of tasks; default: the bundled ones.")]
 Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-room) houses or tasks.")]
+Subset = Annotated[str | None, typer.Option(help="Named subset, SPLIT-N, such as test-90 (docs/tasks.md).")]
 Seed = Annotated[int, typer.Option(min=0, help="Decides everything random.")]
 Workers = Annotated[int | None, typer.Option(min=0, help="Processes; default: one a core. 0: in this process.")]
 AnyAsset = Annotated[

@@ -6,8 +6,10 @@ from typing import Annotated
 import typer
 
 from evonav.cli.options import Limit
+from evonav.cli.tasks_schema import schema
 from evonav.cli.tasks_show import show
 from evonav.cli.tasks_stats import stats
+from evonav.cli.tasks_subset import subset
 from evonav.cli.tasks_validate import validate
 from evonav.cli.tasks_write import write
 
@@ -27,7 +29,9 @@ def list_tasks(folder: Folder, limit: Limit = None) -> None:
         typer.echo(f"{task.task_id}  {rooms}  {task.num_stages} stages  changed before: {', '.join(changed) or '-'}")
 
 
+tasks_app.command()(schema)
 tasks_app.command()(show)
 tasks_app.command()(stats)
+tasks_app.command()(subset)
 tasks_app.command()(write)
 tasks_app.command()(validate)

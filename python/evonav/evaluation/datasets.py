@@ -33,12 +33,15 @@ def make_tasks(
     out: Path,
     *,
     limit: int | None = None,
+    subset: str | None = None,
     seed: int = 0,
     allow_unknown_assets: bool = False,
     num_workers: int = 0,
     on_progress: "Callable[[GenerationProgress], None]" = lambda _: None,
 ) -> list[Path]:
-    """Tasks of the first `limit` houses that allow one, as `evonav.generation.engine.generate_dataset` makes them.
+    """Tasks of the first `limit` houses that allow one, or of a named subset of them.
+
+    `evonav.generation.engine.generate_dataset` makes them.
 
     Returns:
         The folders of the tasks, in the order of the houses.
@@ -54,7 +57,9 @@ def make_tasks(
     dataset, split = inherited_names(houses)
     options = GenerationOptions(seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets)
     workforce = Workforce(num_workers=num_workers)
-    made = generate_dataset(houses, out, options=options, limit=limit, workforce=workforce, on_progress=on_progress)
+    made = generate_dataset(
+        houses, out, options=options, limit=limit, subset=subset, workforce=workforce, on_progress=on_progress
+    )
     return list(made.roots)
 
 

@@ -10,13 +10,14 @@ import json
 import shutil
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass
 from pathlib import Path
 
 from evonav._core import __version__
 from evonav.errors import HouseError, InvalidArgumentError, StoreError, TaskError
 from evonav.folders import sha256_of_file, writing
+from evonav.generation.house_order import house_order, wanted_of
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.pipeline import short_name
 from evonav.generation.worker import MAX_DETAIL, PARTIAL_NAME, WORK, GenerationOptions
@@ -31,6 +32,7 @@ from evonav.tasks.dataset import (
     read_dataset,
     write_dataset,
 )
+from evonav.tasks.subsets import Subset, SubsetError
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +89,7 @@ def generate_dataset(
     *,
     options: GenerationOptions | None = None,
     limit: int | None = None,
+    subset: str | None = None,
     workforce: Workforce | None = None,
     retry_failed: bool = False,
     on_progress: Callable[[GenerationProgress], None] = lambda _: None,
@@ -98,6 +101,7 @@ def generate_dataset(
         out: Gets a folder a task, `journal.jsonl` and, when all is done, `dataset.json`.
         options: Must be the folder's own when it already holds tasks.
         limit: The first houses that give so many tasks; must be the folder's own too.
+        subset: Only the tasks of a named subset of the split (`evonav.tasks.subsets`); must be the folder's own too.
         workforce: Default: this process.
         retry_failed: Do houses again at which the generator failed.
         on_progress: Called when it begins and after every house.
@@ -106,18 +110,20 @@ def generate_dataset(
         HouseError: The houses cannot be read, or the dataset was not fetched.
         InvalidArgumentError: Of the arguments.
         StoreError: `out` holds another run, is being written to, or cannot be written.
-        TaskError: No house gives a task; it says why.
+        TaskError: No house gives a task, or too few for the subset; it says why.
         EngineError: Workers cannot be had.
     """
     options, workforce = options or GenerationOptions(), workforce or Workforce()
     if limit is not None and limit < 1:
         raise InvalidArgumentError(f"argument `limit` is {limit}, expected None or at least 1")
+    wanted_tasks = None if subset is None else wanted_of(subset, options.split, limit)
     texts = HouseTexts(houses)
     sources = _sources(houses, texts)
     run = {
         "evonav": __version__,
         "houses": {source.name: source.sha256 for source in sources},
         "limit": limit,
+        "subset": subset,
         "options": options.as_json(),
     }
     out = out.resolve()  # workers of a cluster have other working directories
@@ -137,10 +143,13 @@ def generate_dataset(
                 timeout_s=workforce.house_timeout_s,
                 ray_address=workforce.ray_address,
             ) as pool:
-                state.do_all(pool)
+                if wanted_tasks is None:
+                    state.do_all(pool)
+                else:
+                    state.do_subset(pool, wanted_tasks)
             shutil.rmtree(out / PARTIAL_NAME, ignore_errors=True)
             journal.rewrite()
-            _write_dataset(out, sources, options, limit, in_order(journal))
+            _write_dataset(out, sources, options, limit, subset, in_order(journal))
         return state.summary(out)
 
 
@@ -166,14 +175,42 @@ class _Run:
         """Of houses that are being done."""
         self._began_s = time.monotonic()
 
-    def do_all(self, pool: Pool) -> None:
+    def do_subset(self, pool: Pool, subset: Subset) -> None:
+        """Does the houses of a subset: the first ones in its order, and on while they give too few tasks.
+
+        Raises:
+            StoreError: A task or the journal cannot be written.
+            SubsetError: All houses give too few.
+        """
+        order = house_order(self._texts)
+        num_begun = 0
+        while self._num_tasks_of(order[:num_begun]) < subset.num_tasks:
+            if num_begun == len(order):
+                raise SubsetError(f"subset '{subset}': only {self._num_tasks} houses give a task")
+            num_begun += subset.num_tasks - self._num_tasks_of(order[:num_begun])
+            num_begun = min(num_begun, len(order))
+            self.do_all(pool, set(order[:num_begun]))
+
+    def _num_tasks_of(self, houses: list[int]) -> int:
+        outcomes = self._journal.outcomes
+        return sum(index in outcomes and outcomes[index].reason is None for index in houses)
+
+    def do_all(self, pool: Pool, wanted: Set[int] | None = None) -> None:
         """Does every house that is left.
+
+        Args:
+            pool: Who does it.
+            wanted: Only these.
 
         Raises:
             StoreError: A task or the journal cannot be written.
         """
         done = self._journal.outcomes
-        left = ((index, house) for index, house in enumerate(self._texts) if index not in done)
+        left = (
+            (index, house)
+            for index, house in enumerate(self._texts)
+            if index not in done and (wanted is None or index in wanted)
+        )
         is_more = True
         while is_more or self._names:
             while is_more and len(self._names) < pool.capacity and self._is_wanted():
@@ -261,7 +298,12 @@ def _is_kept(outcome: Outcome, out: Path, retry_failed: bool) -> bool:
 
 
 def _write_dataset(
-    out: Path, sources: tuple[SourceFile, ...], options: GenerationOptions, limit: int | None, outcomes: list[Outcome]
+    out: Path,
+    sources: tuple[SourceFile, ...],
+    options: GenerationOptions,
+    limit: int | None,
+    subset: str | None,
+    outcomes: list[Outcome],
 ) -> None:
     """Writes what the folder holds.
 
@@ -288,7 +330,7 @@ def _write_dataset(
         sources=sources,
         seed=options.seed,
         limit=limit,
-        subset=None,
+        subset=subset,
         allow_unknown_assets=options.allow_unknown_assets,
         parameters=options.parameters,
         num_houses=len(outcomes),

@@ -9,10 +9,11 @@ houses, and on nothing else: not on file names, on the order of houses or on how
 
 import re
 from collections.abc import Iterable
+from pathlib import Path
 from typing import NamedTuple
 
 from evonav.errors import TaskError
-from evonav.tasks.dataset import DatasetRecord, TaskEntry
+from evonav.tasks.dataset import DatasetRecord, TaskEntry, read_dataset
 from evonav.tasks.records import sha256_of
 
 _SALT = "evonav-subset-1:"
@@ -61,6 +62,24 @@ def subset_of(dataset: DatasetRecord, name: str) -> tuple[TaskEntry, ...]:
     if dataset.limit is not None and dataset.num_tasks >= dataset.limit:
         raise SubsetError(f"subset {name!r}: the tasks are the first {dataset.limit} of their split, not all")
     return tuple(sorted(choose(dataset.tasks, subset), key=lambda entry: entry.task_id))
+
+
+def subset_roots(folder: Path | str, name: str) -> list[Path]:
+    """Folders of a named subset's tasks, in order of task id.
+
+    Args:
+        folder: Holds the tasks and their `dataset.json`.
+        name: Such as `test-90`.
+
+    Raises:
+        SubsetError: As for `subset_of`, or a task of the subset is not there.
+        TaskError: There is no `dataset.json`, or it is malformed.
+    """
+    roots = [Path(folder) / entry.task_id for entry in subset_of(read_dataset(folder), name)]
+    for root in roots:
+        if not (root / "task.json").is_file():
+            raise SubsetError(f"subset {name!r}: {root} is not there")
+    return roots
 
 
 def choose(entries: Iterable[TaskEntry], subset: Subset) -> list[TaskEntry]:

@@ -1,0 +1,23 @@
+"""`evonav tasks schema`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def schema(
+    name: Annotated[
+        str | None, typer.Argument(help="dataset, oracle_stage, public_stage or task; default: all.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for all of them, NAME.schema.json.")] = None,
+) -> None:
+    """Prints or writes the JSON Schema (draft 2020-12) of task files."""
+    from evonav.tasks.schema import MODELS, schema_text, write_schemas
+
+    if out is not None:
+        for path in write_schemas(out):
+            typer.echo(str(path))
+        return
+    for each in MODELS if name is None else (name,):
+        typer.echo(schema_text(each), nl=False)

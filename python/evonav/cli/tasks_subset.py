@@ -1,0 +1,26 @@
+"""`evonav tasks subset`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def subset(
+    folder: Annotated[Path, typer.Argument(help="Folder of tasks with a dataset.json.")],
+    name: Annotated[str, typer.Argument(help="SPLIT-N, such as test-90.")],
+    out: Annotated[Path | None, typer.Option(help="File for the task ids, one a line; default: print them.")] = None,
+) -> None:
+    """Lists the tasks of a named subset (docs/tasks.md): the same for everyone who has the same houses."""
+    from evonav.errors import TaskError
+    from evonav.tasks.subsets import subset_roots
+
+    ids = [root.name for root in subset_roots(folder, name)]
+    if out is None:
+        typer.echo("\n".join(ids))
+        return
+    try:
+        out.write_text("".join(f"{task_id}\n" for task_id in ids), encoding="utf-8")
+    except OSError as error:
+        raise TaskError(f"{out}: cannot be written: {error.strerror or error}") from error
+    typer.echo(f"{len(ids)} task ids in {out}")

@@ -1,0 +1,88 @@
+"""JSON Schema (draft 2020-12) of task files, made from the records that read them.
+
+The same documents lie in the package's folder `schema/`, so that no program needs Python to check a file. JSON itself
+has no NaN and no infinity; no key but those listed is allowed. What no schema can say (files that contradict each
+other, checksums, physics) `evonav tasks validate` finds.
+"""
+
+import ast
+import inspect
+import json
+import textwrap
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from evonav.errors import TaskError
+from evonav.tasks.dataset import DatasetRecord
+from evonav.tasks.manifest import PublicStage, TaskHeader
+from evonav.tasks.oracle import OracleStage
+from evonav.tasks.records import Record
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+MODELS: Mapping[str, type[Record]] = MappingProxyType(
+    {"dataset": DatasetRecord, "oracle_stage": OracleStage, "public_stage": PublicStage, "task": TaskHeader}
+)
+"""Kinds of files: `dataset.json`, `oracle/stage_k.json`, `public/stage_k.json`, `task.json`."""
+
+
+def schema_of(name: str) -> dict[str, Any]:
+    """The schema of a kind of file.
+
+    Args:
+        name: A key of `MODELS`.
+
+    Raises:
+        TaskError: There is no such kind.
+    """
+    if name not in MODELS:
+        raise TaskError(f"schema {name!r}: expected one of {', '.join(MODELS)}")
+    model = MODELS[name]
+    schema = model.model_json_schema(mode="validation")
+    records = {record.__name__: record for record in _all_records(Record)}
+    for title, part in [(model.__name__, schema), *schema.get("$defs", {}).items()]:
+        for field, text in _described(records[title]):
+            part["properties"][field]["description"] = text
+    version = model.model_fields["schema_version"].default
+    return {"$schema": DIALECT, "$id": f"urn:evonav:schema:{version}:{name}", **schema}
+
+
+def schema_text(name: str) -> str:
+    """The file of a schema."""
+    return json.dumps(schema_of(name), indent=2) + "\n"
+
+
+def write_schemas(directory: Path | str) -> list[Path]:
+    """Writes all schemas, `NAME.schema.json`.
+
+    Raises:
+        TaskError: A file cannot be written.
+    """
+    directory = Path(directory)
+    paths = [directory / f"{name}.schema.json" for name in MODELS]
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        for name, path in zip(MODELS, paths, strict=True):
+            path.write_text(schema_text(name), encoding="utf-8")
+    except OSError as error:
+        raise TaskError(f"{directory}: cannot be written: {error.strerror or error}") from error
+    return paths
+
+
+def _all_records(record: type[Record]) -> Iterator[type[Record]]:
+    for one in record.__subclasses__():
+        yield one
+        yield from _all_records(one)
+
+
+def _described(record: type[Record]) -> Iterator[tuple[str, str]]:
+    """Fields with the sentences below them in the source."""
+    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
+    for field, below in pairwise(definition.body if isinstance(definition, ast.ClassDef) else []):
+        if not isinstance(field, ast.AnnAssign) or not isinstance(field.target, ast.Name):
+            continue
+        if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) and isinstance(below.value.value, str):
+            yield field.target.id, " ".join(below.value.value.split())
