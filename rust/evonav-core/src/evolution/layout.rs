@@ -54,7 +54,9 @@ pub struct Item {
     pub solids: Vec<Footprint>,
     /// Box around them.
     pub bounds: Aabb,
-    /// How far below its place the scene has it: files hold some things over what they stand on.
+    /// Where the file has it: what it stands on, and its height ...
+    filed: (Option<usize>, f64),
+    /// ... and how far below the scene has it: files hold some things over what they stand on.
     sunk_m: f64,
     /// Stands on the floor by itself: furniture, and boxes and balls on the floor.
     pub is_on_floor: bool,
@@ -63,7 +65,27 @@ pub struct Item {
 impl Item {
     /// Plan outlines of its parts if it were at `place`.
     pub fn solids_at(&self, placement: &Placement) -> Vec<Footprint> {
-        solids_of(&self.parts, placement)
+        solids_of(&self.parts, &self.settled(placement))
+    }
+
+    /// Where it comes to rest: what is carried along lies as far below its place as before.
+    fn settled(&self, placement: &Placement) -> Placement {
+        let mut settled = *placement;
+        if (placement.parent, placement.position_m[1]) == self.filed {
+            settled.position_m[1] -= self.sunk_m;
+        }
+        settled
+    }
+
+    /// Height of its centre over its lowest point.
+    pub fn rise_m(&self) -> f64 {
+        self.settled(&self.placement).position_m[1] - self.bounds.min_m[1]
+    }
+
+    /// Brings outlines and box to where it is.
+    fn settle(&mut self) {
+        self.solids = self.solids_at(&self.placement);
+        self.bounds = box_of(&self.solids);
     }
 
     /// Whether it hangs on a wall: on nothing, and not on the floor.
@@ -116,7 +138,11 @@ impl Layout {
             let bounds = box_of(&solids);
             let body = scene.bodies.get(scene.first_object + index);
             let sunk_m = body.map_or(0.0, |body| bounds.min_m[1] - body.aabb.min_m[1]);
-            items.push(Item { asset, parts, placement, solids, bounds, sunk_m, is_on_floor });
+            let filed = (placement.parent, placement.position_m[1]);
+            let mut item =
+                Item { asset, parts, placement, solids, bounds, filed, sunk_m, is_on_floor };
+            item.settle();
+            items.push(item);
         }
         let is_solid = |kind| matches!(kind, BodyKind::Wall | BodyKind::Door | BodyKind::Window);
         let structure = scene.bodies[..scene.first_object.min(scene.bodies.len())]
@@ -127,6 +153,15 @@ impl Layout {
             .map(|solid| (box_of(std::slice::from_ref(&solid)), solid))
             .collect();
         Ok(Self { items, scene, structure, passages: reserve::passages(house) })
+    }
+
+    /// The same with everything where the file has it, be it in the air.
+    pub fn as_filed(mut self) -> Self {
+        for item in &mut self.items {
+            item.sunk_m = 0.0;
+            item.settle();
+        }
+        self
     }
 
     /// `root` and everything that stands on it, directly or not; parents first.
@@ -231,23 +266,13 @@ impl Layout {
     /// Puts an object somewhere; what stands on it stays.
     pub fn put(&mut self, index: usize, placement: Placement) {
         let item = &mut self.items[index];
-        if placement.parent != item.placement.parent
-            || placement.position_m[1] != item.placement.position_m[1]
-        {
-            // It was put down, not carried along.
-            item.sunk_m = 0.0;
-        }
         item.placement = placement;
-        item.solids = solids_of(&item.parts, &placement);
-        item.bounds = box_of(&item.solids);
+        item.settle();
         if let Some(body) = self.scene.bodies.get_mut(self.scene.first_object + index) {
-            let mut sunk = placement;
-            sunk.position_m[1] -= item.sunk_m;
-            body.parts = world_parts(&item.parts, &sunk);
+            let settled = item.settled(&placement);
+            body.parts = world_parts(&item.parts, &settled);
             body.aabb = item.bounds;
-            body.aabb.min_m[1] -= item.sunk_m;
-            body.aabb.max_m[1] -= item.sunk_m;
-            body.oriented.centre_m = sunk.position_m;
+            body.oriented.centre_m = settled.position_m;
             body.oriented.rotation = euler_rotation_deg(placement.rotation_deg);
         }
     }

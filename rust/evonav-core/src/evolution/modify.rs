@@ -22,6 +22,9 @@ const NAVIGATION_TRIES: usize = 8;
 /// Ways to put a group together anew that are tried before it is left alone.
 const REARRANGE_TRIES: usize = 20;
 
+/// A move this long is seen; shorter ones are made where nothing else is free.
+const SEEN_M: f64 = 0.5;
+
 /// A room, modified.
 #[derive(Debug, Clone)]
 pub struct Modification {
@@ -185,19 +188,22 @@ impl Modifier<'_> {
     fn move_group(&mut self, work: &mut Work, group: usize) -> Result<(), Blocked> {
         let unit = self.unit(work, group);
         let tries = self.parameters.placement_tries;
+        let least_m = self.parameters.relocated_min_m;
+        let seen_m = SEEN_M.max(least_m);
+        let (all, relaxed) = (Rules::All, Rules::Relaxed);
         let mut num_cut = 0;
-        for rules in [Rules::All, Rules::Relaxed] {
-            if self.place(work, group, &unit, rules, tries, &mut num_cut) {
+        for how in [(all, seen_m), (relaxed, seen_m), (all, least_m), (relaxed, least_m)] {
+            if self.place(work, group, &unit, how, tries, &mut num_cut) {
                 return Ok(());
             }
         }
         let num_anew = if unit.roots.len() > 1 { REARRANGE_TRIES } else { 0 };
-        for rules in [Rules::All, Rules::Relaxed] {
+        for how in [(all, least_m), (relaxed, least_m)] {
             for _ in 0..num_anew {
                 let layout = &work.done.layout;
                 let anew = rearranged(&unit, layout, self.catalogue, &mut self.stream);
                 let tries = tries.div_ceil(REARRANGE_TRIES);
-                if anew.is_some_and(|u| self.place(work, group, &u, rules, tries, &mut num_cut)) {
+                if anew.is_some_and(|u| self.place(work, group, &u, how, tries, &mut num_cut)) {
                     work.done.rearranged.extend(&unit.roots);
                     return Ok(());
                 }
@@ -212,7 +218,7 @@ impl Modifier<'_> {
         work: &mut Work,
         group: usize,
         unit: &Unit,
-        rules: Rules,
+        (rules, min_move_m): (Rules, f64),
         tries: usize,
         num_cut: &mut usize,
     ) -> bool {
@@ -223,7 +229,7 @@ impl Modifier<'_> {
                 plan: &work.plan,
                 reserves: &work.reserves,
                 own: group,
-                min_move_m: self.parameters.relocated_min_m,
+                min_move_m,
             };
             let Some((placed, reserve)) = search.draw(unit, rules, &mut self.stream) else {
                 continue;
@@ -263,8 +269,12 @@ impl Modifier<'_> {
     /// Moves each small thing of the room to a receptacle of the room.
     fn move_small(&mut self, done: &mut Modification, in_room: &[usize]) -> bool {
         let items = &done.layout.items;
+        // What the catalogue does not know has a size that was guessed from its place: it goes
+        // where that goes.
+        let is_known = |index: usize| self.catalogue.get(&items[index].asset.id).is_some();
         let is_small = |&&index: &&usize| {
-            items[index].placement.parent.is_some() && !is_fitting(&items[index])
+            let item = &items[index];
+            item.placement.parent.is_some() && !is_fitting(item) && is_known(index)
         };
         let mut order: Vec<usize> = in_room.iter().filter(is_small).copied().collect();
         let num_small = order.len();
@@ -317,12 +327,18 @@ impl Modifier<'_> {
     fn unit(&self, work: &Work, group: usize) -> Unit {
         let layout = &work.done.layout;
         let Group { roots, definition } = &work.groups[group];
-        let definition = definition.map(|index| (index, &self.catalogue.groups()[index]));
-        let anchors = match roots[..] {
-            [root] => self.places_for(&layout.items[root].asset.category),
-            _ => Vec::new(),
+        let category = &layout.items[roots[0]].asset.category;
+        let own = self.places_for(category);
+        let Some(index) = *definition else {
+            let anchors = if roots.len() == 1 { own } else { Vec::new() };
+            return Unit::new(layout, roots, None, [&anchors, &anchors], &work.plan);
         };
-        Unit::new(layout, roots, definition, &anchors, &work.plan)
+        // ProcTHOR also puts a television with its sofa into the middle of a room, and the back of
+        // its stand, which alone goes to walls only, to a door: that is left for want of better.
+        let all = &self.catalogue.groups()[index].places;
+        let both: Vec<Place> = all.iter().copied().filter(|place| own.contains(place)).collect();
+        let preferred = if both.is_empty() { all } else { &both };
+        Unit::new(layout, roots, Some(index), [preferred, all], &work.plan)
     }
 
     /// Where a category may stand on the floor, by ProcTHOR's annotations.

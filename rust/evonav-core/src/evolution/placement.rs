@@ -167,11 +167,12 @@ impl Search<'_> {
     /// A random pose of the unit's frame in the room.
     fn sample_pose(&self, unit: &Unit, rules: Rules, stream: &mut Stream) -> Option<Pose2> {
         let plan = self.plan;
-        let mut anchor = *unit.anchors.get(stream.below(unit.anchors.len()))?;
+        let anchors = unit.anchors(rules);
+        let mut anchor = *anchors.get(stream.below(anchors.len()))?;
         if anchor == Place::Middle {
             return self.sample_middle(stream);
         }
-        if rules == Rules::Relaxed && !unit.anchors.contains(&Place::Edge) && stream.below(2) == 0 {
+        if rules == Rules::Relaxed && !anchors.contains(&Place::Edge) && stream.below(2) == 0 {
             anchor = Place::Edge;
         }
         // Room along each wall for the unit's back.

@@ -1,4 +1,4 @@
-//! Which rooms, objects and passages an agent can reach while furniture is moved about.
+//! Which rooms, objects, passages and the house's own start an agent can reach while furniture is moved about.
 //!
 //! The same grid, the same obstacles and the same answers as [`Navigation::reachable_positions`],
 //! kept as counts per grid point and per step, so that a moved object costs the points around it
@@ -24,8 +24,8 @@ const MAX_POINTS: f64 = 4e6;
 #[derive(Debug, Clone, Default)]
 struct Marks {
     points: Vec<u32>,
-    /// Steps by their first point: to the next point along x, and along z.
-    steps: [Vec<u32>; 2],
+    /// Steps by their first point: to the next point along x, and along z; then links of the pin.
+    steps: [Vec<u32>; 3],
 }
 
 /// What can be reached from a point, kept up to date.
@@ -43,7 +43,10 @@ pub struct Reach {
     /// Things that block a point.
     point_blocks: Vec<u16>,
     /// Things that block a step, and neither of its ends.
-    step_blocks: [Vec<u16>; 2],
+    step_blocks: [Vec<u16>; 3],
+    /// The house's own start, a point of no grid, and the points that it has a straight way to.
+    pin_m: Option<Vec2>,
+    links: Vec<u32>,
     /// Per object that has been moved, what it blocks now.
     marks: Vec<Option<Marks>>,
     is_reached: Vec<bool>,
@@ -62,8 +65,12 @@ struct Access {
     /// Pairs of a room's neighbours between which a way leads through the room, the same one twice
     /// for a way in: `[room, neighbour, neighbour]`, sorted.
     ways: Vec<[u32; 3]>,
+    /// The house's own start, where simulators begin.
+    start: bool,
 }
 
+/// Points of the grid this near to the house's start are linked to it.
+const LINK_M: f64 = 0.36;
 /// No floor.
 const NOWHERE: u32 = u32::MAX;
 /// Floor of no room: under a door.
@@ -103,8 +110,11 @@ impl Reach {
             start_m,
             start_cell,
             room: vec![NOWHERE; count],
-            point_blocks: vec![0; count],
-            step_blocks: [vec![0; count], vec![0; count]],
+            // The pin comes after all others.
+            point_blocks: vec![0; count + 1],
+            step_blocks: [vec![0; count], vec![0; count], Vec::new()],
+            pin_m: house.start.and_then(|s| navigation.snap([s.position_m[0], s.position_m[2]])),
+            links: Vec::new(),
             marks: vec![None; layout.items.len()],
             is_reached: vec![false; count],
             queue: Vec::new(),
@@ -119,6 +129,8 @@ impl Reach {
                 reach.room[point] = house.room_of(at_m).map_or(NO_ROOM, |room| room as u32);
             }
         }
+        reach.links = reach.points_near_pin();
+        reach.step_blocks[2] = vec![0; reach.links.len()];
         for (index, body) in layout.scene.bodies.iter().enumerate() {
             let object = index.checked_sub(layout.scene.first_object);
             let marks = reach.marks_of(body)?;
@@ -138,6 +150,15 @@ impl Reach {
         [0, 1].map(|i| self.start_m[i] + (cell[i] as i64 - self.start_cell[i]) as f64 * GRID_M)
     }
 
+    /// Points of the grid about the pin: at least those of the square that it is in.
+    fn points_near_pin(&self) -> Vec<u32> {
+        let Some(pin_m) = self.pin_m else { return Vec::new() };
+        let is_near = |&point: &usize| {
+            self.room[point] != NOWHERE && distance_2d_m(self.point_m(point), pin_m) < LINK_M
+        };
+        (0..self.room.len()).filter(is_near).map(|point| point as u32).collect()
+    }
+
     /// What a body blocks; `None` if its geometry is not finite.
     fn marks_of(&self, body: &Body) -> Option<Marks> {
         let mut marks = Marks::default();
@@ -152,6 +173,21 @@ impl Reach {
 
     fn mark(&self, obstacle: &Obstacle, marks: &mut Marks) {
         let [low_m, high_m] = obstacle.extent_m();
+        let is_far = |pin_m: &Vec2| {
+            [0, 1].iter().any(|&i| pin_m[i] < low_m[i] - LINK_M || high_m[i] + LINK_M < pin_m[i])
+        };
+        match self.pin_m.filter(|pin_m| !is_far(pin_m)) {
+            Some(pin_m) if obstacle.blocks(pin_m) => marks.points.push(self.room.len() as u32),
+            Some(pin_m) => {
+                for (link, &point) in self.links.iter().enumerate() {
+                    let sweep = Sweep::new(pin_m, self.point_m(point as usize));
+                    if obstacle.blocks_sweep(&sweep) {
+                        marks.steps[2].push(link as u32);
+                    }
+                }
+            }
+            None => {}
+        }
         let cell = |value_m: f64, axis: usize, slack: f64| {
             let cell = (value_m - self.corner_m[axis]) / GRID_M + slack;
             cell.clamp(0.0, self.shape[axis] as f64) as usize
@@ -192,7 +228,7 @@ impl Reach {
         for &point in &marks.points {
             change(&mut self.point_blocks[point as usize]);
         }
-        for axis in 0..2 {
+        for axis in 0..3 {
             for &step in &marks.steps[axis] {
                 change(&mut self.step_blocks[axis][step as usize]);
             }
@@ -287,7 +323,13 @@ impl Reach {
             }
         }
         let objects = (0..layout.items.len()).map(|index| self.is_near(layout, index)).collect();
-        Access { rooms, objects, ways: self.ways() }
+        Access { rooms, objects, ways: self.ways(), start: self.is_pin_reached() }
+    }
+
+    fn is_pin_reached(&self) -> bool {
+        let mut links = self.links.iter().zip(&self.step_blocks[2]);
+        self.point_blocks.last() == Some(&0)
+            && links.any(|(&point, &blocks)| blocks == 0 && self.is_reached[point as usize])
     }
 
     /// Whether a reached point of an object's room lies at the reference distance from it.
@@ -356,6 +398,7 @@ impl Access {
         let covers = |now: &[bool], then: &[bool]| now.iter().zip(then).all(|(n, t)| *n || !*t);
         covers(&self.rooms, &before.rooms)
             && covers(&self.objects, &before.objects)
+            && (self.start || !before.start)
             && before.ways.iter().all(|way| self.ways.binary_search(way).is_ok())
     }
 }

@@ -7,7 +7,7 @@
 use serde::Deserialize;
 
 use super::{
-    layout::{Layout, Placement, bottom_m},
+    layout::{Layout, Placement},
     placement::round_to,
     surfaces::sample_surface_place,
 };
@@ -203,7 +203,7 @@ fn sample_floor_place(
     });
     let item = &layout.items[index];
     let [x_deg, _, z_deg] = item.placement.rotation_deg;
-    let rise_m = item.placement.position_m[1] - bottom_m(&item.solids);
+    let rise_m = item.rise_m();
     let place = Placement {
         position_m: [x, round_to(rise_m, ROUND_M), z],
         rotation_deg: [x_deg, 90.0 * stream.below(NUM_YAWS) as f64, z_deg],

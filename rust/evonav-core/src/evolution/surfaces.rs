@@ -3,6 +3,7 @@
 use super::{
     layout::{Item, Layout, Placement, TOUCH_M, bottom_m},
     placement::{round_to, turned_deg},
+    plan::overlap_m,
 };
 use crate::{
     assets::catalogue::Catalogue,
@@ -15,6 +16,8 @@ use crate::{
 const SUPPORTED_SHARE: f64 = 0.8;
 /// Height difference between a recorded surface and the top of the part that bears it.
 const SURFACE_M: f64 = 0.02;
+/// Height difference between parts that bear one thing.
+const LEVEL_M: f64 = 0.003;
 /// Rounding of places.
 const ROUND_M: f64 = 1e-4;
 
@@ -67,7 +70,7 @@ pub fn sample_surface_place(
     let local = [(stream.uniform() - 0.5) * size_x, 0.0, (stream.uniform() - 0.5) * size_z];
     let centre =
         add(rotate(&yaw_rotation(yaw_deg.to_radians()), local), receptacle.placement.position_m);
-    let rise_m = item.placement.position_m[1] - bottom_m(&item.solids);
+    let rise_m = item.rise_m();
     let [x_deg, _, z_deg] = item.placement.rotation_deg;
     let mut place = Placement {
         position_m: [
@@ -78,35 +81,40 @@ pub fn sample_surface_place(
         rotation_deg: [x_deg, turned_deg(yaw_deg + 90.0 * stream.below(4) as f64), z_deg],
         parent: Some(receptacle_index),
     };
-    // The part that bears it may end a little above or below the recorded height.
+    let moved_m: f64 = (0..3)
+        .map(|i| (place.position_m[i] - item.placement.position_m[i]).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    if item.placement.parent == place.parent && moved_m <= min_move_m {
+        return None;
+    }
+    let solids = item.solids_at(&place);
+    let outline = convex_hull(solids.iter().flat_map(|s| s.outline_m.iter().copied()).collect());
+    // The parts under it may end a little above or below the recorded height.
     let bearing: Vec<_> = receptacle
         .solids
         .iter()
         .filter(|solid| (solid.top_m - height_m).abs() < SURFACE_M)
+        .filter(|solid| overlap_m(&solid.outline_m, &outline) > TOUCH_M)
         .collect();
     let top_m = bearing.iter().map(|solid| solid.top_m).fold(f64::NEG_INFINITY, f64::max);
     if !top_m.is_finite() {
         return None;
     }
     place.position_m[1] = round_to(top_m + rise_m, ROUND_M);
-    let solids = item.solids_at(&place);
-    let outline = convex_hull(solids.iter().flat_map(|s| s.outline_m.iter().copied()).collect());
-    let is_borne = |p: Vec2| bearing.iter().any(|solid| polygon_contains(&solid.outline_m, p));
+    // It stands level: no part under it is higher than what is under its middle and its corners.
+    let is_borne = |p: Vec2| {
+        let mut level = bearing.iter().filter(|solid| top_m - solid.top_m < LEVEL_M);
+        level.any(|solid| polygon_contains(&solid.outline_m, p))
+    };
     let shrunk = |p: &Vec2| {
         [0, 1].map(|i| {
             let middle = place.position_m[2 * i];
             middle + SUPPORTED_SHARE * (p[i] - middle)
         })
     };
-    let moved_m: f64 = (0..3)
-        .map(|i| (place.position_m[i] - item.placement.position_m[i]).powi(2))
-        .sum::<f64>()
-        .sqrt();
-    let is_moved = item.placement.parent != place.parent || moved_m > min_move_m;
-    let is_valid = is_moved
-        && is_borne([place.position_m[0], place.position_m[2]])
+    let is_valid = is_borne([place.position_m[0], place.position_m[2]])
         && outline.iter().map(shrunk).all(is_borne)
-        && bottom_m(&solids) > top_m - TOUCH_M
         && layout.is_clear(&[(index, place)]);
     is_valid.then_some(place)
 }

@@ -2,11 +2,11 @@
 
 use super::{
     layout::{Layout, Placement, overlap},
-    placement::{AT_WALL_M, Pose2, RoomPlan, round_to, turned_deg},
+    placement::{AT_WALL_M, Pose2, RoomPlan, Rules, round_to, turned_deg},
     reserve::{self, Floor},
 };
 use crate::{
-    assets::{groups::GroupDefinition, placement::Place},
+    assets::placement::Place,
     geometry::{Vec2, Vec3, add, rotate, sub, yaw_rotation},
     world::footprint::Footprint,
 };
@@ -25,8 +25,8 @@ pub struct Unit {
     pub definition: Option<usize>,
     /// All objects, each root with all that it bears behind it.
     members: Vec<Member>,
-    /// Ways in which it may stand.
-    pub anchors: Vec<Place>,
+    /// Ways in which it should stand, and in which it may.
+    anchors: [Vec<Place>; 2],
     /// Centre of the main root.
     pivot_m: Vec3,
     /// Yaw of the unit's frame: its back is at -z.
@@ -64,20 +64,21 @@ impl Unit {
     ///
     /// # Arguments
     /// * `roots` - the main one first; at least one.
-    /// * `definition` - index and definition of the group that the roots are.
-    /// * `anchors` - ways in which it may stand; where empty, the way it stands now.
+    /// * `definition` - index of the definition of the group that the roots are.
+    /// * `anchors` - ways in which it should stand, and in which it may; where empty, the way it
+    ///   stands now.
     pub fn new(
         layout: &Layout,
         roots: &[usize],
-        definition: Option<(usize, &GroupDefinition)>,
-        anchors: &[Place],
+        definition: Option<usize>,
+        anchors: [&[Place]; 2],
         plan: &RoomPlan,
     ) -> Self {
         let mut unit = Self {
             roots: roots.to_vec(),
-            definition: definition.map(|(index, _)| index),
+            definition,
             members: Vec::new(),
-            anchors: definition.map_or_else(|| anchors.to_vec(), |(_, group)| group.places.clone()),
+            anchors: anchors.map(<[Place]>::to_vec),
             pivot_m: layout.items[roots[0]].placement.position_m,
             yaw_deg: layout.items[roots[0]].placement.rotation_deg[1],
             min_m: [0.0; 2],
@@ -91,7 +92,7 @@ impl Unit {
             }
         }
         unit.measure();
-        if unit.anchors.is_empty() || (roots.len() > 1 && definition.is_none()) {
+        if unit.anchors[1].is_empty() {
             unit.turn_back_to_wall(plan);
         }
         unit
@@ -180,7 +181,13 @@ impl Unit {
         if !at_wall.is_empty() {
             *self = at_wall.swap_remove(0);
         }
-        self.anchors = anchors;
+        self.anchors = [anchors.clone(), anchors];
+    }
+
+    /// Ways in which it stands by the rules.
+    pub fn anchors(&self, rules: Rules) -> &[Place] {
+        let [preferred, all] = &self.anchors;
+        if rules == Rules::All { preferred } else { all }
     }
 
     /// The floor that it keeps as it stands.
