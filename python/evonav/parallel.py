@@ -27,7 +27,7 @@ FailureKind = Literal["crash", "timeout", "error"]
 
 MAX_LOSSES = 2
 """Workers that a job may lose before it is given up."""
-MAX_FAILED_STARTS = 3
+MAX_FAILED_STARTS = 10
 """Workers in a row that may die before they are ready."""
 START_TIMEOUT_S = 300.0
 """For a worker to be ready."""

@@ -203,6 +203,7 @@ class _Run:
             wanted: Only these.
 
         Raises:
+            InvalidArgumentError: An option is outside its domain.
             StoreError: A task or the journal cannot be written.
         """
         done = self._journal.outcomes
@@ -236,6 +237,8 @@ class _Run:
             )
         else:
             values = json.loads(answer.text)
+            if "refused" in values:
+                raise InvalidArgumentError(values["refused"])
             if "stop" in values:
                 raise StoreError(values["stop"])
             outcome = Outcome.model_validate(values)

@@ -68,8 +68,8 @@ def make_worker(settings: str) -> Callable[[str], str]:
         settings: `{"out": ..., "options": ...}`.
 
     Returns:
-        It takes `[index, name]` and, after a line feed, the house; and gives an `Outcome`, or `{"stop": ...}` where
-        nothing can be written.
+        It takes `[index, name]` and, after a line feed, the house; and gives an `Outcome`, or `{"refused": ...}` for
+        bad options, or `{"stop": ...}` where nothing can be written.
     """
     values = json.loads(settings)
     options, out = GenerationOptions.from_json(values["options"]), Path(values["out"])
@@ -79,7 +79,9 @@ def make_worker(settings: str) -> Callable[[str], str]:
         index, name = json.loads(head)
         try:
             return do_house(index, name, house, options, out).model_dump_json()
-        except (InvalidArgumentError, TaskError, OSError) as error:
+        except InvalidArgumentError as error:
+            return json.dumps({"refused": str(error)})
+        except (TaskError, OSError) as error:
             return json.dumps({"stop": str(error)})
 
     return work
