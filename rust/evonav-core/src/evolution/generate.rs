@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use serde::Serialize;
 
 use super::{
-    Parameters,
+    Extensions, Parameters,
     beyond::Transition,
     evolve::no_evolution,
     record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason, Rejected},
@@ -89,6 +89,7 @@ pub fn generate_task(
             Some(household) => transition.follow_schedule(&world, household)?,
             None => generator.sample_scene_evolution(&world, &state, stage)?,
         };
+        let is_changed = !delta.is_empty() || parameters.extensions != Extensions::default();
         if !delta.is_empty() {
             world = StageWorld::build(world.house.apply(&delta)?, catalogue, unknown)?;
         }
@@ -101,9 +102,12 @@ pub fn generate_task(
             Ok(made) => made,
             Err(rejected) => return Ok(Generation::Rejected(rejected)),
         };
-        let (target, reference, rejections) = made;
-        task.images.push(reference.image.clone());
-        task.houses.push(world.house.to_json());
+        let (target, mut reference, rejections) = made;
+        task.images.push(std::mem::take(&mut reference.image));
+        task.houses.push(match task.houses.last().filter(|_| !is_changed) {
+            Some(house) => house.clone(),
+            None => world.house.to_json(),
+        });
         task.stages.push(GeneratedStage {
             relations: relations_of(&world.house, &world.layout, target.index),
             target: target.record,

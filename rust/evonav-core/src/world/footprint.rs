@@ -8,7 +8,10 @@ use crate::{
     error::Error,
     geometry::{Vec2, Vec3, add, rotate},
     house::House,
-    world::{mesh::outline, scene::Scene},
+    world::{
+        mesh::{each_polygon, vertices_of},
+        scene::Scene,
+    },
 };
 
 /// Points nearer than this are one.
@@ -30,10 +33,9 @@ pub struct Footprint {
 ///
 /// Of the polyhedron that is drawn, so that the agent collides with what it sees.
 pub fn footprint(part: &Part, low_m: f64, high_m: f64) -> Option<Footprint> {
-    let (mut corners, polygons) = outline(&part.primitive);
-    for corner in &mut corners {
-        *corner = add(rotate(&part.rotation, *corner), part.centre_m);
-    }
+    let own = vertices_of(&part.primitive);
+    let place = |corner: &Vec3| add(rotate(&part.rotation, *corner), part.centre_m);
+    let corners: Vec<Vec3> = own.iter().map(place).collect();
     let mut shadow: Vec<Vec2> = Vec::with_capacity(corners.len());
     let (mut bottom_m, mut top_m) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut keep = |point: Vec3| {
@@ -45,17 +47,23 @@ pub fn footprint(part: &Part, low_m: f64, high_m: f64) -> Option<Footprint> {
         keep(corner);
     }
     // The band's faces cut the solid along polygons whose corners lie on its edges.
-    for polygon in &polygons {
-        for (k, &i) in polygon.iter().enumerate() {
-            let (a, b) = (corners[i as usize], corners[polygon[(k + 1) % polygon.len()] as usize]);
-            for height in [low_m, high_m] {
-                // Each edge runs upwards in one of its two faces.
-                if a[1] < height && height <= b[1] {
-                    let t = (height - a[1]) / (b[1] - a[1]);
-                    keep([a[0] + t * (b[0] - a[0]), height, a[2] + t * (b[2] - a[2])]);
+    let is_cut = |height: f64| {
+        corners.iter().any(|c| c[1] < height) && corners.iter().any(|c| height <= c[1])
+    };
+    if is_cut(low_m) || is_cut(high_m) {
+        each_polygon(&part.primitive, &own, |polygon| {
+            for (k, &i) in polygon.iter().enumerate() {
+                let b = corners[polygon[(k + 1) % polygon.len()] as usize];
+                let a = corners[i as usize];
+                for height in [low_m, high_m] {
+                    // Each edge runs upwards in one of its two faces.
+                    if a[1] < height && height <= b[1] {
+                        let t = (height - a[1]) / (b[1] - a[1]);
+                        keep([a[0] + t * (b[0] - a[0]), height, a[2] + t * (b[2] - a[2])]);
+                    }
                 }
             }
-        }
+        });
     }
     (!shadow.is_empty()).then(|| Footprint { outline_m: convex_hull(shadow), bottom_m, top_m })
 }

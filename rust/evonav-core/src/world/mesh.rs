@@ -116,12 +116,12 @@ impl SceneMesh {
 
     fn push(&mut self, part: &Part, body: u32, is_shown: impl Fn(Vec3) -> bool) {
         let (first_vertex, first_face) = (self.vertices_m.len(), self.faces.len());
-        let (vertices_m, polygons) = outline(&part.primitive);
+        let vertices_m = vertices_of(&part.primitive);
         let to_world = |v: &Vec3| add(part.centre_m, rotate(&part.rotation, *v));
         self.vertices_m.extend(vertices_m.iter().map(to_world));
-        for polygon in polygons {
-            self.push_polygon(&polygon, first_vertex, body, part.colour, &is_shown);
-        }
+        each_polygon(&part.primitive, &vertices_m, |polygon| {
+            self.push_polygon(polygon, first_vertex, body, part.colour, &is_shown);
+        });
         if self.faces.len() == first_face {
             self.vertices_m.truncate(first_vertex);
             return;
@@ -193,26 +193,18 @@ pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Vertices of a primitive in its own frame, and its outward polygons as indices of them.
-pub(crate) fn outline(primitive: &Primitive) -> (Vec<Vec3>, Vec<Vec<u32>>) {
+/// Vertices of a primitive in its own frame.
+pub(crate) fn vertices_of(primitive: &Primitive) -> Vec<Vec3> {
     match *primitive {
         Primitive::Cuboid { half_m } => {
             let corner = |i: usize, axis: usize| {
                 if i >> axis & 1 == 1 { half_m[axis] } else { -half_m[axis] }
             };
-            let vertices_m = (0..8).map(|i| std::array::from_fn(|axis| corner(i, axis))).collect();
-            let polygons = [
-                [1, 3, 7, 5],
-                [0, 4, 6, 2],
-                [2, 6, 7, 3],
-                [0, 1, 5, 4],
-                [4, 5, 7, 6],
-                [0, 2, 3, 1],
-            ];
-            (vertices_m, polygons.iter().map(|p| p.to_vec()).collect())
+            (0..8).map(|i| std::array::from_fn(|axis| corner(i, axis))).collect()
         }
         Primitive::Frustum { bottom_m, top_m, half_height_m, sides } => {
-            rings(usize::from(sides.max(3)), &[(bottom_m, -half_height_m), (top_m, half_height_m)])
+            let levels = [(bottom_m, -half_height_m), (top_m, half_height_m)];
+            rings(usize::from(sides.max(3)), &levels)
         }
         Primitive::Ellipsoid { half_m: [x, y, z] } => {
             let ring = |band: usize| {
@@ -223,43 +215,62 @@ pub(crate) fn outline(primitive: &Primitive) -> (Vec<Vec3>, Vec<Vec<u32>>) {
                 let radius = if is_pole { 0.0 } else { latitude_rad.cos() };
                 ([x * radius, z * radius], y * latitude_rad.sin())
             };
-            let levels: Vec<_> = (0..=ELLIPSOID_BANDS).map(ring).collect();
+            let levels: [_; ELLIPSOID_BANDS + 1] = std::array::from_fn(ring);
             rings(ELLIPSOID_MERIDIANS, &levels)
         }
     }
 }
 
-/// The solid between elliptic rings `(half axes [x, z], y)`, lowest first, over a regular
+/// The solid's corners on elliptic rings `(half axes [x, z], y)`, lowest first, over a regular
 /// `sides`-gon with a corner on +x.
-fn rings(sides: usize, levels: &[([f64; 2], f64)]) -> (Vec<Vec3>, Vec<Vec<u32>>) {
+fn rings(sides: usize, levels: &[([f64; 2], f64)]) -> Vec<Vec3> {
     let turn = |k: usize| (std::f64::consts::TAU * k as f64 / sides as f64).sin_cos();
-    let vertices_m: Vec<Vec3> = levels
-        .iter()
-        .flat_map(|&([x, z], y)| {
-            (0..sides).map(move |k| {
-                let (sin, cos) = turn(k);
-                [x * cos, y, z * sin]
-            })
-        })
-        .collect();
-    let sides = sides as u32;
-    let last = sides * (levels.len() as u32 - 1);
-    let mut polygons = vec![(0..sides).collect(), (last..last + sides).rev().collect()];
-    for low in (0..last).step_by(sides as usize) {
-        polygons.extend((0..sides).map(|k| {
-            let next = (k + 1) % sides;
-            vec![low + k, low + sides + k, low + sides + next, low + next]
-        }));
-    }
+    let turns: Vec<(f64, f64)> = (0..sides).map(turn).collect();
+    let ring =
+        |&([x, z], y): &([f64; 2], f64)| turns.iter().map(move |(sin, cos)| [x * cos, y, z * sin]);
+    levels.iter().flat_map(ring).collect()
+}
+
+/// Faces of a cuboid.
+const CUBOID: [[u32; 4]; 6] =
+    [[1, 3, 7, 5], [0, 4, 6, 2], [2, 6, 7, 3], [0, 1, 5, 4], [4, 5, 7, 6], [0, 2, 3, 1]];
+
+/// Calls `visit` with each of a primitive's outward polygons, as indices of its vertices.
+///
+/// # Arguments
+/// * `vertices_m` - [`vertices_of`] the primitive, in its own frame.
+pub(crate) fn each_polygon(
+    primitive: &Primitive,
+    vertices_m: &[Vec3],
+    mut visit: impl FnMut(&[u32]),
+) {
+    let sides = match *primitive {
+        Primitive::Cuboid { .. } => return CUBOID.iter().for_each(|polygon| visit(polygon)),
+        Primitive::Frustum { sides, .. } => u32::from(sides.max(3)),
+        Primitive::Ellipsoid { .. } => ELLIPSOID_MERIDIANS as u32,
+    };
+    let last = vertices_m.len() as u32 - sides;
+    let mut polygon = Vec::new();
+    let at = |i: u32| vertices_m[i as usize];
     // Rings shrunk to a point have coinciding corners.
-    for polygon in &mut polygons {
-        polygon.dedup_by_key(|&mut i| vertices_m[i as usize]);
-        while polygon.len() > 1
-            && vertices_m[polygon[0] as usize] == vertices_m[polygon[polygon.len() - 1] as usize]
-        {
+    let mut visit_distinct = |corners: &mut dyn Iterator<Item = u32>| {
+        polygon.clear();
+        polygon.extend(corners);
+        polygon.dedup_by_key(|&mut i| at(i));
+        while polygon.len() > 1 && at(polygon[0]) == at(polygon[polygon.len() - 1]) {
             polygon.pop();
         }
+        if polygon.len() >= 3 {
+            visit(&polygon);
+        }
+    };
+    visit_distinct(&mut (0..sides));
+    visit_distinct(&mut (last..last + sides).rev());
+    for low in (0..last).step_by(sides as usize) {
+        for k in 0..sides {
+            let next = (k + 1) % sides;
+            let corners = [low + k, low + sides + k, low + sides + next, low + next];
+            visit_distinct(&mut corners.into_iter());
+        }
     }
-    polygons.retain(|polygon| polygon.len() >= 3);
-    (vertices_m, polygons)
 }
