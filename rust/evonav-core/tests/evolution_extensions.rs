@@ -197,9 +197,8 @@ fn check(task: &GeneratedTask) -> [usize; 4] {
         }
         for change in evolution.states.iter().filter(|change| change.field == "openness") {
             assert!((0.0..=1.0).contains(&change.after) && change.before != change.after);
-            let body = |k: usize| scenes[k].bodies.iter().find(|body| body.id == change.id);
-            // What has just come may be open: then it is checked with all its parts.
-            let (Some(old), Some(new)) = (body(k - 1), body(k)) else { continue };
+            let [old, new] = [k - 1, k]
+                .map(|k| scenes[k].bodies.iter().find(|body| body.id == change.id).unwrap());
             let is_moved = |part: &&Part| !old.parts.contains(part);
             let moved: Vec<Part> = new.parts.iter().filter(is_moved).copied().collect();
             assert!(!moved.is_empty(), "{} shows that it is {}", change.id, change.after);

@@ -64,7 +64,7 @@ def check_changes(before: dict[str, Any], after: dict[str, Any], oracle: OracleS
     yield from _check_objects("removals", evolution.removals, old)
     yield from _check_states(before, after, old, new, oracle)
     causes = {change.cause for change in evolution.changes}
-    if (evolution.outcome == "evolved") != bool(causes & MODES):
+    if (evolution.outcome == "evolved") != bool(causes):
         yield "change_record", f"outcome is {evolution.outcome!r}, causes of the changes are {sorted(map(str, causes))}"
     if not causes & MODES <= {evolution.mode}:
         yield "change_record", f"mode is {evolution.mode!r}, causes of the changes are {sorted(map(str, causes))}"

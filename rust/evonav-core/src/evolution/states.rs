@@ -13,6 +13,7 @@ use crate::{
         part::Part,
         shapes::{drawn_openness, shows_light},
     },
+    geometry::Aabb,
     house::{HouseDelta, StateChange},
     world::{
         footprint::{Footprint, footprint},
@@ -24,6 +25,8 @@ use crate::{
 const LEVELS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 /// A smaller change of openness is none.
 const LEAST_CHANGE: f64 = 0.125;
+/// Something whose bottom is this near the top of a part may stand on it.
+const BEARING_M: f64 = 0.03;
 
 /// Something that can open.
 struct Openable {
@@ -42,7 +45,8 @@ impl Transition<'_> {
     ) -> Result<StageWorld, Error> {
         let house = &world.house;
         let objects = house.objects.iter().zip(&world.layout.items);
-        let openables = objects.filter(|(object, _)| self.is_free(house, object.room));
+        let openables = objects
+            .filter(|(object, _)| self.is_free(house, object.room) && !is_new(record, &object.id));
         let openables = openables.filter_map(|(object, item)| {
             Some(Openable {
                 id: object.id.clone(),
@@ -102,7 +106,8 @@ impl Transition<'_> {
                 let delta = HouseDelta { states: vec![change], ..HouseDelta::default() };
                 let next = self.rebuilt(world.house.apply(&delta)?)?;
                 let [old, new] = [&world, &next].map(|world| &world.layout.scene);
-                if has_room(old, new, &one.id) && self.reaches_as_much(&world, &next)? {
+                let is_valid = has_room(old, new, &one.id) && keeps_up(&world, old, new, &one.id);
+                if is_valid && self.reaches_as_much(&world, &next)? {
                     record.states.push(StateChangeRecord {
                         id: one.id.clone(),
                         category: one.category.clone(),
@@ -130,6 +135,7 @@ impl Transition<'_> {
         let house = &world.house;
         let shows = |&index: &usize| {
             self.is_free(house, house.objects[index].room)
+                && !is_new(record, &house.objects[index].id)
                 && shows_light(&world.layout.items[index].asset)
         };
         let mut lights: Vec<usize> = (0..house.objects.len()).filter(shows).collect();
@@ -155,6 +161,39 @@ impl Transition<'_> {
         }
         self.rebuilt(house.apply(&delta)?)
     }
+}
+
+/// Whether what stands on a body stands where it stood, and not on parts that are elsewhere in
+/// `new`.
+fn keeps_up(world: &StageWorld, old: &Scene, new: &Scene, id: &str) -> bool {
+    let body = |scene: &'_ Scene, id: &str| scene.bodies.iter().position(|body| body.id == id);
+    let (Some(before), Some(after)) = (body(old, id), body(new, id)) else { return false };
+    let Some(index) = world.house.object_index(id) else { return true };
+    let left: Vec<Aabb> = old.bodies[before]
+        .parts
+        .iter()
+        .filter(|part| !new.bodies[after].parts.contains(part))
+        .map(Part::aabb)
+        .collect();
+    world.house.objects[index].children.iter().all(|&child| {
+        let (before, after) = (old.first_object + child, new.first_object + child);
+        let Some((then, now)) = old.bodies.get(before).zip(new.bodies.get(after)) else {
+            return false;
+        };
+        let bears = |part: &Aabb| {
+            (part.max_m[1] - then.aabb.min_m[1]).abs() < BEARING_M
+                && [0, 2].iter().all(|&axis| {
+                    part.min_m[axis] <= then.aabb.max_m[axis]
+                        && then.aabb.min_m[axis] <= part.max_m[axis]
+                })
+        };
+        then.aabb == now.aabb && !left.iter().any(bears)
+    })
+}
+
+/// Whether something came at this very transition: it is in the state in which it came.
+fn is_new(record: &EvolutionRecord, id: &str) -> bool {
+    record.additions.iter().any(|object| object.id == id)
 }
 
 /// Whether the parts of a body that are elsewhere in `new` than in `old` touch no other body; a
