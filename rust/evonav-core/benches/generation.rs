@@ -15,13 +15,15 @@ const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");
 fn bench_generation(c: &mut Criterion) {
     let house = House::from_json("house_100_objects", HOUSE).expect("a valid house");
     let papers = Parameters { num_stages: vec![4], ..Parameters::default() };
-    let shuffling = Parameters {
+    let [retaining, shuffling] = [[1.0, 0.0], [0.0, 1.0]].map(|[retain, shuffle]| Parameters {
         evolve_probability: 1.0,
         salient_object_probability: 0.0,
-        retain_group_probability: 0.0,
+        retain_group_probability: retain,
+        full_shuffle_probability: shuffle,
         ..papers.clone()
-    };
-    for (name, parameters) in [("papers", papers), ("full_shuffle", shuffling)] {
+    });
+    let all = [("papers", papers), ("retain_group", retaining), ("full_shuffle", shuffling)];
+    for (name, parameters) in all {
         let mut seed = 0;
         c.bench_function(&format!("generate_task/4_stages_{name}"), |b| {
             b.iter(|| {

@@ -67,7 +67,9 @@ pub(super) fn category_default(catalogue: &Catalogue, house: &House, object: &Ob
         object_type.strip_prefix("Obja").filter(|rest| !rest.is_empty()).unwrap_or(object_type);
     let alike = like(catalogue, category);
     let model = alike.and_then(|name| catalogue.median_size_m(name)).unwrap_or(BLOCK);
-    let is_on_wall = object.id.contains("|wall|") || alike == Some("Painting");
+    // What stands on something is no picture, whatever its name and the next wall.
+    let is_like_picture = alike == Some("Painting") && object.parent.is_none();
+    let is_on_wall = object.id.contains("|wall|") || is_like_picture;
     let size_m = match wall_distance_m(house, object)
         .filter(|&d| is_on_wall && d < MAX_WALL_DISTANCE_M)
     {
