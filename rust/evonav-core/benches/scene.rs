@@ -6,7 +6,10 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use evonav_core::{
     assets::{Catalogue, UnknownAssets, shapes::shape_of},
     house::House,
-    world::scene::Scene,
+    world::{
+        inspect::{Tolerances, inspect},
+        scene::Scene,
+    },
 };
 
 const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");
@@ -28,6 +31,10 @@ fn bench_scene(c: &mut Criterion) {
     });
     c.bench_function("scene/rebuild_5_of_100_objects", |b| {
         b.iter(|| scene.rebuild(black_box(&house), catalogue, unknown, &moved));
+    });
+    c.bench_function("scene/inspect_100_objects", |b| {
+        let tolerances = Tolerances { touch_m: 0.0025, rest_m: 0.02 };
+        b.iter(|| inspect((&house, &scene), (black_box(&house), &scene), tolerances));
     });
     c.bench_function("scene/shapes_of_all_assets", |b| {
         let ids = catalogue.asset_ids();

@@ -1,10 +1,14 @@
 //! Physics of changed houses, against the separating axis theorem and by hand.
 
 use evonav_core::{
-    assets::part::{Part, Primitive, aabb_of},
+    assets::{
+        Catalogue, UnknownAssets,
+        part::{Part, Primitive, aabb_of},
+    },
     geometry::{Aabb, Vec3, add, euler_rotation_deg, rotate, sub},
+    house::{House, HouseDelta, ObjectMove},
     world::{
-        inspect::Inspector,
+        inspect::{Finding, FindingKind, Inspector, Tolerances, inspect_houses},
         scene::{Body, BodyKind, OrientedBox, Scene},
     },
 };
@@ -123,5 +127,105 @@ proptest! {
         let scene = scene_of(vec![vec![a], vec![b]]);
         let found_m = Inspector::new(&scene).depth_m(0, 1);
         prop_assert!((found_m - expected_m).abs() < 1e-6, "found {found_m}, expected {expected_m}");
+    }
+}
+
+const TOLERANCES: Tolerances = Tolerances { touch_m: 0.0025, rest_m: 0.02 };
+
+fn recorded() -> House {
+    House::from_json("house", include_str!("data/house_100_objects.json")).expect("a valid house")
+}
+
+fn findings(source: &House, stage: &House) -> Vec<Finding> {
+    inspect_houses(source, stage, Catalogue::bundled(), UnknownAssets::Error, TOLERANCES)
+        .expect("known assets")
+}
+
+/// Moves a root, with all that stands on it, by an offset.
+fn shifted(house: &House, root: usize, offset_m: Vec3) -> House {
+    let on_it = |&index: &usize| {
+        std::iter::successors(Some(index), |&above| house.objects[above].parent).any(|i| i == root)
+    };
+    let moves = (0..house.objects.len()).filter(on_it).map(|index| {
+        let object = &house.objects[index];
+        ObjectMove {
+            id: object.id.clone(),
+            position_m: add(object.position_m, offset_m),
+            rotation_deg: object.rotation_deg,
+            parent: object.parent.map(|parent| house.objects[parent].id.clone()),
+        }
+    });
+    house.apply(&HouseDelta { moves: moves.collect(), ..HouseDelta::default() }).expect("all known")
+}
+
+fn foreign(source: &House, stage: &House) -> Vec<(FindingKind, String)> {
+    let found = findings(source, stage).into_iter().filter(|finding| !finding.is_own);
+    found.map(|finding| (finding.kind, finding.id)).collect()
+}
+
+/// Whether flat-sided parts of two objects are deeper in each other than a touch.
+fn overlap(house: &House, one: usize, other: usize) -> bool {
+    let scene = Scene::build(house, Catalogue::bundled(), UnknownAssets::Error).expect("known");
+    let parts = |object: usize| {
+        let parts = scene.bodies[scene.first_object + object].parts.clone();
+        parts.into_iter().filter(|part| !matches!(part.primitive, Primitive::Ellipsoid { .. }))
+    };
+    parts(one).any(|a| parts(other).any(|b| depth_by_axes(&a, &b) > TOLERANCES.touch_m))
+}
+
+#[test]
+fn a_house_owns_what_it_has() {
+    let house = recorded();
+    assert!(findings(&house, &house).iter().all(|finding| finding.is_own));
+}
+
+#[test]
+fn furniture_in_the_air_the_floor_and_other_furniture_is_found() {
+    let house = recorded();
+    let roots: Vec<usize> = (0..house.objects.len())
+        .filter(|&i| house.objects[i].parent.is_none() && house.objects[i].position_m[1] < 0.6)
+        .take(12)
+        .collect();
+    let mut num_touched = 0;
+    for &root in &roots {
+        let id = &house.objects[root].id;
+        let raised = foreign(&house, &shifted(&house, root, [0.0, 0.3, 0.0]));
+        assert!(raised.contains(&(FindingKind::Unsupported, id.clone())), "{id}: {raised:?}");
+        let sunk = foreign(&house, &shifted(&house, root, [0.0, -0.1, 0.0]));
+        assert!(sunk.contains(&(FindingKind::InFloor, id.clone())), "{id}: {sunk:?}");
+        for &other in &roots {
+            let apart = |i: usize| house.objects[i].position_m;
+            if other == root {
+                continue;
+            }
+            let mut offset_m = sub(apart(other), apart(root));
+            offset_m[1] = 0.0;
+            let stage = shifted(&house, root, offset_m);
+            let touched = findings(&house, &stage).into_iter().any(|finding| {
+                !finding.is_own
+                    && finding.kind == FindingKind::Penetration
+                    && [&finding.id, &finding.other_id].contains(&&house.objects[other].id)
+            });
+            assert!(
+                touched || !overlap(&stage, root, other),
+                "{id} at {}",
+                house.objects[other].id
+            );
+            num_touched += usize::from(touched);
+        }
+        let away = foreign(&house, &shifted(&house, root, [50.0, 0.0, 0.0]));
+        assert!(away.iter().all(|(kind, _)| *kind != FindingKind::Penetration), "{id}: {away:?}");
+    }
+    assert!(num_touched > 100, "{num_touched}");
+}
+
+#[test]
+fn bad_tolerances_are_named() {
+    let house = recorded();
+    for (touch_m, rest_m, name) in [(-1.0, 0.0, "touch_m"), (0.0, f64::NAN, "rest_m")] {
+        let tolerances = Tolerances { touch_m, rest_m };
+        let catalogue = Catalogue::bundled();
+        let refused = inspect_houses(&house, &house, catalogue, UnknownAssets::Error, tolerances);
+        assert!(refused.unwrap_err().to_string().contains(name));
     }
 }
