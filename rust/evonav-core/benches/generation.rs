@@ -5,7 +5,9 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::{Parameters, SpawnRequest, generate_task, random_spawn},
+    evolution::{
+        Extensions, Occurrence, Parameters, Schedule, SpawnRequest, generate_task, random_spawn,
+    },
     house::House,
     world::scene::Scene,
 };
@@ -22,8 +24,26 @@ fn bench_generation(c: &mut Criterion) {
         full_shuffle_probability: shuffle,
         ..papers.clone()
     });
-    let all = [("papers", papers), ("retain_group", retaining), ("full_shuffle", shuffling)];
-    for (name, parameters) in all {
+    let often = Some(Occurrence { probability: 1.0, max_count: 3 });
+    let extended = Extensions {
+        insertion: often,
+        removal: often,
+        doors: often,
+        openables: often,
+        switches: often,
+        schedule: None,
+    };
+    let people = Schedule { num_persons: 3, minutes_between_stages: 180, tidiness: 0.8 };
+    let people = Extensions { schedule: Some(people), ..Extensions::default() };
+    let extended = Parameters { extensions: extended, ..papers.clone() };
+    let lived_in = Parameters { extensions: people, ..papers.clone() };
+    for (name, parameters) in [
+        ("papers", papers),
+        ("retain_group", retaining),
+        ("full_shuffle", shuffling),
+        ("extensions", extended),
+        ("schedule", lived_in),
+    ] {
         let mut seed = 0;
         c.bench_function(&format!("generate_task/4_stages_{name}"), |b| {
             b.iter(|| {
