@@ -6,8 +6,14 @@ import sys
 
 from benches.table import write_section
 
-SECTIONS = {"memory": "Memory", "navigation": "Navigation", "rendering": "Rendering", "thor": "AI2-THOR engine"}
-"""Module by title. A module has `NOTES` (Markdown) and `run() -> list[Row]`."""
+SECTIONS = {
+    "generation": "Task generation",
+    "memory": "Memory",
+    "navigation": "Navigation",
+    "rendering": "Rendering",
+    "thor": "AI2-THOR engine",
+}
+"""Module by title. A module has `NOTES` (Markdown) and `run()`, which gives a list of `Row` or a table."""
 
 
 def main() -> None:

@@ -84,10 +84,12 @@ def compare(
     ]
 
 
-def write_section(title: str, notes: str, rows: Sequence[Row]) -> str:
-    """Replaces a section of the README, or appends it; returns the section."""
-    lines = ["| operation | evonav | peer | its time | ratio |", "| --- | --- | --- | --- | --- |"]
-    lines += [_line(row) for row in rows]
+def write_section(title: str, notes: str, rows: Sequence[Row] | str) -> str:
+    """Replaces a section of the README, or appends it; returns the section. A string is a table of its own kind."""
+    lines = [rows] if isinstance(rows, str) else []
+    if not isinstance(rows, str):
+        lines += ["| operation | evonav | peer | its time | ratio |", "| --- | --- | --- | --- | --- |"]
+        lines += [_line(row) for row in rows]
     body = "\n".join([f"## {title}", notes.strip(), "", *lines, "", f"Measured on {_machine()}.", ""])
     sections = _sections(README.read_text(encoding="utf-8")) if README.exists() else {}
     sections[title] = body
