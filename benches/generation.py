@@ -20,7 +20,7 @@ from evonav.house import House
 from evonav.house.files import HouseText, HouseTexts
 
 NOTES = """One process, the paper's parameters, everything written: houses, records and images of all stages. Times are
-CPU time, kernel included. *Core* is Algorithm 1 in Rust with the reference images drawn, *files* is packing and writing,
+CPU time, kernel included. *Core* is Algorithm 1 in Rust with the reference images drawn, *files* packing and writing,
 *rest* is parsing the house, instructions, records and checksums. Memory is the process's greatest resident set after
 the first 100 tasks and after all; where a file has fewer houses than tasks, it is gone through again with other seeds.
 There is no peer to run beside it: EvoNav-Bench's own generator is not published. Nearest is the object placement of the
