@@ -4,6 +4,7 @@ Nothing of the generator's placement, collision or navigation is used; only the 
 (`House.footprints`) and the task's files. By hand, over many houses:
 
     python tests/generation/second_opinion.py HOUSES.jsonl.gz [--limit N] [--seed S] [--evolve P]
+    python tests/generation/second_opinion.py FOLDER_OF_TASKS
 """
 
 import argparse
@@ -14,14 +15,16 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
+import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
 from evonav.errors import EvonavError
 from evonav.generation import GenerationParameters, generate_task
 from evonav.house import House, load_houses
-from evonav.tasks import Task
+from evonav.tasks import Task, load_tasks
 
 AGENT_RADIUS_M, AGENT_HEIGHT_M = 0.2, 1.8
 """AI2-THOR's default agent, a capsule."""
@@ -264,11 +267,14 @@ def _overlap_m(a: Thing, b: Thing) -> float:
 
 
 def _width_m(shape: BaseGeometry) -> float:
-    """The shorter side of the smallest rectangle around it."""
+    """Least width of a convex shape: over its edges, of how far it reaches from the edge's line."""
     if shape.area == 0.0:
         return 0.0
-    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(shape))
-    return min(math.dist(corners[0], corners[1]), math.dist(corners[1], corners[2]))
+    corners = shapely.get_coordinates(shape.convex_hull)[:-1]
+    edges = np.roll(corners, -1, axis=0) - corners
+    normals = np.stack([-edges[:, 1], edges[:, 0]], axis=1) / np.linalg.norm(edges, axis=1, keepdims=True)
+    reach_m = np.abs(np.einsum("eij,ej->ei", corners[None] - corners[:, None], normals)).max(axis=1)
+    return float(reach_m.min())
 
 
 def _unsupported(before: Plan, plan: Plan, moved: Iterable[str]) -> Iterator[tuple[str, str, str]]:
@@ -310,12 +316,7 @@ def main() -> None:
     parameters = GenerationParameters(evolve_probability=arguments.evolve)
     counts: Counter[str] = Counter()
     shown: Counter[str] = Counter()
-    for house in itertools.chain.from_iterable(load_houses(path, arguments.limit) for path in arguments.houses):
-        try:
-            task = generate_task(house, seed=arguments.seed, config=parameters, allow_unknown_assets=True)
-        except EvonavError:
-            counts["(no task)"] += 1
-            continue
+    for task in _tasks(arguments.houses, arguments.limit, arguments.seed, parameters, counts):
         counts["(tasks)"] += 1
         counts["(evolved stages)"] += sum(stage.evolution.outcome == "evolved" for stage in task.oracle_stages)
         counts["(moved objects)"] += sum(len(stage.evolution.changes) for stage in task.oracle_stages)
@@ -327,9 +328,24 @@ def main() -> None:
             counts[problem.kind] += 1
             shown[problem.kind] += 1
             if shown[problem.kind] <= arguments.show:
-                print(problem)
+                print(problem, flush=True)
     for kind, count in sorted(counts.items()):
         print(f"{count:8} {kind}")
+
+
+def _tasks(
+    paths: list[str], limit: int | None, seed: int, parameters: GenerationParameters, counts: Counter[str]
+) -> Iterator[Task]:
+    """Tasks of folders of tasks, and made of files of houses."""
+    for path in paths:
+        if Path(path).is_dir():
+            yield from load_tasks(path, limit)
+            continue
+        for house in load_houses(path, limit):
+            try:
+                yield generate_task(house, seed=seed, config=parameters, allow_unknown_assets=True)
+            except EvonavError:
+                counts["(no task)"] += 1
 
 
 if __name__ == "__main__":
