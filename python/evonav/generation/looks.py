@@ -40,8 +40,12 @@ _UPRIGHT = {
     "Vase",
 }
 """Things that people tell apart by how tall or wide they are."""
+_BROAD = {"Cabinet", "Dresser", "ShelvingUnit", "TVStand"}
+"""Of these, what is called wide."""
+_SOFT = {"ArmChair", "Bed", "DogBed", "Footstool", "Ottoman", "Sofa"}
+"""Upholstered things, whose frames hardly show."""
 _UNSAID: dict[str, set[str]] = {
-    "fabric": {"Cloth", "HandTowel", "Pillow", "ShowerCurtain", "Towel"},
+    "fabric": {"Bed", "Cloth", "HandTowel", "Pillow", "ShowerCurtain", "Towel"},
     "paper": {"Book", "Newspaper", "PaperTowelRoll", "TissueBox", "ToiletPaper"},
     "rubber": {"BasketBall"},
     "wax": {"Candle"},
@@ -120,7 +124,7 @@ def shape_word(category: str, appearance: Appearance) -> str | None:
         ratio, usual = height_m / long_m, float(np.median(heights))
         if ratio > 1.3 and ratio > 1.3 * usual:
             return "tall"
-        if ratio < 0.9 and ratio < usual / 1.3:
+        if category in _BROAD and ratio < 0.9 and ratio < usual / 1.3:
             return "wide"
     return None
 
@@ -136,10 +140,12 @@ def colour_words(tints: Iterable[Tint]) -> list[str]:
 
 def material_word(category: str, made_of: Iterable[str]) -> str | None:
     """What it is mainly made of, unless that goes without saying."""
-    first = next(iter(made_of), None)
+    materials = list(made_of)
+    covers = [material for material in materials if material in ("fabric", "leather")]
+    first = next(iter(covers if category in _SOFT else materials), None)
     if first not in MATERIALS or category in _UNSAID.get(first, ()):
         return None
-    return MATERIALS[first]
+    return "cardboard" if (category, first) == ("Box", "paper") else MATERIALS[first]
 
 
 def details_of(category: str, appearance: Appearance) -> list[str]:
@@ -167,7 +173,8 @@ def colour_word(colour: tuple[int, int, int]) -> str:
     if chroma < 0.09:
         return "black" if lightness < 0.2 else "grey" if lightness < 0.78 else "white"
     if hue_deg < 16.0 or hue_deg >= 345.0:
-        return "pink" if lightness > 0.65 else "brown" if chroma < 0.3 and lightness < 0.4 else "red"
+        is_dull = chroma < 0.36
+        return "pink" if lightness > (0.6 if is_dull else 0.7) else "brown" if is_dull else "red"
     if hue_deg < 46.0:
         if lightness > 0.6 and chroma < 0.45:
             return "beige"

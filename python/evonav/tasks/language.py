@@ -50,6 +50,7 @@ COLOURS = (
 """Words for the colours that a target shows in its reference image."""
 
 MATERIALS = {
+    "cardboard": "cardboard",
     "ceramic": "ceramic",
     "fabric": "fabric",
     "glass": "glass",

@@ -118,9 +118,9 @@ fn fits(all: &[Thing], house: &House, index: usize, said: &Relations, slack_m: f
     let neighbours = said.neighbours.iter().all(|anchor| {
         let mut company = near(all, index, anchor, 0.5 + slack_m);
         company.retain(|other| {
-            other.parent == own.parent
-                && (own.parent.is_none()
-                    || (other.bottom_m() - own.bottom_m()).abs() <= 0.15 + slack_m)
+            let is_level = (other.bottom_m() - own.bottom_m()).abs() <= 0.15 + slack_m;
+            let is_on_floor = other.parent.is_none() && other.bottom_m() < 0.05;
+            is_on_floor || own.parent.is_some() && other.parent == own.parent && is_level
         });
         company.len() >= if anchor.determiner == Determiner::Some { 2 } else { 1 }
     });

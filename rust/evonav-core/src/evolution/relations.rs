@@ -28,7 +28,7 @@ const MAX_NEIGHBOURS: usize = 2;
 /// Nearest categories that the anchors are chosen from.
 const MAX_CHOICES: usize = 8;
 
-/// What things are in, never on.
+/// What things are in, never on; but a faucet stands on its sink.
 const BASINS: [&str; 6] = ["Bathtub", "Box", "GarbageCan", "LaundryHamper", "Pot", "Sink"];
 /// What things are in, unless they stand on its top.
 const CLOSED: [&str; 3] = ["Fridge", "Microwave", "Safe"];
@@ -43,6 +43,9 @@ struct Claim<'a> {
     what: &'a str,
     determiner: Determiner,
     gap_m: f64,
+    /// Taken after all others of its kind: not on the target's support, or a corner, which is seen
+    /// from less far away than doors and windows.
+    is_aside: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -193,14 +196,12 @@ fn surroundings<'a>(
     });
     for (i, item) in in_room {
         let what = item.asset.category.as_str();
-        // On a support its company there is what is next to it; on the floor other furniture.
-        let is_company = match target.placement.parent {
-            Some(_) => {
-                item.placement.parent == target.placement.parent
-                    && (bottom_m(&item.solids) - bottom).abs() < SAME_BOARD_M
-            }
-            None => item.is_on_floor && target.is_on_floor,
-        };
+        // On a support its company there is what is next to it; furniture is next to both.
+        let is_fellow = target.placement.parent.is_some()
+            && item.placement.parent == target.placement.parent
+            && (bottom_m(&item.solids) - bottom).abs() < SAME_BOARD_M;
+        let is_company = is_fellow
+            || item.is_on_floor && !target.is_hung() && target.placement.parent != Some(i);
         let kind = if is_company {
             Kind::NextTo
         } else if !item.is_hung() || target.is_hung() {
@@ -214,15 +215,14 @@ fn surroundings<'a>(
         let gap_m = gap_to(i);
         if gap_m < reach_m {
             let determiner = one_of(count_in_room(house, layout, index, what));
-            claims.push(Claim { kind, what, determiner, gap_m });
+            let is_aside = kind == Kind::NextTo && !is_fellow && target.placement.parent.is_some();
+            claims.push(Claim { kind, what, determiner, gap_m, is_aside });
         }
     }
     claims.extend(structures_near(house, layout, room, &outlines[index], target.is_on_floor));
-    // The corner last: doors and windows are seen from farther away.
-    let rank = |claim: &Claim<'_>| (claim.what == "corner", claim.gap_m);
     claims.sort_by(|a, b| {
-        let ((a_last, a_gap), (b_last, b_gap)) = (rank(a), rank(b));
-        a_last.cmp(&b_last).then(a_gap.total_cmp(&b_gap)).then(a.what.cmp(b.what))
+        let nearer = a.gap_m.total_cmp(&b.gap_m);
+        a.is_aside.cmp(&b.is_aside).then(nearer).then(a.what.cmp(b.what))
     });
     let mut nearest: Vec<Claim<'a>> = Vec::new();
     for claim in claims {
@@ -236,7 +236,8 @@ fn surroundings<'a>(
         support: support.map(|item| item.asset.category.as_str()),
         is_in_support: support.is_some_and(|item| {
             let name = item.asset.category.as_str();
-            BASINS.contains(&name) || CLOSED.contains(&name) && bottom < top_m(item) - INSIDE_M
+            BASINS.contains(&name) && category != "Faucet"
+                || CLOSED.contains(&name) && bottom < top_m(item) - INSIDE_M
         }),
         claims: nearest,
     }
@@ -281,7 +282,13 @@ fn structures_near(
             let gap_m = gap_m(outline, &corners);
             if gap_m < STRUCTURE_M {
                 let determiner = one_of(of_room.len());
-                near.push(Claim { kind: Kind::Structure, what, determiner, gap_m });
+                near.push(Claim {
+                    kind: Kind::Structure,
+                    what,
+                    determiner,
+                    gap_m,
+                    is_aside: false,
+                });
             }
         }
     }
@@ -295,7 +302,8 @@ fn structures_near(
     let gap_m = corners.map(|corner| gap_m(outline, &[corner])).fold(f64::INFINITY, f64::min);
     if is_on_floor && gap_m < CORNER_M {
         let determiner = Determiner::A;
-        near.push(Claim { kind: Kind::Structure, what: "corner", determiner, gap_m });
+        let (kind, what, is_aside) = (Kind::Structure, "corner", true);
+        near.push(Claim { kind, what, determiner, gap_m, is_aside });
     }
     near
 }
