@@ -39,7 +39,7 @@ impl State {
             return rejected(RejectReason::NoStart, "no metadata.agent".to_owned());
         };
         let [x, y, z] = start.position_m;
-        let Some([x, z]) = world.navigation.snap([x, z]) else {
+        let Some([x, z]) = start_near(world, [x, z]) else {
             return rejected(RejectReason::StartNotFree, format!("start at x {x}, z {z}"));
         };
         let pose = PoseRecord {
@@ -112,4 +112,30 @@ impl State {
             transition_room_id: self.transition_room(house).map(id),
         }
     }
+}
+
+/// The start itself if the agent fits there, else the nearest place from which two rooms can be
+/// reached; the nearest of all, if there is no such place.
+fn start_near(world: &StageWorld, start_m: Vec2) -> Option<Vec2> {
+    let navigation = &world.navigation;
+    if navigation.is_free(start_m) {
+        return Some(start_m);
+    }
+    let leads_on = |from_m: Vec2| {
+        let reachable = world.reachable(navigation, from_m).unwrap_or_default();
+        let rooms: BTreeSet<usize> = reachable.iter().filter_map(|(_, room)| *room).collect();
+        rooms.len() > 1
+    };
+    // A place of every pocket met so far.
+    let mut pockets: Vec<Vec2> = Vec::new();
+    for place_m in navigation.free_near(start_m) {
+        if pockets.iter().any(|&pocket_m| navigation.is_connected(pocket_m, place_m)) {
+            continue;
+        }
+        if leads_on(place_m) {
+            return Some(place_m);
+        }
+        pockets.push(place_m);
+    }
+    pockets.first().copied()
 }

@@ -184,11 +184,16 @@ impl Navigation {
     }
 
     /// The nearest free point within [`NavigationConfig::snap_m`], to 2.5 cm; the point itself if
-    /// it is free.
+    /// it is free. It may lie in a pocket that no way leads out of.
     pub fn snap(&self, point_m: Vec2) -> Option<Vec2> {
         if self.is_free(point_m) {
             return Some(point_m);
         }
+        self.free_near(point_m).next()
+    }
+
+    /// Free points within [`NavigationConfig::snap_m`], 2.5 cm apart, nearest first.
+    pub fn free_near(&self, point_m: Vec2) -> impl Iterator<Item = Vec2> + '_ {
         let reach = (self.config.snap_m / SNAP_PITCH_M).floor() as i64;
         let mut offsets: Vec<[i64; 2]> = (-reach..=reach)
             .flat_map(|x| (-reach..=reach).map(move |z| [x, z]))
@@ -197,8 +202,8 @@ impl Navigation {
         offsets.sort_unstable_by_key(|&[x, z]| (x * x + z * z, x, z));
         offsets
             .into_iter()
-            .map(|offset| [0, 1].map(|i| point_m[i] + offset[i] as f64 * SNAP_PITCH_M))
-            .find(|&candidate| self.is_free(candidate))
+            .map(move |offset| [0, 1].map(|i| point_m[i] + offset[i] as f64 * SNAP_PITCH_M))
+            .filter(|&candidate| self.is_free(candidate))
     }
 
     /// Shortest any-angle path of the agent's axis, with its whole body clear of everything.
