@@ -250,15 +250,20 @@ impl<'a> Inspector<'a> {
         deepest_m
     }
 
-    /// Whether a body comes to touch its support when it is lowered by `rest_m`, which is under its middle.
+    /// Whether a body comes to touch its support when it is lowered by `rest_m`, which is under its middle; or
+    /// lies within its support's box, where drawers and shelves hold it that the parts do not show.
     fn rests_on(&self, body: usize, support: usize, rest_m: f64) -> bool {
         let (Some(solids), Some(under)) = (self.solids.get(body), self.solids.get(support)) else {
             return false;
         };
         let touches = |solid: &Solid| under.iter().any(|other| solid.lowered(rest_m).meets(other));
-        let [x, _, z] = self.scene.bodies[body].aabb.centre_m();
+        let [thing, holder] = [body, support].map(|index| self.scene.bodies[index].aabb);
+        let is_inside =
+            (0..3).all(|i| holder.min_m[i] <= thing.min_m[i] && thing.max_m[i] <= holder.max_m[i]);
+        let [x, _, z] = thing.centre_m();
         let column = Solid::column([x, z]);
-        solids.iter().any(touches) && under.iter().any(|other| column.meets(other))
+        let is_over = || under.iter().any(|other| column.meets(other));
+        is_inside || solids.iter().any(touches) && is_over()
     }
 
     /// How far a body sticks out of a simple polygon `[x, z]`, seen from above.
