@@ -11,12 +11,13 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.evaluation.records import ObjectFootprint
 from evonav.generation import GenerationParameters, generate_task
 from evonav.house import House, bundled_houses
-from evonav.report.plan import item_labels, label_point
+from evonav.report.plan import Frame, item_labels, label_point
 from evonav.report.svg import cm
 from evonav.report.task_pages import stage_svg, write_task_page
-from evonav.report.task_plans import TaskDrawing, change_frame, task_drawing
+from evonav.report.task_plans import TaskDrawing, _groups, change_frame, task_drawing
 from evonav.report.task_words import changed_words, move_rows
 from evonav.tasks import Task, write_task
 from evonav.tasks.oracle import StateChange
@@ -99,6 +100,25 @@ def test_a_room_is_named_where_no_furniture_stands() -> None:
     assert 0.7 < x < 3.3
     assert z - 0.15 + 0.1 > 2.9
     assert label_point(square) == pytest.approx((2.0, 2.0), abs=0.2)
+
+
+def test_groups_are_drawn_while_they_stand_together() -> None:
+    def chair(number: int, x_m: float) -> ObjectFootprint:
+        corners = ((x_m, 0.0), (x_m + 0.5, 0.0), (x_m + 0.5, 0.5), (x_m, 0.5))
+        return ObjectFootprint(
+            object_id=f"2|0|{number}",
+            category="Chair",
+            centre_m=(x_m + 0.25, 0.4, 0.25),
+            size_m=(0.5, 0.8, 0.5),
+            polygon_m=corners,
+        )
+
+    frame = Frame.around([(0.0, 0.0), (9.0, 9.0)])
+    together = _groups([chair(0, 0.0), chair(1, 1.0)], frame)
+    assert 'd="M0 0h150v-50h-150z"' in together
+    assert "group: chair, chair" in together
+    assert _groups([chair(0, 0.0), chair(1, 8.0)], frame) == ""
+    assert _groups([chair(0, 0.0)], frame) == ""
 
 
 def test_an_opened_door_is_marked(task: Task) -> None:

@@ -133,7 +133,8 @@ def _relocation_arrow(relocation: Relocation, frame: Frame, *, is_large: bool) -
     neck = (end[0] - direction[0] * scale, end[1] - direction[1] * scale)
     curve = f"M{start[0]} {start[1]}Q{middle[0]:.0f} {middle[1]:.0f} {neck[0]:.0f} {neck[1]:.0f}"
     return (
-        f'<g class="arrow" {width}>{hint}<path d="{curve}"/><circle cx="{start[0]}" cy="{start[1]}" r="{0.7 * u:.0f}"/>'
+        f'<g class="arrow{"" if is_large else " fine"}" {width}>{hint}<path d="{curve}"/>'
+        f'<circle cx="{start[0]}" cy="{start[1]}" r="{0.7 * u:.0f}"/>'
         f'<path class="head" d="{arrow_head(end, direction, 2.4 * u)}"/></g>'
     )
 

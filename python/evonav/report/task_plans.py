@@ -32,6 +32,8 @@ CLOSE_LABEL_MIN_M2 = 0.06
 CLOSE_LETTERS = 2.3
 THUMBNAIL_MIN_M = 0.5
 """Edge from which furniture is drawn in a gallery."""
+MAX_SPREAD = 4.0
+"""Area over its members' up to which a group is drawn as one: a shuffle tears groups apart."""
 VIEW_M = 1.1
 """How far the view cone of the reference pose is drawn."""
 HALF_VIEW_RAD = math.pi / 4
@@ -215,12 +217,19 @@ def _groups(objects: Iterable[ObjectFootprint], frame: Frame) -> str:
     for item in objects:
         if (match := _MEMBER.search(item.object_id)) and item.category not in FLAT_CATEGORIES:
             members.setdefault((match[1], match[2]), []).append(item)
+    hulls = [(items, _hull(items)) for items in members.values() if len(items) > 1]
     shapes = join(
-        f'<path d="{outline(_hull(items))}">{title("group: " + ", ".join(noun_of(i.category) for i in items))}</path>'
-        for items in members.values()
-        if len(items) > 1
+        f'<path d="{outline(hull)}">{title("group: " + ", ".join(noun_of(item.category) for item in items))}</path>'
+        for items, hull in hulls
+        if _area_m2(hull) <= MAX_SPREAD * sum(item.size_m[0] * item.size_m[2] for item in items)
     )
     return f'<g class="groups" stroke-width="{2.4 * frame.unit:.0f}">{shapes}</g>' if shapes else ""
+
+
+def _area_m2(polygon_m: Sequence[Point]) -> float:
+    """Of a polygon (shoelace formula)."""
+    ahead = zip(polygon_m, (*polygon_m[1:], *polygon_m[:1]), strict=True)
+    return abs(sum(x0 * z1 - x1 * z0 for (x0, z0), (x1, z1) in ahead)) / 2
 
 
 def _hull(items: Sequence[ObjectFootprint]) -> list[Point]:
