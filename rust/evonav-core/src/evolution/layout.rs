@@ -156,7 +156,7 @@ impl Layout {
     }
 
     /// The same with everything where the file has it, be it in the air.
-    pub fn as_filed(mut self) -> Self {
+    pub fn into_filed(mut self) -> Self {
         for item in &mut self.items {
             item.sunk_m = 0.0;
             item.settle();

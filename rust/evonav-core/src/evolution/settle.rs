@@ -45,7 +45,7 @@ pub fn settled(
     unknown: UnknownAssets,
     scene: &Scene,
 ) -> Result<HouseDelta, Error> {
-    let mut layout = Layout::new(house, catalogue, unknown, scene.clone())?.as_filed();
+    let mut layout = Layout::new(house, catalogue, unknown, scene.clone())?.into_filed();
     for (index, object) in house.objects.iter().enumerate() {
         let item = &layout.items[index];
         let rule = catalogue.placement(&item.asset.category);
