@@ -152,6 +152,12 @@ fn what_is_said_is_true_and_of_no_more_objects_than_is_recorded() {
             let target = house.object_index(&stage.target.id).unwrap();
             let said = &stage.relations;
             assert!(fits(&all, &house, target, said, SLACK_M), "{said:?}");
+            if let (true, Some(parent)) = (said.is_in_support, all[target].parent) {
+                let holds = ["Bathtub", "Box", "GarbageCan", "LaundryHamper", "Pot", "Sink"];
+                let is_under_its_top = all[target].bottom_m() < all[parent].top_m();
+                let name = all[parent].category.as_str();
+                assert!(holds.contains(&name) || is_under_its_top, "{said:?}");
+            }
             let namesakes = (0..all.len()).filter(|&i| all[i].category == all[target].category);
             assert_eq!(said.is_category_unique, namesakes.clone().count() == 1);
             let num_fitting = namesakes.filter(|&i| fits(&all, &house, i, said, SLACK_M)).count();
