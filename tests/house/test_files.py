@@ -124,7 +124,7 @@ def test_a_house_is_a_value(houses: list[House]) -> None:
     assert (after.position_m, after.parent_id) == ((x_m, y_m, z_m + 0.1), None)
     assert len(moved.objects) == len(house.objects)
     with pytest.raises(InvalidArgumentError, match="moves"):
-        house.apply("{}")
+        house.apply('{"move": []}')
     with pytest.raises(HouseError, match="no object of the house"):
         house.apply(json.dumps({"moves": [{**move, "id": "nothing"}]}))
 

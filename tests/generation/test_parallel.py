@@ -1,0 +1,75 @@
+"""Pools of workers: every job has one answer, whatever becomes of the workers."""
+
+import sys
+
+import pytest
+
+from evonav import parallel
+from evonav.errors import InvalidArgumentError
+from evonav.parallel import EngineError, Job, open_pool
+
+
+def make_echo(settings):
+    """A worker that answers with its settings and the job."""
+
+    def echo(text):
+        if text == "raise":
+            raise ValueError(text)
+        return f"{settings} {text}"
+
+    return echo
+
+
+def make_nothing(settings):
+    """A worker that does not start."""
+    raise SystemExit(3)
+
+
+def answers_of(pool, texts):
+    jobs, answers, num_open = list(enumerate(texts)), {}, 0
+    while jobs or num_open:
+        while jobs and num_open < pool.capacity:
+            pool.submit(Job(*jobs.pop(0)))
+            num_open += 1
+        answer = pool.next_answer()
+        assert answer.key not in answers
+        answers[answer.key] = answer
+        num_open -= 1
+    return answers
+
+
+@pytest.mark.parametrize("num_workers", [0, 2])
+def test_every_job_has_its_answer(num_workers):
+    texts = [*map(str, range(20)), "raise", "ü" * 100_000]
+    with open_pool("test_parallel:make_echo", "ä", num_workers=num_workers, timeout_s=60.0) as pool:
+        answers = answers_of(pool, texts)
+    assert len(answers) == len(texts)
+    for key, text in enumerate(texts):
+        if text == "raise":
+            assert answers[key].failure == "error"
+            assert answers[key].detail.endswith("ValueError: raise\n")
+        else:
+            assert (answers[key].failure, answers[key].text) == (None, f"ä {text}")
+
+
+def test_workers_that_never_start_are_an_error(monkeypatch):
+    monkeypatch.setattr(parallel, "MAX_FAILED_STARTS", 2)
+    with open_pool("test_parallel:make_nothing", "", num_workers=1, timeout_s=60.0) as pool:
+        pool.submit(Job(0, ""))
+        with pytest.raises(EngineError, match=r"workers do not start: the worker process died \(exit code 3\)"):
+            pool.next_answer()
+
+
+def test_arguments_are_checked():
+    with pytest.raises(InvalidArgumentError, match="num_workers = -1"):
+        open_pool("test_parallel:make_echo", "", num_workers=-1, timeout_s=1.0)
+    with pytest.raises(InvalidArgumentError, match="num_workers = 0: too few for engine ray"):
+        open_pool("test_parallel:make_echo", "", engine="ray", num_workers=0, timeout_s=1.0)
+    with pytest.raises(InvalidArgumentError, match="Ray address"):
+        open_pool("test_parallel:make_echo", "", num_workers=1, timeout_s=1.0, ray_address="localhost:1")
+
+
+def test_without_ray_the_error_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with pytest.raises(EngineError, match=r"pip install 'evonav\[ray\]'"):
+        open_pool("test_parallel:make_echo", "", engine="ray", num_workers=1, timeout_s=1.0)
