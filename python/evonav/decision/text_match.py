@@ -97,7 +97,7 @@ class TextMatch:
         for index, entry in enumerate(entries):
             score = self._label_score(parsed, entry.label)
             if score > 0.0:
-                held = self._fit(parsed, entry, entries) if self._names_goal(parsed, entry) else 0.0
+                held = self._relations_held(parsed, entry, entries) if self._names_goal(parsed, entry) else 0.0
                 distance_m = math.dist(_ground(entry), position_m)
                 keys.append((-score, -held, -entry.num_detections, distance_m, entry.entry_id, index))
         return [key[-1] for key in sorted(keys)]
@@ -107,7 +107,7 @@ class TextMatch:
         goal = self._parsed(question.goal)
         config = self.config
         named = [
-            (self._fit(goal, candidate, question.surroundings), index)
+            (self._relations_held(goal, candidate, question.surroundings), index)
             for index, candidate in enumerate(question.objects)
             if self._names_goal(goal, candidate)
         ]
@@ -154,19 +154,12 @@ class TextMatch:
         said = [0.5 if r.kind == "on" else 0.4 for r in goal.relations if similarity(r.noun, label) >= 1.0]
         return max([0.9 * own if own >= 0.4 else 0.0, *said])
 
-    def _fit(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
-        """Share of the relations that hold, a hair more if the size is as said: that settles ties alone."""
-        return self._relations_held(goal, entry, around) + (0.001 if self._is_size_said(goal, entry, around) else 0.0)
-
-    def _is_size_said(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> bool:
-        """Whether a thing said to be large or small is so among those of its name; sizes are said for its kind."""
-        sizes_m = [max(other.size_m) for other in around if self._names_goal(goal, other)]
-        middle_m = sum(sizes_m) / len(sizes_m) if sizes_m else 0.0
-        signs = {"large": 1.0, "small": -1.0}
-        return all(signs[word] * (max(entry.size_m) - middle_m) >= 0.0 for word in goal.adjectives if word in signs)
-
     def _relations_held(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
-        """Share of the relations that hold, 1 if there is none. Doors and windows are in no object memory."""
+        """Share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.
+
+        What is said of looks is left out: memory has no colours, and a thing that is small for its kind may be the
+        larger of two that are remembered.
+        """
         judged = [
             self._holds(relation, entry, around) for relation in goal.relations if relation.noun not in STRUCTURES
         ]
