@@ -124,7 +124,7 @@ def test_errors_are_typed() -> None:
     with pytest.raises(InvalidArgumentError, match="position_m"):
         simulator.render(Pose(math.nan, 0.0, 0.0, 0.0))
     assert not simulator.teleport(Pose(math.nan, 0.0, 0.0, 0.0))
-    with pytest.raises(InvalidArgumentError, match="delta_json"):
+    with pytest.raises(InvalidArgumentError, match="delta"):
         simulator.apply("{")
     with pytest.raises(InvalidArgumentError, match="width_px"):
         EmbeddedSimulator(SimulatorConfig(width_px=0)).reset(HOUSES[0])

@@ -78,6 +78,7 @@ fn scene_of(parts: &[Part]) -> Scene {
             kind: BodyKind::Object,
             parts: vec![*part],
             aabb: aabb_of(&[*part]),
+            unopened: Aabb::EMPTY,
             oriented: OrientedBox::of_aabb(&Aabb::EMPTY),
         })
         .collect();

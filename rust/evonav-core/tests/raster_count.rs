@@ -40,6 +40,7 @@ fn scene_of(bodies: &[Vec<Part>]) -> Scene {
         kind: BodyKind::Object,
         parts: parts.clone(),
         aabb: aabb_of(parts),
+        unopened: Aabb::EMPTY,
         oriented: OrientedBox::of_aabb(&Aabb::EMPTY),
     };
     let bodies = bodies.iter().enumerate().map(body).collect();

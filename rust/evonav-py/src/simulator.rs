@@ -294,7 +294,7 @@ fn body_record(body: &Body) -> BodyRecord {
         BodyKind::Door => "door",
         BodyKind::Window => "window",
     };
-    let aabb = OrientedBox::of_aabb(&body.aabb);
+    let aabb = OrientedBox::of_aabb(&body.unopened);
     (body.id.clone(), body.category.clone(), kind, aabb.centre_m, aabb.half_m.map(|h| 2.0 * h))
 }
 

@@ -12,7 +12,7 @@ use crate::{
         Asset,
         catalogue::{Catalogue, UnknownAssets},
         part::{Part, aabb_of},
-        shapes::{lit, shape_in},
+        shapes::{lit, shape_in, shape_of},
     },
     error::Error,
     geometry::{Aabb, IDENTITY, Mat3, Vec3, euler_rotation_deg},
@@ -77,6 +77,9 @@ pub struct Body {
     pub parts: Vec<Part>,
     /// Box around the parts; [`Aabb::EMPTY`] if there are none.
     pub aabb: Aabb,
+    /// The same if nothing of it were opened or closed: what things are measured by does not change
+    /// with a lid.
+    pub unopened: Aabb,
     /// For objects the asset's box as it is placed (children at rest on their parent, which may be
     /// below where the file has them), for the rest `aabb`.
     pub oriented: OrientedBox,
@@ -87,7 +90,7 @@ impl Body {
         let aabb = aabb_of(&parts);
         let oriented = OrientedBox::of_aabb(&aabb);
         let (id, category) = (id.to_owned(), category.to_owned());
-        Self { id, category, kind, parts, aabb, oriented }
+        Self { id, category, kind, parts, aabb, unopened: aabb, oriented }
     }
 
     /// `parent` is what it stands on, if that is an object, and whether its shape is that of a known
@@ -106,12 +109,22 @@ impl Body {
             centre_m[1] -= fall_m;
             aabb = aabb_of(&parts);
         }
+        let unopened = match object.condition().openness {
+            None => aabb,
+            Some(_) => {
+                let parts = shape_of(asset);
+                aabb_of(
+                    &parts.iter().map(|part| part.placed(centre_m, &rotation)).collect::<Vec<_>>(),
+                )
+            }
+        };
         Self {
             id: object.id.clone(),
             category: asset.category.clone(),
             kind: BodyKind::Object,
             parts,
             aabb,
+            unopened,
             oriented: OrientedBox {
                 centre_m,
                 half_m: asset.size_m.map(|edge| 0.5 * edge),
