@@ -21,6 +21,7 @@ fn scene_of(shapes: Vec<Vec<Part>>) -> Scene {
             id: format!("thing {index}"),
             category: "Thing".to_owned(),
             kind: BodyKind::Object,
+            unopened: Aabb::EMPTY,
             oriented: OrientedBox::of_aabb(&aabb),
             aabb,
             parts,
