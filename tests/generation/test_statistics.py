@@ -18,19 +18,14 @@ from evonav.generation.task_facts import expected_evolutions, facts_of_task, rea
 from evonav.house import bundled_houses
 from evonav.report import figures
 from evonav.report.dataset import write_dataset_report
-from evonav.tasks import Task
+from evonav.tasks import Task, load_tasks
 from evonav.tasks.records import parse_record
 from evonav.tasks.statistics import TaskStatistics
 
 
 @pytest.fixture(scope="module")
-def tasks() -> list[Task]:
-    return list(generate_tasks(bundled_houses(16), seed=0))
-
-
-@pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same tasks, and a house whose doors lead nowhere."""
+    """Tasks of 16 houses, and a house whose doors lead nowhere."""
     folder = tmp_path_factory.mktemp("tasks")
     houses = [house.to_json() for house in bundled_houses(16)]
     alone = json.loads(houses[0])
@@ -39,6 +34,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source.write_text("\n".join([*houses, json.dumps(alone)]))
     generate_dataset(source, folder / "made")
     return folder / "made"
+
+
+@pytest.fixture(scope="module")
+def tasks(folder: Path) -> list[Task]:
+    return list(load_tasks(folder))
 
 
 @pytest.fixture(scope="module")
