@@ -20,7 +20,18 @@ from evonav.generation.room_mix import reweight
 from evonav.house import House, load_houses
 from evonav.significance import weighted_quantiles
 
+MODES = ("SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE")
 SALIENT = 0
+COLUMNS = (
+    "relocated",
+    *MODES,
+    "median ratio",
+    "same room again",
+    "in changed room",
+    "moved",
+    "relocated, all stages",
+)
+"""Goals of stages 2 and on that were relocated; goals moved by the change, if it was of a mode; and so on."""
 HUNG_M = 0.08
 """A root object whose bottom is higher hangs on a wall."""
 HEIGHTS_M = {asset: size_m[1] for asset, _, size_m in assets()}
@@ -107,15 +118,15 @@ class Home:
 
 @dataclass
 class Trial:
-    """What became of one task."""
+    """What became of one task: by measure, how often it held and how often it could have."""
 
-    relocated_goals: int = 0
-    goals: int = 0
-    salient: int = 0
-    salient_moved: int = 0
-    pairs: int = 0
-    repeats: int = 0
+    sums: defaultdict[str, list[int]]
     ratio: float = 0.0
+
+    def add(self, key: str, is_so: bool) -> None:
+        """Counts one."""
+        self.sums[key][0] += is_so
+        self.sums[key][1] += 1
 
 
 def choose(rng: random.Random, weights: Sequence[float]) -> int | None:
@@ -125,7 +136,7 @@ def choose(rng: random.Random, weights: Sequence[float]) -> int | None:
 
 def run(home: Home, reading: Reading, rng: random.Random) -> Trial:
     """One task."""
-    trial, at = Trial(), home.start or 0
+    trial, at = Trial(defaultdict(lambda: [0, 0])), home.start or 0
     visited, goal_rooms, relocated = {at}, list[int](), set[int]()
     changed: list[int | None] = []
     goals = [i for i, is_hung in enumerate(home.is_hung) if reading.walls_are_goals or not is_hung]
@@ -166,32 +177,38 @@ def run(home: Home, reading: Reading, rng: random.Random) -> Trial:
             9 if i == salient else reading.child_weight if salient is not None and i in moved else 1 for i in there
         ]
         target = there[choose(rng, weights) or 0]
+        trial.add("relocated, all stages", target in relocated)
         if stage > 1:
-            trial.goals += 1
-            trial.relocated_goals += target in relocated
-            trial.salient += salient is not None
-            trial.salient_moved += salient is not None and target in moved
+            trial.add("relocated", target in relocated)
+        if room is not None and mode is not None:
+            trial.add("in changed room", goal_room == room)
+            trial.add("moved", target in moved)
+            trial.add(MODES[mode], target in moved)
         visited.update(home.way(at, goal_room))
         at = goal_room
         goal_rooms.append(goal_room)
-    pairs = [(a, b) for a, b in pairwise(changed) if a is not None and b is not None]
-    trial.pairs, trial.repeats = len(pairs), sum(a == b for a, b in pairs)
+    for earlier, later in pairwise(changed):
+        if earlier is not None and later is not None:
+            trial.add("same room again", earlier == later)
     trial.ratio = len(relocated) / home.num_objects
     return trial
 
 
 def row(homes: Sequence[Home], weights: Sequence[float], reading: Reading, num_tasks: int, seed: int) -> list[float]:
-    """Relocated goals, goals moved under `SALIENT_OBJECT`, median ratio, repeats; in %."""
+    """The measures of `COLUMNS`, in %."""
     rng = random.Random(seed)
-    sums, ratios = np.zeros(6), []
+    sums: defaultdict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
+    ratios = []
     for home, weight in zip(homes, weights, strict=True):
         for _ in range(num_tasks):
-            t = run(home, reading, rng)
-            parts = (t.relocated_goals, t.goals, t.salient_moved, t.salient, t.repeats, t.pairs)
-            sums += weight * np.array(parts)
-            ratios.append(t.ratio)
+            trial = run(home, reading, rng)
+            ratios.append(trial.ratio)
+            for key, (above, below) in trial.sums.items():
+                sums[key][0] += weight * above
+                sums[key][1] += weight * below
     median = weighted_quantiles(np.array(ratios), np.repeat(weights, num_tasks), [0.5])[0]
-    return [100 * float(x) for x in (sums[0] / sums[1], sums[2] / sums[3], median, sums[4] / sums[5])]
+    shares = {key: above / below for key, (above, below) in sums.items()} | {"median ratio": float(median)}
+    return [100 * shares[column] for column in COLUMNS]
 
 
 def houses_of(path: Path) -> Iterator[House]:
@@ -213,7 +230,7 @@ def main() -> None:
     homes = [home for home in map(Home, found) if home.start is not None]
     weights = reweight("procthor-10k", [home.num_rooms for home in homes], [None] * len(homes)).weights
     print(f"{len(homes)} houses, {arguments.tasks} tasks each")
-    print("| reading | goals relocated | goal moved, if SALIENT_OBJECT | median ratio | same room again |")
+    print(f"| reading | {' | '.join(COLUMNS)} |")
     for name, reading in READINGS.items():
         values = row(homes, weights.tolist(), reading, arguments.tasks, arguments.seed)
         print(f"| {name} | {' | '.join(f'{value:.1f}' for value in values)} |", flush=True)

@@ -25,8 +25,8 @@ class MeasureInfo:
 
 _EVOLUTION, _GOALS, _OBJECTS, _TASKS = "Evolution", "Goals of stages 2 and on", "Objects", "Tasks"
 
-# Published: Sec. 3.2 and its figure. Expected, evolutions: binomial, K uniform on {3, 4, 5}. Expected, others: a
-# trial of Algorithm 1 on 466 houses in ProcTHOR-10k's mix, without pictures and refusals (docs/parity.md).
+# Published: Sec. 3.2 and its figure. Expected, evolutions: binomial, K uniform on {3, 4, 5}. Expected, others: a trial
+# of Algorithm 1 in ProcTHOR-10k's mix, without pictures and refusals (scripts/try_readings.py, docs/dataset.md).
 MEASURES = (
     MeasureInfo("evolved_once", "tasks with an evolution", _EVOLUTION, is_of_tasks=True, paper=0.859, expected=0.8542),
     MeasureInfo("evolved_twice", "tasks with two or more", _EVOLUTION, is_of_tasks=True, paper=0.484, expected=0.4792),
@@ -35,20 +35,20 @@ MEASURES = (
     MeasureInfo("mode_SALIENT_OBJECT", "by SALIENT_OBJECT", _EVOLUTION, paper=0.5),
     MeasureInfo("mode_RETAIN_GROUP", "by RETAIN_GROUP", _EVOLUTION, paper=0.4),
     MeasureInfo("mode_FULL_SHUFFLE", "by FULL_SHUFFLE", _EVOLUTION, paper=0.1),
-    MeasureInfo("room_again", "same room as just before", _EVOLUTION, expected=0.033, accepted=(0.03, 0.05)),
-    MeasureInfo("goal_relocated", "relocated before", _GOALS, paper=0.379, expected=0.377, accepted=(0.36, 0.41)),
-    MeasureInfo("goal_in_changed_room", "in the room just changed", _GOALS, expected=0.82),
-    MeasureInfo("goal_moved", "moved by the change", _GOALS, expected=0.625),
-    MeasureInfo("goal_moved_SALIENT_OBJECT", "  if SALIENT_OBJECT", _GOALS, expected=0.50),
-    MeasureInfo("goal_moved_RETAIN_GROUP", "  if RETAIN_GROUP", _GOALS, expected=0.83),
-    MeasureInfo("goal_moved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _GOALS, expected=0.81),
+    MeasureInfo("room_again", "same room as just before", _EVOLUTION, expected=0.036, accepted=(0.03, 0.05)),
+    MeasureInfo("goal_relocated", "relocated before", _GOALS, paper=0.379, expected=0.39, accepted=(0.36, 0.41)),
+    MeasureInfo("goal_in_changed_room", "in the room just changed", _GOALS, expected=0.795),
+    MeasureInfo("goal_moved", "moved by the change", _GOALS, expected=0.685),
+    MeasureInfo("goal_moved_SALIENT_OBJECT", "  if SALIENT_OBJECT", _GOALS, expected=0.575),
+    MeasureInfo("goal_moved_RETAIN_GROUP", "  if RETAIN_GROUP", _GOALS, expected=0.795),
+    MeasureInfo("goal_moved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _GOALS, expected=0.8),
     MeasureInfo("goal_is_salient", "the salient object itself", _GOALS),
     MeasureInfo("goal_room_again", "in the previous goal's room", _GOALS),
     MeasureInfo("goal_again", "an earlier goal of the task", _GOALS),
-    MeasureInfo("goal_relocated_all", "relocated before, all stages", _GOALS, expected=0.283),
+    MeasureInfo("goal_relocated_all", "relocated before, all stages", _GOALS, expected=0.295),
     MeasureInfo("relocated_ratio", "median relocated ratio", _OBJECTS, "median share", accepted=(0.1, 0.2)),
-    MeasureInfo("ratio_zero", "tasks with none relocated", _OBJECTS, is_of_tasks=True, expected=0.146),
-    MeasureInfo("ratio_above_80", "tasks above 80%", _OBJECTS, is_of_tasks=True, expected=0.02),
+    MeasureInfo("ratio_zero", "tasks with none relocated", _OBJECTS, is_of_tasks=True, expected=0.1458),
+    MeasureInfo("ratio_above_80", "tasks above 80%", _OBJECTS, is_of_tasks=True),
     MeasureInfo("room_relocated", "of a changed room's objects", _OBJECTS),
     MeasureInfo("room_relocated_SALIENT_OBJECT", "  if SALIENT_OBJECT", _OBJECTS),
     MeasureInfo("room_relocated_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
@@ -63,7 +63,7 @@ MEASURES = (
 DISTRIBUTIONS = {
     "num_evolutions": "Evolutions a task",
     "modes": "Modes of evolutions",
-    "modes_drawn": "Modes drawn, whether anything moved or not",
+    "modes_drawn": "Modes drawn, moved or not",
     "relocated_ratio": "Objects relocated by the end, of a house's",
     "outcomes": "Outcomes of transitions",
     "failures": "Triggered, but nothing moved: why",

@@ -106,7 +106,10 @@ def _goals(found: TaskStatistics) -> Panel | None:
         paper=(paper, 1 - paper),
         band=None,
         band_words="",
-        notes=(f"relocated: {_percent(goals.raw)}, paper {100 * paper:.1f}%",),
+        notes=(
+            f"relocated: {_percent(goals.raw)}, paper {100 * paper:.1f}%",
+            *(() if goals.reweighted is None else (f"reweighted: {_percent(goals.reweighted)}",)),
+        ),
     )
 
 
