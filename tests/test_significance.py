@@ -76,7 +76,7 @@ def test_p_values_of_true_draws_are_uniform() -> None:
 
 
 @given(
-    st.lists(st.tuples(st.floats(-5, 5), st.integers(1, 4)), min_size=1, max_size=30), st.sampled_from([0.25, 0.5, 0.9])
+    st.lists(st.tuples(st.floats(-5, 5), st.integers(1, 4)), min_size=1, max_size=30), st.sampled_from([0.25, 0.5, 0.75])
 )
 def test_weighted_quantiles_are_those_of_repeated_values(values: list[tuple[float, int]], share: float) -> None:
     numbers, weights = (np.array(column, dtype=float) for column in zip(*values, strict=True))
