@@ -2,6 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
+mod evolved;
+
+use evolved::always;
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     evolution::{
@@ -13,18 +16,6 @@ use evonav_core::{
 use serde_json::Value;
 
 const HOUSE: &str = include_str!("data/house_100_objects.json");
-
-fn always(mode: Mode) -> Parameters {
-    let [salient, retain, shuffle] = Mode::ALL.map(|m| f64::from(u8::from(m == mode)));
-    Parameters {
-        evolve_probability: 1.0,
-        salient_object_probability: salient,
-        retain_group_probability: retain,
-        full_shuffle_probability: shuffle,
-        num_stages: vec![3],
-        ..Parameters::default()
-    }
-}
 
 fn task_of(house: &House, seed: u64, parameters: &Parameters) -> GeneratedTask {
     let (catalogue, unknown) = (Catalogue::bundled(), UnknownAssets::Error);
@@ -52,7 +43,7 @@ fn failures(task: &GeneratedTask) -> Vec<Option<ModificationFailure>> {
 fn no_place_is_free_where_every_place_is_too_near() {
     let house = House::from_json("house", HOUSE).unwrap();
     for mode in [Mode::SalientObject, Mode::RetainGroup] {
-        let parameters = Parameters { relocated_min_m: 1e6, ..always(mode) };
+        let parameters = Parameters { relocated_min_m: 1e6, ..always(mode, 3) };
         let found = failures(&task_of(&house, 0, &parameters));
         assert_eq!(found, [Some(ModificationFailure::NoFreePlace); 2], "{mode:?}");
     }
@@ -67,7 +58,7 @@ fn nothing_moves_where_everything_hangs_on_walls() {
     }
     let house = House::from_json("hung", &document.to_string()).unwrap();
     for mode in Mode::ALL {
-        let parameters = Parameters { goals_on_walls: true, ..always(mode) };
+        let parameters = Parameters { goals_on_walls: true, ..always(mode, 3) };
         let found = failures(&task_of(&house, 0, &parameters));
         assert_eq!(found, [Some(ModificationFailure::NothingMovable); 2], "{mode:?}");
     }
@@ -83,7 +74,7 @@ fn a_room_is_tried_again_before_it_is_given_up() {
             relocated_min_m: 4.0,
             modification_tries,
             num_stages: vec![2],
-            ..always(Mode::RetainGroup)
+            ..always(Mode::RetainGroup, 3)
         };
         let tasks = (0..40).map(|seed| task_of(&house, seed, &parameters));
         let drawn: Vec<(Option<String>, bool)> = tasks

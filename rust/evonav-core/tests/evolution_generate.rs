@@ -3,10 +3,12 @@
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
+mod evolved;
 mod points;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use evolved::always;
 use evonav_core::{
     assets::{Catalogue, UnknownAssets, part::Part, placement::Place},
     evolution::{
@@ -44,19 +46,6 @@ fn generate(house: &House, seed: u64, parameters: &Parameters) -> GeneratedTask 
     }
 }
 
-/// Every transition evolves, by one mode.
-fn always(mode: Mode) -> Parameters {
-    let [salient, retain, shuffle] = Mode::ALL.map(|m| f64::from(u8::from(m == mode)));
-    Parameters {
-        evolve_probability: 1.0,
-        salient_object_probability: salient,
-        retain_group_probability: retain,
-        full_shuffle_probability: shuffle,
-        num_stages: vec![4],
-        ..Parameters::default()
-    }
-}
-
 fn stage_houses(task: &GeneratedTask) -> Vec<House> {
     task.houses.iter().map(|json| House::from_json("stage", json).unwrap()).collect()
 }
@@ -71,7 +60,7 @@ fn moved_objects_stand_in_their_room_in_nothing_and_on_something() {
     let mut num_moved = 0;
     for (house, mode) in houses().iter().flat_map(|h| Mode::ALL.map(|m| (h.clone(), m))) {
         for seed in 0..3 {
-            let task = generate(&house, seed, &always(mode));
+            let task = generate(&house, seed, &always(mode, 4));
             let stages = stage_houses(&task);
             for (k, stage) in task.stages.iter().enumerate().skip(1) {
                 let (before, after) = (&stages[k - 1], &stages[k]);
@@ -143,7 +132,7 @@ fn check_support(before: &House, after: &House, id: &str, solids: &BTreeMap<&str
 #[test]
 fn furniture_that_moved_stands_off_doors() {
     for (house, seed) in houses().iter().flat_map(|h| (0..8).map(|s| (h.clone(), s))) {
-        let task = generate(&house, seed, &always(Mode::RetainGroup));
+        let task = generate(&house, seed, &always(Mode::RetainGroup, 4));
         for (stage, house) in task.stages.iter().zip(stage_houses(&task)) {
             let furniture = stage.evolution.changes.iter().filter(|c| c.to_support_id.is_none());
             for change in furniture {
@@ -172,7 +161,7 @@ fn is_at_door(house: &House, point: Vec2) -> bool {
 #[test]
 fn salient_moves_one_piece_of_furniture_with_what_stands_on_it() {
     for (house, seed) in houses().iter().flat_map(|h| [0, 1, 2].map(|s| (h.clone(), s))) {
-        let task = generate(&house, seed, &always(Mode::SalientObject));
+        let task = generate(&house, seed, &always(Mode::SalientObject, 4));
         let stages = stage_houses(&task);
         for (k, stage) in task.stages.iter().enumerate().skip(1) {
             let Some(salient) = &stage.evolution.salient_id else {
@@ -194,7 +183,7 @@ fn salient_moves_one_piece_of_furniture_with_what_stands_on_it() {
 #[test]
 fn retained_groups_keep_their_shape() {
     for (house, seed) in houses().iter().flat_map(|h| [0, 1, 2].map(|s| (h.clone(), s))) {
-        let task = generate(&house, seed, &always(Mode::RetainGroup));
+        let task = generate(&house, seed, &always(Mode::RetainGroup, 4));
         let stages = stage_houses(&task);
         for (k, stage) in task.stages.iter().enumerate().skip(1) {
             let (before, after) = (&stages[k - 1], &stages[k]);
@@ -249,7 +238,7 @@ fn check_rigid(before: &House, after: &House, members: &BTreeSet<&str>) {
 #[test]
 fn what_hangs_on_walls_stays() {
     for (house, mode) in houses().iter().flat_map(|h| Mode::ALL.map(|m| (h.clone(), m))) {
-        for stage in &generate(&house, 5, &always(mode)).stages {
+        for stage in &generate(&house, 5, &always(mode, 4)).stages {
             for change in &stage.evolution.changes {
                 let rule = Catalogue::bundled().placement(&change.category);
                 let is_hung = rule.is_some_and(|rule| rule.is_placed(Place::Wall));
@@ -278,7 +267,7 @@ fn goals_hang_on_walls_only_where_that_is_allowed() {
 #[test]
 fn rooms_that_could_be_reached_still_can() {
     for (house, mode) in houses().iter().flat_map(|h| Mode::ALL.map(|m| (h.clone(), m))) {
-        let task = generate(&house, 1, &always(mode));
+        let task = generate(&house, 1, &always(mode, 4));
         let stages = stage_houses(&task);
         for (k, stage) in task.stages.iter().enumerate().skip(1) {
             let start = stage.start_pose.position_m;

@@ -3,6 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
+mod evolved;
 #[allow(dead_code, reason = "other tests use the rest")]
 mod points;
 #[allow(dead_code, reason = "other tests use the rest")]
@@ -10,10 +11,11 @@ mod recorded;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use evolved::always;
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     evolution::{
-        Generation, Mode, Parameters, generate_task,
+        Generation, Mode, generate_task,
         record::{EvolutionOutcome, GeneratedStage, GeneratedTask},
     },
     geometry::{Vec2, Vec3, polygon_contains},
@@ -35,24 +37,11 @@ const FILES: [(&str, usize); 4] = [
     ("roseh-procthor-100k-history/objaverse-val-100.jsonl.gz", 20),
 ];
 
-/// Every transition evolves, by one mode.
-fn always(mode: Mode) -> Parameters {
-    let [salient, retain, shuffle] = Mode::ALL.map(|m| f64::from(u8::from(m == mode)));
-    Parameters {
-        evolve_probability: 1.0,
-        salient_object_probability: salient,
-        retain_group_probability: retain,
-        full_shuffle_probability: shuffle,
-        num_stages: vec![3],
-        ..Parameters::default()
-    }
-}
-
 fn task_of(house: &House, mode: Mode) -> Option<GeneratedTask> {
     // Others than the fixed one on demand: `EVONAV_SEED=7 cargo test --test evolution_houses`.
     let seed = std::env::var("EVONAV_SEED").map_or(3, |seed| seed.parse().unwrap());
     let made =
-        generate_task(house, Catalogue::bundled(), UNKNOWN, seed, &house.name, &always(mode));
+        generate_task(house, Catalogue::bundled(), UNKNOWN, seed, &house.name, &always(mode, 3));
     match made.unwrap() {
         Generation::Task(task) => Some(task),
         Generation::Rejected(_) => None,
