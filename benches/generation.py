@@ -25,8 +25,7 @@ CPU time, kernel included. *Core* is Algorithm 1 in Rust with the reference imag
 the first 100 tasks and after all; where a file has fewer houses than tasks, it is gone through again with other seeds.
 There is no peer to run beside it: EvoNav-Bench's own generator is not published. Nearest is the object placement of the
 published `procthor` package, which asks Unity about every collision (docs/procthor.md has its times on our engine).
-A task is some 17 small files: on a file system in memory (`TMPDIR=/dev/shm`) the machine of the table does 26.5, 36.8
-and 23.8 tasks/s; its disk's file system takes a millisecond of kernel time to create a file.
+A task is some 17 small files, and the file system's own time for them counts: `TMPDIR=/dev/shm` leaves it out.
 """
 SHARED = Path(os.environ.get("EVONAV_SHARED", Path(__file__).parents[2] / "shared")) / "data"
 SOURCES = {
