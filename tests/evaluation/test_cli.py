@@ -41,7 +41,7 @@ def test_lists():
     ("arguments", "words"),
     [
         (("evaluate", "--agents", "nobody", "--out", "OUT"), "no agent `nobody`"),
-        (("evaluate", "--tasks", "OUT", "--out", "OUT"), "no tasks here"),
+        (("evaluate", "--tasks", "OUT", "--out", "OUT"), "holds no task"),
         (("evaluate", "--houses", "OUT/none.json", "--out", "OUT"), "none.json"),
         (("report", "OUT"), "no run here"),
         (("houses", "OUT/none.json"), "none.json"),

@@ -16,6 +16,7 @@ from evonav.evaluation.records import EndState, ErrorKind, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.workers import EpisodeJob, JobEvent, run_here, run_in_workers
 from evonav.folders import check_same_run, write_atomically, writing
+from evonav.tasks.files import task_roots
 
 SUMMARY_NAME = "summary.json"
 
@@ -58,10 +59,7 @@ def task_files(directory: Path, limit: int | None = None) -> list[TaskFile]:
     Raises:
         TaskError: There is no task, or a header is malformed.
     """
-    roots = sorted(path.parent for path in directory.glob("*/task.json"))
-    if not roots:
-        raise TaskError(f"{directory}: no tasks here (expected TASK_ID/task.json)")
-    return [task_file(root) for root in roots[:limit]]
+    return [task_file(root) for root in task_roots(directory)[:limit]]
 
 
 def task_file(root: Path) -> TaskFile:

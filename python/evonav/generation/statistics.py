@@ -18,7 +18,7 @@ from evonav.generation.measures import (
     QUANTITIES,
 )
 from evonav.generation.room_mix import Reweighting, check_mix, reweight
-from evonav.generation.task_facts import MODES, RATIO_CLASSES, TaskFacts, read_all_facts, task_roots
+from evonav.generation.task_facts import MODES, RATIO_CLASSES, TaskFacts, read_all_facts
 from evonav.significance import (
     bootstrap_medians,
     bootstrap_ratios,
@@ -28,6 +28,7 @@ from evonav.significance import (
     wilson,
 )
 from evonav.tasks.dataset import DATASET_NAME, read_dataset
+from evonav.tasks.files import task_roots
 from evonav.tasks.statistics import (
     Distribution,
     Estimate,

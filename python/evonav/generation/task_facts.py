@@ -225,21 +225,6 @@ def read_facts(root: Path) -> TaskFacts:
         raise TaskError(f"{house}: {error}") from error
 
 
-def task_roots(folder: Path) -> list[Path]:
-    """Folders of the tasks in a folder, in order of task id.
-
-    Raises:
-        TaskError: There is none.
-    """
-    try:
-        roots = sorted(path.parent for path in folder.glob("*/task.json"))
-    except OSError as error:
-        raise TaskError(f"{folder}: cannot be read: {error.strerror or error}") from error
-    if not roots:
-        raise TaskError(f"{folder}: holds no task (expected */task.json)")
-    return roots
-
-
 def read_all_facts(roots: Sequence[Path], *, num_workers: int = 1) -> Iterator[TaskFacts]:
     """Facts of many tasks, in order, in worker processes where more than one is wanted.
 

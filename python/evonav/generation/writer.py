@@ -24,7 +24,7 @@ from evonav.decision.vlm_errors import VlmError, VlmFailure
 from evonav.errors import TaskError
 from evonav.generation.prompts import appearance_question, cleaned, fault_of, repair_request, unified_question
 from evonav.tasks.dataset import DATASET_NAME, TaskEntry, entry_of, read_dataset, write_dataset
-from evonav.tasks.files import checksums_of, load_task, write_task
+from evonav.tasks.files import checksums_of, load_task, task_roots, write_task
 from evonav.tasks.manifest import PublicStage, Task
 
 _ENDS_ALL: frozenset[VlmFailure] = frozenset({"over_budget", "unauthorized", "bad_request", "not_recorded"})
@@ -231,10 +231,7 @@ def _roots(directory: Path, limit: int | None) -> list[Path]:
                 old.rename(root)
         for new in directory.glob(".*.new"):
             shutil.rmtree(new)
-        roots = sorted(path.parent for path in directory.glob("*/task.json"))
-    if not roots:
-        raise TaskError(f"{directory}: holds no task (expected */task.json)")
-    return roots[:limit]
+    return task_roots(directory)[:limit]
 
 
 @contextlib.contextmanager

@@ -204,12 +204,20 @@ def load_tasks(directory: Path | str, limit: int | None = None) -> Iterator[Task
     Raises:
         TaskError: There is no task in it, or one is malformed.
     """
-    directory = Path(directory)
+    for root in task_roots(Path(directory))[:limit]:
+        yield load_task(root)
+
+
+def task_roots(directory: Path) -> list[Path]:
+    """Folders of the tasks in a folder, in order of task id.
+
+    Raises:
+        TaskError: There is none, or it cannot be read.
+    """
     try:
         roots = sorted(path.parent for path in directory.glob("*/task.json"))
     except OSError as error:
         raise TaskError(f"{directory}: cannot be read: {error.strerror or error}") from error
     if not roots:
         raise TaskError(f"{directory}: holds no task (expected */task.json)")
-    for root in roots[:limit]:
-        yield load_task(root)
+    return roots

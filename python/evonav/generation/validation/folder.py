@@ -12,6 +12,7 @@ from evonav.generation.validation.problems import Problem, Report
 from evonav.generation.validation.task import validate_files
 from evonav.parallel import Answer, Job, open_pool
 from evonav.tasks.dataset import DATASET_NAME, check_dataset, read_dataset
+from evonav.tasks.files import task_roots
 
 WORK = "evonav.generation.validation.folder:make_worker"
 TASK_TIMEOUT_S = 300.0
@@ -62,7 +63,7 @@ def validate_folder(
         EngineError: Workers cannot be had.
     """
     folder = Path(folder).resolve()
-    roots = sorted(path.parent for path in folder.glob("*/task.json"))
+    roots = task_roots(folder)[:limit]
     problems: list[Problem] = []
     if (folder / DATASET_NAME).exists():
         try:
@@ -71,9 +72,6 @@ def validate_folder(
             problems += [_dataset_problem(task_id, detail) for task_id, detail in check_dataset(record, folder)]
         except TaskError as error:
             problems.append(_dataset_problem("", str(error)))
-    if not roots:
-        raise TaskError(f"{folder}: holds no task (expected */task.json)")
-    roots = roots[:limit]
     on_progress(0, len(roots))
     reports: dict[int, Report] = {}
     settings = json.dumps({"allow_unknown_assets": allow_unknown_assets})
