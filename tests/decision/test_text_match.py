@@ -1,16 +1,15 @@
 """The text matcher's choices, and that they do not depend on the order of what it is shown."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evonav.decision.questions import (
-    ChooseQuestion,
-    FrontierCandidate,
-    ObjectCandidate,
-    Sighting,
-    VerifyQuestion,
-)
+from evonav.decision.matching import Matcher
+from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
+from evonav.decision.questions.frontier_update import ChooseQuestion, Sighting, VerifyQuestion
+from evonav.decision.questions.question import AnswerError
+from evonav.decision.ranking import rank_entries
 from evonav.decision.text_match import TextMatch
 from evonav.tasks.public import StageInput
 
@@ -37,21 +36,22 @@ NEAR, FAR = FrontierCandidate(1, (0.0, 1.0), 1.0), FrontierCandidate(2, (6.0, 4.
 
 def question(entries, frontiers=(), stage=MUG_GOAL, rounds=40):
     model = TextMatch()
-    ranked = [entries[i] for i in model.rank(stage, entries, (0.0, 0.0))[:5]]
+    ranked = [entries[i] for i in rank_entries(Matcher(), stage, entries, (0.0, 0.0))[:5]]
     return model, ChooseQuestion(stage, (0.0, 0.0), ranked, frontiers, entries, rounds)
 
 
 def chosen(model, asked):
-    choice = model.choose(asked)
-    assert choice.is_valid(asked)
-    candidates = {"object": asked.objects, "frontier": asked.frontiers, "none": [None]}
-    return candidates[choice.kind][choice.index]
+    reply = model.answer(asked)
+    assert asked.parse(reply.text) == reply.answer
+    candidates = {"object": asked.objects, "frontier": asked.frontiers}
+    return candidates[reply.answer.kind][reply.answer.index]
 
 
-def test_the_instance_that_the_instruction_describes_is_ranked_first():
-    order = [ALL[i].entry_id for i in TextMatch().rank(MUG_GOAL, ALL, (0.0, 0.0))]
-    assert order[:3] == [5, 4, 2]
-    assert BED.entry_id not in order
+def test_all_are_ranked_by_what_the_instruction_speaks_of():
+    order = [ALL[i].entry_id for i in rank_entries(Matcher(), MUG_GOAL, ALL, (0.0, 0.0))]
+    assert order[:2] == [4, 5]  # of the same label the one that was detected more often comes first
+    assert order[2] == 2
+    assert sorted(order) == [entry.entry_id for entry in ALL]
 
 
 @given(st.permutations(ALL))
@@ -81,7 +81,8 @@ def test_with_nothing_left_to_explore_it_goes_where_the_object_should_be():
     model, asked = question([TABLE, COUNTER, BED])
     assert chosen(model, asked) == COUNTER
     model, asked = question([BED])
-    assert model.choose(asked).kind == "none"
+    with pytest.raises(AnswerError, match="nothing to go to"):
+        model.answer(asked)
 
 
 def test_the_room_is_told_by_what_stands_in_it():
@@ -100,6 +101,6 @@ def test_verification_needs_the_label_at_the_place():
         (Sighting("Mug", 0.0, float("inf")), False),
         (Sighting("Bowl", 0.9, 0.0), False),
     ):
-        assert model.verify(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [sighting], 0.01)).is_present is is_present
-    assert not model.verify(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], 0.01)).is_present
-    assert model.verify(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], 0.0005)).is_present
+        assert model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [sighting], 0.01)).answer is is_present
+    assert not model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], 0.01)).answer
+    assert model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], 0.0005)).answer

@@ -14,13 +14,14 @@ import pytest
 
 from evonav.decision.account import Account, Price, Usage, image_tokens, read_prices
 from evonav.decision.exchanges import ExchangeStore
-from evonav.decision.vlm import Answer, Picture, Question, Text, Turn, VlmClient, VlmConfig
+from evonav.decision.prompts import Picture, Prompt, Text, Turn
+from evonav.decision.vlm import Answer, VlmClient, VlmConfig
 from evonav.decision.vlm_errors import VlmError
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError
 from vlm_stub import KEY, Stub, images_in, serving
 
 IMAGE = np.random.default_rng(0).integers(0, 256, (30, 40, 3), dtype=np.uint8)
-QUESTION = Question.of(Text("What is this?"), Picture(IMAGE), Text("One word."))
+QUESTION = Prompt.of(Text("What is this?"), Picture(IMAGE), Text("One word."))
 
 
 @pytest.fixture
@@ -39,7 +40,7 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "deep" / "exchanges.sqlite"
 
 
-def told(client: VlmClient, question: Question = QUESTION) -> str:
+def told(client: VlmClient, question: Prompt = QUESTION) -> str:
     with pytest.raises(VlmError) as caught:
         client.ask(question)
     assert KEY not in str(caught.value)
@@ -68,7 +69,7 @@ def test_asks_and_counts(stub: Stub, config: VlmConfig) -> None:
 
 def test_conversations_and_schemas_are_sent(stub: Stub, config: VlmConfig) -> None:
     schema = {"type": "object", "properties": {"index": {"type": "integer"}}, "required": ["index"]}
-    question = Question((Turn("system", (Text("Be brief."),)), *QUESTION.turns), schema).then("Mug.", "Sure?")
+    question = Prompt((Turn("system", (Text("Be brief."),)), *QUESTION.turns), schema).then("Mug.", "Sure?")
     other = replace(config, temperature=None, seed=None, max_tokens_field="max_completion_tokens")
     VlmClient(other).ask(question)
     (request,) = stub.requests
@@ -92,21 +93,22 @@ def test_what_was_kept_is_had_again_without_a_server(config: VlmConfig, path: Pa
     assert again.is_replayed
     assert not first.is_replayed
     assert (client.account.usage, client.account.num_replayed) == (Usage(), 1)
-    assert told(client, Question.of(Text("And this?"))) == "not_recorded"
-    assert told(client, Question.of(Text("What is this?"), Picture(IMAGE[::-1]), Text("One word."))) == "not_recorded"
+    assert told(client, Prompt.of(Text("And this?"))) == "not_recorded"
+    assert told(client, Prompt.of(Text("What is this?"), Picture(IMAGE[::-1]), Text("One word."))) == "not_recorded"
     # Where the answer comes from is no part of the question, but the model is.
     assert VlmClient(replace(config, base_url="http://elsewhere"), store=store, mode="replay").is_kept(QUESTION)
     assert not VlmClient(replace(config, model="other"), store=store, mode="replay").is_kept(QUESTION)
 
 
 def test_replay_imports_no_client(config: VlmConfig, path: Path) -> None:
-    VlmClient(config, store=ExchangeStore(path), mode="record").ask(Question.of(Text("Hello?")))
+    VlmClient(config, store=ExchangeStore(path), mode="record").ask(Prompt.of(Text("Hello?")))
     script = f"""
 import sys
 from evonav.decision.exchanges import ExchangeStore
-from evonav.decision.vlm import Question, Text, VlmClient, VlmConfig
+from evonav.decision.prompts import Prompt, Text
+from evonav.decision.vlm import VlmClient, VlmConfig
 client = VlmClient(VlmConfig("gpt-4o"), store=ExchangeStore({str(path)!r}), mode="replay")
-print(client.ask(Question.of(Text("Hello?"))).text)
+print(client.ask(Prompt.of(Text("Hello?"))).text)
 assert not {{"openai", "httpx", "httpx2"}} & sys.modules.keys()
 """
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
@@ -133,7 +135,7 @@ def test_the_same_exchanges_make_the_same_rows_and_images_are_kept_once(config: 
     for order in (1, -1):
         store = ExchangeStore(tmp_path / f"{order}.sqlite")
         client = VlmClient(config, store=store, mode="record")
-        questions = [Question.of(Text(f"Number {i}?"), Picture(IMAGE)) for i in range(4)]
+        questions = [Prompt.of(Text(f"Number {i}?"), Picture(IMAGE)) for i in range(4)]
         for question in questions[::order]:
             client.ask(question)
         store.close()
@@ -238,7 +240,7 @@ def test_no_more_questions_at_a_time_than_asked_for(stub: Stub, config: VlmConfi
     stub.reply = lambda _: {"text": "Yes.", "hang_s": 0.03}
     client = VlmClient(replace(config, max_concurrency=3))
     with ThreadPoolExecutor(12) as pool:
-        list(pool.map(lambda i: client.ask(Question.of(Text(f"{i}?"))), range(24)))
+        list(pool.map(lambda i: client.ask(Prompt.of(Text(f"{i}?"))), range(24)))
     assert stub.most_at_once == 3
     assert client.account.num_asked == 24
     assert client.account.usage == Usage(24_000, 2400)
@@ -252,7 +254,7 @@ def test_the_limit_is_not_passed(stub: Stub, config: VlmConfig) -> None:
 
     def ask(index: int) -> None:
         try:
-            client.ask(Question.of(Text(f"{index}? " + "word " * 700)))
+            client.ask(Prompt.of(Text(f"{index}? " + "word " * 700)))
         except VlmError as error:
             kinds.append(error.kind)
 
@@ -269,7 +271,7 @@ def test_the_limit_is_not_passed(stub: Stub, config: VlmConfig) -> None:
 
 
 def test_estimates_hold_what_is_used(config: VlmConfig) -> None:
-    estimate = VlmClient(config).estimate(Question.of(Text("word " * 300), Picture(np.zeros((300, 300, 3), np.uint8))))
+    estimate = VlmClient(config).estimate(Prompt.of(Text("word " * 300), Picture(np.zeros((300, 300, 3), np.uint8))))
     assert estimate.input_tokens >= 300 + 255
     assert estimate.output_tokens == 300
     # The figures of OpenAI's documentation.

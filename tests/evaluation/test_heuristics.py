@@ -8,7 +8,7 @@ from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 from evonav.agents.fail_then_update import FailThenUpdate
 from evonav.agents.frontier_update import FrontierUpdate
 from evonav.agents.stage_reset import StageReset
-from evonav.decision.questions import Choice, Verdict
+from evonav.decision.scripted import Scripted
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import EndState
 from evonav.evaluation.rollout import Episode
@@ -122,41 +122,21 @@ def test_memory_shortens_the_second_visit():
     assert fu[2].trace[0].choice.startswith("object")
 
 
-class Scripted:
-    """A decision model that says what it is told to."""
-
-    def __init__(self, choices, verdict=True):
-        self.choices = choices
-        self.verdict = verdict
-        self.questions = []
-
-    def rank(self, goal, entries, position_m):
-        return list(range(len(entries)))
-
-    def choose(self, question):
-        self.questions.append(question)
-        return self.choices(question)
-
-    def verify(self, question):
-        self.questions.append(question)
-        return Verdict(self.verdict)
-
-
 def test_five_candidates_at_most_are_shown():
-    model = Scripted(lambda question: Choice("frontier", 0))
+    model = Scripted(lambda question: "Frontier 0")
     run(FrontierUpdate(decision=model), case_of(stage_case(1, "Mug|1")), ProtocolConfig(max_rounds=10))
     assert max(len(question.objects) for question in model.questions) == 5
 
 
 def test_invalid_answers_are_asked_again_then_the_nearest_frontier_is_taken():
-    model = Scripted(lambda question: Choice("object", 99))
+    model = Scripted(lambda question: "Object 99")
     (record,) = run(FrontierUpdate(decision=model), case_of(stage_case(1, "Mug|1")), ProtocolConfig(max_rounds=3))
     assert record.trace[-1].counters["invalid_answers"] == record.trace[-1].counters["decisions"] == 9
     assert all(entry.choice.startswith("frontier") for entry in record.trace)
 
 
 def test_an_object_is_kept_until_arrival_and_a_frontier_for_one_round():
-    model = Scripted(lambda question: Choice("object", 0) if len(question.objects) > 1 else Choice("frontier", 0))
+    model = Scripted(lambda question: "Object 0" if len(question.objects) > 1 else "Frontier 0")
     (record,) = run(FrontierUpdate(decision=model), case_of(stage_case(1, "Mug|1")))
     objects = [entry.choice for entry in record.trace if entry.choice.startswith("object")]
     assert len(set(objects)) == 1
@@ -165,7 +145,9 @@ def test_an_object_is_kept_until_arrival_and_a_frontier_for_one_round():
 
 
 def test_fail_then_update_asks_once_an_arrival_and_goes_on_until_the_budget_ends():
-    model = Scripted(lambda question: Choice("object", 0) if question.objects else Choice("frontier", 0), verdict=False)
+    model = Scripted(
+        lambda question: "no" if question.kind == "verify" else "Object 0" if question.objects else "Frontier 0"
+    )
     (record,) = run(FailThenUpdate(decision=model), case_of(stage_case(1, "Mug|1")), ProtocolConfig(max_rounds=12))
     counters = record.trace[-1].counters
     assert not record.has_stopped
@@ -192,7 +174,7 @@ def test_an_unsupported_choice_leads_to_the_frontier_nearest_to_it():
 def test_budget_end_within_the_radius_counts():
     """The paper's formula asks for no stop."""
     (record,) = run(
-        FrontierUpdate(decision=Scripted(lambda question: Choice("frontier", 0))),
+        FrontierUpdate(decision=Scripted(lambda question: "Frontier 0")),
         case_of(stage_case(1, "Fridge|1"), start=replace(START, x_m=0.6, z_m=3.5)),
         ProtocolConfig(max_rounds=1),
     )

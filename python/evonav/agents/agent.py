@@ -2,9 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
-from evonav.sensors.observation import Observation
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.decision.asking import Asked
+from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.simulator import Action
 
@@ -52,6 +56,8 @@ class Sensing:
     first_round: ViewSchedule = ViewSchedule(7, 40.0)
     later_rounds: ViewSchedule = ViewSchedule(3, 60.0)
     needs_rgb: bool = False
+    motion: Literal["waypoints", "actions"] = "waypoints"
+    """What the stage's budget counts: 50 decision rounds, or 500 discrete actions (UniGoal; paper, Sec. C.3)."""
     max_travel_m: float = 1.0
     """Path length a `NavigateTo` covers in one round."""
     occupancy_range_m: float = 3.0
@@ -112,4 +118,38 @@ class ExplainingAgent(Protocol):
 
     def entries(self) -> Sequence[EntryBelief]:
         """The object memory; asked once, at the end of a stage."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class FrontierBelief:
+    """A frontier as the agent knows it."""
+
+    frontier_id: int
+    position_m: tuple[float, float]
+    direction_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Belief:
+    """All that an agent holds true in a round."""
+
+    entries: Sequence[EntryBelief]
+    candidate_ids: tuple[int, ...]
+    """Entries that the last question offered."""
+    frontiers: Sequence[FrontierBelief]
+    cells: NDArray[np.uint8]
+    """`(R, C)`: 0 unknown, 1 free, 2 blocked."""
+    map_frame: MapFrame
+    """Of `cells`; need not be the task's own."""
+    asked: tuple[Asked, ...]
+    """Questions of the round, with their answers."""
+
+
+@runtime_checkable
+class InspectableAgent(Protocol):
+    """An agent whose rounds can be looked at (`evonav view`); never asked in an evaluation."""
+
+    def belief(self) -> Belief:
+        """What it holds true after `act`."""
         ...

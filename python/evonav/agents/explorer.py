@@ -1,4 +1,4 @@
-"""Mapping and exploration, as all agents of the Frontier-Update family share it."""
+"""Mapping and exploration, as all agents but UniGoal share it."""
 
 import math
 from dataclasses import dataclass
@@ -20,8 +20,10 @@ class ExplorerConfig:
     """Free cells this near the agent are explored wherever it looks."""
     start_radius_m: float = 0.6
     """Cells this near the first pose are taken for free: no camera sees them."""
-    min_conflict_cells: int = 1
-    """Contradicting cells from which on the map is outdated (1: the paper's oracle occupancy has no noise)."""
+    min_conflict_cells: int | None = 1
+    """Contradicting cells from which on the map is outdated (1: the paper's oracle occupancy has no noise).
+
+    `None`: it never is, and the last observation of a cell wins (3D-Mem and MSGNav; paper, Sec. C.3)."""
     reached_m: float = 0.3
     """A frontier this near that is still there after a look is given up."""
 
@@ -51,8 +53,7 @@ class Explorer:
         Returns:
             Whether they contradicted the map, which then holds this round's views alone.
         """
-        num_conflicting = sum(len(self.map.conflicts(view.occupancy)) for view in observation.views)
-        is_outdated = num_conflicting >= self.config.min_conflict_cells
+        is_outdated = self._is_contradicted(observation)
         if is_outdated:
             self.num_conflicts += 1
             self.num_cells_cleared += int((self.map.cells != UNKNOWN).sum())
@@ -67,6 +68,12 @@ class Explorer:
         self.map.update_frontiers(here)
         self._give_up_unseeable(observation, here)
         return is_outdated
+
+    def _is_contradicted(self, observation: Observation) -> bool:
+        if self.config.min_conflict_cells is None:
+            return False
+        num_conflicting = sum(len(self.map.conflicts(view.occupancy)) for view in observation.views)
+        return num_conflicting >= self.config.min_conflict_cells
 
     def _give_up_unseeable(self, observation: Observation, here: Point2) -> None:
         """A frontier that was reached, or could not be, and that is still there, would be chosen for ever."""

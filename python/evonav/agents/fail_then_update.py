@@ -3,8 +3,10 @@
 import math
 from typing import Literal
 
-from evonav.agents.frontier_update import FrontierUpdate, FrontierUpdateConfig, _candidate
-from evonav.decision.questions import DecisionModel, Sighting, VerifyQuestion
+from evonav.agents.frontier_update import FrontierUpdate, FrontierUpdateConfig
+from evonav.decision.questions.frontier_update import Sighting, VerifyQuestion
+from evonav.decision.questions.question import DecisionModel
+from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation, View
 
 
@@ -24,17 +26,27 @@ class FailThenUpdate(FrontierUpdate):
         return False
 
     def _is_confirmed(self, entry_id: int, observation: Observation) -> bool:
-        entry = self._objects.entry(entry_id)
-        if entry is None or self._goal is None:
+        navigator = self._navigator
+        entry = navigator.objects.entry(entry_id)
+        if entry is None:
             return False
-        views = observation.views if self._verify_views == "all" else observation.views[-1:]
-        seen = [sighting for view in views for sighting in self._sightings(entry_id, view)]
+        first = 0 if self._verify_views == "all" else -1
+        views, stored = observation.views[first:], navigator.round_views[first:]
+        images = [pixels_of(view, navigator.config.image_px) for view in stored]
         self._counters["verifications"] += 1
-        share = image_share(observation.views[-1], entry.centre_m, entry.size_m)
-        return self._decision.verify(VerifyQuestion(self._goal, _candidate(entry), seen, share)).is_present
+        is_present = self._asker.ask(
+            VerifyQuestion(
+                goal=self._goal,
+                entry=navigator.candidate(entry, with_images=self.sensing.needs_rgb),
+                seen=[sighting for view in views for sighting in self._sightings(entry_id, view)],
+                image_share=image_share(observation.views[-1], entry.centre_m, entry.size_m),
+                views=[image for image in images if image is not None],
+            )
+        )
+        return is_present is not False  # without an answer the entry stays, and the stage ends here
 
     def _sightings(self, entry_id: int, view: View) -> list[Sighting]:
-        compared = self._objects.compare(entry_id, view)
+        compared = self._navigator.objects.compare(entry_id, view)
         return [
             Sighting(label, overlap, distance_m)
             for label, overlap, distance_m in zip(
@@ -43,7 +55,7 @@ class FailThenUpdate(FrontierUpdate):
         ]
 
     def _reject(self, entry_id: int) -> None:
-        if self._objects.remove(entry_id):
+        if self._navigator.objects.remove(entry_id):
             self._counters["rejected_entries"] += 1
 
 

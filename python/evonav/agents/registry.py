@@ -1,11 +1,13 @@
 """Agents by name: evonav's own, those of installed packages, and any class by its import path."""
 
+import inspect
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import cast
+from typing import Any, cast
 
 from evonav.agents.agent import Agent
+from evonav.decision.questions.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 
 ENTRY_POINT_GROUP = "evonav.agents"
@@ -20,7 +22,7 @@ BUILT_IN: dict[str, tuple[str, str]] = {
 """Import path and description by name."""
 
 
-def agent_factory(name: str) -> Callable[[], Agent]:
+def agent_factory(name: str) -> Callable[..., Agent]:
     """What makes an agent.
 
     Args:
@@ -40,13 +42,23 @@ def agent_factory(name: str) -> Callable[[], Agent]:
     raise InvalidArgumentError(f"no agent `{name}`; there are {known}, or name a class as `package.module:Class`")
 
 
+def new_agent(factory: Callable[..., Agent], decision: DecisionModel | None = None) -> Agent:
+    """An agent; one whose factory has a parameter `decision` is given the model of the run."""
+    try:
+        takes_decision = "decision" in inspect.signature(factory).parameters
+    except (TypeError, ValueError):  # builtins and some extension types tell nothing
+        takes_decision = False
+    options: dict[str, Any] = {"decision": decision} if takes_decision and decision is not None else {}
+    return factory(**options)
+
+
 def agent_descriptions() -> dict[str, str]:
     """Names and what they are: built-in agents and those of installed packages."""
     installed = {entry.name: f"plug-in: {entry.value}" for entry in entry_points(group=ENTRY_POINT_GROUP)}
     return {**installed, **{name: description for name, (_, description) in BUILT_IN.items()}}
 
 
-def imported(path: str) -> Callable[[], Agent]:
+def imported(path: str) -> Callable[..., Agent]:
     """The callable at `package.module:name`.
 
     Raises:
@@ -59,4 +71,4 @@ def imported(path: str) -> Callable[[], Agent]:
         raise InvalidArgumentError(f"agent `{path}` cannot be imported: {type(error).__name__}: {error}") from error
     if not callable(found):
         raise InvalidArgumentError(f"agent `{path}` is not callable: name a class or a function that makes an agent")
-    return cast("Callable[[], Agent]", found)
+    return cast("Callable[..., Agent]", found)

@@ -1,221 +1,44 @@
 """A decision model without a network: reads the instruction by rule and compares it with what the agent remembers.
 
 It stands where the paper's agents ask GPT-4o. It is deterministic, free, and blind to images: it knows objects by label
-and box, so it judges "on" and "next to" by geometry and a room by what stands in it.
+and box, so it judges "on" and "next to" by geometry and a room by what stands in it. `evonav.decision.rules` holds its
+answers, a file an agent family.
 """
 
-import math
-from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, TypeVar
 
-from evonav.decision.language import Goal, Relation, canonical, parse_goal, similarity
-from evonav.decision.questions import (
-    Choice,
-    ChooseQuestion,
-    FrontierCandidate,
-    ObjectCandidate,
-    Point2,
-    Verdict,
-    VerifyQuestion,
-)
-from evonav.tasks.language import STRUCTURES
-from evonav.tasks.public import StageInput
+from evonav.decision.matching import Matcher, TextMatchConfig
+from evonav.decision.questions.question import Question, Reply
+from evonav.errors import DecisionError
 
-ROOM_SIGNS: dict[str, tuple[str, ...]] = {
-    "kitchen": (
-        "fridge",
-        "microwave",
-        "toaster",
-        "coffee machine",
-        "countertop",
-        "kettle",
-        "pot",
-        "pan",
-        "dish sponge",
-    ),
-    "bathroom": (
-        "toilet",
-        "bathtub",
-        "shower curtain",
-        "shower head",
-        "toilet paper hanger",
-        "plunger",
-        "towel holder",
-    ),
-    "bedroom": ("bed", "dresser", "alarm clock", "laundry hamper"),
-    "living room": ("sofa", "television", "tv stand", "coffee table", "arm chair", "remote control"),
-}
-"""Things that mostly stand in one type of room."""
-_ROOM_OF_SIGN = {sign: room for room, signs in ROOM_SIGNS.items() for sign in signs}
+A = TypeVar("A")
 
-
-@dataclass(frozen=True, slots=True)
-class TextMatchConfig:
-    """The matcher's thresholds."""
-
-    near_m: float = 1.0
-    """Largest gap between boxes that are near each other."""
-    support_margin_m: float = 0.15
-    """How far the centre of what stands on something may lie outside its box, and its bottom above it."""
-    room_radius_m: float = 3.5
-    """Within which things speak for a room."""
-    min_relations: float = 0.6
-    """Share of an instruction's relations that must hold before exploration ends for a candidate."""
-    unknown_room: float = 0.5
-    """What a room that cannot be told counts for."""
-    hurry_rounds: int = 8
-    """With no more rounds left than this, any candidate of the right category will do."""
-    min_similarity: float = 0.99
-    """From which on a label names the goal."""
-    lead_radius_m: float = 3.0
-    """A frontier this near something that the instruction mentions is worth a detour..."""
-    lead_m: float = 3.0
-    """...of this length."""
-    min_image_share: float = 0.002
-    """Verification: an object that would cover less of the image is not missed (detectors give up at 0.001)."""
-    same_place_m: float = 0.5
-    """Verification: centres this near are the same place."""
-    min_overlap: float = 0.2
-    """Verification: or this share of what is seen lies by what is remembered."""
+_FAMILIES = ("frontier_update",)
+"""Modules of `evonav.decision.rules`; each has `RULES`, which gives the function that answers a class of question."""
 
 
 class TextMatch:
-    """Ranks, chooses and verifies by rule."""
+    """Answers every question of evonav's agents by rule."""
+
+    needs_images = False
 
     def __init__(self, config: TextMatchConfig | None = None) -> None:
-        self.config = config or TextMatchConfig()
-        self._goals: dict[tuple[str, str], Goal] = {}
+        """Rules with the given thresholds."""
+        self.matcher = Matcher(config)
+        self._rules: dict[type[Question[Any]], Any] = {}
+        for family in _FAMILIES:
+            self._rules.update(import_module(f"evonav.decision.rules.{family}").RULES)
 
-    def rank(self, goal: StageInput, entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
-        """Entries of the goal's label first, those that satisfy most relations first; then what the goal is on or near.
+    def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
+        """The rule's answer; the same at every attempt.
 
-        Ties go to more detections, then to the nearer entry, then to the older one.
+        Raises:
+            AnswerError: Nothing fits, and there is nothing to choose.
+            DecisionError: There is no rule for such questions.
         """
-        parsed = self._parsed(goal)
-        keys = []
-        for index, entry in enumerate(entries):
-            score = self._label_score(parsed, entry.label)
-            if score > 0.0:
-                held = self._relations_held(parsed, entry, entries) if self._names_goal(parsed, entry) else 0.0
-                distance_m = math.dist(_ground(entry), position_m)
-                keys.append((-score, -held, -entry.num_detections, distance_m, entry.entry_id, index))
-        return [key[-1] for key in sorted(keys)]
-
-    def choose(self, question: ChooseQuestion) -> Choice:
-        """A candidate that the instruction fits; else a frontier; else what the goal should be on or near."""
-        goal = self._parsed(question.goal)
-        config = self.config
-        named = [
-            (self._relations_held(goal, candidate, question.surroundings), index)
-            for index, candidate in enumerate(question.objects)
-            if self._names_goal(goal, candidate)
-        ]
-        if named:
-            held, index = max(named, key=lambda pair: (pair[0], -pair[1]))
-            is_last_chance = not question.frontiers or question.num_rounds_left <= config.hurry_rounds
-            if held >= config.min_relations or is_last_chance:
-                return Choice("object", index, f"{question.objects[index].label}, {held:.0%} of what is said fits")
-        if question.frontiers:
-            index = min(
-                range(len(question.frontiers)),
-                key=lambda i: (self._frontier_cost_m(goal, question, question.frontiers[i]), i),
-            )
-            return Choice("frontier", index, "nothing remembered fits" if not named else "relations do not hold")
-        if question.objects:
-            return Choice("object", 0, f"{question.objects[0].label} is where the {goal.noun} should be")
-        return Choice("none", 0, "nothing to go to")
-
-    def verify(self, question: VerifyQuestion) -> Verdict:
-        """Present if something of the entry's label is seen at the entry's place."""
-        entry, config = question.entry, self.config
-        if question.image_share < config.min_image_share:
-            return Verdict(True, "too small to be told from here")
-        for seen in question.seen:
-            is_here = seen.overlap > config.min_overlap or seen.distance_m < config.same_place_m
-            if is_here and canonical(seen.label) == canonical(entry.label):
-                return Verdict(True, f"{seen.label} seen {seen.distance_m:.2f} m from the remembered middle")
-        return Verdict(False, f"no {entry.label} seen at the remembered place")
-
-    def _parsed(self, goal: StageInput) -> Goal:
-        key = (goal.unified_instruction, goal.category)
-        if key not in self._goals:
-            self._goals[key] = parse_goal(*key)
-        return self._goals[key]
-
-    def _names_goal(self, goal: Goal, entry: ObjectCandidate) -> bool:
-        return similarity(goal.noun, entry.label) >= self.config.min_similarity
-
-    def _label_score(self, goal: Goal, label: str) -> float:
-        """1 for the goal's own label, less for part of it, less again for what it is said to be on or near."""
-        own = similarity(goal.noun, label)
-        if own >= self.config.min_similarity:
-            return own
-        said = [0.5 if r.kind == "on" else 0.4 for r in goal.relations if similarity(r.noun, label) >= 1.0]
-        return max([0.9 * own if own >= 0.4 else 0.0, *said])
-
-    def _relations_held(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
-        """Share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.
-
-        What is said of looks is left out: memory has no colours, and a thing that is small for its kind may be the
-        larger of two that are remembered.
-        """
-        judged = [
-            self._holds(relation, entry, around) for relation in goal.relations if relation.noun not in STRUCTURES
-        ]
-        return sum(judged) / len(judged) if judged else 1.0
-
-    def _holds(self, relation: Relation, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
-        """1 if a relation of an entry holds, 0 if not."""
-        if relation.kind == "in":
-            room = self._room_around(_ground(entry), around)
-            return self.config.unknown_room if room is None else float(room == relation.noun)
-        others = [o for o in around if o.entry_id != entry.entry_id and similarity(relation.noun, o.label) >= 1.0]
-        if relation.kind == "on":
-            return float(any(self._is_on(entry, other) for other in others))
-        return float(any(_gap_m(entry, other) <= self.config.near_m for other in others))
-
-    def _is_on(self, entry: ObjectCandidate, support: ObjectCandidate) -> bool:
-        margin_m = self.config.support_margin_m
-        for axis in (0, 2):
-            if abs(entry.centre_m[axis] - support.centre_m[axis]) > support.size_m[axis] / 2 + margin_m:
-                return False
-        bottom_m = entry.centre_m[1] - entry.size_m[1] / 2
-        low_m = support.centre_m[1] - support.size_m[1] / 2
-        return low_m - margin_m <= bottom_m <= low_m + support.size_m[1] + margin_m
-
-    def _room_around(self, place_m: Point2, around: Sequence[ObjectCandidate]) -> str | None:
-        """The type of room that things around a place speak for, the nearer the louder; `None` if none does."""
-        votes: dict[str, list[float]] = defaultdict(list)
-        for other in around:
-            room = _ROOM_OF_SIGN.get(canonical(other.label))
-            if room is None:
-                continue
-            weight = 1.0 - math.dist(_ground(other), place_m) / self.config.room_radius_m
-            if weight > 0.0:
-                votes[room].append(weight)
-        return max(sorted(votes), key=lambda room: math.fsum(votes[room]), default=None)
-
-    def _frontier_cost_m(self, goal: Goal, question: ChooseQuestion, frontier: FrontierCandidate) -> float:
-        """Travel, less what a hint is worth: something the instruction mentions, or the right kind of room."""
-        mentioned = {relation.noun for relation in goal.relations if relation.kind != "in"}
-        is_lead = any(
-            canonical(other.label) in mentioned
-            and math.dist(_ground(other), frontier.position_m) <= self.config.lead_radius_m
-            for other in question.surroundings
-        )
-        if not is_lead and goal.room is not None:
-            is_lead = self._room_around(frontier.position_m, question.surroundings) == goal.room
-        return frontier.travel_m - (self.config.lead_m if is_lead else 0.0)
-
-
-def _ground(entry: ObjectCandidate) -> Point2:
-    return (entry.centre_m[0], entry.centre_m[2])
-
-
-def _gap_m(a: ObjectCandidate, b: ObjectCandidate) -> float:
-    """Distance between two boxes on the ground plane; 0 if they overlap there."""
-    gaps_m = (
-        max(0.0, abs(a.centre_m[axis] - b.centre_m[axis]) - (a.size_m[axis] + b.size_m[axis]) / 2) for axis in (0, 2)
-    )
-    return math.hypot(*gaps_m)
+        rule = self._rules.get(type(question))
+        if rule is None:
+            raise DecisionError(f"the text matcher has no rule for {type(question).__name__}: ask a model")
+        answer, reason = rule(self.matcher, question)
+        return Reply(answer, f"{question.words(answer)}\n{reason}")

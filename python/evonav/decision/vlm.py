@@ -1,7 +1,7 @@
 """Asks a vision-language model behind any OpenAI-compatible endpoint.
 
     client = VlmClient(VlmConfig("gpt-4o"), store=ExchangeStore("exchanges.sqlite"))
-    answer = client.ask(Question.of(Text("What is this?"), Picture(image)))
+    answer = client.ask(Prompt.of(Text("What is this?"), Picture(image)))
 
 Retries of lost connections, of 429 and of 5xx are the SDK's, which honours `Retry-After`; what remains is a `VlmError`.
 Keys come from the caller or the environment, are sent in the header, and appear in no file, record or message.
@@ -11,7 +11,7 @@ import base64
 import json
 import os
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, Literal
@@ -22,6 +22,7 @@ from PIL import Image
 
 from evonav.decision.account import CHARACTERS_PER_TOKEN, Account, Usage, image_tokens
 from evonav.decision.exchanges import ExchangeStore, JsonObject, image_name, key_of
+from evonav.decision.prompts import Picture, Prompt, Text, Turn
 from evonav.decision.vlm_errors import VlmError
 from evonav.errors import DecisionError, InvalidArgumentError
 
@@ -75,51 +76,6 @@ class VlmConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class Text:
-    """Words of a question."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Picture:
-    """An image of a question."""
-
-    pixels: NDArray[np.uint8]
-    """`(H, W, 3)` RGB."""
-
-
-Part = Text | Picture
-
-
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """One side's words in a conversation."""
-
-    role: Literal["system", "user", "assistant"]
-    parts: tuple[Part, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Question:
-    """A conversation that the model is to go on with."""
-
-    turns: tuple[Turn, ...]
-    schema: Mapping[str, Any] | None = None
-    """JSON Schema that the answer has to follow (`response_format`), for servers that can."""
-
-    @classmethod
-    def of(cls, *parts: Part) -> "Question":
-        """A question of one turn."""
-        return cls((Turn("user", parts),))
-
-    def then(self, answer: str, reply: str) -> "Question":
-        """The question that follows an answer."""
-        turns = (*self.turns, Turn("assistant", (Text(answer),)), Turn("user", (Text(reply),)))
-        return Question(turns, self.schema)
-
-
-@dataclass(frozen=True, slots=True)
 class Answer:
     """A whole answer."""
 
@@ -166,7 +122,7 @@ class VlmClient:
         self._lock = threading.Lock()
         self._sdk: openai.OpenAI | None = None
 
-    def ask(self, question: Question) -> Answer:
+    def ask(self, prompt: Prompt) -> Answer:
         """The model's answer.
 
         Raises:
@@ -174,7 +130,7 @@ class VlmClient:
             StoreError: The exchanges cannot be read or written.
             DecisionError: The package `openai` is missing.
         """
-        kept = self.request_of(question, image_name)
+        kept = self.request_of(prompt, image_name)
         key = key_of(kept)
         if self.store is not None and self.mode in ("replay", "auto"):
             response = self.store.get(key)
@@ -183,7 +139,7 @@ class VlmClient:
                 return _answer(response, key, is_replayed=True)
             if self.mode == "replay":
                 raise VlmError("not_recorded", f"{self.store.path} has no exchange {key}")
-        response = self._ask_server(self.request_of(question), self.estimate(question))
+        response = self._ask_server(self.request_of(prompt), self.estimate(prompt))
         try:
             return _answer(response, key, is_replayed=False)
         except VlmError as error:
@@ -193,40 +149,40 @@ class VlmClient:
         finally:
             # A refusal is an answer too.
             if self.store is not None and self.mode != "live" and kept:
-                pictures = [part for turn in question.turns for part in turn.parts if isinstance(part, Picture)]
+                pictures = [part for turn in prompt.turns for part in turn.parts if isinstance(part, Picture)]
                 images = {image_name(picture.pixels): _png(picture.pixels) for picture in pictures}
                 self.store.put(kept, images, response)
 
-    def is_kept(self, question: Question) -> bool:
+    def is_kept(self, prompt: Prompt) -> bool:
         """Whether the store has the answer."""
-        return self.store is not None and self.store.get(key_of(self.request_of(question, image_name))) is not None
+        return self.store is not None and self.store.get(key_of(self.request_of(prompt, image_name))) is not None
 
-    def request_of(self, question: Question, url_of: Callable[[NDArray[np.uint8]], str] | None = None) -> JsonObject:
+    def request_of(self, prompt: Prompt, url_of: Callable[[NDArray[np.uint8]], str] | None = None) -> JsonObject:
         """The body that is posted to `/chat/completions`.
 
         Args:
-            question: What is asked.
+            prompt: What is asked.
             url_of: Of an image; default all of it, as PNG in a `data:` URL.
         """
         config = self.config
         request: JsonObject = {
             "model": config.model,
-            "messages": [_message(turn, config.image_detail, url_of or _data_url) for turn in question.turns],
+            "messages": [_message(turn, config.image_detail, url_of or _data_url) for turn in prompt.turns],
             config.max_tokens_field: config.max_tokens,
         }
         if config.temperature is not None:
             request["temperature"] = config.temperature
         if config.seed is not None:
             request["seed"] = config.seed
-        if question.schema is not None:
-            schema = {"name": "answer", "strict": True, "schema": dict(question.schema)}
+        if prompt.schema is not None:
+            schema = {"name": "answer", "strict": True, "schema": dict(prompt.schema)}
             request["response_format"] = {"type": "json_schema", "json_schema": schema}
         return request
 
-    def estimate(self, question: Question) -> Usage:
+    def estimate(self, prompt: Prompt) -> Usage:
         """Tokens that a question may cost, rather too many than too few."""
         tokens = 0.0
-        for part in (part for turn in question.turns for part in turn.parts):
+        for part in (part for turn in prompt.turns for part in turn.parts):
             if isinstance(part, Text):
                 tokens += 8 + len(part.text) / CHARACTERS_PER_TOKEN
             else:

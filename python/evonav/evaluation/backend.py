@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from evonav.agents.agent import Agent
-from evonav.agents.registry import agent_factory
+from evonav.agents.registry import agent_factory, new_agent
+from evonav.decision.questions.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.privileged import YARDSTICKS, yardstick
 from evonav.evaluation.protocol import EpisodeCase
@@ -38,10 +39,18 @@ class Backend:
     """Keywords for `simulator`, as JSON."""
     host_options: Mapping[str, Any] = field(default_factory=dict)
     """More of them, on this machine's means (GPU, display, timeouts): not part of what makes runs the same."""
+    decision: str = "evonav.decision.backends:text_match"
+    """Makes a `DecisionModel`; its first argument is the seed of the episode's agent."""
+    decision_options: Mapping[str, Any] = field(default_factory=dict)
+    """Keywords for `decision`, as JSON."""
+    decision_host_options: Mapping[str, Any] = field(default_factory=dict)
+    """More of them, on how the model is reached (address, file of exchanges, limits): no part of what makes runs the
+    same."""
 
     def identity(self) -> dict[str, Any]:
         """What makes runs the same."""
-        return {key: value for key, value in asdict(self).items() if key != "host_options" and value != {}}
+        host = ("host_options", "decision_host_options")
+        return {key: value for key, value in asdict(self).items() if key not in host and value != {}}
 
     def load_case(self, path: Path) -> EpisodeCase:
         """A task as the evaluator runs it."""
@@ -67,19 +76,28 @@ class Backend:
         finally:
             simulator.close()
 
+    def make_decision(self, seed: int) -> DecisionModel:
+        """A decision model for one agent's episode."""
+        model: DecisionModel = _imported(self.decision)(seed, **self.decision_options, **self.decision_host_options)
+        return model
+
     def make_perception(self) -> Perception:
         """A perception of the worker's own."""
         perception: Perception = _imported(self.perception)()
         return perception
 
 
-def make_agent(name: str) -> Agent:
+def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
     """A fresh agent or yardstick.
+
+    Args:
+        name: Of a built-in agent, a plug-in or a class.
+        decision: Handed to agents that take one; default: their own.
 
     Raises:
         InvalidArgumentError: There is none of this name.
     """
-    return yardstick(name) if name in YARDSTICKS else agent_factory(name)()
+    return yardstick(name) if name in YARDSTICKS else new_agent(agent_factory(name), decision)
 
 
 def check_agent_name(name: str) -> None:

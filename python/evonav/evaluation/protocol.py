@@ -25,6 +25,8 @@ class ProtocolConfig:
 
     max_rounds: int = 50
     """Decision rounds a stage."""
+    max_actions: int = 500
+    """Discrete actions a stage, for agents whose `Sensing.motion` is `actions`."""
     success_radius_m: float = SUCCESS_RADIUS_M
     waypoint_m: float = 0.25
     """Longest teleport while following planner waypoints."""
@@ -35,12 +37,19 @@ class ProtocolConfig:
     min_visible_px: int = 25
     """Pixels from which on the target counts as seen in a view (diagnostics and yardsticks)."""
 
+    def budget(self, sensing: Sensing) -> int:
+        """Rounds of a stage: decisions, or single actions."""
+        return self.max_actions if sensing.motion == "actions" else self.max_rounds
+
     def check(self, sensing: Sensing) -> None:
         """Refuses sensing that the protocol does not grant.
 
         Raises:
-            InvalidArgumentError: A schedule has no or too many views, or travel or range exceed the caps.
+            InvalidArgumentError: The motion is none of the two, a schedule has no or too many views, or travel or range
+                exceed the caps.
         """
+        if sensing.motion not in ("waypoints", "actions"):
+            raise InvalidArgumentError(f"sensing.motion = {sensing.motion!r}: must be `waypoints` or `actions`")
         for name, schedule in (("first_round", sensing.first_round), ("later_rounds", sensing.later_rounds)):
             if not 1 <= schedule.count <= self.max_views:
                 raise InvalidArgumentError(f"sensing.{name}.count = {schedule.count}: must be 1..{self.max_views}")

@@ -14,6 +14,7 @@ from evonav.agents.agent import (
     Move,
     NavigateTo,
     RoundDiagnostics,
+    Sensing,
     Stop,
 )
 from evonav.errors import DecisionError, InvalidArgumentError, SimulationError, SimulatorLostError
@@ -173,7 +174,7 @@ class _StageRun:
                     TaskInfo(
                         task_id=self._case.task_id,
                         num_stages=len(self._case.stages),
-                        max_rounds=self._protocol.max_rounds,
+                        max_rounds=self._protocol.budget(self._agent.sensing),
                         map_frame=map_frame(self._simulator.occupancy()),
                         seed=self._seed,
                     )
@@ -196,18 +197,19 @@ class _StageRun:
                 self._simulator, self._perception, sensing, self._stage.target.object_id, self._protocol.min_visible_px
             )
         last = motion.Motion((), is_success=True)
-        for number in range(self._protocol.max_rounds):
+        budget = self._protocol.budget(sensing)
+        for number in range(budget):
             with _blame(ErrorKind.SIMULATION):
                 sensed = sensors.observe(
                     is_first=number == 0,
                     is_action_success=last.is_success,
                     has_arrived=last.has_arrived,
-                    num_rounds_left=self._protocol.max_rounds - number,
+                    num_rounds_left=budget - number,
                 )
             with _blame(ErrorKind.AGENT):
                 if (privileged := privileges_of(self._agent)) is not None:
                     privileged.reveal_sighting(Sighting(sensed.is_target_visible))
-                action = checked_action(self._agent.act(sensed.observation))
+                action = checked_action(self._agent.act(sensed.observation), self._agent.sensing)
             with _blame(ErrorKind.SIMULATION):
                 last = self._carry_out(action)
             self._length_m += last.length_m
@@ -312,15 +314,18 @@ def pose_record(pose: Pose) -> PoseRecord:
     return PoseRecord(x_m=pose.x_m, y_m=pose.y_m, z_m=pose.z_m, yaw_rad=pose.yaw_rad, horizon_rad=pose.horizon_rad)
 
 
-def checked_action(action: object) -> AgentAction:
+def checked_action(action: object, sensing: Sensing) -> AgentAction:
     """What an agent answered, if it is an action.
 
     Raises:
-        InvalidArgumentError: It is not, or has a coordinate that is not a finite number.
+        InvalidArgumentError: It is not, has a coordinate that is not a finite number, or is a `NavigateTo` of an agent
+            whose budget counts single actions.
     """
     if isinstance(action, Move) and isinstance(action.action, Action):
         return Stop() if action.action is Action.STOP else action
     if isinstance(action, NavigateTo):
+        if sensing.motion == "actions":
+            raise InvalidArgumentError("NavigateTo: an agent whose `sensing.motion` is `actions` answers Move or Stop")
         position_m = _finite_point("position_m", action.position_m)
         face_m = None if action.face_m is None else _finite_point("face_m", action.face_m)
         return replace(action, position_m=position_m, face_m=face_m)

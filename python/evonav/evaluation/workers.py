@@ -103,7 +103,7 @@ def run_job(job: EpisodeJob, workplace: Workplace) -> Generator[StageOutcome]:
 def _attempt(case: EpisodeCase, job: EpisodeJob, workplace: Workplace) -> Generator[StageOutcome]:
     perception = workplace.backend.make_perception()
     with workplace.simulator() as simulator:
-        agent = make_agent(job.agent)
+        agent = make_agent(job.agent, workplace.backend.make_decision(job.seed))
         yield from Episode(case, job.agent, agent, simulator, perception, workplace.protocol, job.seed).run()
 
 

@@ -5,7 +5,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.vlm import Picture, Question, Text
+from evonav.decision.prompts import Picture, Prompt, Text
 from evonav.tasks.language import noun_of
 
 APPEARANCE_PROMPT = (
@@ -37,7 +37,7 @@ _FAULTS: tuple[tuple[str, str], ...] = (
 )  # fmt: skip
 
 
-def appearance_question(category: str, basic: str, image: NDArray[np.uint8]) -> Question:
+def appearance_question(category: str, basic: str, image: NDArray[np.uint8]) -> Prompt:
     """Asks for the appearance instruction.
 
     Args:
@@ -46,10 +46,10 @@ def appearance_question(category: str, basic: str, image: NDArray[np.uint8]) -> 
         image: `(H, W, 3)` RGB reference image.
     """
     inputs = f"Target category: {noun_of(category)}\nBasic instruction: {basic}\nReference image:"
-    return Question.of(Text(f"{APPEARANCE_PROMPT}\n\n{inputs}"), Picture(image))
+    return Prompt.of(Text(f"{APPEARANCE_PROMPT}\n\n{inputs}"), Picture(image))
 
 
-def unified_question(basic: str, appearance: str, image: NDArray[np.uint8]) -> Question:
+def unified_question(basic: str, appearance: str, image: NDArray[np.uint8]) -> Prompt:
     """Asks for the unified instruction.
 
     Args:
@@ -58,7 +58,7 @@ def unified_question(basic: str, appearance: str, image: NDArray[np.uint8]) -> Q
         image: `(H, W, 3)` RGB reference image.
     """
     inputs = f"Basic instruction: {basic}\nAppearance instruction: {appearance}\nReference image:"
-    return Question.of(Text(f"{UNIFIED_PROMPT}\n\n{inputs}"), Picture(image))
+    return Prompt.of(Text(f"{UNIFIED_PROMPT}\n\n{inputs}"), Picture(image))
 
 
 def repair_request(fault: str) -> str:

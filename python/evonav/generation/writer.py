@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.decision.account import Usage
-from evonav.decision.vlm import Question, VlmClient
+from evonav.decision.prompts import Prompt
+from evonav.decision.vlm import VlmClient
 from evonav.decision.vlm_errors import VlmError, VlmFailure
 from evonav.errors import TaskError
 from evonav.generation.prompts import appearance_question, cleaned, fault_of, repair_request, unified_question
@@ -156,7 +157,7 @@ def write_stage(public: PublicStage, image: NDArray[np.uint8], client: VlmClient
     return public.model_copy(update=texts)
 
 
-def _text(client: VlmClient, question: Question) -> str:
+def _text(client: VlmClient, question: Prompt) -> str:
     """An instruction, asked for once more if the first cannot stand."""
     answer = client.ask(question).text
     text = cleaned(answer)

@@ -1,0 +1,200 @@
+"""What all agents but UniGoal share: a map with frontiers, object entries, kept views, and one committed target.
+
+Specification: the common substrate of the paper's Sec. C.3 and C.4, with 3D-Mem's parameters.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.agents.agent import Belief, EntryBelief, FrontierBelief, NavigateTo
+from evonav.agents.explorer import Explorer, ExplorerConfig
+from evonav.agents.viewpoint import observation_point
+from evonav.decision.asking import Asked
+from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels
+from evonav.memory import Frontier, ObjectMap, ObjectMapConfig
+from evonav.memory.objects import ObjectEntry
+from evonav.memory.occupancy import FREE
+from evonav.memory.views import StoredView, ViewStore, crop_of, pixels_of
+from evonav.sensors.observation import MapFrame, Observation
+
+Point2 = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class NavigatorConfig:
+    """3D-Mem's constants, and what the paper leaves open."""
+
+    explorer: ExplorerConfig = field(default_factory=ExplorerConfig)
+    objects: ObjectMapConfig = field(default_factory=ObjectMapConfig)
+    observation_distance_m: float = 1.5
+    """Where to stand to look at an object."""
+    aim_again_m: float = 0.25
+    """The place to stand is chosen again when the middle of the entry has shifted by more than this."""
+    image_px: int = 360
+    """Longer edge of an image in a prompt, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """An object entry that the agent is committed to."""
+
+    entry_id: int
+    goal_m: Point2
+    """Where to stand."""
+    centre_m: Point2
+
+
+class Navigator:
+    """Takes in observations, and turns choices into places to go."""
+
+    def __init__(self, map_frame: MapFrame, config: NavigatorConfig) -> None:
+        self.config = config
+        self.explorer = Explorer(map_frame, config.explorer)
+        self.objects = ObjectMap(config.objects)
+        self.views = ViewStore()
+        self.target: Target | None = None
+        self.round_views: list[StoredView] = []
+        """Of the last round, the heading view last."""
+        self.stage = 1
+        self.round = -1
+
+    def begin_stage(self, stage: int) -> None:
+        """A new goal: the target is dropped, all else stays, the count of views to the next clean-up starts over."""
+        self.target = None
+        self.stage = stage
+        self.round = -1
+        self.objects.begin_stage(stage)
+
+    def observe(self, observation: Observation) -> bool:
+        """Takes over a round's views: entries first, then cells and frontiers.
+
+        Returns:
+            Whether the views contradicted the map, which then holds this round's views alone; the target is dropped.
+        """
+        self.round += 1
+        self.round_views = []
+        for view in observation.views:
+            update = self.objects.update(view)
+            self.views.follow(update.merged)
+            self.round_views.append(self.views.add(view, update.entry_ids, stage=self.stage, round_=self.round))
+            self._follow(update.removed)
+        is_outdated = self.explorer.observe(observation)
+        if is_outdated:
+            self.target = None
+        return is_outdated
+
+    def _follow(self, removed: Sequence[int]) -> None:
+        """Keeps the commitment when its entry was merged into another; drops it when the entry is gone."""
+        target = self.target
+        if target is None:
+            return
+        entry_id = self.views.resolve(target.entry_id)
+        self.target = None if entry_id in removed else replace(target, entry_id=entry_id)
+
+    def reached(self, observation: Observation) -> Target | None:
+        """The committed target, if its place was reached, or cannot be any nearer."""
+        is_done = observation.has_arrived or not observation.is_action_success
+        return self.target if is_done else None
+
+    def observation_point(self, centre_m: Point2) -> Point2 | None:
+        """Where to stand to look at a place; `None` where the map knows no free floor around it."""
+        occupancy = self.explorer.map
+        return observation_point(
+            occupancy.cells == FREE, occupancy.map_frame, centre_m, self.config.observation_distance_m
+        )
+
+    def aim(self) -> None:
+        """Brings the target's place up to date: the first glimpse of a table may be its corner."""
+        target = self.target
+        entry = None if target is None else self.objects.entry(target.entry_id)
+        if target is None or entry is None:
+            return
+        centre_m = (entry.centre_m[0], entry.centre_m[2])
+        if math.dist(centre_m, target.centre_m) > self.config.aim_again_m:
+            goal_m = self.observation_point(centre_m) or target.goal_m
+            self.target = Target(entry.id, goal_m, centre_m)
+
+    def approach(self, target: Target) -> NavigateTo:
+        """Commits to a target and goes on towards it."""
+        self.target = target
+        self.explorer.stop_exploring()
+        return NavigateTo(target.goal_m, face_m=target.centre_m)
+
+    def go_to_frontier(self, frontier: Frontier) -> NavigateTo:
+        """Goes on towards a frontier; no commitment."""
+        position_m, face_m = self.explorer.go_to(frontier)
+        return NavigateTo(position_m, face_m=face_m)
+
+    def heading_view(self) -> Pixels | None:
+        """The heading view of the last round, for a prompt."""
+        return pixels_of(self.round_views[-1], self.config.image_px) if self.round_views else None
+
+    def candidate(self, entry: ObjectEntry, *, with_images: bool = False) -> ObjectCandidate:
+        """An entry as questions show it.
+
+        Args:
+            entry: Of the object memory.
+            with_images: Cut its best crop out, and find the view that it was last seen in.
+        """
+        crop: Pixels | None = None
+        view: Pixels | None = None
+        if with_images:
+            if (best := self.views.best(entry.id)) is not None:
+                crop = crop_of(best[0], best[1].box_px)
+            if (latest := self.views.latest(entry.id)) is not None:
+                view = pixels_of(latest, self.config.image_px)
+        return ObjectCandidate(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections, crop, view)
+
+    def frontier_candidate(self, frontier: Frontier, here: Point2, *, with_images: bool = False) -> FrontierCandidate:
+        """A frontier as questions show it."""
+        x_m, z_m = frontier.position_m
+        image = self.frontier_image(frontier) if with_images else None
+        return FrontierCandidate(frontier.id, (x_m, z_m), math.dist((x_m, z_m), here), image)
+
+    def frontier_image(self, frontier: Frontier) -> Pixels | None:
+        """A frontier as the agent saw it: the kept view whose axis points most nearly at it.
+
+        3D-Mem renders a fresh view for each new frontier; here one of those that showed it has to do, since no agent
+        may look around without spending a round.
+        """
+        best: tuple[float, StoredView] | None = None
+        for view in reversed(self.views.views):
+            if view.jpeg is None or (best is not None and view.stage != best[1].stage):
+                break
+            dx_m, dz_m = frontier.position_m[0] - view.pose.x_m, frontier.position_m[1] - view.pose.z_m
+            distance_m = math.hypot(dx_m, dz_m)
+            off_axis_rad = abs(math.remainder(math.atan2(dx_m, dz_m) - view.pose.yaw_rad, math.tau))
+            cost = off_axis_rad + 0.1 * distance_m
+            if best is None or cost < best[0]:
+                best = (cost, view)
+        return None if best is None else pixels_of(best[1], self.config.image_px)
+
+    def beliefs(self) -> list[EntryBelief]:
+        """The object memory."""
+        return [belief_of(entry) for entry in self.objects.entries]
+
+    def belief(self, asked: Sequence[Asked], candidate_ids: Sequence[int] = ()) -> Belief:
+        """All of it, for pictures.
+
+        Args:
+            asked: Questions of the round.
+            candidate_ids: Entries that the last question offered.
+        """
+        cells: NDArray[np.uint8] = self.explorer.map.cells
+        return Belief(
+            entries=self.beliefs(),
+            candidate_ids=tuple(candidate_ids),
+            frontiers=[FrontierBelief(f.id, f.position_m, f.direction_rad) for f in self.explorer.frontiers],
+            cells=cells,
+            map_frame=self.explorer.map.map_frame,
+            asked=tuple(asked),
+        )
+
+
+def belief_of(entry: ObjectEntry) -> EntryBelief:
+    """An entry for records."""
+    return EntryBelief(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)

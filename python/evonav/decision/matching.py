@@ -1,0 +1,157 @@
+"""What rules know of goals and homes: nouns, relations by geometry, and rooms by what stands in them."""
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from evonav.decision.language import Goal, Relation, canonical, parse_goal, similarity
+from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Point2
+from evonav.tasks.language import STRUCTURES
+from evonav.tasks.public import StageInput
+
+ROOM_SIGNS: dict[str, tuple[str, ...]] = {
+    "kitchen": (
+        "fridge",
+        "microwave",
+        "toaster",
+        "coffee machine",
+        "countertop",
+        "kettle",
+        "pot",
+        "pan",
+        "dish sponge",
+    ),
+    "bathroom": (
+        "toilet",
+        "bathtub",
+        "shower curtain",
+        "shower head",
+        "toilet paper hanger",
+        "plunger",
+        "towel holder",
+    ),
+    "bedroom": ("bed", "dresser", "alarm clock", "laundry hamper"),
+    "living room": ("sofa", "television", "tv stand", "coffee table", "arm chair", "remote control"),
+}
+"""Things that mostly stand in one type of room."""
+_ROOM_OF_SIGN = {sign: room for room, signs in ROOM_SIGNS.items() for sign in signs}
+
+
+@dataclass(frozen=True, slots=True)
+class TextMatchConfig:
+    """The rules' thresholds."""
+
+    near_m: float = 1.0
+    """Largest gap between boxes that are near each other."""
+    support_margin_m: float = 0.15
+    """How far the centre of what stands on something may lie outside its box, and its bottom above it."""
+    room_radius_m: float = 3.5
+    """Within which things speak for a room."""
+    min_relations: float = 0.6
+    """Share of an instruction's relations that must hold before exploration ends for a candidate."""
+    unknown_room: float = 0.5
+    """What a room that cannot be told counts for."""
+    hurry_rounds: int = 8
+    """With no more rounds left than this, any candidate of the right category will do."""
+    min_similarity: float = 0.99
+    """From which on a label names the goal."""
+    lead_radius_m: float = 3.0
+    """A frontier this near something that the instruction mentions is worth a detour..."""
+    lead_m: float = 3.0
+    """...of this length."""
+    min_image_share: float = 0.002
+    """Verification: an object that would cover less of the image is not missed (detectors give up at 0.001)."""
+    same_place_m: float = 0.5
+    """Verification: centres this near are the same place."""
+    min_overlap: float = 0.2
+    """Verification: or this share of what is seen lies by what is remembered."""
+
+
+class Matcher:
+    """Compares goals with remembered things."""
+
+    def __init__(self, config: TextMatchConfig | None = None) -> None:
+        self.config = config or TextMatchConfig()
+        self._goals: dict[tuple[str, str], Goal] = {}
+
+    def parsed(self, goal: StageInput) -> Goal:
+        """The instruction, read once."""
+        key = (goal.unified_instruction, goal.category)
+        if key not in self._goals:
+            self._goals[key] = parse_goal(*key)
+        return self._goals[key]
+
+    def names_goal(self, goal: Goal, entry: ObjectCandidate) -> bool:
+        """Whether an entry's label is what the goal calls its target."""
+        return similarity(goal.noun, entry.label) >= self.config.min_similarity
+
+    def label_score(self, goal: Goal, label: str) -> float:
+        """1 for the goal's own label, less for part of it, less again for what it is said to be on or near."""
+        own = similarity(goal.noun, label)
+        if own >= self.config.min_similarity:
+            return own
+        said = [0.5 if r.kind == "on" else 0.4 for r in goal.relations if similarity(r.noun, label) >= 1.0]
+        return max([0.9 * own if own >= 0.4 else 0.0, *said])
+
+    def relations_held(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
+        """Share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.
+
+        What is said of looks is left out: memory has no colours, and a thing that is small for its kind may be the
+        larger of two that are remembered.
+        """
+        judged = [
+            self._holds(relation, entry, around) for relation in goal.relations if relation.noun not in STRUCTURES
+        ]
+        return sum(judged) / len(judged) if judged else 1.0
+
+    def _holds(self, relation: Relation, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
+        """1 if a relation of an entry holds, 0 if not."""
+        if relation.kind == "in":
+            room = self.room_around(entry.ground_m, around)
+            return self.config.unknown_room if room is None else float(room == relation.noun)
+        others = [o for o in around if o.entry_id != entry.entry_id and similarity(relation.noun, o.label) >= 1.0]
+        if relation.kind == "on":
+            return float(any(self._is_on(entry, other) for other in others))
+        return float(any(_gap_m(entry, other) <= self.config.near_m for other in others))
+
+    def _is_on(self, entry: ObjectCandidate, support: ObjectCandidate) -> bool:
+        margin_m = self.config.support_margin_m
+        for axis in (0, 2):
+            if abs(entry.centre_m[axis] - support.centre_m[axis]) > support.size_m[axis] / 2 + margin_m:
+                return False
+        bottom_m = entry.centre_m[1] - entry.size_m[1] / 2
+        low_m = support.centre_m[1] - support.size_m[1] / 2
+        return low_m - margin_m <= bottom_m <= low_m + support.size_m[1] + margin_m
+
+    def room_around(self, place_m: Point2, around: Sequence[ObjectCandidate]) -> str | None:
+        """The type of room that things around a place speak for, the nearer the louder; `None` if none does."""
+        votes: dict[str, list[float]] = defaultdict(list)
+        for other in around:
+            room = _ROOM_OF_SIGN.get(canonical(other.label))
+            if room is None:
+                continue
+            weight = 1.0 - math.dist(other.ground_m, place_m) / self.config.room_radius_m
+            if weight > 0.0:
+                votes[room].append(weight)
+        return max(sorted(votes), key=lambda room: math.fsum(votes[room]), default=None)
+
+    def frontier_cost_m(self, goal: Goal, frontier: FrontierCandidate, around: Sequence[ObjectCandidate]) -> float:
+        """Travel, less what a hint is worth: something the instruction mentions, or the right kind of room."""
+        mentioned = {relation.noun for relation in goal.relations if relation.kind != "in"}
+        is_lead = any(
+            canonical(other.label) in mentioned
+            and math.dist(other.ground_m, frontier.position_m) <= self.config.lead_radius_m
+            for other in around
+        )
+        if not is_lead and goal.room is not None:
+            is_lead = self.room_around(frontier.position_m, around) == goal.room
+        return frontier.travel_m - (self.config.lead_m if is_lead else 0.0)
+
+
+def _gap_m(a: ObjectCandidate, b: ObjectCandidate) -> float:
+    """Distance between two boxes on the ground plane; 0 if they overlap there."""
+    gaps_m = (
+        max(0.0, abs(a.centre_m[axis] - b.centre_m[axis]) - (a.size_m[axis] + b.size_m[axis]) / 2) for axis in (0, 2)
+    )
+    return math.hypot(*gaps_m)

@@ -1,0 +1,53 @@
+"""What a model is given to read and to look at: words and images in turns."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """Words of a prompt."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """An image of a prompt."""
+
+    pixels: NDArray[np.uint8]
+    """`(H, W, 3)` RGB."""
+
+
+Part = Text | Picture
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """One side's words in a conversation."""
+
+    role: Literal["system", "user", "assistant"]
+    parts: tuple[Part, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Prompt:
+    """A conversation that the model is to go on with."""
+
+    turns: tuple[Turn, ...]
+    schema: Mapping[str, Any] | None = None
+    """JSON Schema that the answer has to follow (`response_format`), for servers that can."""
+
+    @classmethod
+    def of(cls, *parts: Part) -> "Prompt":
+        """A prompt of one turn."""
+        return cls((Turn("user", parts),))
+
+    def then(self, answer: str, reply: str) -> "Prompt":
+        """The prompt that follows an answer."""
+        turns = (*self.turns, Turn("assistant", (Text(answer),)), Turn("user", (Text(reply),)))
+        return Prompt(turns, self.schema)

@@ -1,0 +1,1 @@
+"""What agents ask: one typed question a purpose, one file an agent family."""

@@ -1,0 +1,45 @@
+"""What questions offer to choose from."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Point2 = tuple[float, float]
+"""`(x, z)` in metres."""
+Point3 = tuple[float, float, float]
+"""`(x, y, z)` in metres."""
+Pixels = NDArray[np.uint8]
+"""`(H, W, 3)` RGB."""
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectCandidate:
+    """A remembered object: a label and an axis-aligned box; images where the model looks at them."""
+
+    entry_id: int
+    label: str
+    centre_m: Point3
+    size_m: Point3
+    num_detections: int
+    crop: Pixels | None = field(default=None, compare=False, repr=False)
+    """Its best view, cut out."""
+    view: Pixels | None = field(default=None, compare=False, repr=False)
+    """The image that it was last seen in."""
+
+    @property
+    def ground_m(self) -> Point2:
+        """`(x, z)` of its middle."""
+        return (self.centre_m[0], self.centre_m[2])
+
+
+@dataclass(frozen=True, slots=True)
+class FrontierCandidate:
+    """A place from which unexplored space can be seen."""
+
+    frontier_id: int
+    position_m: Point2
+    travel_m: float
+    """Distance from the agent."""
+    image: Pixels | None = field(default=None, compare=False, repr=False)
+    """Towards it."""

@@ -1,0 +1,163 @@
+"""What Frontier-Update and its kin ask (paper, Sec. C.4): where to go, and whether the target is still there."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+from evonav.decision.prompts import Prompt, Text
+from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.questions.question import AnswerError, Question, first_line
+from evonav.decision.questions.wording import goal_parts, merged, titled
+from evonav.tasks.public import StageInput
+
+_CHOICE = re.compile(r"(object|frontier)\s+(\d+)\b[.:]?", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of a question's candidates."""
+
+    kind: Literal["object", "frontier"]
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class ChooseQuestion(Question[Choice]):
+    """Where to go next: to one of the objects, or to one of the frontiers?"""
+
+    kind: ClassVar[str] = "choose"
+    goal: StageInput
+    position_m: Point2
+    """Of the agent."""
+    objects: Sequence[ObjectCandidate]
+    """Best first, by `rank_entries`."""
+    frontiers: Sequence[FrontierCandidate]
+    surroundings: Sequence[ObjectCandidate]
+    """Everything remembered: what the candidates' images would show around them. Not part of the prompt."""
+    num_rounds_left: int
+    heading_view: Pixels | None = field(default=None, compare=False, repr=False)
+
+    def prompt(self) -> Prompt:
+        """The heading view, each object with its crop and last view, each frontier with its image."""
+        parts = [
+            *goal_parts(self.goal),
+            Text(
+                "The robot searches a home in which things may have been moved since they were last seen. Choose where "
+                "it goes next: to a remembered object that is the goal, or to a frontier behind which the goal may be."
+            ),
+            *titled("What the robot sees ahead:", self.heading_view),
+        ]
+        for index, candidate in enumerate(self.objects):
+            parts += titled(f"Object {index}: {candidate.label}", candidate.crop)
+            if candidate.view is not None:
+                parts += titled(f"The view in which object {index} was last seen:", candidate.view)
+        for index, frontier in enumerate(self.frontiers):
+            parts += titled(f"Frontier {index}: {frontier.travel_m:.1f} m away", frontier.image)
+        parts.append(
+            Text(
+                f"There are {len(self.objects)} objects and {len(self.frontiers)} frontiers. Answer on the first line "
+                'with exactly "Object i" or "Frontier i", and give your reason on the second.'
+            )
+        )
+        return Prompt.of(*merged(parts))
+
+    def parse(self, text: str) -> Choice:
+        """`Object i` or `Frontier i`, whatever the case, with an index that there is."""
+        line = first_line(text)
+        match = _CHOICE.fullmatch(line)
+        if match is None:
+            raise AnswerError("invalid", f"neither `Object i` nor `Frontier i`: {line[:80]!r}", text)
+        choice = Choice("object" if match[1].lower() == "object" else "frontier", int(match[2]))
+        if choice not in self._choices():
+            raise AnswerError("invalid", f"there is no {line[:80]}", text)
+        return choice
+
+    def words(self, answer: Choice) -> str:
+        """`Object i` or `Frontier i`."""
+        return f"{answer.kind.capitalize()} {answer.index}"
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """One of the candidates."""
+        return {"type": "string", "enum": [self.words(choice) for choice in self._choices()]}
+
+    def alternatives(self, answer: Choice) -> Sequence[Choice]:
+        """Every other candidate."""
+        return [choice for choice in self._choices() if choice != answer]
+
+    def _choices(self) -> list[Choice]:
+        return [
+            *(Choice("object", index) for index in range(len(self.objects))),
+            *(Choice("frontier", index) for index in range(len(self.frontiers))),
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """An object in a present view, compared with a remembered one."""
+
+    label: str
+    overlap: float
+    """Share of its points that lie by the remembered object's."""
+    distance_m: float
+    """From its centroid to the middle of the remembered object's box; `inf` if it cannot be told."""
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyQuestion(Question[bool]):
+    """Does the present observation support that the remembered object is still here?"""
+
+    kind: ClassVar[str] = "verify"
+    goal: StageInput
+    entry: ObjectCandidate
+    seen: Sequence[Sighting]
+    """What the present views show, for models that do not look at them. Not part of the prompt."""
+    image_share: float
+    """Share of the present view that the remembered object's box would cover if nothing hid it."""
+    views: Sequence[Pixels] = field(default=(), compare=False, repr=False)
+    """Present ones, the facing view last."""
+
+    def prompt(self) -> Prompt:
+        """The stored crop, and what the robot sees where it was."""
+        parts = [
+            *goal_parts(self.goal),
+            *titled(f"The robot remembers this object: {self.entry.label}", self.entry.crop),
+            Text("It went to where it remembers it, and now sees:"),
+        ]
+        for index, view in enumerate(self.views):
+            parts += titled(f"View {index}:", view)
+        parts.append(
+            Text(
+                "Does what it sees support that the remembered object is still here? Answer on the first line with "
+                'exactly "yes" or "no", and give your reason on the second.'
+            )
+        )
+        return Prompt.of(*merged(parts))
+
+    def parse(self, text: str) -> bool:
+        """`yes` or `no`, whatever the case."""
+        return parse_yes_no(text)
+
+    def words(self, answer: bool) -> str:
+        """`yes` or `no`."""
+        return "yes" if answer else "no"
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """`yes` or `no`."""
+        return {"type": "string", "enum": ["yes", "no"]}
+
+    def alternatives(self, answer: bool) -> Sequence[bool]:
+        """The opposite."""
+        return [not answer]
+
+
+def parse_yes_no(text: str) -> bool:
+    """Reads a first line that begins with the word `yes` or `no`.
+
+    Raises:
+        AnswerError: It begins with neither.
+    """
+    match = re.match(r"(yes|no)\b", first_line(text), re.IGNORECASE)
+    if match is None:
+        raise AnswerError("invalid", f"neither yes nor no: {first_line(text)[:80]!r}", text)
+    return match[1].lower() == "yes"

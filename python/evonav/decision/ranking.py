@@ -1,0 +1,30 @@
+"""Which remembered objects a decision model is shown, where no image-text features rank them."""
+
+import math
+from collections.abc import Sequence
+
+from evonav.decision.matching import Matcher
+from evonav.decision.questions.candidates import ObjectCandidate, Point2
+from evonav.tasks.public import StageInput
+
+
+def rank_entries(
+    matcher: Matcher, goal: StageInput, entries: Sequence[ObjectCandidate], position_m: Point2
+) -> list[int]:
+    """Indices of all entries, those whose label the instruction speaks of first.
+
+    Stands for the paper's CLIP similarity (Sec. C.4), which ground-truth perception lacks. Ties go to more detections,
+    then to the nearer entry, then to the older one.
+
+    Args:
+        matcher: Reads the goal.
+        goal: Of the stage.
+        entries: All that is remembered.
+        position_m: Of the agent.
+    """
+    parsed = matcher.parsed(goal)
+    keys = []
+    for index, entry in enumerate(entries):
+        score = matcher.label_score(parsed, entry.label)
+        keys.append((-score, -entry.num_detections, math.dist(entry.ground_m, position_m), entry.entry_id, index))
+    return [key[-1] for key in sorted(keys)]

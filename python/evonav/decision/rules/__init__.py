@@ -1,0 +1,1 @@
+"""The text matcher's answers, a file an agent family."""
