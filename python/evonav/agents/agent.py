@@ -144,6 +144,8 @@ class Belief:
     """Of `cells`; need not be the task's own."""
     asked: tuple[Asked, ...]
     """Questions of the round, with their answers."""
+    explored: NDArray[np.bool_] | None = None
+    """`(R, C)`: cells that were seen from close by, where the agent tells them apart."""
 
 
 @runtime_checkable

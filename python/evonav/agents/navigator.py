@@ -192,6 +192,7 @@ class Navigator:
             cells=cells,
             map_frame=self.explorer.map.map_frame,
             asked=tuple(asked),
+            explored=self.explorer.map.explored,
         )
 
 

@@ -2,9 +2,10 @@
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Protocol
 
 from evonav.agents.agent import (
     Agent,
@@ -35,12 +36,29 @@ from evonav.evaluation.records import (
     StageRecord,
 )
 from evonav.evaluation.sensing import Perception, Sensed, Sensors, map_frame
+from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, SceneObject, Simulator
 
 STALE_MARGIN_M = 0.3
 """An entry whose centre is this near the box of an object of its label is not stale."""
+
+
+class EpisodeObserver(Protocol):
+    """Looks on as an episode runs (`evonav.evaluation.trace`); nothing of it reaches agent or record."""
+
+    def stage_begins(self, stage: int, simulator: Simulator) -> None:
+        """A stage's house is loaded; the agent was not told yet."""
+        ...
+
+    def round_begins(self, observation: Observation) -> None:
+        """What the agent is about to be given."""
+        ...
+
+    def round_ends(self, record: RoundRecord) -> None:
+        """The agent has acted, and its action was carried out."""
+        ...
 
 
 class _StageError(Exception):
@@ -80,7 +98,9 @@ class Episode:
         perception: Perception,
         protocol: ProtocolConfig,
         seed: int,
+        observer: EpisodeObserver | None = None,
     ) -> None:
+        self._observer = observer
         self._case = case
         self._agent_name = agent_name
         self._agent = agent
@@ -123,6 +143,7 @@ class _StageRun:
         self._perception = episode._perception
         self._protocol = episode._protocol
         self._seed = episode._seed
+        self._observer = episode._observer
         self._stage = self._case.stages[record.stage - 1]
         self._record = record
         self._requested = requested
@@ -155,6 +176,8 @@ class _StageRun:
         for body in self._simulator.objects:
             self._bodies.setdefault(body.category, []).append(body)
         self.plan = stage_map(self._case, stage, self._simulator.objects)
+        if self._observer is not None:
+            self._observer.stage_begins(stage, self._simulator)
         room_id = room_at(self.plan, (self._requested.x_m, self._requested.z_m))
         evolved_room_id = self._record.transition.room_id
         self._record = self._record.model_copy(
@@ -206,6 +229,8 @@ class _StageRun:
                     has_arrived=last.has_arrived,
                     num_rounds_left=budget - number,
                 )
+            if self._observer is not None:
+                self._observer.round_begins(sensed.observation)
             with _blame(ErrorKind.AGENT):
                 if (privileged := privileges_of(self._agent)) is not None:
                     privileged.reveal_sighting(Sighting(sensed.is_target_visible))
@@ -214,6 +239,8 @@ class _StageRun:
                 last = self._carry_out(action)
             self._length_m += last.length_m
             self._trace.append(self._round_record(number, sensed, action, last))
+            if self._observer is not None:
+                self._observer.round_ends(self._trace[-1])
             if isinstance(action, Stop):
                 return action.reason
         return None
@@ -296,17 +323,26 @@ class _StageRun:
             return tuple(self._entry_record(belief) for belief in self._agent.entries())
 
     def _entry_record(self, belief: EntryBelief) -> EntryRecord:
-        return EntryRecord(
-            entry_id=belief.entry_id,
-            label=belief.label,
-            centre_m=belief.centre_m,
-            size_m=belief.size_m,
-            num_detections=belief.num_detections,
-            is_stale=not any(
-                _distance_to_box_m(belief.centre_m, body) <= STALE_MARGIN_M
-                for body in self._bodies.get(belief.label, ())
-            ),
-        )
+        return entry_record(belief, self._bodies)
+
+
+def entry_record(belief: EntryBelief, bodies: Mapping[str, Sequence[SceneObject]]) -> EntryRecord:
+    """An entry for the record, judged.
+
+    Args:
+        belief: As the agent holds it.
+        bodies: Of the stage's house, by category.
+    """
+    return EntryRecord(
+        entry_id=belief.entry_id,
+        label=belief.label,
+        centre_m=belief.centre_m,
+        size_m=belief.size_m,
+        num_detections=belief.num_detections,
+        is_stale=not any(
+            distance_to_box_m(belief.centre_m, body) <= STALE_MARGIN_M for body in bodies.get(belief.label, ())
+        ),
+    )
 
 
 def pose_record(pose: Pose) -> PoseRecord:
@@ -352,6 +388,7 @@ def _action_record(action: AgentAction) -> ActionRecord:
     return ActionRecord(kind="stop", reason=str(action.reason))
 
 
-def _distance_to_box_m(point_m: Point3, body: SceneObject) -> float:
+def distance_to_box_m(point_m: Point3, body: SceneObject) -> float:
+    """From a point to the axis-aligned box of a body; 0 inside."""
     gaps_m = (max(0.0, abs(p - c) - s / 2) for p, c, s in zip(point_m, body.centre_m, body.size_m, strict=True))
     return math.hypot(*gaps_m)
