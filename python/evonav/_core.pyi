@@ -331,6 +331,17 @@ class ObjectMap:
     @property
     def entries(self) -> list[ObjectEntry]: ...
 
+# snapshots
+
+def update_snapshots(
+    objects: list[tuple[int, tuple[float, float]]],
+    frames: list[list[tuple[int, float]]],
+    snapshots: list[tuple[int, list[int]]],
+    *,
+    agent_m: tuple[float, float],
+    reach_m: float,
+) -> list[tuple[int, list[int]]]: ...
+
 # camera
 
 def unproject_image(

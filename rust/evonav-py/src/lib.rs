@@ -10,6 +10,7 @@ mod memory;
 mod objects;
 mod sensors;
 mod simulator;
+mod snapshots;
 
 use pyo3::prelude::*;
 
@@ -23,6 +24,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     memory::register(module)?;
     camera::register(module)?;
     simulator::register(module)?;
+    snapshots::register(module)?;
     evolution::register(module)?;
     // PyO3 lists every name in `__all__`, which the stub would have to repeat.
     module.delattr("__all__")

@@ -10,5 +10,6 @@ pub mod frontiers;
 pub mod objects;
 pub mod occupancy;
 mod regions;
+pub mod snapshots;
 mod viewpoints;
 pub mod voxels;

@@ -1,0 +1,94 @@
+"""3D-Mem's snapshots: a few of the kept views, which together show every remembered object once."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from evonav import _core
+from evonav.memory.objects import ObjectEntry
+from evonav.memory.views import StoredView, ViewStore
+
+Point2 = tuple[float, float]
+
+RECLUSTER_REACH_M = 4.0
+"""Entries nearer to the agent than this are clustered anew (3D-Mem: the 3.5 m of its detections and 0.5 m)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """A view, and the entries that it stands for."""
+
+    view: StoredView
+    entry_ids: tuple[int, ...]
+    """Never empty; all are seen in the view."""
+
+
+class SnapshotMemory:
+    """Keeps each entry in exactly one snapshot, whose view shows it.
+
+    Frames (views with what was detected in them) and snapshots follow entries that merge or vanish.
+    """
+
+    def __init__(self, reach_m: float = RECLUSTER_REACH_M) -> None:
+        """A memory without snapshots.
+
+        Args:
+            reach_m: Entries nearer to the agent than this are clustered anew at each update.
+        """
+        self.reach_m = reach_m
+        self.snapshots: list[Snapshot] = []
+        """By ascending id of their views."""
+        self._frames: dict[int, dict[int, float]] = {}
+        self._num_views = 0
+
+    @property
+    def num_frames(self) -> int:
+        """Views that show at least one entry that is still remembered."""
+        return len(self._frames)
+
+    def update(self, views: ViewStore, entries: Sequence[ObjectEntry], agent_m: Point2) -> None:
+        """Takes over the views that came since, and clusters what is new or near the agent.
+
+        Args:
+            views: The same store at each call.
+            entries: All that is remembered.
+            agent_m: `(x, z)`.
+        """
+        self._take_over(views, {entry.id for entry in entries})
+        frame_of_view = {view_id: index for index, view_id in enumerate(self._frames)}
+        before = [
+            (frame_of_view[snapshot.view.id], list(snapshot.entry_ids))
+            for snapshot in self.snapshots
+            if snapshot.view.id in frame_of_view
+        ]
+        after = _core.update_snapshots(
+            [(entry.id, (entry.centre_m[0], entry.centre_m[2])) for entry in entries],
+            [list(frame.items()) for frame in self._frames.values()],
+            before,
+            agent_m=agent_m,
+            reach_m=self.reach_m,
+        )
+        view_ids = list(self._frames)
+        self.snapshots = [Snapshot(views.views[view_ids[frame]], tuple(entry_ids)) for frame, entry_ids in after]
+
+    def _take_over(self, views: ViewStore, remembered: set[int]) -> None:
+        """Makes frames of new views, and drops from all of them what is not remembered any more."""
+        for view in views.views[self._num_views :]:
+            self._frames[view.id] = {}
+            for seen in view.seen:
+                if seen.entry_id is not None:
+                    _note(self._frames[view.id], views.resolve(seen.entry_id), seen.confidence)
+        self._num_views = len(views.views)
+        for view_id, frame in list(self._frames.items()):
+            if not frame.keys() <= remembered:
+                renamed: dict[int, float] = {}
+                for entry_id, confidence in frame.items():
+                    _note(renamed, views.resolve(entry_id), confidence)
+                frame = {entry_id: confidence for entry_id, confidence in renamed.items() if entry_id in remembered}
+                self._frames[view_id] = frame
+            if not frame:
+                del self._frames[view_id]
+
+
+def _note(frame: dict[int, float], entry_id: int, confidence: float) -> None:
+    """Of several detections of an entry the surest counts."""
+    frame[entry_id] = max(confidence, frame.get(entry_id, confidence))
