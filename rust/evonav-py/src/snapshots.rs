@@ -22,8 +22,7 @@ fn update_snapshots(
     let frames: Vec<Frame> = frames.into_iter().map(|seen| Frame { seen }).collect();
     let snapshots: Vec<Snapshot> =
         snapshots.into_iter().map(|(frame, objects)| Snapshot { frame, objects }).collect();
-    let update =
-        || snapshots::update_snapshots(&objects, &frames, &snapshots, agent_m, reach_m);
+    let update = || snapshots::update_snapshots(&objects, &frames, &snapshots, agent_m, reach_m);
     let updated = py.detach(update).map_err(error::to_py)?;
     Ok(updated.into_iter().map(|snapshot| (snapshot.frame, snapshot.objects)).collect())
 }
