@@ -287,6 +287,7 @@ class ObjectMap:
         cluster_min_points: int,
         max_distance_m: float,
         overlap_radius_m: float,
+        visual_weight: float,
         match_threshold: float,
         views_per_cleanup: int,
         min_detections: int,

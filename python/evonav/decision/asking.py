@@ -40,13 +40,17 @@ class Asker:
         """Forgets what was asked in the last round."""
         self.asked.clear()
 
-    def ask(self, question: Question[A]) -> A | None:
+    def ask(self, question: Question[A], num_tries: int | None = None) -> A | None:
         """The first valid answer; `None`, a failed decision, when there is none in all tries.
+
+        Args:
+            question: What is asked.
+            num_tries: Instead of the asker's own, for a question whose number of tries is part of the algorithm.
 
         Raises:
             DecisionError: Asking again would not help.
         """
-        for attempt in range(self.num_tries):
+        for attempt in range(self.num_tries if num_tries is None else num_tries):
             self.counters["decisions"] += 1
             try:
                 reply = self.model.answer(question, attempt)

@@ -112,10 +112,11 @@ class Matcher:
             return self.config.unknown_room if room is None else float(room == relation.noun)
         others = [o for o in around if o.entry_id != entry.entry_id and similarity(relation.noun, o.label) >= 1.0]
         if relation.kind == "on":
-            return float(any(self._is_on(entry, other) for other in others))
-        return float(any(_gap_m(entry, other) <= self.config.near_m for other in others))
+            return float(any(self.is_on(entry, other) for other in others))
+        return float(any(gap_m(entry, other) <= self.config.near_m for other in others))
 
-    def _is_on(self, entry: ObjectCandidate, support: ObjectCandidate) -> bool:
+    def is_on(self, entry: ObjectCandidate, support: ObjectCandidate) -> bool:
+        """Whether a thing stands on, or in, another, by their boxes."""
         margin_m = self.config.support_margin_m
         for axis in (0, 2):
             if abs(entry.centre_m[axis] - support.centre_m[axis]) > support.size_m[axis] / 2 + margin_m:
@@ -149,7 +150,7 @@ class Matcher:
         return frontier.travel_m - (self.config.lead_m if is_lead else 0.0)
 
 
-def _gap_m(a: ObjectCandidate, b: ObjectCandidate) -> float:
+def gap_m(a: ObjectCandidate, b: ObjectCandidate) -> float:
     """Distance between two boxes on the ground plane; 0 if they overlap there."""
     gaps_m = (
         max(0.0, abs(a.centre_m[axis] - b.centre_m[axis]) - (a.size_m[axis] + b.size_m[axis]) / 2) for axis in (0, 2)

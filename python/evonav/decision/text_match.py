@@ -14,7 +14,7 @@ from evonav.errors import DecisionError
 
 A = TypeVar("A")
 
-_FAMILIES = ("frontier_update",)
+_FAMILIES = ("frontier_update", "unigoal")
 """Modules of `evonav.decision.rules`; each has `RULES`, which gives the function that answers a class of question."""
 
 

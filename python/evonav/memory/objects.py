@@ -32,8 +32,10 @@ class ObjectMapConfig:
     """Detections and unconfirmed entries farther from the agent than this, on the ground plane, do not count."""
     overlap_radius_m: float = 0.025
     """Two points nearer than this are the same place."""
+    visual_weight: float = 1.0
+    """What visual similarity counts for beside overlap; 0 matches by overlap alone, whatever the label."""
     match_threshold: float = 1.2
-    """A detection joins an entry if overlap plus visual similarity exceeds this."""
+    """A detection joins an entry if overlap plus weighted visual similarity exceeds this."""
     views_per_cleanup: int = 12
     """Views between two clean-ups; 0 for none."""
     min_detections: int = 2

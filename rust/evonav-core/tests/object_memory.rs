@@ -223,7 +223,8 @@ impl NaiveMap {
                 let most = counts.values().max();
                 // Scenes here never give an entry two labels of equal count.
                 let same = counts.get(label) == most;
-                overlap_naive(&cloud, points, radius) + f64::from(u8::from(same))
+                overlap_naive(&cloud, points, radius)
+                    + self.config.visual_weight * f64::from(u8::from(same))
             };
             let mut best = (self.config.match_threshold, None);
             for (i, entry) in before.iter().enumerate() {
@@ -260,11 +261,14 @@ proptest! {
         boxes in vec(([-1.5..1.5, 0.2..1.2, 1.0..3.5], [0.05..0.6, 0.05..0.6, 0.05..0.6], 0..3_usize), 1..7),
         cameras in vec((-0.6..0.6, -0.6..0.4, -0.5..0.5), 1..5),
         voxel_m in 0.008..0.03,
+        (visual_weight, match_threshold) in prop_oneof![Just((1.0, 1.2)), Just((0.0, 0.01))],
     ) {
         let boxes: Vec<SolidBox> =
             boxes.into_iter().map(|(c, s, k)| (c, s, ["Chair", "Mug", "Bed"][k])).collect();
         let labels: Vec<String> = boxes.iter().map(|b| b.2.to_owned()).collect();
-        let config = ObjectMapConfig { voxel_m, views_per_cleanup: 0, ..Default::default() };
+        let config = ObjectMapConfig {
+            voxel_m, visual_weight, match_threshold, views_per_cleanup: 0, ..Default::default()
+        };
         let mut map = ObjectMap::new(config).unwrap();
         let mut naive = NaiveMap { config, entries: Vec::new(), next_id: 1 };
         for (x, z, yaw_rad) in cameras {
@@ -427,5 +431,6 @@ fn arguments_that_do_not_fit_are_named_and_change_nothing() {
         assert!(message.contains(name), "{message}");
     };
     view_of("voxel_m", ObjectMapConfig { voxel_m: 0.0, ..Default::default() });
+    view_of("visual_weight", ObjectMapConfig { visual_weight: -1.0, ..Default::default() });
     view_of("match_threshold", ObjectMapConfig { match_threshold: f64::NAN, ..Default::default() });
 }

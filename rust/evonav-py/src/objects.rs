@@ -61,8 +61,8 @@ impl ObjectMap {
     #[new]
     #[pyo3(signature = (
         *, min_points, max_points, min_box_m3, voxel_m, cluster_radius_m, cluster_min_points,
-        max_distance_m, overlap_radius_m, match_threshold, views_per_cleanup, min_detections,
-        merge_overlap, merge_similarity,
+        max_distance_m, overlap_radius_m, visual_weight, match_threshold, views_per_cleanup,
+        min_detections, merge_overlap, merge_similarity,
     ))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python class")]
     fn new(
@@ -74,6 +74,7 @@ impl ObjectMap {
         cluster_min_points: usize,
         max_distance_m: f64,
         overlap_radius_m: f64,
+        visual_weight: f64,
         match_threshold: f64,
         views_per_cleanup: u32,
         min_detections: u32,
@@ -89,6 +90,7 @@ impl ObjectMap {
             cluster_min_points,
             max_distance_m,
             overlap_radius_m,
+            visual_weight,
             match_threshold,
             views_per_cleanup,
             min_detections,

@@ -33,7 +33,9 @@ pub struct ObjectMapConfig {
     pub max_distance_m: f64,
     /// Two points nearer than this are the same place.
     pub overlap_radius_m: f64,
-    /// A detection joins an entry if overlap plus visual similarity exceeds this.
+    /// What visual similarity counts for beside overlap; 0 matches by overlap alone.
+    pub visual_weight: f64,
+    /// A detection joins an entry if overlap plus weighted visual similarity exceeds this.
     pub match_threshold: f64,
     /// Views between two clean-ups; 0 for none.
     pub views_per_cleanup: u32,
@@ -56,6 +58,7 @@ impl Default for ObjectMapConfig {
             cluster_min_points: 10,
             max_distance_m: 3.5,
             overlap_radius_m: 0.025,
+            visual_weight: 1.0,
             match_threshold: 1.2,
             views_per_cleanup: 12,
             min_detections: 2,
@@ -79,6 +82,8 @@ impl ObjectMapConfig {
         let is_amount = |v: f64| v >= 0.0;
         Error::require("min_box_m3", self.min_box_m3, "at least 0", is_amount)?;
         Error::require("max_distance_m", self.max_distance_m, "at least 0", is_amount)?;
+        let is_weight = |v: f64| v.is_finite() && v >= 0.0;
+        Error::require("visual_weight", self.visual_weight, "at least 0", is_weight)?;
         Error::require("match_threshold", self.match_threshold, "a number", |v| !v.is_nan())?;
         Error::require("merge_overlap", self.merge_overlap, "a number", |v| !v.is_nan())?;
         Error::require("merge_similarity", self.merge_similarity, "a number", |v| !v.is_nan())
@@ -297,7 +302,8 @@ impl ObjectMap {
         let threshold = self.config.match_threshold;
         let mut best = (threshold, None);
         for (index, entry) in self.entries[..num].iter().enumerate() {
-            let visual = entry.similarity(&sighting.label, sighting.feature.as_deref());
+            let visual = self.config.visual_weight
+                * entry.similarity(&sighting.label, sighting.feature.as_deref());
             // Even lying wholly inside the entry could not lift it over the best so far.
             if visual + 1.0 <= best.0 || !entry.is_beside(&sighting.bounds_m, &self.config) {
                 continue;

@@ -1,0 +1,255 @@
+"""What UniGoal asks about the goal (design: agents.md 3.5): its objects, their relations, subgraphs, its category."""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from evonav.decision.prompts import Picture, Prompt, Text
+from evonav.decision.questions.candidates import Pixels
+from evonav.decision.questions.question import AnswerError, Question, first_line, lines_of
+from evonav.memory.goal_graph import GoalEdge, GoalGraph
+from evonav.tasks.public import StageInput
+
+MAX_GOAL_NODES = 5
+_LIST = re.compile(r"\[([^\[\]]*)\]\.?")
+_RELATION = re.compile(r"(?P<a>.+?) and (?P<b>.+?): (?P<rest>.+)")
+NO_CATEGORY = "none"
+
+
+def relation_line(a: str, b: str, subject: str, relation: str, object_: str) -> str:
+    """`A and B: A is <relation> B`."""
+    return f"{a} and {b}: {subject} is {relation} {object_}"
+
+
+def parse_relation(line: str) -> tuple[str, str, str] | None:
+    """Reads `A and B: A is <relation> B`.
+
+    Returns:
+        Subject, relation and object; `None` if the line is none such, or says it of something other than A and B.
+    """
+    match = _RELATION.fullmatch(line.strip().rstrip("."))
+    if match is None:
+        return None
+    for subject, other in ((match["a"], match["b"]), (match["b"], match["a"])):
+        said = re.fullmatch(rf"{re.escape(subject)} is (.+) {re.escape(other)}", match["rest"], re.IGNORECASE)
+        if said is not None:
+            return subject.lower(), said[1].lower(), other.lower()
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class DescribeQuestion(Question[str]):
+    """What does the goal image show in its middle, and how does it stand to what is around?"""
+
+    kind: ClassVar[str] = "describe"
+    goal: StageInput
+    image: Pixels = field(compare=False, repr=False)
+
+    def prompt(self) -> Prompt:
+        """The reference image."""
+        return Prompt.of(
+            Picture(self.image),
+            Text(
+                "A robot is to find the object in the middle of this image. Describe it and how it stands to the "
+                "things around it, in one sentence on one line."
+            ),
+        )
+
+    def parse(self, text: str) -> str:
+        """A line with a word in it."""
+        line = first_line(text)
+        if re.search(r"[A-Za-z]", line) is None:
+            raise AnswerError("invalid", "no description", text)
+        return line
+
+    def words(self, answer: str) -> str:
+        """The sentence."""
+        return answer
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectsQuestion(Question[tuple[str, ...]]):
+    """Which objects does the goal speak of?"""
+
+    kind: ClassVar[str] = "goal-objects"
+    goal: StageInput
+    text: str
+    """The goal in words: the instruction, or what was said of the goal image."""
+
+    def prompt(self) -> Prompt:
+        """The goal's words."""
+        return Prompt.of(
+            Text(
+                f"A robot is told: {self.text}\nWhich objects does this speak of? Rooms are no objects. Answer on the "
+                f"first line with exactly [a, b, ...]: nouns without adjectives, the object to find first, at most "
+                f"{MAX_GOAL_NODES}."
+            )
+        )
+
+    def parse(self, text: str) -> tuple[str, ...]:
+        """`[a, b, ...]`; the first five different words."""
+        match = _LIST.fullmatch(first_line(text))
+        if match is None:
+            raise AnswerError("invalid", f"no list in brackets: {first_line(text)[:80]!r}", text)
+        words = [word.strip().strip("'\"").strip().lower() for word in match[1].split(",")]
+        objects = tuple(dict.fromkeys(word for word in words if word))[:MAX_GOAL_NODES]
+        if not objects:
+            raise AnswerError("invalid", "an empty list", text)
+        return objects
+
+    def words(self, answer: tuple[str, ...]) -> str:
+        """`[a, b, ...]`."""
+        return f"[{', '.join(answer)}]"
+
+
+@dataclass(frozen=True, slots=True)
+class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
+    """How do the goal's objects stand to each other?"""
+
+    kind: ClassVar[str] = "goal-relations"
+    goal: StageInput
+    text: str
+    objects: tuple[str, ...]
+
+    def prompt(self) -> Prompt:
+        """The goal's words, and its objects."""
+        return Prompt.of(
+            Text(
+                f"A robot is told: {self.text}\nThe objects are [{', '.join(self.objects)}]. How do they stand to each "
+                "other? Write one line for each relation that is said, exactly of the form\n"
+                "A and B: A is <relation> B\nwith A and B from the list, such as "
+                '"mug and table: mug is on table". If none is said, answer "none".'
+            )
+        )
+
+    def parse(self, text: str) -> tuple[GoalEdge, ...]:
+        """Lines of the form `A and B: A is <relation> B`; those of things that are not in the list are left out."""
+        lines = lines_of(text)
+        if lines and lines[0].lower().rstrip(".") == "none":
+            return ()
+        edges: list[GoalEdge] = []
+        for line in lines:
+            read = parse_relation(line)
+            if read is None:
+                raise AnswerError("invalid", f"no relation: {line[:80]!r}", text)
+            edge = GoalEdge(*read)
+            if {edge.subject, edge.object} <= set(self.objects) and edge.subject != edge.object and edge not in edges:
+                edges.append(edge)
+        if not lines:
+            raise AnswerError("invalid", "no line", text)
+        return tuple(edges)
+
+    def words(self, answer: tuple[GoalEdge, ...]) -> str:
+        """A line an edge."""
+        lines = [relation_line(e.subject, e.object, e.subject, e.relation, e.object) for e in answer]
+        return "\n".join(lines) or "none"
+
+
+@dataclass(frozen=True, slots=True)
+class DecomposeQuestion(Question[tuple[GoalGraph, ...]]):
+    """Into which parts does the goal graph fall?"""
+
+    kind: ClassVar[str] = "decompose"
+    goal: StageInput
+    graph: GoalGraph
+
+    def prompt(self) -> Prompt:
+        """The graph as JSON."""
+        return Prompt.of(
+            Text(
+                f"This is a graph of objects and relations: {_json_of(self.graph)}\nDivide it into subgraphs of "
+                "objects that stand together. Answer with one line of JSON and nothing before it, exactly of the form\n"
+                '{"subgraph_1": {"nodes": ["a", "b"], "edges": [["a", "on", "b"]]}, "subgraph_2": ...}\n'
+                "Use only nodes and edges of the graph; the object to find belongs to subgraph_1."
+            )
+        )
+
+    def parse(self, text: str) -> tuple[GoalGraph, ...]:
+        """JSON at the beginning: numbered subgraphs of nodes and edges that there are, the target in the first."""
+        try:
+            value, _ = json.JSONDecoder().raw_decode(text.strip())
+        except ValueError as error:
+            raise AnswerError("invalid", f"no JSON: {error}", text) from error
+        if not isinstance(value, dict) or list(value) != [f"subgraph_{i + 1}" for i in range(len(value))] or not value:
+            raise AnswerError("invalid", "no object of subgraph_1, subgraph_2, ...", text)
+        subgraphs = tuple(self._subgraph(name, part, text) for name, part in value.items())
+        if self.graph.nodes[0] not in subgraphs[0].nodes:
+            raise AnswerError("invalid", f"subgraph_1 is without {self.graph.nodes[0]}", text)
+        return subgraphs
+
+    def _subgraph(self, name: str, part: object, text: str) -> GoalGraph:
+        """One part, its nodes in the graph's order."""
+        if not isinstance(part, dict) or set(part) != {"nodes", "edges"}:
+            raise AnswerError("invalid", f"{name} is not nodes and edges", text)
+        nodes, edges = part["nodes"], part["edges"]
+        if not isinstance(nodes, list) or not nodes or not all(node in self.graph.nodes for node in nodes):
+            raise AnswerError("invalid", f"{name} has other nodes than the graph, or none", text)
+        if not isinstance(edges, list):
+            raise AnswerError("invalid", f"{name} has no list of edges", text)
+        known = {(edge.subject, edge.relation, edge.object): edge for edge in self.graph.edges}
+        kept = []
+        for edge in edges:
+            key = tuple(edge) if isinstance(edge, list) else ()
+            if not all(isinstance(word, str) for word in key) or key not in known:
+                raise AnswerError("invalid", f"{name} has an edge that the graph has not: {str(edge)[:80]}", text)
+            if key[0] not in nodes or key[2] not in nodes:
+                raise AnswerError("invalid", f"{name} has an edge that leaves it", text)
+            kept.append(known[key])
+        return GoalGraph(tuple(node for node in self.graph.nodes if node in nodes), tuple(kept))
+
+    def words(self, answer: tuple[GoalGraph, ...]) -> str:
+        """JSON on one line."""
+        parts = {f"subgraph_{i + 1}": json.loads(_json_of(graph)) for i, graph in enumerate(answer)}
+        return json.dumps(parts)
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """A JSON text."""
+        return {"type": "string"}
+
+
+def _json_of(graph: GoalGraph) -> str:
+    edges = [[edge.subject, edge.relation, edge.object] for edge in graph.edges]
+    return json.dumps({"nodes": list(graph.nodes), "edges": edges})
+
+
+@dataclass(frozen=True, slots=True)
+class CategoryQuestion(Question[str]):
+    """Which of its detector's categories is the goal?"""
+
+    kind: ClassVar[str] = "category"
+    goal: StageInput
+    text: str
+    target: str
+    """The object to find, as the goal graph calls it."""
+    categories: tuple[str, ...]
+
+    def prompt(self) -> Prompt:
+        """The goal's words, and the categories."""
+        return Prompt.of(
+            Text(
+                f"A robot is told: {self.text}\nIt is to find: {self.target}. Its detector knows "
+                f"[{', '.join(self.categories)}]. Which of these is the object? Answer on the first line with exactly "
+                f'one of them, or with "{NO_CATEGORY}" if it is none of them.'
+            )
+        )
+
+    def parse(self, text: str) -> str:
+        """One of the categories, or `none`."""
+        line = first_line(text).rstrip(".").lower()
+        if line not in (*self.categories, NO_CATEGORY):
+            raise AnswerError("invalid", f"no category: {line[:80]!r}", text)
+        return line
+
+    def words(self, answer: str) -> str:
+        """The category."""
+        return answer
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """One of them."""
+        return {"type": "string", "enum": [*self.categories, NO_CATEGORY]}
+
+    def alternatives(self, answer: str) -> Sequence[str]:
+        """Every other category."""
+        return [word for word in (*self.categories, NO_CATEGORY) if word != answer]

@@ -1,0 +1,158 @@
+"""UniGoal's goal graph, and how it is matched with the scene graph (design: agents.md 3.5, 3.6)."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from evonav.memory.object_graph import SceneEdge, SceneNode
+
+Point2 = tuple[float, float]
+MatchMode = Literal["code", "paper"]
+"""`code`: names of scene nodes carry a number, as released, so that they never equal a goal's word; `paper`: captions
+are compared."""
+
+_ON = frozenset({"on", "atop", "upon", "in", "inside", "within"})
+_UNDER = frozenset({"under", "below", "beneath", "underneath"})
+_NEAR = frozenset({"next", "near", "nearby", "beside", "by", "close", "adjacent", "alongside", "against"})
+
+
+@dataclass(frozen=True, slots=True)
+class GoalEdge:
+    """`subject` is `relation` `object`."""
+
+    subject: str
+    relation: str
+    object: str
+
+
+@dataclass(frozen=True, slots=True)
+class GoalGraph:
+    """Words for objects, the target first, and how they stand to each other."""
+
+    nodes: tuple[str, ...]
+    edges: tuple[GoalEdge, ...] = ()
+
+    def degree(self, node: str) -> int:
+        """Edges at a node."""
+        return sum(node in (edge.subject, edge.object) for edge in self.edges)
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """How much of a goal graph the scene graph holds."""
+
+    score: float
+    """S, in 0..1."""
+    anchors: Mapping[str, int]
+    """Goal node to id of the scene node with its name, in the goal graph's order."""
+
+
+def relation_kind(relation: str) -> str:
+    """`on`, `under` or `near`; other relations are of their own kind."""
+    words = relation.lower().split()
+    first = words[0] if words else ""
+    for kind, known in (("on", _ON), ("under", _UNDER), ("near", _NEAR)):
+        if first in known:
+            return kind
+    return " ".join(words)
+
+
+def is_edge_in(goal: GoalEdge, subject_id: int, object_id: int, edges: Mapping[tuple[int, int], str]) -> bool:
+    """Whether the scene relates two nodes as the goal does; an edge holds in both directions, `on` as `under`."""
+    wanted = relation_kind(goal.relation)
+    forward = edges.get((subject_id, object_id))
+    if forward is not None and relation_kind(forward) == wanted:
+        return True
+    backward = edges.get((object_id, subject_id))
+    mirrored = {"on": "under", "under": "on"}.get(wanted, wanted)
+    return backward is not None and relation_kind(backward) == mirrored
+
+
+def match_graphs(
+    goal: GoalGraph,
+    nodes: Sequence[SceneNode],
+    edges: Sequence[SceneEdge],
+    mode: MatchMode,
+    spell: Callable[[str], str],
+) -> Match:
+    """Scores how well the scene graph holds a goal graph.
+
+    S is the mean of node and edge similarity. Node similarity: mean of the share of goal nodes found and of how well
+    their degrees agree (less over more; 0 if none is found). Edge similarity: share of goal edges found, 1 if there is
+    none. A scene node's degree counts edges to other found nodes that the goal relates too: the scene graph joins every
+    pair of nodes, so that its full degree would agree with no goal.
+
+    Args:
+        goal: A subgraph of the goal graph.
+        nodes: Of the scene.
+        edges: Of the scene.
+        mode: What a scene node is called.
+        spell: One spelling a word, such as `sofa` for "couch".
+    """
+    spelt = {word: spell(word) for word in goal.nodes}
+    relation_of = {(edge.subject_id, edge.object_id): edge.relation for edge in edges}
+    by_name: dict[str, list[SceneNode]] = {}
+    for node in nodes:
+        name = node.name if mode == "code" else spell(node.caption)
+        by_name.setdefault(name, []).append(node)
+    anchors = _assigned(goal, {word: by_name.get(name, []) for word, name in spelt.items()}, relation_of)
+    found = [edge for edge in goal.edges if _holds(edge, anchors, relation_of)]
+    edge_similarity = len(found) / len(goal.edges) if goal.edges else 1.0
+    agreements = []
+    for word in anchors:
+        wanted, held = goal.degree(word), sum(word in (edge.subject, edge.object) for edge in found)
+        agreements.append(1.0 if wanted == held else min(wanted, held) / max(wanted, held))
+    share = len(anchors) / len(goal.nodes)
+    agreement = math.fsum(agreements) / len(agreements) if agreements else 0.0
+    return Match(((share + agreement) / 2.0 + edge_similarity) / 2.0, anchors)
+
+
+def _holds(edge: GoalEdge, anchors: Mapping[str, int], relations: Mapping[tuple[int, int], str]) -> bool:
+    subject, other = anchors.get(edge.subject), anchors.get(edge.object)
+    return subject is not None and other is not None and is_edge_in(edge, subject, other, relations)
+
+
+def _assigned(
+    goal: GoalGraph, candidates: Mapping[str, Sequence[SceneNode]], relations: Mapping[tuple[int, int], str]
+) -> dict[str, int]:
+    """A scene node for each goal node: around each candidate of the first one found, those that keep most edges."""
+    words = [word for word in goal.nodes if candidates[word]]
+    best: tuple[tuple[int, int, int], dict[str, int]] | None = None
+    for first in candidates[words[0]] if words else ():
+        anchors = {words[0]: first.id}
+        for word in words[1:]:
+            free = [node for node in candidates[word] if node.id not in anchors.values()]
+            costs = [
+                (-_num_kept(goal, {**anchors, word: node.id}, relations), math.dist(node.ground_m, first.ground_m))
+                for node in free
+            ]
+            if free:
+                anchors[word] = free[costs.index(min(costs))].id
+        key = (_num_kept(goal, anchors, relations), first.num_detections, -first.id)
+        if best is None or key > best[0]:
+            best = (key, anchors)
+    return {} if best is None else best[1]
+
+
+def _num_kept(goal: GoalGraph, anchors: Mapping[str, int], relations: Mapping[tuple[int, int], str]) -> int:
+    return sum(_holds(edge, anchors, relations) for edge in goal.edges)
+
+
+def similarity_transform(layout: Sequence[Point2], places_m: Sequence[Point2], point: Point2) -> Point2 | None:
+    """Where a point of a layout is, when two others lie at known places: turned, scaled and shifted.
+
+    Args:
+        layout: Two places in the layout's frame.
+        places_m: The same two, `(x, z)` in the world.
+        point: In the layout's frame.
+
+    Returns:
+        `(x, z)`; `None` if the two coincide in the layout.
+    """
+    a, b = (complex(*place) for place in layout)
+    to_a, to_b = (complex(*place) for place in places_m)
+    if abs(b - a) < 1e-9:
+        return None
+    there = to_a + (to_b - to_a) / (b - a) * (complex(*point) - a)
+    return (there.real, there.imag)

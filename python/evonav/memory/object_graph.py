@@ -1,0 +1,233 @@
+"""UniGoal's scene graph: object nodes with captions, one relation between every two, groups of what stands together.
+
+Specification: agents.md 3.4. Nodes are the entries of an `ObjectMap` that matches by overlap alone, whatever the
+label, so that a caption is the word that most detections at a place gave.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from evonav.memory.objects import ObjectMap, ObjectMapConfig
+from evonav.memory.vocabulary import WORD_OF_TYPE, relabelled
+from evonav.sensors.observation import View
+
+Point2 = tuple[float, float]
+Point3 = tuple[float, float, float]
+
+
+def overlap_only() -> ObjectMapConfig:
+    """UniGoal's association; entries are never cleaned up, merged or dropped."""
+    return ObjectMapConfig(
+        voxel_m=0.025,
+        max_distance_m=math.inf,
+        visual_weight=0.0,
+        match_threshold=0.01,
+        views_per_cleanup=0,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectGraphConfig:
+    """UniGoal's constants."""
+
+    objects: ObjectMapConfig = field(default_factory=overlap_only)
+    min_detections: int = 3
+    """From which on an entry is a node."""
+    group_eps_m: float = 0.5
+    """Nodes with centres this near belong to one group (DBSCAN, min. 1)."""
+    group_cell_m: float = 0.05
+    """Centres are rounded to cells first."""
+
+
+@dataclass(frozen=True, slots=True)
+class SceneNode:
+    """An object as the scene graph knows it."""
+
+    id: int
+    caption: str
+    centre_m: Point3
+    size_m: Point3
+    num_detections: int
+
+    @property
+    def name(self) -> str:
+        """As questions call it."""
+        return f"{self.caption}_{self.id}"
+
+    @property
+    def ground_m(self) -> Point2:
+        """`(x, z)` of its middle."""
+        return (self.centre_m[0], self.centre_m[2])
+
+
+@dataclass(frozen=True, slots=True)
+class SceneEdge:
+    """`subject` is `relation` `object`."""
+
+    subject_id: int
+    object_id: int
+    relation: str
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Nodes that stand together."""
+
+    nodes: tuple[SceneNode, ...]
+
+    @property
+    def centre_m(self) -> Point2:
+        """`(x, z)`: mean of the nodes' middles."""
+        num = len(self.nodes)
+        return (
+            math.fsum(node.ground_m[0] for node in self.nodes) / num,
+            math.fsum(node.ground_m[1] for node in self.nodes) / num,
+        )
+
+
+class ObjectGraph:
+    """Nodes, edges, and pairs of nodes that no relation was proposed for yet."""
+
+    def __init__(self, config: ObjectGraphConfig | None = None) -> None:
+        self.config = config or ObjectGraphConfig()
+        self.objects = ObjectMap(self.config.objects)
+        self._nodes: dict[int, SceneNode] = {}
+        self._relations: dict[tuple[int, int], str] = {}
+        self._renamed: dict[int, tuple[str, str]] = {}
+        """What a correction called a node, and what detections called it then."""
+        self.seen_ids: frozenset[int] = frozenset()
+        """Entries that the last view showed."""
+
+    @property
+    def nodes(self) -> list[SceneNode]:
+        """By ascending id."""
+        return list(self._nodes.values())
+
+    @property
+    def edges(self) -> list[SceneEdge]:
+        """In the order in which they were proposed."""
+        return [SceneEdge(a, b, relation) for (a, b), relation in self._relations.items()]
+
+    def node(self, node_id: int) -> SceneNode | None:
+        """The node of an id, if it is still there."""
+        return self._nodes.get(node_id)
+
+    def begin_stage(self, stage: int) -> None:
+        """Nodes and edges stay, stale or not."""
+        self.objects.begin_stage(stage)
+
+    def update(self, view: View) -> list[tuple[SceneNode, SceneNode]]:
+        """Takes over a view's detections.
+
+        Returns:
+            Pairs that need a relation: every new node with each old one and each other new one. A node whose caption
+            has changed is new, and its edges are gone.
+        """
+        found = relabelled(view.detections, WORD_OF_TYPE)
+        shown = View(view.pose, view.intrinsics, view.depth_m, found, view.occupancy, view.rgb, view.camera_height_m)
+        update = self.objects.update(shown)
+        self.seen_ids = frozenset(entry_id for entry_id in update.entry_ids if entry_id is not None)
+        new_ids = []
+        for entry_id in sorted(self.seen_ids):  # the others are as they were
+            entry = self.objects.entry(entry_id)
+            if entry is None or entry.num_detections < self.config.min_detections:
+                continue
+            caption = self._caption(entry.id, entry.label)
+            known = self._nodes.get(entry.id)
+            if known is None or known.caption != caption:
+                self._drop_edges(entry.id)
+                new_ids.append(entry.id)
+            self._nodes[entry.id] = SceneNode(entry.id, caption, entry.centre_m, entry.size_m, entry.num_detections)
+        if not new_ids:
+            return []
+        self._nodes = dict(sorted(self._nodes.items()))
+        old = [node for node in self._nodes.values() if node.id not in new_ids]
+        new = [self._nodes[node_id] for node_id in new_ids]
+        return [(node, other) for index, node in enumerate(new) for other in (*old, *new[index + 1 :])]
+
+    def _caption(self, node_id: int, label: str) -> str:
+        word, was = self._renamed.get(node_id, (label, label))
+        return word if was == label else label
+
+    def relate(self, pairs: Sequence[tuple[SceneNode, SceneNode]], relations: Sequence[str] | None) -> None:
+        """Makes edges of proposed pairs.
+
+        Args:
+            pairs: As `update` gave them.
+            relations: One a pair; `None`: there was no usable answer, and the pairs get no edge.
+        """
+        for (a, b), relation in zip(pairs, relations or (), strict=relations is not None):
+            self._relations[(a.id, b.id)] = relation
+
+    def groups(self, room_of: Callable[[SceneNode], str]) -> dict[str, list[Group]]:
+        """Groups by room: what hangs together by steps of at most `group_eps_m` from centre to centre.
+
+        With a minimum of one, DBSCAN's clusters are just the connected components.
+        """
+        rooms: dict[str, list[SceneNode]] = {}
+        for node in self._nodes.values():
+            rooms.setdefault(room_of(node), []).append(node)
+        return {room: self._clusters(nodes) for room, nodes in rooms.items()}
+
+    def _clusters(self, nodes: Sequence[SceneNode]) -> list[Group]:
+        cell_m = self.config.group_cell_m
+        reach = round(self.config.group_eps_m / cell_m)
+        cells = [tuple(math.floor(value / cell_m) for value in node.ground_m) for node in nodes]
+        left = set(range(len(nodes)))
+        groups = []
+        while left:
+            member, queue = [], [min(left)]
+            left.discard(queue[0])
+            while queue:
+                here = queue.pop()
+                member.append(here)
+                near = [i for i in left if math.dist(cells[here], cells[i]) <= reach]
+                left.difference_update(near)
+                queue.extend(near)
+            groups.append(Group(tuple(nodes[i] for i in sorted(member))))
+        return groups
+
+    def neighbourhood(self, node_ids: Sequence[int], num_hops: int, reach_m: float) -> list[SceneNode]:
+        """Nodes within so many hops of others, along edges no longer than `reach_m`, by ascending id.
+
+        Every two nodes are joined by an edge; without a limit to its length two hops would be the whole house.
+        """
+        inside = {node_id for node_id in node_ids if node_id in self._nodes}
+        border = set(inside)
+        for _ in range(num_hops):
+            reached = {b if a in border else a for a, b in self._relations if (a in border) != (b in border)}
+            border = {
+                node_id
+                for node_id in reached - inside
+                if any(math.dist(self._nodes[node_id].ground_m, self._nodes[i].ground_m) <= reach_m for i in border)
+            }
+            inside |= border
+        return [self._nodes[node_id] for node_id in sorted(inside)]
+
+    def rename(self, node_id: int, word: str) -> None:
+        """Calls a node something else, until detections change their mind about it."""
+        node, entry = self._nodes.get(node_id), self.objects.entry(node_id)
+        if node is None or entry is None or node.caption == word:
+            return
+        self._renamed[node_id] = (word, entry.label)
+        self._nodes[node_id] = SceneNode(node.id, word, node.centre_m, node.size_m, node.num_detections)
+
+    def delete(self, node_id: int) -> None:
+        """Takes a node out, with its edges and its points; it comes back if it is detected again."""
+        self._nodes.pop(node_id, None)
+        self._renamed.pop(node_id, None)
+        self.objects.remove(node_id)
+        self._drop_edges(node_id)
+
+    def set_relation(self, edge: SceneEdge, relation: str | None) -> None:
+        """Changes what an edge says; `None` takes it out."""
+        key = (edge.subject_id, edge.object_id)
+        if relation is None:
+            self._relations.pop(key, None)
+        elif key in self._relations:
+            self._relations[key] = relation
+
+    def _drop_edges(self, node_id: int) -> None:
+        for key in [key for key in self._relations if node_id in key]:
+            del self._relations[key]
