@@ -74,38 +74,59 @@ def test_summary_counts_every_stage_once(tasks, tmp_path):
     (summary,) = evaluate(["toy_agents:Raising"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
     assert sum(summary.counts.values()) == summary.num_stages == 6
     assert summary.counts["errored"] == 2
-    assert summary.counts["not_run"] == 2
+    assert summary.counts["not_run"] == 0
     assert summary.is_incomplete
     content = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert content["is_incomplete"] is True
-    assert content["agents"]["toy_agents:Raising"]["n"] == 2
+    assert content["agents"]["toy_agents:Raising"]["n"] == 4
+
+
+@pytest.mark.parametrize(
+    ("agent", "message"),
+    [
+        ("toy_agents:Raising", "RuntimeError: no idea [toy_agents:"),
+        ("toy_agents:Speechless", "is no action"),
+        ("toy_agents:Lost", "must be finite"),
+        ("toy_agents:FarSighted", "occupancy_range_m"),
+    ],
+)
+def test_an_agents_fault_costs_its_stage_alone(tasks, tmp_path, agent, message):
+    evaluate([agent, "toy_agents:Idle"], tasks[:1], tmp_path / "run", config=CONFIG, num_workers=0)
+    assert all(record.is_scored for record in records(tmp_path / "run", "toy_agents:Idle"))
+    stages = records(tmp_path / "run", agent)
+    failed = [record.stage for record in stages if record.state is EndState.ERRORED]
+    assert failed == ([2] if agent in ("toy_agents:Raising", "toy_agents:Speechless") else [1, 2, 3])
+    for record in stages:
+        assert record.failed_before == tuple(stage for stage in failed if stage < record.stage)
+        if record.stage in failed:
+            assert record.error.kind is ErrorKind.AGENT
+            assert message in record.error.message
+            assert record.spl is None
+        else:
+            assert record.is_scored
+    if len(failed) == 1:
+        assert stages[2].requested_start == stages[1].effective_start  # where the failure left it
+        assert [record.memory_lost_at for record in stages] == [None] * 3
 
 
 @pytest.mark.parametrize(
     ("agent", "kind", "message"),
     [
-        ("toy_agents:Raising", ErrorKind.AGENT, "RuntimeError: no idea"),
-        ("toy_agents:Speechless", ErrorKind.AGENT, "is no action"),
-        ("toy_agents:Lost", ErrorKind.AGENT, "must be finite"),
-        ("toy_agents:FarSighted", ErrorKind.AGENT, "occupancy_range_m"),
         ("toy_agents:Dying", ErrorKind.CRASH, "exit code 3"),
         ("toy_agents:Hanging", ErrorKind.TIMEOUT, "within 8 s"),
     ],
 )
-def test_an_agents_fault_costs_its_episode_alone(tasks, tmp_path, agent, kind, message):
-    timeout_s = 8.0 if kind is ErrorKind.TIMEOUT else 600.0
-    config = RunConfig(backend=TOY, protocol=CONFIG.protocol, stage_timeout_s=timeout_s)
-    num_workers = 1 if kind in (ErrorKind.TIMEOUT, ErrorKind.CRASH) else 0
-    evaluate([agent, "toy_agents:Idle"], tasks[:1], tmp_path / "run", config=config, num_workers=num_workers)
+def test_a_worker_that_is_lost_costs_its_episode_alone(tasks, tmp_path, agent, kind, message):
+    config = RunConfig(
+        backend=TOY, protocol=CONFIG.protocol, stage_timeout_s=8.0 if kind is ErrorKind.TIMEOUT else 600.0
+    )
+    evaluate([agent, "toy_agents:Idle"], tasks[:1], tmp_path / "run", config=config, num_workers=1)
     assert all(record.is_scored for record in records(tmp_path / "run", "toy_agents:Idle"))
     stages = records(tmp_path / "run", agent)
-    states = [record.state for record in stages]
-    failed = states.index(EndState.ERRORED)
-    assert failed in (0, 1)
-    assert states[failed + 1 :] == [EndState.NOT_RUN] * (2 - failed)
-    assert stages[failed].error.kind is kind
-    assert message in stages[failed].error.message
-    assert stages[failed].spl is None
+    assert [record.state for record in stages[1:]] == [EndState.ERRORED, EndState.NOT_RUN]
+    assert stages[1].error.kind is kind
+    assert message in stages[1].error.message
+    assert stages[1].spl is None
 
 
 def test_resumption_does_what_is_left(tasks, tmp_path):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from evonav.agents.agent import Sensing
-from evonav.errors import InvalidArgumentError
+from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.metrics import SUCCESS_RADIUS_M
 from evonav.evaluation.records import (
     EndState,
@@ -17,6 +17,15 @@ from evonav.evaluation.records import (
 )
 from evonav.tasks.public import StageInput
 from evonav.world.pose import Pose
+
+
+class AgentFailedError(EvonavError):
+    """An agent in a process of its own has failed: it raised, died, or did not answer in time."""
+
+    def __init__(self, kind: ErrorKind, message: str) -> None:
+        """An error of one of the kinds that are the agent's own."""
+        super().__init__(message)
+        self.kind = kind
 
 
 @dataclass(frozen=True, slots=True)

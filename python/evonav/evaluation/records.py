@@ -48,11 +48,16 @@ class ErrorKind(str, Enum):
     REFERENCE = "reference"
     """There is no path from the effective start to the target, so SPL is undefined."""
     CRASH = "crash"
-    """The worker process died."""
+    """The agent's process died, or the worker's."""
     TIMEOUT = "timeout"
-    """The stage took longer than the run allows."""
+    """The agent did not answer, or the stage did not end, within the time that the run allows."""
     HARNESS = "harness"
-    """Anything else: a bug of ours."""
+    """Anything else: a task that cannot be read, a bug of ours."""
+
+    @property
+    def is_agents(self) -> bool:
+        """Whether it is the agent's own fault: such a failure costs its stage, and the episode goes on."""
+        return self in (ErrorKind.AGENT, ErrorKind.DECISION, ErrorKind.CRASH, ErrorKind.TIMEOUT)
 
 
 class StageError(_Record):
@@ -189,6 +194,10 @@ class StageRecord(_Record):
     num_stages: int
     state: EndState
     error: StageError | None = None
+    failed_before: tuple[int, ...] = ()
+    """Earlier stages of the episode in which the agent failed: it may know less than it would."""
+    memory_lost_at: int | None = None
+    """The last stage, up to this one, that the agent began anew, without memory: its process was lost before."""
     goal: GoalRecord
     target: TargetRecord
     transition: TransitionRecord

@@ -1,12 +1,16 @@
-"""An episode: one agent through the stages of one task, by the paper's multi-stage protocol (Sec. C.1)."""
+"""An episode: one agent through the stages of one task, by the paper's multi-stage protocol (Sec. C.1).
+
+An agent's failure costs its stage: the same agent goes on with the next one, or, if its process was lost, a fresh agent
+that remembers nothing. The records of later stages say so. A failure of anything else ends the episode.
+"""
 
 import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
+from evonav.agents import wire
 from evonav.agents.agent import (
     Agent,
     AgentAction,
@@ -18,12 +22,19 @@ from evonav.agents.agent import (
     Sensing,
     Stop,
 )
-from evonav.errors import DecisionError, InvalidArgumentError, SimulationError, SimulatorLostError
+from evonav.errors import DecisionError, SimulationError, SimulatorLostError
 from evonav.evaluation import motion
 from evonav.evaluation.cases import room_at, stage_map
 from evonav.evaluation.metrics import stage_soft_spl, stage_spl
 from evonav.evaluation.privileged import Sighting, privileges_of
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome, as_errored, as_not_run
+from evonav.evaluation.protocol import (
+    AgentFailedError,
+    EpisodeCase,
+    ProtocolConfig,
+    StageOutcome,
+    as_errored,
+    as_not_run,
+)
 from evonav.evaluation.records import (
     ActionRecord,
     EndState,
@@ -39,7 +50,7 @@ from evonav.evaluation.sensing import Perception, Sensed, Sensors, map_frame
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
 from evonav.world.pose import Pose
-from evonav.world.simulator import Action, SceneObject, Simulator
+from evonav.world.simulator import SceneObject, Simulator
 
 STALE_MARGIN_M = 0.3
 """An entry whose centre is this near the box of an object of its label is not stale."""
@@ -61,6 +72,20 @@ class EpisodeObserver(Protocol):
         ...
 
 
+LOSSES = (ErrorKind.CRASH, ErrorKind.TIMEOUT)
+"""Failures that end the agent's process, and its memory with it."""
+
+
+@runtime_checkable
+class HasOwnProcess(Protocol):
+    """An agent in a process of its own: what it says has crossed the border as JSON already."""
+
+    @property
+    def cpu_s(self) -> float:
+        """CPU time that its processes have used."""
+        ...
+
+
 class _StageError(Exception):
     """A stage that cannot go on; carries whose fault it is."""
 
@@ -76,13 +101,17 @@ def _blame(kind: ErrorKind) -> Iterator[None]:
         yield
     except _StageError:
         raise
+    except AgentFailedError as error:
+        raise _StageError(error.kind, str(error)) from error
     except DecisionError as error:
-        raise _StageError(ErrorKind.DECISION, str(error)) from error
-    except SimulatorLostError as error:
-        raise _StageError(ErrorKind.SIMULATOR_LOST, str(error)) from error
-    except SimulationError as error:
-        raise _StageError(ErrorKind.SIMULATION, str(error)) from error
+        raise _StageError(ErrorKind.DECISION, wire.clean(str(error))) from error
     except Exception as error:
+        if kind is ErrorKind.AGENT:
+            raise _StageError(kind, wire.describe(error)) from error
+        if isinstance(error, SimulationError):
+            is_lost = isinstance(error, SimulatorLostError)
+            kind = ErrorKind.SIMULATOR_LOST if is_lost else ErrorKind.SIMULATION
+            raise _StageError(kind, str(error)) from error
         raise _StageError(kind, f"{type(error).__name__}: {error}") from error
 
 
@@ -108,35 +137,53 @@ class Episode:
         self._perception = perception
         self._protocol = protocol
         self._seed = seed
+        self._has_begun = False
+        """The agent knows the task."""
 
     def run(self) -> Iterator[StageOutcome]:
         """Runs the stages in order.
 
         Yields:
-            The outcome of every stage as it ends. An error ends the episode: the later stages are not run, since the
-            agent's memory of the errored one is not what it would have been.
+            The outcome of every stage as it ends. After an error that is not the agent's, the later stages are not
+            run: where the agent would have stood, and what it would have seen, is not known.
         """
         pose = self._case.start
-        failure = None
+        failure: StageRecord | None = None
+        failed: tuple[int, ...] = ()
+        memory_lost_at: int | None = None
+        is_lost = False
         for stage in range(1, len(self._case.stages) + 1):
             record = self._case.blank_record(self._agent_name, stage)
             if failure is not None and failure.error is not None:
                 yield StageOutcome(as_not_run(record, failure.error, failure.stage), None, 0.0, 0.0)
                 continue
-            wall_s, cpu_s = time.perf_counter(), time.process_time()
+            if is_lost:
+                memory_lost_at, is_lost = stage, False
+            record = record.model_copy(update={"failed_before": failed, "memory_lost_at": memory_lost_at})
+            wall_s, cpu_s = time.perf_counter(), self._cpu_s()
             run = _StageRun(self, record, pose)
             record = run.run()
-            yield StageOutcome(record, run.plan, time.perf_counter() - wall_s, time.process_time() - cpu_s)
-            if run.is_broken:
-                failure = record
-            else:
+            yield StageOutcome(record, run.plan, time.perf_counter() - wall_s, self._cpu_s() - cpu_s)
+            if run.failure is None:
                 pose = self._simulator.pose
+            elif run.failure.is_agents:
+                failed = (*failed, stage)
+                pose = self._simulator.pose
+                is_lost = run.failure in LOSSES
+                self._has_begun = self._has_begun and not is_lost
+            else:
+                failure = record
+
+    def _cpu_s(self) -> float:
+        """Of this process, and of the agent's where it has one."""
+        return time.process_time() + (self._agent.cpu_s if isinstance(self._agent, HasOwnProcess) else 0.0)
 
 
 class _StageRun:
     """One stage of an episode: start, rounds, measures."""
 
     def __init__(self, episode: Episode, record: StageRecord, requested: Pose) -> None:
+        self._episode = episode
         self._case = episode._case
         self._agent = episode._agent
         self._simulator = episode._simulator
@@ -147,13 +194,14 @@ class _StageRun:
         self._stage = self._case.stages[record.stage - 1]
         self._record = record
         self._requested = requested
+        self._sensing = Sensing()
         self._planner = motion.Planner(self._simulator)
         self._bodies: dict[str, list[SceneObject]] = {}
         self._trace: list[RoundRecord] = []
         self._length_m = 0.0
         self.plan: StageMap | None = None
-        self.is_broken = False
-        """The episode cannot go on."""
+        self.failure: ErrorKind | None = None
+        """Why the stage could not be finished."""
 
     def run(self) -> StageRecord:
         try:
@@ -164,7 +212,7 @@ class _StageRun:
                 stop_reason = self._rounds()
                 return self._measured(reference_length_m, stop_reason)
         except _StageError as failure:
-            self.is_broken = True
+            self.failure = failure.kind
             return as_errored(self._with_trace(self._record), failure.kind, str(failure))
 
     def _start(self) -> None:
@@ -191,20 +239,32 @@ class _StageRun:
             }
         )
         with _blame(ErrorKind.AGENT):
-            if stage == 1:
-                self._protocol.check(self._agent.sensing)
-                self._agent.begin_task(
-                    TaskInfo(
-                        task_id=self._case.task_id,
-                        num_stages=len(self._case.stages),
-                        max_rounds=self._protocol.budget(self._agent.sensing),
-                        map_frame=map_frame(self._simulator.occupancy()),
-                        seed=self._seed,
-                    )
+            self._tell_goal()
+
+    def _tell_goal(self) -> None:
+        """Tells the agent of the task, if it does not know, and of the stage. Its sensing is held for the stage."""
+        self._sensing = self._granted()
+        if not self._episode._has_begun:
+            self._agent.begin_task(
+                TaskInfo(
+                    task_id=self._case.task_id,
+                    num_stages=len(self._case.stages),
+                    max_rounds=self._protocol.budget(self._sensing),
+                    map_frame=map_frame(self._simulator.occupancy()),
+                    seed=self._seed,
                 )
-            self._agent.begin_stage(self._stage.public)
-            if (privileged := privileges_of(self._agent)) is not None:
-                privileged.reveal_target(self._stage.target.position_m)
+            )
+            self._episode._has_begun = True
+        self._agent.begin_stage(self._stage.public)
+        self._sensing = self._granted()
+        if (privileged := privileges_of(self._agent)) is not None:
+            privileged.reveal_target(self._stage.target.position_m)
+
+    def _granted(self) -> Sensing:
+        """What the agent asks of its sensors, within the protocol."""
+        sensing = wire.sensing_of(wire.read_json(wire.sensing_json(self._agent.sensing).encode()))
+        self._protocol.check(sensing)
+        return sensing
 
     def _reference_length_m(self) -> float | None:
         """L*: the planner's path from the effective start to the target, or `None` when there is none."""
@@ -214,13 +274,16 @@ class _StageRun:
 
     def _rounds(self) -> str | None:
         """Decision rounds until the agent stops (returns why) or the budget ends (returns `None`)."""
-        sensing = self._agent.sensing
         with _blame(ErrorKind.SIMULATION):
             sensors = Sensors(
-                self._simulator, self._perception, sensing, self._stage.target.object_id, self._protocol.min_visible_px
+                self._simulator,
+                self._perception,
+                self._sensing,
+                self._stage.target.object_id,
+                self._protocol.min_visible_px,
             )
         last = motion.Motion((), is_success=True)
-        budget = self._protocol.budget(sensing)
+        budget = self._protocol.budget(self._sensing)
         for number in range(budget):
             with _blame(ErrorKind.SIMULATION):
                 sensed = sensors.observe(
@@ -234,7 +297,7 @@ class _StageRun:
             with _blame(ErrorKind.AGENT):
                 if (privileged := privileges_of(self._agent)) is not None:
                     privileged.reveal_sighting(Sighting(sensed.is_target_visible))
-                action = checked_action(self._agent.act(sensed.observation), self._agent.sensing)
+                action = wire.checked_action(self._agent.act(sensed.observation), self._sensing)
             with _blame(ErrorKind.SIMULATION):
                 last = self._carry_out(action)
             self._length_m += last.length_m
@@ -252,7 +315,7 @@ class _StageRun:
                 self._planner,
                 action,
                 spacing_m=self._protocol.waypoint_m,
-                max_travel_m=self._agent.sensing.max_travel_m,
+                max_travel_m=self._sensing.max_travel_m,
             )
         if isinstance(action, Move):
             return motion.move(self._simulator, action)
@@ -261,7 +324,7 @@ class _StageRun:
 
     def _round_record(self, number: int, sensed: Sensed, action: AgentAction, done: motion.Motion) -> RoundRecord:
         with _blame(ErrorKind.AGENT):
-            told = self._agent.diagnostics() if isinstance(self._agent, ExplainingAgent) else RoundDiagnostics()
+            told = self._told()
             return RoundRecord(
                 round=number,
                 pose=pose_record(sensed.observation.pose),
@@ -276,6 +339,15 @@ class _StageRun:
                 counters=dict(told.counters),
                 details=dict(told.details),
             )
+
+    def _told(self) -> RoundDiagnostics:
+        """The round in the agent's words, as JSON has them whatever process it is in."""
+        if not isinstance(self._agent, ExplainingAgent):
+            return RoundDiagnostics()
+        told = self._agent.diagnostics()
+        if isinstance(self._agent, HasOwnProcess):
+            return told
+        return wire.diagnostics_of(wire.read_json(wire.diagnostics_json(told).encode()))
 
     def _measured(self, reference_length_m: float | None, stop_reason: str | None) -> StageRecord:
         start, end = self._record.effective_start, self._simulator.pose
@@ -320,7 +392,10 @@ class _StageRun:
         if not isinstance(self._agent, ExplainingAgent):
             return ()
         with _blame(ErrorKind.AGENT):
-            return tuple(self._entry_record(belief) for belief in self._agent.entries())
+            entries = self._agent.entries()
+            if not isinstance(self._agent, HasOwnProcess):
+                entries = wire.entries_of(wire.read_json(wire.entries_json(entries).encode()))
+            return tuple(self._entry_record(belief) for belief in entries)
 
     def _entry_record(self, belief: EntryBelief) -> EntryRecord:
         return entry_record(belief, self._bodies)
@@ -348,36 +423,6 @@ def entry_record(belief: EntryBelief, bodies: Mapping[str, Sequence[SceneObject]
 def pose_record(pose: Pose) -> PoseRecord:
     """A pose for the record."""
     return PoseRecord(x_m=pose.x_m, y_m=pose.y_m, z_m=pose.z_m, yaw_rad=pose.yaw_rad, horizon_rad=pose.horizon_rad)
-
-
-def checked_action(action: object, sensing: Sensing) -> AgentAction:
-    """What an agent answered, if it is an action.
-
-    Raises:
-        InvalidArgumentError: It is not, has a coordinate that is not a finite number, or is a `NavigateTo` of an agent
-            whose budget counts single actions.
-    """
-    if isinstance(action, Move) and isinstance(action.action, Action):
-        return Stop() if action.action is Action.STOP else action
-    if isinstance(action, NavigateTo):
-        if sensing.motion == "actions":
-            raise InvalidArgumentError("NavigateTo: an agent whose `sensing.motion` is `actions` answers Move or Stop")
-        position_m = _finite_point("position_m", action.position_m)
-        face_m = None if action.face_m is None else _finite_point("face_m", action.face_m)
-        return replace(action, position_m=position_m, face_m=face_m)
-    if isinstance(action, Stop):
-        return action
-    raise InvalidArgumentError(f"{action!r} is no action: answer Move(Action), NavigateTo((x, z)) or Stop()")
-
-
-def _finite_point(name: str, point_m: object) -> tuple[float, float]:
-    try:
-        x_m, z_m = (float(value) for value in point_m)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
-        raise InvalidArgumentError(f"NavigateTo.{name} = {point_m!r}: must be (x, z)") from None
-    if not (math.isfinite(x_m) and math.isfinite(z_m)):
-        raise InvalidArgumentError(f"NavigateTo.{name} = {point_m!r}: must be finite")
-    return x_m, z_m
 
 
 def _action_record(action: AgentAction) -> ActionRecord:
