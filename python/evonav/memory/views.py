@@ -109,6 +109,12 @@ class ViewStore:
         found = self._best.get(self.resolve(entry_id))
         return None if found is None else (self.views[found[0]], found[1])
 
+    def seen_in(self, view: StoredView, entry_id: int) -> Seen | None:
+        """Where a view shows an entry, the largest part if there are several; `None` if it does not."""
+        entry_id = self.resolve(entry_id)
+        shown = (one for one in view.seen if one.entry_id is not None and self.resolve(one.entry_id) == entry_id)
+        return max(shown, key=lambda one: one.area_px, default=None)
+
     def latest(self, entry_id: int) -> StoredView | None:
         """The view that an entry was last seen in."""
         found = self._latest.get(self.resolve(entry_id))

@@ -1,0 +1,201 @@
+"""3D-Mem (paper, Sec. C.3): snapshots and frontiers, chosen from by a decision model; what it remembers it believes."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from evonav.agents.agent import AgentAction, Belief, EntryBelief, RoundDiagnostics, Sensing, Stop
+from evonav.agents.explorer import ExplorerConfig
+from evonav.agents.navigator import Navigator, NavigatorConfig, Target, belief_of
+from evonav.decision.asking import Asker
+from evonav.decision.questions.candidates import ObjectCandidate
+from evonav.decision.questions.question import DecisionModel
+from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotCandidate, SnapshotQuestion
+from evonav.decision.text_match import TextMatch
+from evonav.memory import Frontier
+from evonav.memory.objects import ObjectEntry
+from evonav.memory.snapshots import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
+from evonav.memory.views import crop_of, pixels_of
+from evonav.sensors.observation import Observation
+from evonav.tasks.public import StageInput, TaskInfo
+
+NO_ANSWER = "aborted: no valid answer"
+"""Reason of a stop: the decision model could not be understood."""
+NOTHING_LEFT = "aborted: no snapshot and no frontier left"
+"""Reason of a stop: there was nothing to ask about."""
+
+
+@dataclass(frozen=True, slots=True)
+class ThreeDMemConfig:
+    """3D-Mem's constants."""
+
+    navigator: NavigatorConfig = field(
+        # The last observation of a cell wins, and the map is never cleared.
+        default_factory=lambda: NavigatorConfig(explorer=ExplorerConfig(min_conflict_cells=None))
+    )
+    max_classes: int = 10
+    """Classes that the prefilter keeps."""
+    recluster_reach_m: float = RECLUSTER_REACH_M
+    """Entries nearer than this are clustered anew in each round."""
+    num_tries: int = 3
+    """Questions asked before an invalid answer is given up on."""
+
+
+class ThreeDMem:
+    """Walks to what a snapshot shows and stops there, whether or not it is still there."""
+
+    def __init__(self, config: ThreeDMemConfig | None = None, decision: DecisionModel | None = None) -> None:
+        self.config = config or ThreeDMemConfig()
+        model: DecisionModel = decision or TextMatch()
+        self.sensing = Sensing(needs_rgb=model.needs_images)
+        self._asker = Asker(model, num_tries=self.config.num_tries)
+        self._counters: Counter[str] = Counter()
+        self._candidates: tuple[int, ...] = ()
+        self._details: dict[str, Any] = {}
+        self._diagnostics = RoundDiagnostics()
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """Forgets everything."""
+        self._counters.clear()
+        self._asker.counters.clear()
+        self._navigator = Navigator(task.map_frame, self.config.navigator)
+        self._snapshots = SnapshotMemory(self.config.recluster_reach_m)
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """A new goal; entries, snapshots, map and frontiers stay."""
+        self._goal = stage
+        self._navigator.begin_stage(stage.stage)
+
+    def act(self, observation: Observation) -> AgentAction:
+        """Stops at the object it was committed to; else looks, clusters, decides and goes on."""
+        self._asker.begin_round()
+        self._candidates = ()
+        navigator = self._navigator
+        self._details = {"num_snapshots_before": len(self._snapshots.snapshots)}
+        reached = navigator.reached(observation)
+        if reached is not None:
+            return self._stop("arrived", reached.entry_id)
+        committed = navigator.target
+        navigator.observe(observation)
+        if navigator.target is None:
+            navigator.target = committed  # until arrival, even where a clean-up dropped its entry
+        here = (observation.pose.x_m, observation.pose.z_m)
+        self._snapshots.update(navigator.views, navigator.objects.entries, here)
+        if navigator.target is not None:
+            navigator.aim()
+            return self._approach(navigator.target)
+        return self._decide(observation)
+
+    def _decide(self, observation: Observation) -> AgentAction:
+        """Asks which classes matter, then where to go: to an object of a snapshot, or to a frontier."""
+        navigator = self._navigator
+        here = (observation.pose.x_m, observation.pose.z_m)
+        entries = {entry.id: entry for entry in navigator.objects.entries}
+        shown = self._surviving(entries)
+        frontiers = navigator.explorer.frontiers
+        if not shown and not frontiers:
+            self._counters["aborts_nothing_left"] += 1
+            return self._stop(NOTHING_LEFT)
+        with_images = self.sensing.needs_rgb
+        question = SnapshotQuestion(
+            goal=self._goal,
+            position_m=here,
+            snapshots=[self._candidate(snapshot, entries) for snapshot in shown],
+            frontiers=[navigator.frontier_candidate(f, here, with_images=with_images) for f in frontiers],
+            surroundings=[navigator.candidate(entry) for entry in entries.values()],
+            num_rounds_left=observation.num_rounds_left,
+            heading_view=navigator.heading_view() if with_images else None,
+        )
+        self._candidates = tuple(entry_id for snapshot in shown for entry_id in snapshot.entry_ids)
+        choice = self._asker.ask(question)
+        if choice is None:
+            self._counters["aborts_no_answer"] += 1
+            return self._stop(NO_ANSWER)
+        reason = " ".join(self._asker.asked[-1].text.splitlines()[1:])
+        if choice.snapshot is None:
+            return self._go_to_frontier(frontiers[choice.index], reason)
+        self._details["snapshot"] = shown[choice.snapshot].view.id
+        return self._go_to_object(question.snapshots[choice.snapshot].objects[choice.index], reason)
+
+    def _surviving(self, entries: dict[int, ObjectEntry]) -> list[Snapshot]:
+        """Snapshots with something of the classes that the decision model finds useful, and that alone."""
+        snapshots = self._snapshots.snapshots
+        names = sorted({entries[entry_id].label for snapshot in snapshots for entry_id in snapshot.entry_ids})
+        kept: tuple[str, ...] = ()
+        if names:
+            answer = self._asker.ask(PrefilterQuestion(self._goal, names, self.config.max_classes))
+            kept = answer or ()  # without an answer there are no snapshots, as in the original
+        self._details["prefilter"] = list(kept)
+        useful = [
+            Snapshot(snapshot.view, tuple(i for i in snapshot.entry_ids if entries[i].label in kept))
+            for snapshot in snapshots
+        ]
+        surviving = [snapshot for snapshot in useful if snapshot.entry_ids]
+        self._details["num_snapshots_shown"] = len(surviving)
+        return surviving
+
+    def _candidate(self, snapshot: Snapshot, entries: dict[int, ObjectEntry]) -> SnapshotCandidate:
+        """A snapshot as the question shows it; crops are of its own view."""
+        navigator, view = self._navigator, snapshot.view
+        objects: list[ObjectCandidate] = []
+        for entry_id in snapshot.entry_ids:
+            seen = navigator.views.seen_in(view, entry_id) if self.sensing.needs_rgb else None
+            crop = None if seen is None else crop_of(view, seen.box_px)
+            objects.append(replace(navigator.candidate(entries[entry_id]), crop=crop))
+        image = pixels_of(view, navigator.config.image_px) if self.sensing.needs_rgb else None
+        return SnapshotCandidate(view.id, objects, image)
+
+    def _go_to_object(self, chosen: ObjectCandidate, reason: str) -> AgentAction:
+        """Commits to an entry, wherever it is."""
+        goal_m = self._navigator.observation_point(chosen.ground_m)
+        if goal_m is None:
+            self._counters["unmapped_choices"] += 1
+            goal_m = chosen.ground_m  # the planner ends at the nearest free point
+        return self._approach(Target(chosen.entry_id, goal_m, chosen.ground_m), reason)
+
+    def _approach(self, target: Target, reason: str = "") -> AgentAction:
+        self._tell(f"object {target.entry_id}", reason, target.entry_id)
+        return self._navigator.approach(target)
+
+    def _go_to_frontier(self, frontier: Frontier, reason: str) -> AgentAction:
+        self._tell(f"frontier {frontier.id}", reason)
+        return self._navigator.go_to_frontier(frontier)
+
+    def _stop(self, reason: str, entry_id: int | None = None) -> AgentAction:
+        self._tell("none" if entry_id is None else f"object {entry_id}", reason, entry_id)
+        return Stop(reason)
+
+    def _tell(self, choice: str, reason: str, entry_id: int | None = None) -> None:
+        """Notes a round for `diagnostics`."""
+        navigator = self._navigator
+        entry = None if entry_id is None else navigator.objects.entry(entry_id)
+        self._diagnostics = RoundDiagnostics(
+            choice=choice,
+            chosen_entry=None if entry is None else belief_of(entry),
+            num_entries=len(navigator.objects),
+            num_frontiers=len(navigator.explorer.frontiers),
+            counters={
+                **self._asker.counters,
+                **self._counters,
+                "conflicts": navigator.explorer.num_conflicts,
+                "cells_cleared": navigator.explorer.num_cells_cleared,
+            },
+            details={
+                **self._details,
+                "num_snapshots": len(self._snapshots.snapshots),
+                **({"reason": reason} if reason else {}),
+            },
+        )
+
+    def diagnostics(self) -> RoundDiagnostics:
+        """Choice, prefilter, snapshots and counters of the last round."""
+        return self._diagnostics
+
+    def entries(self) -> Sequence[EntryBelief]:
+        """The object memory."""
+        return self._navigator.beliefs()
+
+    def belief(self) -> Belief:
+        """Entries, map, frontiers, and what was asked."""
+        return self._navigator.belief(self._asker.asked, self._candidates)

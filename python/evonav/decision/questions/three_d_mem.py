@@ -1,0 +1,169 @@
+"""What 3D-Mem asks (paper, Sec. C.3): which classes matter, then which snapshot's object or frontier to go to."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from evonav.decision.prompts import Part, Prompt, Text
+from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.questions.question import AnswerError, Question, first_line, lines_of
+from evonav.decision.questions.wording import goal_parts, merged, titled
+from evonav.tasks.public import StageInput
+
+_OBJECT = re.compile(r"snapshot\s+(\d+)\s*,\s*object\s+(\d+)\b[.:]?", re.IGNORECASE)
+_FRONTIER = re.compile(r"frontier\s+(\d+)\b[.:]?", re.IGNORECASE)
+_NONE = "none"
+
+
+@dataclass(frozen=True, slots=True)
+class PrefilterQuestion(Question[tuple[str, ...]]):
+    """Which kinds of remembered things may lead to the goal, the most useful first?"""
+
+    kind: ClassVar[str] = "prefilter"
+    goal: StageInput
+    class_names: Sequence[str]
+    """Of what is in snapshots; each once, sorted."""
+    max_kept: int = 10
+
+    def prompt(self) -> Prompt:
+        """The names. How many are kept is not said, as in the original."""
+        return Prompt.of(
+            *merged(
+                (
+                    *goal_parts(self.goal),
+                    Text(
+                        "The robot remembers objects of these classes:\n"
+                        + "\n".join(self.class_names)
+                        + "\nRank those that help to reach the goal: the goal's own class, and what is mostly found by "
+                        "it. Answer with names from the list only, one a line, the most useful first; leave out what "
+                        f'does not help. If nothing does, answer "{_NONE}".'
+                    ),
+                )
+            )
+        )
+
+    def parse(self, text: str) -> tuple[str, ...]:
+        """Names of the list, whatever the case; others are dropped, and so is what comes after the first ten.
+
+        Raises:
+            AnswerError: There is no line with a name of the list, nor one that says `none`.
+        """
+        known = {name.lower(): name for name in self.class_names}
+        lines = [line.lower() for line in lines_of(text)]
+        names = tuple(dict.fromkeys(known[line] for line in lines if line in known))[: self.max_kept]
+        if not names and _NONE not in lines:
+            raise AnswerError("invalid", f"no name of the list: {first_line(text)[:80]!r}", text)
+        return names
+
+    def words(self, answer: tuple[str, ...]) -> str:
+        """A name a line."""
+        return "\n".join(answer) or _NONE
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """Lines, each a name of the list."""
+        return {"type": "array", "items": {"type": "string", "enum": [*self.class_names, _NONE]}}
+
+    def alternatives(self, answer: tuple[str, ...]) -> Sequence[tuple[str, ...]]:
+        """The same without its best name, and all that it leaves out."""
+        others = tuple(name for name in self.class_names if name not in answer)[: self.max_kept]
+        return [names for names in dict.fromkeys((answer[1:], others)) if names != answer]
+
+
+@dataclass(frozen=True, slots=True)
+class SnapshotCandidate:
+    """A kept view, and those of the objects it stands for whose class the prefilter kept."""
+
+    view_id: int
+    objects: Sequence[ObjectCandidate]
+    """Never empty; with crops from this very view."""
+    image: Pixels | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class SnapshotChoice:
+    """An object of a snapshot, or, without a snapshot, a frontier; indices of the question."""
+
+    snapshot: int | None
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class SnapshotQuestion(Question[SnapshotChoice]):
+    """Where to go next: to an object in one of the snapshots, or to one of the frontiers?"""
+
+    kind: ClassVar[str] = "choose_snapshot"
+    goal: StageInput
+    position_m: Point2
+    """Of the agent."""
+    snapshots: Sequence[SnapshotCandidate]
+    frontiers: Sequence[FrontierCandidate]
+    surroundings: Sequence[ObjectCandidate]
+    """Everything remembered: what the snapshots' images would show around their objects. Not part of the prompt."""
+    num_rounds_left: int
+    """Not part of the prompt."""
+    heading_view: Pixels | None = field(default=None, compare=False, repr=False)
+
+    def prompt(self) -> Prompt:
+        """The heading view, each snapshot with its image and crops, each frontier with its image."""
+        parts: list[Part] = [
+            *goal_parts(self.goal),
+            Text(
+                "The robot explores a home. Snapshots are views that it remembers, each with objects in it; frontiers "
+                "are places from which it can see what it has not explored. Choose where it goes next: to an object in "
+                "a snapshot that is the goal, or to a frontier behind which the goal may be."
+            ),
+            *titled("What the robot sees ahead:", self.heading_view),
+        ]
+        for index, snapshot in enumerate(self.snapshots):
+            parts += titled(f"Snapshot {index}:", snapshot.image)
+            for number, candidate in enumerate(snapshot.objects):
+                parts += titled(f"Snapshot {index}, Object {number}: {candidate.label}", candidate.crop)
+        for index, frontier in enumerate(self.frontiers):
+            parts += titled(f"Frontier {index}:", frontier.image)
+        parts.append(
+            Text(
+                f"There are {len(self.snapshots)} snapshots and {len(self.frontiers)} frontiers. Answer on the first "
+                'line with exactly "Snapshot i, Object j" or "Frontier i", and give your reason on the next.'
+            )
+        )
+        return Prompt.of(*merged(parts))
+
+    def parse(self, text: str) -> SnapshotChoice:
+        """`Snapshot i, Object j` or `Frontier i`, whatever the case, with indices that there are."""
+        line = first_line(text)
+        if (found := _OBJECT.fullmatch(line)) is not None:
+            choice = SnapshotChoice(int(found[1]), int(found[2]))
+        elif (found := _FRONTIER.fullmatch(line)) is not None:
+            choice = SnapshotChoice(None, int(found[1]))
+        else:
+            message = f"neither `Snapshot i, Object j` nor `Frontier i`: {line[:80]!r}"
+            raise AnswerError("invalid", message, text)
+        if choice not in self.choices():
+            raise AnswerError("invalid", f"there is no {line[:80]}", text)
+        return choice
+
+    def words(self, answer: SnapshotChoice) -> str:
+        """`Snapshot i, Object j` or `Frontier i`."""
+        if answer.snapshot is None:
+            return f"Frontier {answer.index}"
+        return f"Snapshot {answer.snapshot}, Object {answer.index}"
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """One of the candidates."""
+        return {"type": "string", "enum": [self.words(choice) for choice in self.choices()]}
+
+    def alternatives(self, answer: SnapshotChoice) -> Sequence[SnapshotChoice]:
+        """Every other candidate."""
+        return [choice for choice in self.choices() if choice != answer]
+
+    def choices(self) -> list[SnapshotChoice]:
+        """All valid answers: objects in the order of their snapshots, then frontiers."""
+        return [
+            *(
+                SnapshotChoice(index, number)
+                for index, snapshot in enumerate(self.snapshots)
+                for number in range(len(snapshot.objects))
+            ),
+            *(SnapshotChoice(None, index) for index in range(len(self.frontiers))),
+        ]
