@@ -62,10 +62,54 @@ REQUEST = {
         "seed": {"type": "integer"},
         "max_tokens": {"type": "integer", "minimum": 1},
         "max_completion_tokens": {"type": "integer", "minimum": 1},
-        "response_format": {"type": "object"},
+        "top_p": {"type": "number", "minimum": 0, "maximum": 1},
+        "response_format": {
+            "type": "object",
+            "required": ["type", "json_schema"],
+            "additionalProperties": False,
+            "properties": {
+                "type": {"const": "json_schema"},
+                "json_schema": {
+                    "type": "object",
+                    "required": ["name", "schema"],
+                    "additionalProperties": False,
+                    "properties": {
+                        "name": {"type": "string", "pattern": "^[a-zA-Z0-9_-]{1,64}$"},
+                        "strict": {"type": "boolean"},
+                        "schema": {"type": "object"},
+                    },
+                },
+            },
+        },
     },
 }
 """The part of OpenAI's published API that is used; anything else is refused with 400."""
+
+_STRICT_KEYWORDS = {
+    "type", "properties", "required", "additionalProperties", "items", "enum", "const", "anyOf", "description", "title",
+    "pattern", "format", "minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum", "multipleOf", "minItems",
+    "maxItems",
+}  # fmt: skip
+"""What the documentation of structured outputs lists; other keywords of JSON Schema are refused."""
+
+
+def check_strict(schema: dict[str, Any]) -> None:
+    """Holds a schema to what strict mode takes: closed objects, all required, known keywords, few values."""
+    unknown = schema.keys() - _STRICT_KEYWORDS
+    assert not unknown, f"response_format: keywords {sorted(unknown)} are not supported"
+    if schema.get("type") == "object":
+        properties = schema["properties"]
+        assert schema.get("additionalProperties") is False, "response_format: additionalProperties must be false"
+        assert schema.get("required") == list(properties), "response_format: every property must be required"
+        for part in properties.values():
+            check_strict(part)
+    if schema.get("type") == "array":
+        check_strict(schema["items"])
+    for part in schema.get("anyOf", []):
+        check_strict(part)
+    assert len(schema.get("enum", [])) <= 1000, "response_format: too many values"
+    assert schema.get("enum") != [], "response_format: enum must not be empty"
+
 
 Reply = dict[str, Any]
 """`text` or `message`, `finish_reason`, `status`, `headers`, `raw` bytes, `cut` (announce more than is sent),
@@ -131,6 +175,10 @@ def serving(reply: Callable[[dict[str, Any]], Reply]) -> Iterator[Stub]:
                 assert self.path == "/v1/chat/completions", self.path
                 jsonschema.validate(request, REQUEST)
                 images_in(request)
+                if "response_format" in request:
+                    schema = request["response_format"]["json_schema"]
+                    assert not schema.get("strict") or schema["schema"]["type"] == "object"
+                    check_strict(schema["schema"])
             except Exception as error:
                 return self.send(400, json.dumps({"error": {"message": str(error)[:300]}}).encode())
             reply = stub.reply(request) if scripted is None else scripted

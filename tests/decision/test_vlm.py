@@ -68,7 +68,12 @@ def test_asks_and_counts(stub: Stub, config: VlmConfig) -> None:
 
 
 def test_conversations_and_schemas_are_sent(stub: Stub, config: VlmConfig) -> None:
-    schema = {"type": "object", "properties": {"index": {"type": "integer"}}, "required": ["index"]}
+    schema = {
+        "type": "object",
+        "properties": {"index": {"type": "integer"}},
+        "required": ["index"],
+        "additionalProperties": False,
+    }
     question = Prompt((Turn("system", (Text("Be brief."),)), *QUESTION.turns), schema).then("Mug.", "Sure?")
     other = replace(config, temperature=None, seed=None, max_tokens_field="max_completion_tokens")
     VlmClient(other).ask(question)

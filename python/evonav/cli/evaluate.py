@@ -1,11 +1,19 @@
 """Running agents, and what comes of it: `evaluate`, `demo`, `report`, `strip`."""
 
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evonav.cli.decision_options import (
+    DecisionOptions,
+    print_spending,
+    stage_timeout_s,
+    with_decision_options,
+    with_decisions,
+)
 from evonav.cli.display import generation_progress, interruptible, print_table, progress, status
 from evonav.cli.options import (
     HEURISTICS,
@@ -39,8 +47,10 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
 EXIT_INCOMPLETE = 3
 
 
+@with_decision_options
 def evaluate(
     out: Out,
+    decisions: DecisionOptions,
     agents: Agents = HEURISTICS,
     houses: Houses = None,
     tasks: Tasks = None,
@@ -70,14 +80,18 @@ def evaluate(
         "platform": None if thor_platform is None else thor_platform.value,
     }
     host = {"gpu_device": thor_gpu, "x_display": thor_display, "timeout_s": thor_timeout}
-    config = _config(seed, _backend(simulator, allow_unknown_assets, build, host))
+    backend = _backend(simulator, allow_unknown_assets, build, host)
+    config = _config(seed, backend, decisions, out, num_workers)
     with _tasks(out, houses, tasks, limit, subset, seed, allow_unknown_assets, num_workers) as task_files:
         summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored)
     print_table(summaries)
+    print_spending(out)
     _exit(summaries)
 
 
+@with_decision_options
 def demo(
+    decisions: DecisionOptions,
     out: Out = Path("out/demo"),
     agents: Agents = HEURISTICS,
     limit: Limit = None,
@@ -87,8 +101,10 @@ def demo(
     """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report."""
     num_workers = count_of(workers)
     with _tasks(out, None, None, limit, None, seed, False, num_workers) as task_files:
-        summaries = _evaluate(out, agents, task_files, _config(seed), num_workers, retry_errored=False)
+        config = _config(seed, _backend(SimulatorName.EMBEDDED, False, {}, {}), decisions, out, num_workers)
+        summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored=False)
     print_table(summaries)
+    print_spending(out)
     _report(out)
     _exit(summaries)
 
@@ -181,11 +197,12 @@ def _evaluate(
             )
 
 
-def _config(seed: int, backend: "Backend | None" = None) -> "RunConfig":
-    from evonav.evaluation.backend import Backend
+def _config(seed: int, backend: "Backend", decisions: DecisionOptions, out: Path, num_workers: int) -> "RunConfig":
     from evonav.evaluation.engine import RunConfig
 
-    return RunConfig(seed=seed, backend=backend or Backend())
+    backend = with_decisions(backend, decisions, out=out, seed=seed, num_workers=num_workers)
+    config = RunConfig(seed=seed, backend=backend)
+    return replace(config, stage_timeout_s=stage_timeout_s(decisions, config.stage_timeout_s))
 
 
 def _backend(

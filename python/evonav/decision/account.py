@@ -6,6 +6,7 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
+from evonav.decision.ledger import Ledger
 from evonav.decision.vlm_errors import VlmError
 from evonav.errors import InvalidArgumentError
 
@@ -82,12 +83,21 @@ def image_tokens(size_px: tuple[int, int], detail: str) -> int:
 class Account:
     """Counts what is spent, and refuses what would pass the limit. Any number of threads may use it."""
 
-    def __init__(self, price: Price | None = None, max_cost_usd: float | None = None) -> None:
+    def __init__(
+        self,
+        price: Price | None = None,
+        max_cost_usd: float | None = None,
+        *,
+        ledger: Ledger | None = None,
+        model: str = "",
+    ) -> None:
         """An account with nothing spent.
 
         Args:
             price: Without one, costs are unknown.
             max_cost_usd: Most that may be spent; needs a price.
+            ledger: Books everything as well, and holds the limit over all processes that share it.
+            model: Whose account this is in the ledger.
 
         Raises:
             InvalidArgumentError: The limit is not finite and positive, or there is no price to hold it by.
@@ -101,12 +111,14 @@ class Account:
         self.usage = Usage()
         self.num_asked = 0
         self.num_replayed = 0
+        self._ledger = ledger
+        self._model = model
         self._reserved_usd = 0.0
         self._lock = threading.Lock()
 
     @property
     def cost_usd(self) -> float | None:
-        """Spent so far; `None` without prices."""
+        """Spent so far by this process; `None` without prices."""
         return None if self.price is None else self.price.of(self.usage)
 
     def reserve(self, estimate: Usage) -> float:
@@ -117,13 +129,14 @@ class Account:
 
         Raises:
             VlmError: It might pass the limit.
+            StoreError: The ledger cannot be written.
         """
-        if self.price is None:
-            return 0.0
-        cost_usd = self.price.of(estimate)
+        cost_usd = 0.0 if self.price is None else self.price.of(estimate)
+        if self._ledger is not None:
+            self._ledger.reserve(self._model, cost_usd, self.max_cost_usd)
         with self._lock:
-            spent_usd = self.price.of(self.usage) + self._reserved_usd
-            if self.max_cost_usd is not None and spent_usd + cost_usd > self.max_cost_usd:
+            spent_usd = (self.cost_usd or 0.0) + self._reserved_usd
+            if self._ledger is None and self.max_cost_usd is not None and spent_usd + cost_usd > self.max_cost_usd:
                 message = f"${spent_usd:.4f} of ${self.max_cost_usd:g} spent, the next may cost ${cost_usd:.4f}"
                 raise VlmError("over_budget", message)
             self._reserved_usd += cost_usd
@@ -136,8 +149,20 @@ class Account:
             if usage is not None:
                 self.usage += usage
                 self.num_asked += 1
+        if self._ledger is not None:
+            used = usage or Usage()
+            self._ledger.settle(
+                self._model,
+                reserved_usd,
+                input_tokens=used.input_tokens,
+                output_tokens=used.output_tokens,
+                cost_usd=0.0 if self.price is None else self.price.of(used),
+                is_answered=usage is not None,
+            )
 
     def replayed(self) -> None:
         """Counts an answer that was had for nothing."""
         with self._lock:
             self.num_replayed += 1
+        if self._ledger is not None:
+            self._ledger.replayed(self._model)

@@ -1,6 +1,27 @@
-"""What makes decision models, by import path: see `evonav.evaluation.backend.Backend.decision`."""
+"""What makes decision models, by import path: see `evonav.evaluation.backend.Backend.decision`.
+
+Options are JSON. Those that decide what is answered are `decision_options`, part of what makes runs the same; those on
+how the model is reached are `decision_host_options`. A key is neither: it is read from the environment.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from evonav.decision.questions.question import DecisionModel
+
+if TYPE_CHECKING:  # the text matcher loads none of this
+    from evonav.decision.vlm import VlmConfig
+    from evonav.decision.vlm_decision import VlmDecision
+
+SAMPLING: Mapping[str, Any] = {
+    "temperature": 0.7,
+    "top_p": 0.95,
+    "max_tokens": 4096,
+    "seed": 0,
+    "image_detail": "high",
+}
+"""3D-Mem's, whose questions the paper's agents build on; the paper does not state its own. The seed is ours."""
 
 
 def text_match(seed: int) -> DecisionModel:
@@ -8,3 +29,73 @@ def text_match(seed: int) -> DecisionModel:
     from evonav.decision.text_match import TextMatch
 
     return TextMatch()
+
+
+def vlm(
+    seed: int,
+    *,
+    model: str,
+    structured: Any = "auto",  # noqa: ANN401 - JSON, checked
+    images: bool = True,
+    request: Mapping[str, Any] | None = None,
+    server: Mapping[str, Any] | None = None,
+    exchanges: str | None = None,
+    mode: Any = None,  # noqa: ANN401 - JSON, checked
+    keeps_images: bool = True,
+    ledger: str | None = None,
+    price: Sequence[float] | None = None,
+    max_cost_usd: float | None = None,
+) -> "VlmDecision":
+    """A model behind an OpenAI-compatible endpoint.
+
+    Args:
+        seed: Of the agent; questions do not depend on it, so agents that ask the same have the same answer.
+        model: Its name, as the server calls it.
+        structured: Whether answers are held to a JSON Schema: auto, on, off.
+        images: Whether the model is shown images.
+        request: What else requests say, by the names of `VlmConfig`; what is not given is `SAMPLING`.
+        server: How the server is reached, by the names of `VlmConfig`.
+        exchanges: File of exchanges.
+        mode: Default `auto` with a file, else `live`.
+        keeps_images: Whether that file gets the images too.
+        ledger: File that books what all processes of the run spend.
+        price: Of the model: dollars a million tokens, in and out.
+        max_cost_usd: Most that the run may spend; needs `price`.
+
+    Raises:
+        InvalidArgumentError: An option makes no sense.
+        StoreError: The file of exchanges cannot be opened.
+    """
+    from evonav.decision.account import Account, Price
+    from evonav.decision.exchanges import ExchangeStore
+    from evonav.decision.ledger import Ledger
+    from evonav.decision.vlm import VlmClient
+    from evonav.decision.vlm_decision import VlmDecision
+
+    store = None if exchanges is None else ExchangeStore(Path(exchanges))
+    config = vlm_config(model, request, server)
+    account = Account(
+        None if price is None else Price(*price),
+        max_cost_usd,
+        ledger=None if ledger is None else Ledger(ledger),
+        model=model,
+    )
+    client = VlmClient(config, store=store, mode=mode, account=account, keeps_failures=True, keeps_images=keeps_images)
+    return VlmDecision(client, structured=structured, needs_images=images)
+
+
+def vlm_config(
+    model: str, request: Mapping[str, Any] | None = None, server: Mapping[str, Any] | None = None
+) -> "VlmConfig":
+    """How decisions are asked for, with `SAMPLING` where nothing else is said.
+
+    Raises:
+        InvalidArgumentError: A name is unknown, or a value makes no sense.
+    """
+    from evonav.decision.vlm import VlmConfig
+    from evonav.errors import InvalidArgumentError
+
+    try:
+        return VlmConfig(model, **{**SAMPLING, **(request or {}), **(server or {})})
+    except TypeError as error:
+        raise InvalidArgumentError(f"decision options: {error}") from error

@@ -2,6 +2,9 @@
 
 An exchange is found by its question alone: the SHA-256 of the request as canonical JSON, each image replaced by the
 SHA-256 of its pixels. Images are kept once. No key, address or time is kept, so the same exchanges make the same rows.
+
+What came instead of a response (a timeout, a lost connection, a server's error) is kept apart, in `failures`, by who
+wants it to happen again in a replay.
 """
 
 import hashlib
@@ -10,6 +13,7 @@ import sqlite3
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +26,8 @@ JsonObject = dict[str, Any]
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS exchanges (key TEXT PRIMARY KEY, request TEXT NOT NULL, response TEXT NOT NULL) STRICT;
+CREATE TABLE IF NOT EXISTS failures (key TEXT PRIMARY KEY, request TEXT NOT NULL, kind TEXT NOT NULL,
+    message TEXT NOT NULL) STRICT;
 CREATE TABLE IF NOT EXISTS images (name TEXT PRIMARY KEY, png BLOB NOT NULL) STRICT;
 """
 
@@ -48,6 +54,14 @@ def key_of(request: JsonObject) -> str:
     return hashlib.sha256(canonical(request).encode()).hexdigest()
 
 
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """What came of a question instead of a response."""
+
+    kind: str
+    message: str
+
+
 class ExchangeStore:
     """Exchanges in one SQLite file (WAL); any number of threads and processes may use it."""
 
@@ -63,12 +77,19 @@ class ExchangeStore:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(self.path, timeout=60.0, check_same_thread=False, isolation_level=None)
             self._db.execute("PRAGMA journal_mode = WAL")
+            self._db.execute("PRAGMA synchronous = NORMAL")
             self._db.executescript(_SCHEMA)
 
     def __len__(self) -> int:
         """Number of exchanges."""
         with self._lock, self._told():
             return int(self._db.execute("SELECT count(*) FROM exchanges").fetchone()[0])
+
+    @property
+    def num_failures(self) -> int:
+        """Number of questions of which something else came."""
+        with self._lock, self._told():
+            return int(self._db.execute("SELECT count(*) FROM failures").fetchone()[0])
 
     def get(self, key: str) -> JsonObject | None:
         """The response kept for a key.
@@ -88,6 +109,18 @@ class ExchangeStore:
             raise StoreError(f"{self.path}: response of {key}: expected an object, got {str(row[0])[:80]!r}")
         return response
 
+    def outcome(self, key: str) -> JsonObject | Failure | None:
+        """What is kept for a key: the response, or what came instead.
+
+        Raises:
+            StoreError: The file cannot be read, or the response in it is no JSON object.
+        """
+        response = self.get(key)
+        if response is not None:
+            return response
+        with self._lock, self._told():
+            return self._failure(key)
+
     def put(self, request: JsonObject, images: Mapping[str, bytes], response: JsonObject) -> str:
         """Keeps an exchange in place of an older one of the same question; all of it or nothing.
 
@@ -103,17 +136,49 @@ class ExchangeStore:
             StoreError: The file cannot be written.
         """
         key = key_of(request)
-        with self._lock, self._told():
-            self._db.execute("BEGIN IMMEDIATE")
-            try:
-                self._db.executemany("INSERT OR IGNORE INTO images VALUES (?, ?)", images.items())
-                row = (key, canonical(request), canonical(response))
-                self._db.execute("INSERT OR REPLACE INTO exchanges VALUES (?, ?, ?)", row)
-                self._db.execute("COMMIT")
-            except BaseException:
-                self._db.execute("ROLLBACK")
-                raise
+        with self._transaction():
+            self._db.execute("DELETE FROM failures WHERE key = ?", (key,))
+            self._db.execute("DELETE FROM exchanges WHERE key = ?", (key,))
+            self._insert(key, request, images, response)
         return key
+
+    def keep_first(
+        self, request: JsonObject, images: Mapping[str, bytes], outcome: JsonObject | Failure
+    ) -> JsonObject | Failure:
+        """Keeps an outcome unless there is one of the same question, which another process may have got meanwhile.
+
+        Returns:
+            What is kept: all who ask the same have the same answer, in this run and in every replay of it.
+
+        Raises:
+            StoreError: The file cannot be written.
+        """
+        key = key_of(request)
+        with self._transaction():
+            row = self._db.execute("SELECT response FROM exchanges WHERE key = ?", (key,)).fetchone()
+            there: JsonObject | Failure | None = self._failure(key) if row is None else json.loads(row[0])
+            if there is None:
+                self._insert(key, request, images, outcome)
+        return outcome if there is None else there
+
+    def forget_failures(self) -> int:
+        """Drops what came instead of responses, so that it is asked again; the number of them."""
+        with self._transaction():
+            return self._db.execute("DELETE FROM failures").rowcount
+
+    def _failure(self, key: str) -> Failure | None:
+        row = self._db.execute("SELECT kind, message FROM failures WHERE key = ?", (key,)).fetchone()
+        return None if row is None else Failure(*row)
+
+    def _insert(
+        self, key: str, request: JsonObject, images: Mapping[str, bytes], outcome: JsonObject | Failure
+    ) -> None:
+        self._db.executemany("INSERT OR IGNORE INTO images VALUES (?, ?)", images.items())
+        if isinstance(outcome, Failure):
+            row = (key, canonical(request), outcome.kind, outcome.message)
+            self._db.execute("INSERT INTO failures VALUES (?, ?, ?, ?)", row)
+        else:
+            self._db.execute("INSERT INTO exchanges VALUES (?, ?, ?)", (key, canonical(request), canonical(outcome)))
 
     def image(self, name: str) -> bytes | None:
         """An image's PNG file."""
@@ -134,8 +199,19 @@ class ExchangeStore:
             self._db.close()
 
     @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        with self._lock, self._told():
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._db.execute("COMMIT")
+            except BaseException:
+                self._db.execute("ROLLBACK")
+                raise
+
+    @contextmanager
     def _told(self) -> Iterator[None]:
         try:
             yield
-        except (sqlite3.Error, OSError) as error:
+        except (sqlite3.Error, OSError, ValueError) as error:
             raise StoreError(f"{self.path}: exchanges: {error}") from error

@@ -47,6 +47,21 @@ class Prompt:
         """A prompt of one turn."""
         return cls((Turn("user", parts),))
 
+    @property
+    def parts(self) -> list[Part]:
+        """Words and images of all turns, in order."""
+        return [part for turn in self.turns for part in turn.parts]
+
+    @property
+    def pictures(self) -> list[Picture]:
+        """The images alone."""
+        return [part for part in self.parts if isinstance(part, Picture)]
+
+    @property
+    def text(self) -> str:
+        """The words alone; `<image>` stands for an image."""
+        return "\n".join(part.text if isinstance(part, Text) else "<image>" for part in self.parts)
+
     def then(self, answer: str, reply: str) -> "Prompt":
         """The prompt that follows an answer."""
         turns = (*self.turns, Turn("assistant", (Text(answer),)), Turn("user", (Text(reply),)))

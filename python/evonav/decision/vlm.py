@@ -11,19 +11,21 @@ import base64
 import json
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from evonav.decision.account import CHARACTERS_PER_TOKEN, Account, Usage, image_tokens
-from evonav.decision.exchanges import ExchangeStore, JsonObject, image_name, key_of
-from evonav.decision.prompts import Picture, Prompt, Text, Turn
-from evonav.decision.vlm_errors import VlmError
+from evonav.decision.exchanges import ExchangeStore, Failure, JsonObject, image_name, key_of
+from evonav.decision.pacing import Pace
+from evonav.decision.prompts import Prompt, Text, Turn
+from evonav.decision.vlm_answer import Answer, is_malformed, read_answer, usage_of
+from evonav.decision.vlm_errors import LASTING, VlmError, VlmFailure
 from evonav.errors import DecisionError, InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -53,12 +55,19 @@ class VlmConfig:
     """Most questions under way at a time, over all threads."""
     temperature: float | None = 0.0
     """`None` leaves it to the server; some models allow no other."""
+    top_p: float | None = None
+    """`None` leaves it to the server."""
     seed: int | None = 0
+    """Of the first attempt; `None` leaves it to the server."""
     max_tokens: int = 300
     """Of an answer."""
     max_tokens_field: Literal["max_tokens", "max_completion_tokens"] = "max_tokens"
     """How the server calls that; OpenAI's reasoning models know the second alone."""
     image_detail: Literal["low", "high", "auto"] = "auto"
+    requests_per_minute: float | None = None
+    """Most that are begun, by this process; retries of the SDK are not counted."""
+    tokens_per_minute: float | None = None
+    """Most that may be used, by this process and by estimate."""
 
     def __post_init__(self) -> None:
         """Checks what a typing mistake may have made of it.
@@ -66,26 +75,22 @@ class VlmConfig:
         Raises:
             InvalidArgumentError: It names the field.
         """
-        least = {"timeout_s": 1e-3, "max_retries": 0, "max_concurrency": 1, "max_tokens": 1}
-        for name, minimum in least.items():
+        ranges = {
+            "timeout_s": (1e-3, 1e6),
+            "max_retries": (0, 1000),
+            "max_concurrency": (1, 10_000),
+            "max_tokens": (1, 10**7),
+            "temperature": (0, 2),
+            "top_p": (0, 1),
+            "requests_per_minute": (1e-3, 1e9),
+            "tokens_per_minute": (1, 1e12),
+        }
+        for name, (least, most) in ranges.items():
             value = getattr(self, name)
-            if not np.isfinite(value) or value < minimum:
-                raise InvalidArgumentError(f"{name}: expected {minimum:g} or more, got {value!r}")
+            if value is not None and not least <= value <= most:
+                raise InvalidArgumentError(f"{name}: expected {least:g} to {most:g}, got {value!r}")
         if not self.model:
             raise InvalidArgumentError("model: expected a name, got ''")
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """A whole answer."""
-
-    text: str
-    model: str
-    """As the server calls it, with its version."""
-    usage: Usage
-    key: str
-    """Of the exchange."""
-    is_replayed: bool
 
 
 class VlmClient:
@@ -98,6 +103,8 @@ class VlmClient:
         store: ExchangeStore | None = None,
         mode: Mode | None = None,
         account: Account | None = None,
+        keeps_failures: bool = False,
+        keeps_images: bool = True,
     ) -> None:
         """A client; nothing is asked or imported yet.
 
@@ -106,6 +113,9 @@ class VlmClient:
             store: Of exchanges; every mode but `live` needs one.
             mode: Default `auto` with a store, else `live`.
             account: Default one without prices or limit.
+            keeps_failures: In mode `auto`, keep timeouts, lost connections, servers' errors and broken responses as
+                well, so that going on with a run or replaying it meets them again; else they are asked again.
+            keeps_images: Keep the images' files beside their hashes, for people; replays need none.
 
         Raises:
             InvalidArgumentError: The mode needs a store.
@@ -114,66 +124,108 @@ class VlmClient:
         self.store = store
         self.mode: Mode = mode or ("live" if store is None else "auto")
         self.account = account or Account()
+        self.keeps_failures = keeps_failures
+        self.keeps_images = keeps_images
         if self.mode not in MODES:
             raise InvalidArgumentError(f"mode: expected one of {', '.join(MODES)}, got {self.mode!r}")
         if self.mode != "live" and store is None:
             raise InvalidArgumentError(f"mode {self.mode}: needs a file of exchanges")
         self._slots = threading.BoundedSemaphore(config.max_concurrency)
+        self._pace = Pace(config.requests_per_minute, config.tokens_per_minute)
         self._lock = threading.Lock()
         self._sdk: openai.OpenAI | None = None
 
-    def ask(self, prompt: Prompt) -> Answer:
+    def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
         """The model's answer.
+
+        Args:
+            prompt: What is asked.
+            attempt: How often the same was asked before without use: another attempt is another request.
 
         Raises:
             VlmError: There is none that could be used; `kind` says why.
             StoreError: The exchanges cannot be read or written.
             DecisionError: The package `openai` is missing.
         """
-        kept = self.request_of(prompt, image_name)
+        kept = self.kept_request(prompt, attempt)
         key = key_of(kept)
-        if self.store is not None and self.mode in ("replay", "auto"):
-            response = self.store.get(key)
-            if response is not None:
-                self.account.replayed()
-                return _answer(response, key, is_replayed=True)
-            if self.mode == "replay":
-                raise VlmError("not_recorded", f"{self.store.path} has no exchange {key}")
-        response = self._ask_server(self.request_of(prompt), self.estimate(prompt))
+        outcome = None if self.store is None or self.mode not in ("replay", "auto") else self.store.outcome(key)
+        is_replayed = outcome is not None
+        if outcome is not None:
+            self.account.replayed()
+        elif self.mode == "replay":
+            raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {key}")
+        else:
+            outcome = self._ask_anew(prompt, attempt, kept)
+        if isinstance(outcome, Failure):
+            raise VlmError(cast("VlmFailure", outcome.kind), outcome.message)
+        return read_answer(outcome, key, is_replayed=is_replayed)
+
+    def _ask_anew(self, prompt: Prompt, attempt: int, kept: JsonObject) -> JsonObject | Failure:
+        """Asks the server, and keeps what comes of it as far as the mode and `keeps_failures` say."""
+        images = {image_name(picture.pixels): _png(picture.pixels) for picture in prompt.pictures}
+        request = self.request_of(prompt, lambda pixels: _data_url(images[image_name(pixels)]), attempt)
+        outcome: JsonObject | Failure
         try:
-            return _answer(response, key, is_replayed=False)
+            outcome = self._ask_server(request, self.estimate(prompt))
         except VlmError as error:
-            if error.kind == "malformed":
-                kept = {}
-            raise
-        finally:
-            # A refusal is an answer too.
-            if self.store is not None and self.mode != "live" and kept:
-                pictures = [part for turn in prompt.turns for part in turn.parts if isinstance(part, Picture)]
-                images = {image_name(picture.pixels): _png(picture.pixels) for picture in pictures}
-                self.store.put(kept, images, response)
+            if not self.keeps_failures or error.kind in LASTING:
+                raise
+            outcome = Failure(error.kind, error.message)
+        if self.store is None or self.mode == "live":
+            return outcome
+        if self.mode == "auto" and (self.keeps_failures or not is_malformed(outcome)):
+            return self.store.keep_first(kept, images if self.keeps_images else {}, outcome)
+        if self.mode == "record" and not isinstance(outcome, Failure) and not is_malformed(outcome):
+            self.store.put(kept, images if self.keeps_images else {}, outcome)
+        return outcome
 
-    def is_kept(self, prompt: Prompt) -> bool:
-        """Whether the store has the answer."""
-        return self.store is not None and self.store.get(key_of(self.request_of(prompt, image_name))) is not None
+    @property
+    def never_asks(self) -> bool:
+        """Whether there are no answers but those that are kept."""
+        return self.mode == "replay"
 
-    def request_of(self, prompt: Prompt, url_of: Callable[[NDArray[np.uint8]], str] | None = None) -> JsonObject:
+    def check(self) -> None:
+        """Finds out before the first question what would make all of them fail here; asks nothing.
+
+        Raises:
+            DecisionError: The package `openai` is missing, or there is no key.
+        """
+        if self.mode != "replay":
+            self._client()
+
+    def is_kept(self, prompt: Prompt, attempt: int = 0) -> bool:
+        """Whether the store has what came of a question."""
+        return self.store is not None and self.store.outcome(key_of(self.kept_request(prompt, attempt))) is not None
+
+    def kept_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
+        """The request as it is kept: images by name, and the attempt where nothing else would tell it apart."""
+        request = self.request_of(prompt, image_name, attempt)
+        return {**request, "attempt": attempt} if attempt and self.config.seed is None else request
+
+    def request_of(
+        self, prompt: Prompt, url_of: Callable[[NDArray[np.uint8]], str] | None = None, attempt: int = 0
+    ) -> JsonObject:
         """The body that is posted to `/chat/completions`.
 
         Args:
             prompt: What is asked.
             url_of: Of an image; default all of it, as PNG in a `data:` URL.
+            attempt: Counts the seed up.
         """
         config = self.config
+        url_of = url_of or (lambda pixels: _data_url(_png(pixels)))
         request: JsonObject = {
             "model": config.model,
-            "messages": [_message(turn, config.image_detail, url_of or _data_url) for turn in prompt.turns],
+            "messages": [_message(turn, config.image_detail, url_of) for turn in prompt.turns],
             config.max_tokens_field: config.max_tokens,
         }
         if config.temperature is not None:
             request["temperature"] = config.temperature
+        if config.top_p is not None:
+            request["top_p"] = config.top_p
         if config.seed is not None:
-            request["seed"] = config.seed
+            request["seed"] = config.seed + attempt
         if prompt.schema is not None:
             schema = {"name": "answer", "strict": True, "schema": dict(prompt.schema)}
             request["response_format"] = {"type": "json_schema", "json_schema": schema}
@@ -196,9 +248,10 @@ class VlmClient:
         usage: Usage | None = None
         try:
             with self._slots:
+                self._pace.wait(estimate.input_tokens)
                 response = self._post(request)
             # Servers that count no tokens are taken to have used what was expected.
-            usage = _usage(response) or estimate
+            usage = usage_of(response) or estimate
             return response
         finally:
             self.account.settle(reserved_usd, usage)
@@ -213,18 +266,21 @@ class VlmClient:
         except openai.APITimeoutError as error:
             raise VlmError("timeout", f"no answer in {self.config.timeout_s:g} s") from error
         except openai.APIConnectionError as error:
-            raise VlmError("connection", self._without_key(error.__cause__ or error)) from None
+            raise VlmError("connection", self._told(error.__cause__ or error)) from None
         except openai.RateLimitError as error:
-            raise VlmError("rate_limited", self._without_key(error)) from None
+            # OpenAI answers so too when the account is empty, and waiting does not fill it.
+            is_broke = error.code == "insufficient_quota"
+            raise VlmError("over_budget" if is_broke else "rate_limited", self._told(error)) from None
         except (openai.AuthenticationError, openai.PermissionDeniedError) as error:
-            raise VlmError("unauthorized", self._without_key(error)) from None
+            raise VlmError("unauthorized", self._told(error)) from None
         except openai.APIStatusError as error:
             kind: Literal["server", "bad_request"] = "server" if error.status_code >= 500 else "bad_request"
-            raise VlmError(kind, self._without_key(error)) from None
+            raise VlmError(kind, self._told(error)) from None
         except openai.OpenAIError as error:
-            raise VlmError("malformed", self._without_key(error)) from None
+            raise VlmError("malformed", self._told(error)) from None
         if len(text) > MAX_ANSWER_BYTES:
             raise VlmError("oversized", f"a response of {len(text)} characters")
+        text = self._without_secrets(text)
         try:
             response = json.loads(text)
         except ValueError as error:
@@ -260,11 +316,15 @@ class VlmClient:
     def _key(self) -> str:
         return self.config.api_key or os.environ.get(KEY_VARIABLE) or ""
 
-    def _without_key(self, error: BaseException) -> str:
-        """An error's words; servers quote keys."""
-        words = " ".join(str(error).split())[:500]
-        key = self._key()
-        return words.replace(key, "***") if key else words
+    def _told(self, error: BaseException) -> str:
+        """An error's words."""
+        return self._without_secrets(" ".join(str(error).split())[:500])
+
+    def _without_secrets(self, words: str) -> str:
+        """Words without key and address, which servers quote."""
+        for secret in (self._key(), self.config.base_url or os.environ.get(URL_VARIABLE) or ""):
+            words = words.replace(secret, "***") if secret else words
+        return words
 
 
 def _message(turn: Turn, detail: str, url_of: Callable[[NDArray[np.uint8]], str]) -> JsonObject:
@@ -279,59 +339,11 @@ def _message(turn: Turn, detail: str, url_of: Callable[[NDArray[np.uint8]], str]
     return {"role": "user", "content": content}
 
 
-def _data_url(pixels: NDArray[np.uint8]) -> str:
-    return "data:image/png;base64," + base64.b64encode(_png(pixels)).decode()
+def _data_url(png: bytes) -> str:
+    return "data:image/png;base64," + base64.b64encode(png).decode()
 
 
 def _png(pixels: NDArray[np.uint8]) -> bytes:
     buffer = BytesIO()
     Image.fromarray(np.ascontiguousarray(pixels)).save(buffer, "PNG")
     return buffer.getvalue()
-
-
-def _usage(response: JsonObject) -> Usage | None:
-    """Tokens as the server counts them; `None` where it does not."""
-    usage = response.get("usage")
-    counts = [usage.get(name) for name in ("prompt_tokens", "completion_tokens")] if isinstance(usage, dict) else []
-    numbers = [count for count in counts if isinstance(count, int) and count >= 0]
-    return Usage(*numbers) if len(numbers) == 2 else None
-
-
-def _answer(response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
-    """The answer in a response.
-
-    Raises:
-        VlmError: There is none that is whole.
-    """
-    choices = response.get("choices")
-    choice = choices[0] if isinstance(choices, list) and choices else None
-    message = choice.get("message") if isinstance(choice, dict) else None
-    if not isinstance(choice, dict) or not isinstance(message, dict):
-        raise VlmError("malformed", f"a response without a message: {json.dumps(response)[:200]}")
-    if message.get("refusal"):
-        raise VlmError("refusal", str(message["refusal"])[:200])
-    content = _content(message.get("content"))
-    reason = choice.get("finish_reason")
-    if reason == "content_filter":
-        raise VlmError("refusal", "stopped by the server's filter of contents")
-    if reason == "length":
-        raise VlmError("truncated", f"cut off after {len(content)} characters: {content[:80]!r}")
-    if not content.strip():
-        raise VlmError("empty", f"an answer without words (finish_reason {reason!r})")
-    model = response.get("model")
-    return Answer(content, model if isinstance(model, str) else "", _usage(response) or Usage(), key, is_replayed)
-
-
-def _content(content: Any) -> str:  # noqa: ANN401
-    """A message's words: a string, or parts of which some are text.
-
-    Raises:
-        VlmError: It is neither.
-    """
-    if content is None:
-        return ""
-    if isinstance(content, str):
-        return content
-    if isinstance(content, Sequence) and all(isinstance(part, dict) for part in content):
-        return "".join(part["text"] for part in content if isinstance(part.get("text"), str))
-    raise VlmError("malformed", f"content: expected words, got {str(content)[:80]!r}")

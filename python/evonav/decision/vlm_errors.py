@@ -23,9 +23,14 @@ VlmFailure = Literal[
 """`unusable` is an answer that the asker cannot use though it is one; `not_recorded` a question that a replay lacks."""
 
 
+LASTING: frozenset[VlmFailure] = frozenset({"unauthorized", "bad_request", "not_recorded", "over_budget"})
+"""The next question would meet them as well."""
+
+
 class VlmError(DecisionError):
     """A model gave no usable answer."""
 
     def __init__(self, kind: VlmFailure, message: str) -> None:
         super().__init__(f"{kind}: {message}")
         self.kind: VlmFailure = kind
+        self.message = message

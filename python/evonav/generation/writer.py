@@ -21,15 +21,12 @@ from numpy.typing import NDArray
 from evonav.decision.account import Usage
 from evonav.decision.prompts import Prompt
 from evonav.decision.vlm import VlmClient
-from evonav.decision.vlm_errors import VlmError, VlmFailure
+from evonav.decision.vlm_errors import LASTING, VlmError
 from evonav.errors import TaskError
 from evonav.generation.prompts import appearance_question, cleaned, fault_of, repair_request, unified_question
 from evonav.tasks.dataset import DATASET_NAME, TaskEntry, entry_of, read_dataset, write_dataset
 from evonav.tasks.files import checksums_of, load_task, task_roots, write_task
 from evonav.tasks.manifest import PublicStage, Task
-
-_ENDS_ALL: frozenset[VlmFailure] = frozenset({"over_budget", "unauthorized", "bad_request", "not_recorded"})
-"""Failures that the next question would meet as well."""
 
 
 @dataclass
@@ -186,7 +183,7 @@ def _write_task(root: Path, client: VlmClient, stop: threading.Event) -> tuple[T
             stages.append(write_stage(public, image, client))
             part.num_written += 1
         except VlmError as error:
-            if error.kind in _ENDS_ALL:
+            if error.kind in LASTING:
                 return task, Writing(stopped=error)
             part.failures[error.kind] += 1
             part.messages.append(f"{task.task_id} stage {public.stage}: {error}")

@@ -1,0 +1,143 @@
+"""What all processes of a run spend together: one SQLite file (WAL), each booking a transaction.
+
+Costs are set aside before a question is asked, so that no number of processes passes the limit. A process that dies
+with a question under way leaves what it had set aside: the server may have counted it.
+"""
+
+import sqlite3
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from evonav.decision.vlm_errors import VlmError
+from evonav.errors import StoreError
+
+LEDGER_NAME = "spending.sqlite"
+"""In the folder of a run."""
+
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS spending (
+    model TEXT PRIMARY KEY,
+    num_asked INTEGER NOT NULL, num_replayed INTEGER NOT NULL, num_without_answer INTEGER NOT NULL,
+    input_tokens INTEGER NOT NULL, output_tokens INTEGER NOT NULL, cost_usd REAL NOT NULL, set_aside_usd REAL NOT NULL
+) STRICT;
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Spending:
+    """On one model."""
+
+    model: str
+    num_asked: int
+    """Questions that a server was asked."""
+    num_replayed: int
+    """Questions answered by kept exchanges."""
+    num_without_answer: int
+    """Of those asked: nothing came back that was counted."""
+    input_tokens: int
+    output_tokens: int
+    cost_usd: float
+    """By the prices given; 0 without."""
+    set_aside_usd: float
+    """For questions under way, or of processes that died with one."""
+
+
+class Ledger:
+    """The file; any number of threads and processes may use it."""
+
+    def __init__(self, path: Path | str) -> None:
+        """Opens or makes it.
+
+        Raises:
+            StoreError: It cannot be opened.
+        """
+        self.path = Path(path)
+        self._lock = threading.Lock()
+        with self._told():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(self.path, timeout=60.0, check_same_thread=False, isolation_level=None)
+            self._db.execute("PRAGMA journal_mode = WAL")
+            self._db.execute("PRAGMA synchronous = NORMAL")
+            self._db.executescript(_SCHEMA)
+
+    def reserve(self, model: str, cost_usd: float, max_cost_usd: float | None) -> None:
+        """Sets the cost of a question aside.
+
+        Raises:
+            VlmError: With all that is spent and set aside, it might pass the limit.
+            StoreError: The file cannot be written.
+        """
+        with self._transaction():
+            query = "SELECT coalesce(sum(cost_usd + set_aside_usd), 0) FROM spending"
+            spent_usd = float(self._db.execute(query).fetchone()[0])
+            if max_cost_usd is not None and spent_usd + cost_usd > max_cost_usd:
+                message = f"${spent_usd:.4f} of ${max_cost_usd:g} spent, the next may cost ${cost_usd:.4f}"
+                raise VlmError("over_budget", message)
+            self._add(model, set_aside_usd=cost_usd)
+
+    def settle(
+        self,
+        model: str,
+        reserved_usd: float,
+        *,
+        input_tokens: int,
+        output_tokens: int,
+        cost_usd: float,
+        is_answered: bool,
+    ) -> None:
+        """Books what was used in place of what was set aside.
+
+        Raises:
+            StoreError: The file cannot be written.
+        """
+        with self._transaction():
+            self._add(
+                model,
+                num_asked=1,
+                num_without_answer=int(not is_answered),
+                input_tokens=input_tokens,
+                output_tokens=output_tokens,
+                cost_usd=cost_usd,
+                set_aside_usd=-reserved_usd,
+            )
+
+    def replayed(self, model: str) -> None:
+        """Counts an answer that was had for nothing."""
+        with self._transaction():
+            self._add(model, num_replayed=1)
+
+    def spending(self) -> list[Spending]:
+        """What was spent, by model."""
+        with self._lock, self._told():
+            return [Spending(*row) for row in self._db.execute("SELECT * FROM spending ORDER BY model")]
+
+    def close(self) -> None:
+        """Closes the file."""
+        with self._lock, self._told():
+            self._db.close()
+
+    def _add(self, model: str, **amounts: float) -> None:
+        self._db.execute("INSERT OR IGNORE INTO spending VALUES (?, 0, 0, 0, 0, 0, 0, 0)", (model,))
+        changes = ", ".join(f"{column} = {column} + ?" for column in amounts)  # columns are ours
+        self._db.execute(f"UPDATE spending SET {changes} WHERE model = ?", (*amounts.values(), model))  # noqa: S608
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        with self._lock, self._told():
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+                self._db.execute("COMMIT")
+            except BaseException:
+                self._db.execute("ROLLBACK")
+                raise
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except (sqlite3.Error, OSError) as error:
+            raise StoreError(f"{self.path}: spending: {error}") from error

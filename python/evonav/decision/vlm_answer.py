@@ -1,0 +1,82 @@
+"""What a server's response says: the answer whole, or what is wrong with it."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from evonav.decision.account import Usage
+from evonav.decision.exchanges import Failure, JsonObject
+from evonav.decision.vlm_errors import VlmError
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A whole answer."""
+
+    text: str
+    model: str
+    """As the server calls it, with its version."""
+    usage: Usage
+    key: str
+    """Of the exchange."""
+    is_replayed: bool
+
+
+def usage_of(response: JsonObject) -> Usage | None:
+    """Tokens as the server counts them; `None` where it does not."""
+    usage = response.get("usage")
+    counts = [usage.get(name) for name in ("prompt_tokens", "completion_tokens")] if isinstance(usage, dict) else []
+    numbers = [count for count in counts if isinstance(count, int) and count >= 0]
+    return Usage(*numbers) if len(numbers) == 2 else None
+
+
+def read_answer(response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
+    """The answer in a response.
+
+    Raises:
+        VlmError: There is none that is whole.
+    """
+    choices = response.get("choices")
+    choice = choices[0] if isinstance(choices, list) and choices else None
+    message = choice.get("message") if isinstance(choice, dict) else None
+    if not isinstance(choice, dict) or not isinstance(message, dict):
+        raise VlmError("malformed", f"a response without a message: {json.dumps(response)[:200]}")
+    if message.get("refusal"):
+        raise VlmError("refusal", str(message["refusal"])[:200])
+    content = _content(message.get("content"))
+    reason = choice.get("finish_reason")
+    if reason == "content_filter":
+        raise VlmError("refusal", "stopped by the server's filter of contents")
+    if reason == "length":
+        raise VlmError("truncated", f"cut off after {len(content)} characters: {content[:80]!r}")
+    if not content.strip():
+        raise VlmError("empty", f"an answer without words (finish_reason {reason!r})")
+    model = response.get("model")
+    return Answer(content, model if isinstance(model, str) else "", usage_of(response) or Usage(), key, is_replayed)
+
+
+def is_malformed(outcome: JsonObject | Failure) -> bool:
+    """Whether it is no response of a model at all; one that refuses or is cut off is one."""
+    if isinstance(outcome, Failure):
+        return True
+    try:
+        read_answer(outcome, "", is_replayed=False)
+    except VlmError as error:
+        return error.kind == "malformed"
+    return False
+
+
+def _content(content: Any) -> str:  # noqa: ANN401
+    """A message's words: a string, or parts of which some are text.
+
+    Raises:
+        VlmError: It is neither.
+    """
+    if content is None:
+        return ""
+    if isinstance(content, str):
+        return content
+    if isinstance(content, Sequence) and all(isinstance(part, dict) for part in content):
+        return "".join(part["text"] for part in content if isinstance(part.get("text"), str))
+    raise VlmError("malformed", f"content: expected words, got {str(content)[:80]!r}")
