@@ -3,6 +3,9 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from evonav.memory import Frontier, OccupancyMap
 from evonav.memory.occupancy import FREE, UNKNOWN
 from evonav.sensors.observation import MapFrame, Observation
@@ -24,6 +27,9 @@ class ExplorerConfig:
     """Contradicting cells from which on the map is outdated (1: the paper's oracle occupancy has no noise).
 
     `None`: it never is, and the last observation of a cell wins (3D-Mem and MSGNav; paper, Sec. C.3)."""
+    conflict_margin_cells: int = 0
+    """A contradicting cell counts only if all cells this near it, rows and columns, contradict the map too: against
+    the noise of predicted occupancy, whose edges waver."""
     reached_m: float = 0.3
     """A frontier this near that is still there after a look is given up."""
 
@@ -33,16 +39,21 @@ class Explorer:
 
     def __init__(self, map_frame: MapFrame, config: ExplorerConfig | None = None) -> None:
         self.config = config or ExplorerConfig()
-        self.map = OccupancyMap(map_frame, explored_range_m=self.config.explored_range_m)
+        self._map_frame = map_frame
+        self.map = self._new_map()
         self.num_conflicts = 0
         self.num_cells_cleared = 0
+        self.num_frontiers_reset = 0
         self._is_blank = True
         self._given_up: set[int] = set()
         self._last: Frontier | None = None
 
+    def _new_map(self) -> OccupancyMap:
+        return OccupancyMap(self._map_frame, explored_range_m=self.config.explored_range_m)
+
     def clear(self) -> None:
-        """Forgets cells, frontiers and what was given up."""
-        self.map.clear()
+        """Forgets cells, frontiers with their ids, and what was given up."""
+        self.map = self._new_map()
         self._is_blank = True
         self._given_up.clear()
         self._last = None
@@ -57,6 +68,7 @@ class Explorer:
         if is_outdated:
             self.num_conflicts += 1
             self.num_cells_cleared += int((self.map.cells != UNKNOWN).sum())
+            self.num_frontiers_reset += len(self.frontiers)
             self.clear()
         here = (observation.pose.x_m, observation.pose.z_m)
         if self._is_blank:
@@ -72,7 +84,14 @@ class Explorer:
     def _is_contradicted(self, observation: Observation) -> bool:
         if self.config.min_conflict_cells is None:
             return False
-        num_conflicting = sum(len(self.map.conflicts(view.occupancy)) for view in observation.views)
+        found = [self.map.conflicts(view.occupancy) for view in observation.views]
+        if not any(len(conflicts) for conflicts in found):
+            return False
+        is_conflict = np.zeros((self._map_frame.rows, self._map_frame.cols), np.bool_)
+        for conflicts in found:  # views overlap: a cell counts once
+            for cells in (conflicts.freed, conflicts.obstructed):
+                is_conflict[cells[:, 0], cells[:, 1]] = True
+        num_conflicting = int(_eroded(is_conflict, self.config.conflict_margin_cells).sum())
         return num_conflicting >= self.config.min_conflict_cells
 
     def _give_up_unseeable(self, observation: Observation, here: Point2) -> None:
@@ -111,6 +130,16 @@ class Explorer:
         row = math.floor((point_m[1] - frame.corner_m[1]) / frame.cell_m)
         col = math.floor((point_m[0] - frame.corner_m[0]) / frame.cell_m)
         return 0 <= row < frame.rows and 0 <= col < frame.cols and bool(self.map.cells[row, col] == FREE)
+
+
+def _eroded(cells: NDArray[np.bool_], margin_cells: int) -> NDArray[np.bool_]:
+    """Cells all of whose neighbours up to `margin_cells` rows and columns away are set, too."""
+    for _ in range(margin_cells):
+        padded = np.pad(cells, 1)
+        sides = range(3)
+        rows, cols = cells.shape
+        cells = np.logical_and.reduce([padded[r : r + rows, c : c + cols] for r in sides for c in sides])
+    return cells
 
 
 def nearest_frontier(frontiers: list[Frontier], point_m: Point2) -> Frontier | None:

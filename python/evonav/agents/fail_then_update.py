@@ -1,26 +1,53 @@
 """Fail-then-Update (paper, Sec. C.4): Frontier-Update that looks whether its target is there before it stops."""
 
 import math
+from dataclasses import dataclass
 from typing import Literal
 
 from evonav.agents.frontier_update import FrontierUpdate, FrontierUpdateConfig
+from evonav.decision.questions.candidates import Point3
 from evonav.decision.questions.frontier_update import Sighting, VerifyQuestion
 from evonav.decision.questions.question import DecisionModel
+from evonav.memory.objects import ObjectEntry
 from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation, View
+from evonav.tasks.public import StageInput, TaskInfo
+
+SAME_PLACE_M = 0.5
+"""An entry whose middle is this near that of a rejected one of its label is the same again."""
+
+
+@dataclass(frozen=True, slots=True)
+class FailThenUpdateConfig(FrontierUpdateConfig):
+    """What the paper leaves open about the look on arrival."""
+
+    verify_views: Literal["facing", "all"] = "facing"
+    """Show the view towards the entry, or all of the round."""
+    unanswered_means: Literal["yes", "no"] = "yes"
+    """What no valid answer is taken for; `yes` ends the stage, `no` deletes the entry."""
+    hide_after_rejections: int | None = None
+    """A safety: an entry that has come up again at the same place, and was rejected so often in a stage, is no
+    candidate for the rest of it. `None`: it is offered again."""
 
 
 class FailThenUpdate(FrontierUpdate):
     """On arrival it asks whether the present view supports the entry; if not, the entry goes and the search goes on."""
 
-    def __init__(
-        self,
-        config: FrontierUpdateConfig | None = None,
-        decision: DecisionModel | None = None,
-        verify_views: Literal["facing", "all"] = "facing",
-    ) -> None:
-        super().__init__(config, decision)
-        self._verify_views = verify_views
+    def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
+        self._verification = config or FailThenUpdateConfig()
+        super().__init__(self._verification, decision)
+        self._rejected: list[tuple[int, str, Point3]] = []
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """Forgets everything."""
+        super().begin_task(task)
+        self._counters.update(verifications=0, rejected_entries=0)
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """A new goal; what was rejected for the last one is gone from memory anyway."""
+        super().begin_stage(stage)
+        self._rejected.clear()
+        self._details = {}
 
     def _stops_at_sight_of_place(self) -> bool:
         return False
@@ -30,20 +57,19 @@ class FailThenUpdate(FrontierUpdate):
         entry = navigator.objects.entry(entry_id)
         if entry is None:
             return False
-        first = 0 if self._verify_views == "all" else -1
-        views, stored = observation.views[first:], navigator.round_views[first:]
-        images = [pixels_of(view, navigator.config.image_px) for view in stored]
+        first = 0 if self._verification.verify_views == "all" else -1
+        images = [pixels_of(view, navigator.config.image_px) for view in navigator.round_views[first:]]
         self._counters["verifications"] += 1
         is_present = self._asker.ask(
             VerifyQuestion(
                 goal=self._goal,
                 entry=navigator.candidate(entry, with_images=self.sensing.needs_rgb),
-                seen=[sighting for view in views for sighting in self._sightings(entry_id, view)],
+                seen=[sighting for view in observation.views[first:] for sighting in self._sightings(entry_id, view)],
                 image_share=image_share(observation.views[-1], entry.centre_m, entry.size_m),
                 views=[image for image in images if image is not None],
             )
         )
-        return is_present is not False  # without an answer the entry stays, and the stage ends here
+        return self._verification.unanswered_means == "yes" if is_present is None else is_present
 
     def _sightings(self, entry_id: int, view: View) -> list[Sighting]:
         compared = self._navigator.objects.compare(entry_id, view)
@@ -55,8 +81,23 @@ class FailThenUpdate(FrontierUpdate):
         ]
 
     def _reject(self, entry_id: int) -> None:
-        if self._navigator.objects.remove(entry_id):
-            self._counters["rejected_entries"] += 1
+        entry = self._navigator.objects.entry(entry_id)
+        if entry is None:
+            return
+        self._navigator.objects.remove(entry_id)
+        self._counters["rejected_entries"] += 1
+        self._rejected.append((entry_id, entry.label, entry.centre_m))
+        self._details = {"rejected": [rejected_id for rejected_id, _, _ in self._rejected]}
+
+    def _is_offered(self, entry: ObjectEntry) -> bool:
+        limit = self._verification.hide_after_rejections
+        if limit is None:
+            return True
+        times = sum(
+            label == entry.label and math.dist(centre_m, entry.centre_m) <= SAME_PLACE_M
+            for _, label, centre_m in self._rejected
+        )
+        return times < limit
 
 
 def image_share(view: View, centre_m: tuple[float, float, float], size_m: tuple[float, float, float]) -> float:

@@ -3,18 +3,20 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any, Literal
 
 from evonav.agents.agent import AgentAction, Belief, EntryBelief, RoundDiagnostics, Sensing, Stop
 from evonav.agents.explorer import nearest_frontier
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target, belief_of
 from evonav.decision.asking import Asker
 from evonav.decision.matching import Matcher
-from evonav.decision.questions.candidates import ObjectCandidate
+from evonav.decision.questions.candidates import ObjectCandidate, Point2
 from evonav.decision.questions.frontier_update import ChooseQuestion
 from evonav.decision.questions.question import DecisionModel
 from evonav.decision.ranking import rank_entries
 from evonav.decision.text_match import TextMatch
 from evonav.memory import Frontier
+from evonav.memory.objects import ObjectEntry
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
 
@@ -28,6 +30,10 @@ class FrontierUpdateConfig:
     """Object entries that the decision model is shown."""
     num_tries: int = 3
     """Questions asked before an invalid answer is given up on."""
+    on_failed_decision: Literal["nearest_frontier", "abort"] = "nearest_frontier"
+    """Without a valid answer: explore on (the paper leaves it open), or end the stage as 3D-Mem does."""
+    explore_towards: Literal["object", "agent"] = "object"
+    """An object that the map does not reach leads to the frontier nearest to it, or to the agent."""
 
 
 class FrontierUpdate:
@@ -40,6 +46,8 @@ class FrontierUpdate:
         self._asker = Asker(model, num_tries=self.config.num_tries)
         self._matcher = Matcher()
         self._counters: Counter[str] = Counter()
+        self._details: dict[str, Any] = {}
+        """Extras for the records, beside the reason of a choice."""
         self._candidates: tuple[int, ...] = ()
         self._diagnostics = RoundDiagnostics()
 
@@ -47,6 +55,7 @@ class FrontierUpdate:
         """Forgets everything."""
         self._task = task
         self._counters.clear()
+        self._details = {}
         self._asker.counters.clear()
         self._navigator = Navigator(task.map_frame, self.config.navigator)
 
@@ -92,8 +101,14 @@ class FrontierUpdate:
         here = (observation.pose.x_m, observation.pose.z_m)
         entries = navigator.objects.entries
         remembered = [navigator.candidate(entry) for entry in entries]
-        ranked = rank_entries(self._matcher, self._goal, remembered, here)[: self.config.num_candidates]
+        ranked = [
+            index
+            for index in rank_entries(self._matcher, self._goal, remembered, here)
+            if self._is_offered(entries[index])
+        ][: self.config.num_candidates]
         frontiers = navigator.explorer.frontiers
+        if not ranked and not frontiers:
+            return self._without_candidates(observation)
         with_images = self.sensing.needs_rgb
         question = ChooseQuestion(
             goal=self._goal,
@@ -107,12 +122,20 @@ class FrontierUpdate:
         self._candidates = tuple(candidate.entry_id for candidate in question.objects)
         choice = self._asker.ask(question)
         if choice is not None and choice.kind == "object":
-            return self._go_to_object(question.objects[choice.index], frontiers)
+            return self._go_to_object(question.objects[choice.index], frontiers, here)
         if choice is not None:
             return self._go_to_frontier(frontiers[choice.index], self._reason())
         nearest = nearest_frontier(frontiers, here)
-        if nearest is not None:
+        if nearest is not None and self.config.on_failed_decision == "nearest_frontier":
             return self._go_to_frontier(nearest, "no valid answer")
+        return self._stop("no valid answer", None)
+
+    def _is_offered(self, entry: ObjectEntry) -> bool:
+        """Whether an entry may be a candidate."""
+        return True
+
+    def _without_candidates(self, observation: Observation) -> AgentAction:
+        """There is nothing to ask about: neither entries nor frontiers."""
         return self._stop("nothing to go to", None)
 
     def _reason(self) -> str:
@@ -120,12 +143,13 @@ class FrontierUpdate:
         lines = self._asker.asked[-1].text.splitlines() if self._asker.asked else []
         return " ".join(lines[1:])
 
-    def _go_to_object(self, chosen: ObjectCandidate, frontiers: list[Frontier]) -> AgentAction:
+    def _go_to_object(self, chosen: ObjectCandidate, frontiers: list[Frontier], here: Point2) -> AgentAction:
         """Commits to an entry whose surroundings the map knows; else explores towards it."""
         goal_m = self._navigator.observation_point(chosen.ground_m)
         if goal_m is None:
             self._counters["unsupported_choices"] += 1
-            frontier = nearest_frontier(frontiers, chosen.ground_m)
+            near_m = chosen.ground_m if self.config.explore_towards == "object" else here
+            frontier = nearest_frontier(frontiers, near_m)
             if frontier is not None:
                 return self._go_to_frontier(frontier, f"towards object {chosen.entry_id}, which the map does not reach")
             goal_m = chosen.ground_m  # the planner ends at the nearest free point
@@ -155,11 +179,13 @@ class FrontierUpdate:
             num_frontiers=len(explorer.frontiers),
             counters={
                 **self._asker.counters,
-                **self._counters,
                 "conflicts": explorer.num_conflicts,
                 "cells_cleared": explorer.num_cells_cleared,
+                "frontiers_reset": explorer.num_frontiers_reset,
+                "unsupported_choices": 0,
+                **self._counters,
             },
-            details={"reason": reason} if reason else {},
+            details={**({"reason": reason} if reason else {}), **self._details},
         )
 
     def diagnostics(self) -> RoundDiagnostics:

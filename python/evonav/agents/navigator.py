@@ -59,6 +59,8 @@ class Navigator:
         self.target: Target | None = None
         self.round_views: list[StoredView] = []
         """Of the last round, the heading view last."""
+        self._first_map_view = 0
+        """Id of the first view that the map, as it is now, was made of."""
         self.stage = 1
         self.round = -1
 
@@ -85,6 +87,7 @@ class Navigator:
         is_outdated = self.explorer.observe(observation)
         if is_outdated:
             self.target = None
+            self._first_map_view = self.round_views[0].id
         return is_outdated
 
     def _follow(self, removed: Sequence[int]) -> None:
@@ -159,10 +162,10 @@ class Navigator:
         """A frontier as the agent saw it: the kept view whose axis points most nearly at it.
 
         3D-Mem renders a fresh view for each new frontier; here one of those that showed it has to do, since no agent
-        may look around without spending a round.
+        may look around without spending a round. Views from before the map was rebuilt show what is no longer so.
         """
         best: tuple[float, StoredView] | None = None
-        for view in reversed(self.views.views):
+        for view in reversed(self.views.views[self._first_map_view :]):
             if view.jpeg is None or (best is not None and view.stage != best[1].stage):
                 break
             dx_m, dz_m = frontier.position_m[0] - view.pose.x_m, frontier.position_m[1] - view.pose.z_m

@@ -86,3 +86,39 @@ def _largest_group(cells: NDArray[np.bool_]) -> NDArray[np.int64] | None:
         if len(group) > len(largest):
             largest = group
     return np.array(largest) if largest else None
+
+
+def widest_direction_rad(
+    is_free: NDArray[np.bool_], frame: MapFrame, here_m: Point2, reach_m: float, num_directions: int = 72
+) -> float | None:
+    """The middle of the widest run of directions in which the floor is known to be free.
+
+    Args:
+        is_free: `(R, C)`, cells known to be free.
+        frame: Of the map.
+        here_m: `(x, z)` to go from.
+        reach_m: How far it has to be free.
+        num_directions: Directions tried, evenly spaced from +z clockwise.
+
+    Returns:
+        Radians clockwise from +z, of the first run of those as wide; `None` when it is free in none.
+    """
+    bearings_rad = np.arange(num_directions) * (math.tau / num_directions)
+    steps_m = np.arange(1, math.ceil(reach_m / frame.cell_m) + 1) * frame.cell_m
+    x_m = here_m[0] + np.sin(bearings_rad)[:, None] * np.minimum(steps_m, reach_m)
+    z_m = here_m[1] + np.cos(bearings_rad)[:, None] * np.minimum(steps_m, reach_m)
+    rows = np.floor((z_m - frame.corner_m[1]) / frame.cell_m).astype(int)
+    cols = np.floor((x_m - frame.corner_m[0]) / frame.cell_m).astype(int)
+    is_on_map = (rows >= 0) & (rows < frame.rows) & (cols >= 0) & (cols < frame.cols)
+    is_open = (is_on_map & is_free[np.where(is_on_map, rows, 0), np.where(is_on_map, cols, 0)]).all(axis=1).tolist()
+    if all(is_open):
+        return 0.0
+    best_start, best_length = 0, 0
+    for start in range(num_directions):
+        if is_open[start] and not is_open[start - 1]:
+            length = next(k for k in range(num_directions) if not is_open[(start + k) % num_directions])
+            if length > best_length:
+                best_start, best_length = start, length
+    if best_length == 0:
+        return None
+    return ((best_start + (best_length - 1) / 2) % num_directions) * (math.tau / num_directions)
