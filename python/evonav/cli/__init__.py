@@ -8,6 +8,7 @@ from evonav.cli.evaluate import demo, evaluate, report, strip
 from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
 from evonav.cli.tasks import tasks_app
+from evonav.cli.view import view
 
 EXIT_ERROR = 1
 
@@ -18,7 +19,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (evaluate, demo, report, strip, generate):
+for command in (evaluate, demo, report, strip, view, generate):
     app.command()(command)
 app.add_typer(houses_app, name="houses")
 app.add_typer(tasks_app, name="tasks")

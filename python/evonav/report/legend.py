@@ -8,7 +8,7 @@ from evonav.report.svg import arrow_head, escape, join, star
 
 _DASH = "stroke-dasharray:3 2"
 
-_ENTRIES = (
+ENTRIES = (
     (
         "path, from first round to last",
         '<g class="path" stroke-width="5">'
@@ -68,7 +68,7 @@ _ENTRIES = (
 
 def legend() -> Markup:
     """The legend as HTML."""
-    return legend_html(_ENTRIES)
+    return legend_html(ENTRIES)
 
 
 def legend_html(entries: Iterable[tuple[str, str, int]]) -> Markup:
@@ -92,7 +92,7 @@ def legend_row(width_px: int) -> tuple[str, int]:
     """The legend as SVG, broken into lines of `width_px`, and its height in pixels."""
     parts = []
     x = y = 0.0
-    for words, drawing, icon_px in _ENTRIES:
+    for words, drawing, icon_px in ENTRIES:
         item_px = icon_px + 6 + 6.3 * len(words) + 18
         if x > 0 and x + item_px > width_px:
             x, y = 0.0, y + 26

@@ -32,7 +32,7 @@ CARRIED_GAP_M = 0.05
 def course(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
     """What one agent did in a stage: path, beliefs, start and end, and where the target was."""
     return (
-        _ring(record, frame, success_radius_m)
+        ring(record, frame, success_radius_m)
         + _path(record, frame)
         + _stale_entries(record, frame)
         + target_mark(record.target, frame)
@@ -139,7 +139,8 @@ def _relocation_arrow(relocation: Relocation, frame: Frame, *, is_large: bool) -
     )
 
 
-def _ring(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
+def ring(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
+    """The circle around the target within which a stage is a success."""
     x, y = cm(_ground(record.target.position_m))
     radius_cm = round(100 * success_radius_m)
     hint = title(f"success within {success_radius_m:g} m of the target")
@@ -215,14 +216,15 @@ def _ends(record: StageRecord, frame: Frame) -> str:
         words = "start, moved here since the carried pose was no longer free" if record.is_snapped else "start"
         marks.append(start_mark(cm((start.x_m, start.z_m)), frame, words))
     if (end := record.terminal) is not None:
-        marks.append(_end_mark(cm((end.x_m, end.z_m)), record.state is EndState.SUCCESS, u))
+        marks.append(end_mark(cm((end.x_m, end.z_m)), record.state is EndState.SUCCESS, u))
     elif record.state is EndState.ERRORED and record.trace:
         last = record.trace[-1].path_m or ((record.trace[-1].pose.x_m, record.trace[-1].pose.z_m),)
-        marks.append(_end_mark(cm(last[-1]), is_success=False, unit=u))
+        marks.append(end_mark(cm(last[-1]), is_success=False, unit=u))
     return join(marks)
 
 
-def _end_mark(at: tuple[int, int], is_success: bool, unit: float) -> str:
+def end_mark(at: tuple[int, int], is_success: bool, unit: float) -> str:
+    """Where a stage ended."""
     x, y = at
     r = 1.9 * unit
     d = 0.8 * unit

@@ -1,0 +1,89 @@
+"""`evonav view`: an episode round by round, in a browser."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evonav.cli.display import status
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from evonav.report.run import Run
+
+
+def view(
+    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    task: Annotated[str | None, typer.Option(help="Id of a task of the run; default: the most telling one.")] = None,
+    agent: Annotated[str, typer.Option(help="Agents of the run, comma-separated; default: all.")] = "",
+    stage: Annotated[int | None, typer.Option(min=1, help="Show this stage alone.")] = None,
+    tasks: Annotated[
+        Path | None, typer.Option(help="Folder of the run's tasks; default: where the run had them.")
+    ] = None,
+    exchanges: Annotated[Path | None, typer.Option(help="File of a model's answers; default: the one in RUN.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Where to write; default: RUN/view.")] = None,
+    open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
+) -> None:
+    """Shows episodes round by round: views, map, memory, questions and answers, as pages of HTML (docs/viewer.md)."""
+    from evonav.evaluation.trace import RunReplay
+    from evonav.report.run import load_run
+    from evonav.report.viewer import VIEW_DIR, write_episode, write_index
+
+    found = load_run(run)
+    agents = [name.strip() for name in agent.split(",") if name.strip()] or list(found.agents)
+    task_id = task if task is not None else _telling_task(found, agents)
+    replay = RunReplay(run, _task_path(run, tasks), exchanges)
+    out_dir = out or run / VIEW_DIR
+    pages = []
+    with status("Replaying") as tell:
+        for name in agents:
+            stages = list(replay.episode(name, task_id, _teller(tell, name, task_id), last_stage=stage))
+            pages += write_episode(
+                stages, out_dir, budget=replay.budget(name), success_radius_m=found.success_radius_m, only=stage
+            )
+    index = write_index(pages, out_dir, run.resolve().name)
+    for page in pages:
+        typer.echo(f"page: {page.path}{' (the replay differs from the records)' if page.differs else ''}")
+    typer.echo(f"index: {index}")
+    if open_:
+        import webbrowser
+
+        webbrowser.open((pages[0].path if len(pages) == 1 else index).resolve().as_uri())
+
+
+def _teller(tell: "Callable[[str], None]", agent: str, task_id: str) -> "Callable[[int, int], None]":
+    return lambda stage, round_: tell(f"{agent} in {task_id}, stage {stage}, round {round_ + 1}")
+
+
+def _telling_task(run: "Run", agents: list[str]) -> str:
+    """The most telling task; of the longest list of agents that have one in common."""
+    from evonav.report.strip import most_telling
+
+    ranked = sorted(agents, key=lambda name: name not in ("fu", "stage-reset"))
+    return most_telling(run, ranked)[0]
+
+
+def _task_path(run: Path, tasks: Path | None) -> "Callable[[str], Path]":
+    """Where the run's tasks are: as told, in the run's folder, where it had them, or bundled.
+
+    Raises:
+        TaskError: There are none.
+    """
+    from evonav.errors import TaskError
+    from evonav.evaluation.datasets import bundled_tasks
+    from evonav.evaluation.store import RunStore
+
+    with RunStore(run) as store:
+        noted = store.meta("tasks_dir")
+    with bundled_tasks() as bundled:
+        places = [tasks] if tasks is not None else [run / "tasks", *([Path(noted)] if noted else []), bundled]
+
+    def find(task_id: str) -> Path:
+        found = next((place / task_id for place in places if (place / task_id / "task.json").is_file()), None)
+        if found is None:
+            looked = ", ".join(str(place) for place in places)
+            raise TaskError(f"no task {task_id!r} in {looked}; name the folder of the run's tasks with --tasks")
+        return found
+
+    return find

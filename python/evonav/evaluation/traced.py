@@ -1,0 +1,117 @@
+"""A replayed episode as plain data: what `evonav.evaluation.trace` tells and pages show.
+
+What the agent believes and what the evaluator alone knows are fields apart: `TracedEntry.truth`, `StageRecord.target`,
+`StageRecord.transition` and every `is_stale` are the evaluator's.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.evaluation.records import EntryRecord, Point2, Point3, PoseRecord, RoundRecord, StageMap, StageRecord
+
+UNKNOWN, FREE, BLOCKED, EXPLORED = 0, 1, 2, 3
+"""Values of `TracedMap.cells`; explored cells are free ones that were seen from close by."""
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """The object behind an entry, as the evaluator knows it."""
+
+    object_id: str
+    stood_in_stage: int
+    """The last stage in which it stood where the entry is; the present one if the entry is not stale."""
+    now_m: Point3 | None
+    """Where it stands in the present stage; `None` when it is no longer in the house."""
+
+
+@dataclass(frozen=True, slots=True)
+class TracedEntry:
+    """An entry of the object memory in one round."""
+
+    record: EntryRecord
+    truth: Truth | None
+    """`None` when nothing of its label ever stood there."""
+
+
+@dataclass(frozen=True, slots=True)
+class TracedFrontier:
+    """A frontier in one round."""
+
+    frontier_id: int
+    position_m: Point2
+    direction_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class TracedView:
+    """What one camera of a round saw, in colours."""
+
+    yaw_rad: float
+    jpeg: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class TracedQuestion:
+    """One try at a question."""
+
+    kind: str
+    parts: tuple[tuple[str, str | bytes], ...]
+    """The prompt: role, and words or an image (JPEG)."""
+    answer: str
+    """As it came; of a lost one, what happened."""
+    outcome: str
+    """`answered`, `invalid`, `refusal` or `lost`."""
+
+
+@dataclass(frozen=True, slots=True)
+class TracedMap:
+    """The agent's map in one round."""
+
+    cells: NDArray[np.uint8]
+    """`(R, C)`, `[row = z, col = x]`."""
+    cell_m: float
+    corner_m: Point2
+    """`(x, z)` of the smallest corner of cell (0, 0)."""
+
+
+@dataclass(frozen=True, slots=True)
+class TracedRound:
+    """One round: what was seen, believed, asked and done."""
+
+    record: RoundRecord | None
+    """`None` when the stage errored in this round."""
+    pose: PoseRecord
+    """When it observed."""
+    views: tuple[TracedView, ...]
+    """The heading view last."""
+    entries: tuple[TracedEntry, ...] = ()
+    candidate_ids: tuple[int, ...] = ()
+    frontiers: tuple[TracedFrontier, ...] = ()
+    map: TracedMap | None = None
+    """`None` for an agent that cannot be inspected."""
+    asked: tuple[TracedQuestion, ...] = ()
+    note: str = ""
+    """Why there is no belief, where the agent should have told one."""
+
+
+@dataclass(frozen=True, slots=True)
+class TracedStage:
+    """One stage, run again or not."""
+
+    record: StageRecord
+    """The replayed one; where nothing was run again, the stored one."""
+    stage_map: StageMap | None
+    rounds: tuple[TracedRound, ...]
+    why_not: str
+    """Why it was not run again; empty if it was."""
+    differences: tuple[str, ...]
+    """Fields in which the replay departs from what is stored, the first few; none: equal, byte for byte."""
+    fov_rad: float
+    """Horizontal, of a view."""
+
+    @property
+    def is_replayed(self) -> bool:
+        """Whether it was run again."""
+        return not self.why_not

@@ -1,0 +1,211 @@
+"""The pages of `evonav view`: an episode round by round, one self-contained HTML file each, and their index.
+
+What is drawn comes from `evonav.evaluation.traced`; no agent, model or task is read here.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from markupsafe import Markup
+
+from evonav.errors import StoreError
+from evonav.evaluation.records import StageMap, StageRecord
+from evonav.evaluation.traced import TracedStage
+from evonav.report.html import page_environment, text_of
+from evonav.report.legend import ENTRIES, legend_html
+from evonav.report.maps import map_css, outcome_words, task_frame
+from evonav.report.overlay import change, end_mark, ring, start_mark, target_mark
+from evonav.report.plan import Frame, floors, furniture, item_labels, labels, structure
+from evonav.report.svg import cm, slug
+from evonav.report.viewer_data import PageData
+
+VIEW_DIR = "view"
+INDEX_NAME = "index.html"
+MAX_PAGE_BYTES = 8_000_000
+"""An episode whose page would be larger is written a stage a page."""
+_SHARED_MARKS = ("start", "end, success", "end, no success", "target", "where it stood in stage 1", "success radius")
+
+
+@dataclass(frozen=True, slots=True)
+class StageDrawing:
+    """What of a stage's map is the same in all rounds, by layer."""
+
+    number: int
+    floors: Markup
+    furniture: Markup
+    structure: Markup
+    names: Markup
+    change: Markup
+    target: Markup
+    ends: Markup
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenPage:
+    """A page on disk, for the index."""
+
+    agent: str
+    task_id: str
+    path: Path
+    stages: tuple[StageRecord, ...]
+    """Without their traces."""
+    differs: bool
+
+
+def page_name(task_id: str, agent: str, stage: int | None = None) -> str:
+    """File name of an episode's page."""
+    return f"{slug(task_id)}_{slug(agent)}{'' if stage is None else f'_stage{stage}'}.html"
+
+
+def write_episode(
+    stages: Sequence[TracedStage], out_dir: Path, *, budget: int, success_radius_m: float, only: int | None = None
+) -> list[WrittenPage]:
+    """Writes an episode's page, or one a stage where one would be too large.
+
+    Args:
+        stages: As replayed, in order.
+        out_dir: Where to.
+        budget: Rounds that the agent had in a stage.
+        success_radius_m: Of the ring around the target.
+        only: The one stage to show.
+
+    Raises:
+        StoreError: A file cannot be written.
+    """
+    shown = [stage for stage in stages if only is None or stage.record.stage == only]
+    maps = {stage.record.stage: stage.stage_map for stage in stages if stage.stage_map is not None}
+    page = _page(shown, maps, budget, success_radius_m)
+    if len(page.encode()) <= MAX_PAGE_BYTES or len(shown) == 1:
+        return [_write(page, shown, out_dir, only)]
+    pages = []
+    for stage in shown:
+        text = _page([stage], maps, budget, success_radius_m)
+        pages.append(_write(text, [stage], out_dir, stage.record.stage))
+    return pages
+
+
+def write_index(pages: Iterable[WrittenPage], out_dir: Path, run_name: str) -> Path:
+    """Writes `index.html`, which links to the pages.
+
+    Raises:
+        StoreError: It cannot be written.
+    """
+    rows = [
+        (
+            page.agent,
+            page.task_id,
+            page.path.name,
+            [(record.stage, record.state.value, outcome_words(record)) for record in page.stages],
+            page.differs,
+        )
+        for page in pages
+    ]
+    text = (
+        page_environment()
+        .get_template("viewer_index.html.j2")
+        .render(name=run_name, rows=rows, css=text_of("report.css"))
+    )
+    return _save(out_dir / INDEX_NAME, text)
+
+
+def _page(stages: Sequence[TracedStage], maps: Mapping[int, StageMap], budget: int, radius_m: float) -> str:
+    first = stages[0].record
+    frame = task_frame(maps, [stage.record for stage in stages])
+    data = PageData()
+    for stage in stages:
+        data.add_stage(stage, maps, frame, budget)
+    template = page_environment().get_template("viewer.html.j2")
+    return template.render(
+        task_id=first.task_id,
+        house=first.house,
+        agent=first.agent,
+        stages=[stage.record for stage in stages],
+        drawings=[_drawing(stage, maps, frame, radius_m) for stage in stages],
+        view_box=frame.view_box,
+        legend=_legend(),
+        css=text_of("report.css") + map_css() + text_of("viewer.css"),
+        js=text_of("viewer.js"),
+        data=Markup(data.text()),  # noqa: S704 - JSON without `<`
+    )
+
+
+def _drawing(stage: TracedStage, maps: Mapping[int, StageMap], frame: Frame, radius_m: float) -> StageDrawing:
+    record, stage_map = stage.record, stage.stage_map
+    previous = maps.get(record.stage - 1)
+    ends = ""
+    if (start := record.effective_start) is not None:
+        ends += start_mark(cm((start.x_m, start.z_m)), frame, "start")
+    if (end := record.terminal) is not None:
+        ends += (
+            f'<g class="terminal">{end_mark(cm((end.x_m, end.z_m)), record.state.value == "success", frame.unit)}</g>'
+        )
+    house = stage_map or StageMap(
+        task_id=record.task_id, house=record.house, stage=record.stage, rooms=(), walls=(), openings=(), objects=()
+    )
+    layers = (
+        floors(house),
+        furniture(house.objects, frame),
+        structure(house, frame),
+        item_labels(house.objects, frame) + labels(house, frame),
+        change(record.transition, frame, stage_map=stage_map, previous_map=previous),
+        ring(record, frame, radius_m) + target_mark(record.target, frame),
+        ends,
+    )
+    return StageDrawing(record.stage, *(Markup(layer) for layer in layers))  # noqa: S704 - our own SVG
+
+
+def _legend() -> Markup:
+    box = 'x="4" y="5" width="16" height="14" stroke-width="1.6"'
+    agent = (
+        (
+            "agent, and where its views look",
+            '<path class="fov heading" d="M14 20L4 6A17 17 0 0 1 24 6Z"/>'
+            '<g class="agent"><circle cx="14" cy="19" r="4"/></g>',
+            28,
+        ),
+        ("way so far", '<g class="path" stroke-width="4"><path class="t3" d="M3 12h22"/></g>', 28),
+        ("this round's step", '<path class="step" stroke-width="4" d="M3 12h22"/>', 28),
+        ("entry", f'<g class="entry"><rect {box}/></g>', 24),
+        ("candidate of a question", f'<g class="entry candidate"><rect {box}/></g>', 24),
+        ("chosen", f'<g class="entry chosen"><rect {box}/></g>', 24),
+        ("frontier", '<g class="frontier"><path d="M12 4l7 14l-7 -4l-7 4z"/></g>', 24),
+        ("chosen frontier", '<g class="frontier chosen"><path d="M12 4l7 14l-7 -4l-7 4z"/></g>', 24),
+        ("free, explored", '<rect class="cell-explored" x="2" y="4" width="20" height="16"/>', 24),
+        ("free", '<rect class="cell-free" x="2" y="4" width="20" height="16"/>', 24),
+        ("blocked", '<rect class="cell-blocked" x="2" y="4" width="20" height="16"/>', 24),
+        ("unknown", '<rect class="cell-unknown" x="2" y="4" width="20" height="16"/>', 24),
+    )
+    evaluator = (
+        (
+            "stale entry, and where its object stands now",
+            f'<g class="entry stale"><rect {box}/><path d="M8 8l8 8m0 -8l-8 8" stroke-width="1.6"/></g>'
+            '<g class="now" stroke-width="1.6"><path d="M20 12h22"/><circle cx="45" cy="12" r="4"/></g>',
+            54,
+        ),
+        *(entry for entry in ENTRIES if entry[0] in _SHARED_MARKS),
+        *(entry for entry in ENTRIES if entry[0].startswith("object moved")),
+    )
+    heading = Markup('<b class="what">{}</b>')
+    return (
+        heading.format("The agent's")
+        + legend_html(agent)
+        + heading.format("Evaluator's knowledge; no agent sees it")
+        + legend_html(evaluator)
+    )
+
+
+def _write(text: str, stages: Sequence[TracedStage], out_dir: Path, only: int | None) -> WrittenPage:
+    first = stages[0].record
+    path = _save(out_dir / page_name(first.task_id, first.agent, only), text)
+    brief = tuple(stage.record.model_copy(update={"trace": (), "entries": ()}) for stage in stages)
+    return WrittenPage(first.agent, first.task_id, path, brief, any(stage.differences for stage in stages))
+
+
+def _save(path: Path, text: str) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{path}: {error}") from error
+    return path
