@@ -343,6 +343,94 @@ def update_snapshots(
     reach_m: float,
 ) -> list[tuple[int, list[int]]]: ...
 
+# planning
+
+@final
+class BevMap:
+    """UniGoal's map; `evonav.memory.bev` has shapes and units."""
+
+    def __new__(
+        cls,
+        *,
+        centre_m: tuple[float, float],
+        num_categories: int,
+        size_m: float,
+        cell_m: float,
+        block_m: float,
+        heights_m: tuple[float, float],
+        obstacle_min_m: float,
+        obstacle_above_camera_m: float,
+        max_depth_m: float,
+        stride_px: int,
+        category_points: int,
+    ) -> BevMap: ...
+    def integrate(
+        self,
+        depth_m: NDArray[np.float32],
+        categories: NDArray[np.int32] | None,
+        *,
+        position_m: tuple[float, float, float],
+        yaw_rad: float,
+        horizon_rad: float,
+        vertical_fov_rad: float,
+    ) -> None: ...
+    def cells_of(
+        self,
+        depth_m: NDArray[np.float32],
+        mask: NDArray[np.bool_],
+        *,
+        position_m: tuple[float, float, float],
+        yaw_rad: float,
+        horizon_rad: float,
+        vertical_fov_rad: float,
+    ) -> NDArray[np.int32]: ...
+    def visit(self, from_m: tuple[float, float], to_m: tuple[float, float]) -> None: ...
+    def collide(
+        self, position_m: tuple[float, float], yaw_rad: float, *, start: int, length: int, width: int
+    ) -> NDArray[np.int32]: ...
+    def grown(self, cells: NDArray[np.int32], radius: int) -> NDArray[np.int32]: ...
+    def frontiers(self, *, obstacle_radius: int, min_cells: int) -> NDArray[np.int32]: ...
+    def choose_frontier(
+        self,
+        agent_m: tuple[float, float],
+        goal_m: tuple[float, float] | None,
+        *,
+        frontier_obstacle_radius: int,
+        min_cells: int,
+        min_distance_m: float,
+        span_m: float,
+        path_obstacle_radius: int,
+        margin: int,
+    ) -> tuple[tuple[int, int], float, float | None, float] | None:
+        """`[row, col]`, way from the agent and from the goal, and score."""
+
+    def plan(
+        self,
+        agent_m: tuple[float, float],
+        goals: NDArray[np.int32],
+        *,
+        goal_radius: int,
+        obstacle_radius: int,
+        margin: int,
+        circle: int,
+        small_circle: int,
+    ) -> tuple[float | None, float, tuple[float, float] | None]:
+        """Way and straight distance to the nearest goal cell, and the point to head for."""
+
+    def category(self, index: int) -> NDArray[np.float32]: ...
+    @property
+    def shape(self) -> tuple[int, int]: ...
+    @property
+    def corner_m(self) -> tuple[float, float]: ...
+    @property
+    def obstacles(self) -> NDArray[np.bool_]: ...
+    @property
+    def explored(self) -> NDArray[np.bool_]: ...
+    @property
+    def visited(self) -> NDArray[np.bool_]: ...
+    @property
+    def collisions(self) -> NDArray[np.bool_]: ...
+
 # camera
 
 def unproject_image(

@@ -1,7 +1,7 @@
 //! Houses, simulator, mapping and evolution of evonav, in pure Rust.
 //!
-//! One way through: [`house`] -> [`assets`] -> [`world`] -> [`sensors`] -> [`memory`], with
-//! [`evolution`] beside it. Metres and radians; AI2-THOR's frame (left-handed, y up, yaw
+//! One way through: [`house`] -> [`assets`] -> [`world`] -> [`sensors`] -> [`memory`] -> [`planning`],
+//! with [`evolution`] beside it. Metres and radians; AI2-THOR's frame (left-handed, y up, yaw
 //! clockwise from +z seen from above).
 
 pub mod assets;
@@ -11,6 +11,7 @@ pub mod geometry;
 pub mod grid;
 pub mod house;
 pub mod memory;
+pub mod planning;
 pub mod rng;
 pub mod sensors;
 pub mod simulator;

@@ -8,6 +8,7 @@ mod house;
 mod inspect;
 mod memory;
 mod objects;
+mod planning;
 mod sensors;
 mod simulator;
 mod snapshots;
@@ -22,6 +23,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     inspect::register(module)?;
     sensors::register(module)?;
     memory::register(module)?;
+    planning::register(module)?;
     camera::register(module)?;
     simulator::register(module)?;
     snapshots::register(module)?;

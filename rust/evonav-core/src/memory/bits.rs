@@ -68,6 +68,32 @@ impl BitGrid {
         self.words.fill(0);
     }
 
+    /// Sets the bits that are 1 in `other`, a grid of the same shape.
+    pub fn unite(&mut self, other: &Self) {
+        self.words.iter_mut().zip(&other.words).for_each(|(word, other)| *word |= other);
+    }
+
+    /// Clears the bits that are 0 in `other`, a grid of the same shape.
+    pub fn intersect(&mut self, other: &Self) {
+        self.words.iter_mut().zip(&other.words).for_each(|(word, other)| *word &= other);
+    }
+
+    /// Clears the bits that are 1 in `other`, a grid of the same shape.
+    pub fn subtract(&mut self, other: &Self) {
+        self.words.iter_mut().zip(&other.words).for_each(|(word, other)| *word &= !other);
+    }
+
+    /// Turns every bit over.
+    pub fn invert(&mut self) {
+        for row in 0..self.rows {
+            for word in 0..self.stride {
+                let mask = self.word_mask(word);
+                let bits = &mut self.words[row * self.stride + word];
+                *bits = !*bits & mask;
+            }
+        }
+    }
+
     /// Number of bits that are 1.
     pub fn count(&self) -> usize {
         self.words.iter().map(|word| word.count_ones() as usize).sum()

@@ -1,0 +1,343 @@
+"""How UniGoal gets about: exploration targets, ways by fast marching, single actions, and what to do when stuck.
+
+The planner holds no goal of its own but the one to get unstuck; which goal counts is the agent's to say.
+"""
+
+import math
+import random
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from evonav.memory.bev import BevMap, Cells, Point2
+from evonav.world.pose import Pose
+from evonav.world.simulator import Action
+
+GoalKind = Literal["confirmed", "temporary", "exploration"]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannerConfig:
+    """UniGoal's constants."""
+
+    object_radius: int = 10
+    """Cells by which confirmed and temporary goals are grown."""
+    exploration_radius: int = 3
+    """The same for exploration targets."""
+    stuck_radius: int = 1
+    """The same for the goal to get unstuck."""
+    blacklist_radius: int = 3
+    """Cells by which a rejected goal is grown."""
+    obstacle_radius: int = 3
+    """Cells by which obstacles are grown for paths."""
+    margin_m: float = 1.0
+    """Paths may leave the known part of the map by this much."""
+    circle: int = 5
+    """Radius in cells of the circle that short-term goals lie on ..."""
+    small_circle: int = 2
+    """... and of the one that is tried where the first has none."""
+    turn_deg: float = 15.0
+    """A larger error of bearing is turned away."""
+    stop_m: float = 0.25
+    """A confirmed goal nearer than this is reached."""
+    detour_straight_m: float = 1.0
+    """A confirmed goal nearer than this as the crow flies ..."""
+    detour_ratio: float = 2.0
+    """... whose way is longer than this many times that is reached too: it is behind something."""
+    frontier_obstacle_radius: int = 4
+    """Cells by which obstacles are grown before frontiers are sought."""
+    min_frontier_cells: int = 20
+    """Fewest cells of a frontier (8-connected)."""
+    min_frontier_m: float = 1.2
+    """Nearer frontiers do not count."""
+    frontier_span_m: float = 10.0
+    """Ways longer than `min_frontier_m` by this and more count alike."""
+    replan_steps: int = 40
+    """Steps after which an exploration target is chosen anew ..."""
+    reached_m: float = 0.5
+    """... or when it is this near."""
+    collision_m: float = 0.20
+    """A move forward by less has failed."""
+    still_m: float = 0.05
+    """A move by less along both axes has not got anywhere."""
+    stuck_cells: int = 16
+    """The goal to get unstuck is farther than this (0.8 m)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedStep:
+    """A single action, and what it was read off."""
+
+    action: Action
+    """`STOP`: a confirmed goal is reached."""
+    goal: GoalKind | Literal["stuck", "none"]
+    """What the action serves; `none` without any goal."""
+    distance_m: float | None = None
+    """Way to the grown goal; `None` if there is none."""
+    straight_m: float = math.inf
+    """Straight distance to it."""
+    short_term_m: Point2 | None = None
+    """`(x, z)` that the action heads for."""
+
+
+@dataclass(slots=True)
+class _Stuck:
+    """What failed moves add up to."""
+
+    width: int = 1
+    is_stuck: bool = False
+    goal_m: Point2 | None = None
+
+
+@dataclass(slots=True)
+class _Exploration:
+    target_m: Point2 | None = None
+    num_steps: int = 0
+
+
+@dataclass(slots=True)
+class _Counters:
+    """Since the task began."""
+
+    collisions: int = 0
+    stuck: int = 0
+    unreachable: int = 0
+    targets: int = 0
+
+
+class UniGoalPlanner:
+    """Plans on a `BevMap`, and writes down there where the agent has been and bumped into something."""
+
+    def __init__(self, bev: BevMap, seed: int, config: PlannerConfig | None = None) -> None:
+        """For one task.
+
+        Args:
+            bev: The agent's map; the planner adds visited cells and collisions.
+            seed: Of the goals to get unstuck.
+            config: Parameters.
+        """
+        self.bev = bev
+        self.config = config or PlannerConfig()
+        self.counters = _Counters()
+        self._random = random.Random(f"unigoal {seed}")  # noqa: S311 - not for secrets
+        self._last: Pose | None = None
+        self._last_action: Action | None = None
+        self._stuck = _Stuck()
+        self._detour_m: Point2 | None = None
+        self._exploration = _Exploration()
+        self._blacklist: set[tuple[int, int]] = set()
+
+    def begin_stage(self) -> None:
+        """Keeps the map; drops the exploration target, what is blacklisted and being stuck."""
+        self._last = None
+        self._last_action = None
+        self._stuck = _Stuck()
+        self._detour_m = None
+        self._exploration = _Exploration()
+        self._blacklist = set()
+
+    def observe(self, pose: Pose) -> None:
+        """Where the last action has brought the agent; to be called once before each `step`."""
+        here = (pose.x_m, pose.z_m)
+        last = self._last or pose
+        there = (last.x_m, last.z_m)
+        self.bev.core.visit(there, here)
+        is_still = abs(here[0] - there[0]) < self.config.still_m and abs(here[1] - there[1]) < self.config.still_m
+        if not is_still:
+            self._stuck.is_stuck, self._stuck.goal_m = False, None
+        if self._last is not None and self._last_action is Action.MOVE_FORWARD:
+            self._learn_from_move(last, math.dist(here, there), is_still)
+        self._last = pose
+        self._exploration.num_steps += 1
+
+    def _learn_from_move(self, start: Pose, moved_m: float, is_still: bool) -> None:
+        """Blocks a strip ahead of a move that failed; failing again and again, the agent is stuck."""
+        stuck = self._stuck
+        length, buffer = 2, 4
+        if is_still:
+            stuck.width += 2
+            if stuck.width >= 7:
+                length, buffer = 4, 3
+                self.counters.stuck += not stuck.is_stuck
+                stuck.is_stuck = True
+            stuck.width = min(stuck.width, 5)
+        else:
+            stuck.width = 1
+        if moved_m < self.config.collision_m:
+            self.counters.collisions += 1
+            self.bev.core.collide((start.x_m, start.z_m), start.yaw_rad, start=buffer, length=length, width=stuck.width)
+
+    @property
+    def is_stuck(self) -> bool:
+        """Whether the agent is to get away from where it is before anything else."""
+        return self._stuck.is_stuck
+
+    def blacklist(self, cells: Cells) -> None:
+        """Rejects goal cells, grown by `blacklist_radius`, for the rest of the stage."""
+        grown = self.bev.grown(cells, self.config.blacklist_radius)
+        self._blacklist.update((int(row), int(col)) for row, col in grown)
+
+    def allowed(self, cells: Cells) -> Cells:
+        """Of goal cells those that are not blacklisted."""
+        if not self._blacklist:
+            return cells
+        keep = [(int(row), int(col)) not in self._blacklist for row, col in cells]
+        return cells[np.array(keep, np.bool_)] if len(cells) else cells
+
+    @property
+    def target_m(self) -> Point2 | None:
+        """The exploration target that holds."""
+        return self._exploration.target_m
+
+    def needs_target(self, pose: Pose) -> bool:
+        """Whether an exploration target is due: none yet, reached, or `replan_steps` old."""
+        exploration = self._exploration
+        target_m = exploration.target_m
+        return (
+            target_m is None
+            or exploration.num_steps >= self.config.replan_steps
+            or math.dist(target_m, (pose.x_m, pose.z_m)) < self.config.reached_m
+        )
+
+    def exploration_target(self, pose: Pose, mid_term_goal_m: Point2 | None = None) -> Point2 | None:
+        """Chooses an exploration target, and holds on to it.
+
+        Args:
+            pose: The agent's.
+            mid_term_goal_m: `(x, z)` that decides among frontiers about as near; ignored off the map.
+
+        Returns:
+            The target `(x, z)`. Without a frontier to go to, the last one stays; `None` if there was none.
+        """
+        config, bev = self.config, self.bev
+        if mid_term_goal_m is not None and bev.cell_of(mid_term_goal_m) is None:
+            mid_term_goal_m = None
+        chosen = None
+        if bev.cell_of((pose.x_m, pose.z_m)) is not None:
+            chosen = bev.core.choose_frontier(
+                (pose.x_m, pose.z_m),
+                mid_term_goal_m,
+                frontier_obstacle_radius=config.frontier_obstacle_radius,
+                min_cells=config.min_frontier_cells,
+                min_distance_m=config.min_frontier_m,
+                span_m=config.frontier_span_m,
+                path_obstacle_radius=config.obstacle_radius,
+                margin=self._margin,
+            )
+        self._exploration.num_steps = 0
+        if chosen is not None:
+            self.counters.targets += 1
+            self._exploration.target_m = bev.centre_of(chosen[0])
+        return self._exploration.target_m
+
+    def frontiers(self) -> Cells:
+        """Frontier cells as the map has them now."""
+        return self.bev.core.frontiers(
+            obstacle_radius=self.config.frontier_obstacle_radius, min_cells=self.config.min_frontier_cells
+        )
+
+    def distance_m(self, pose: Pose, goal: Cells) -> float | None:
+        """Way from the agent to goal cells grown by `object_radius`.
+
+        Returns:
+            Metres, 0 on the goal; `None` if there is no way, or nothing of it is on the map.
+        """
+        plan = self._plan(pose, goal, self.config.object_radius)
+        return None if plan is None else plan[0]
+
+    def step(self, pose: Pose, goal: Cells | Point2 | None, kind: GoalKind) -> PlannedStep:
+        """The next action towards a goal. `observe` comes first.
+
+        A stuck agent heads for a random place where it has been, until it moves, unless its goal is confirmed. While
+        the map shows no way to the goal, the agent wanders from one such place to the next, and an exploration target
+        is dropped. An agent that has nothing to head for turns right.
+
+        Args:
+            pose: The agent's.
+            goal: Cells, or a point `(x, z)`; `None` for nowhere.
+            kind: How the goal is grown; only a `confirmed` one ends in `STOP`.
+        """
+        if self.is_stuck and kind != "confirmed":
+            if self._stuck.goal_m is None:
+                self._stuck.goal_m = self._visited_place(pose)
+            return self._act(self._step_to(pose, self._stuck.goal_m, "stuck"))
+        step = self._step_to(pose, goal, kind)
+        if step.goal == "none" or step.action is Action.STOP or step.distance_m is not None:
+            self._detour_m = None
+            return self._act(step)
+        self.counters.unreachable += 1
+        self._exploration.target_m = None
+        if self._detour_m is None or math.dist(self._detour_m, (pose.x_m, pose.z_m)) < self.config.stop_m:
+            self._detour_m = self._visited_place(pose)
+        detour = self._step_to(pose, self._detour_m, "stuck")
+        if detour.distance_m is None:
+            self._detour_m = None
+        return self._act(detour)
+
+    def _act(self, step: PlannedStep) -> PlannedStep:
+        self._last_action = step.action
+        return step
+
+    def _step_to(
+        self, pose: Pose, goal: Cells | Point2 | None, kind: Literal["confirmed", "temporary", "exploration", "stuck"]
+    ) -> PlannedStep:
+        config = self.config
+        radii = {"exploration": config.exploration_radius, "stuck": config.stuck_radius}
+        plan = self._plan(pose, self._cells(goal), radii.get(kind, config.object_radius))
+        if plan is None:
+            return PlannedStep(Action.TURN_RIGHT, "none")
+        distance_m, straight_m, short_term_m = plan
+        if kind == "confirmed":
+            way_m = math.inf if distance_m is None else distance_m
+            is_behind = straight_m < config.detour_straight_m and way_m > config.detour_ratio * straight_m
+            if way_m < config.stop_m or is_behind:
+                return PlannedStep(Action.STOP, kind, distance_m, straight_m, short_term_m)
+        action = self._steer(pose, short_term_m)
+        return PlannedStep(action, kind, distance_m, straight_m, short_term_m)
+
+    def _steer(self, pose: Pose, point_m: Point2 | None) -> Action:
+        if point_m is None:
+            return Action.TURN_RIGHT
+        bearing_rad = math.atan2(point_m[0] - pose.x_m, point_m[1] - pose.z_m)
+        error_rad = math.remainder(bearing_rad - pose.yaw_rad, math.tau)
+        if abs(error_rad) <= math.radians(self.config.turn_deg) + 1e-9:
+            return Action.MOVE_FORWARD
+        return Action.TURN_RIGHT if error_rad > 0 else Action.TURN_LEFT
+
+    def _cells(self, goal: Cells | Point2 | None) -> Cells:
+        if isinstance(goal, np.ndarray):
+            return goal
+        cell = None if goal is None else self.bev.cell_of(goal)
+        return np.array([] if cell is None else [cell], np.int32).reshape(-1, 2)
+
+    def _plan(self, pose: Pose, goal: Cells, radius: int) -> tuple[float | None, float, Point2 | None] | None:
+        """Way, straight distance and short-term goal; `None` if agent or goal are off the map."""
+        here = (pose.x_m, pose.z_m)
+        if not len(goal) or self.bev.cell_of(here) is None:
+            return None
+        config = self.config
+        plan = self.bev.core.plan(
+            here,
+            goal,
+            goal_radius=radius,
+            obstacle_radius=config.obstacle_radius,
+            margin=self._margin,
+            circle=config.circle,
+            small_circle=config.small_circle,
+        )
+        return None if math.isinf(plan[1]) else plan
+
+    def _visited_place(self, pose: Pose) -> Point2 | None:
+        """A random place where the agent has been, farther than `stuck_cells` away if there is one."""
+        cells = np.argwhere(self.bev.visited)
+        here = self.bev.cell_of((pose.x_m, pose.z_m))
+        if here is None or not len(cells):
+            return None
+        far = cells[np.hypot(*(cells - here).T) > self.config.stuck_cells]
+        row, col = self._random.choice((far if len(far) else cells).tolist())
+        return self.bev.centre_of((row, col))
+
+    @property
+    def _margin(self) -> int:
+        return round(self.config.margin_m / self.bev.config.cell_m)

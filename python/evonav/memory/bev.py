@@ -1,0 +1,153 @@
+"""UniGoal's map seen from above: what stands in the way, what was seen, where which category is.
+
+Specification: UniGoal (Yin et al., CVPR 2025), whose mapping is SemExp's; docs/memory.md says where ours differs.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav import _core
+from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
+from evonav.sensors.observation import MapFrame, View
+
+Point2 = tuple[float, float]
+Cells = NDArray[np.int32]
+"""`(N, 2)` `[row, col]` of a map."""
+
+
+@dataclass(frozen=True, slots=True)
+class BevConfig:
+    """UniGoal's constants; strides and depths are those of our camera."""
+
+    size_m: float = 36.0
+    """Edge of the map."""
+    cell_m: float = 0.05
+    """Edge of a cell and of a voxel."""
+    block_m: float = 5.0
+    """Points up to this far ahead, and half as far to either side, are used."""
+    heights_m: tuple[float, float] = (-0.8, 3.6)
+    """Heights over the floor of the points that are used."""
+    obstacle_min_m: float = 0.35
+    """Surfaces from this height on are obstacles ..."""
+    obstacle_above_camera_m: float = 0.01
+    """... up to this much over the camera."""
+    max_depth_m: float = 29.7
+    """99% of the original's 30 m; beyond is no measurement."""
+    stride_px: int = 2
+    """Every second pixel: 150 x 150 points, where the original has 160 x 120."""
+    category_points: int = 5
+    """Points of a category in a cell that make it certain."""
+
+
+class BevMap:
+    """What one task has shown so far. Nothing that was seen is ever taken back: maxima of all views."""
+
+    def __init__(self, centre_m: Point2, num_categories: int, config: BevConfig | None = None) -> None:
+        """A map of nothing.
+
+        Args:
+            centre_m: `(x, z)` of its middle: where the agent starts.
+            num_categories: Categories that pixels may have.
+            config: Parameters.
+
+        Raises:
+            InvalidArgumentError: A parameter is outside its domain; the message names it.
+        """
+        self.config = config = config or BevConfig()
+        self.num_categories = num_categories
+        self.core = _core.BevMap(
+            centre_m=centre_m,
+            num_categories=num_categories,
+            size_m=config.size_m,
+            cell_m=config.cell_m,
+            block_m=config.block_m,
+            heights_m=config.heights_m,
+            obstacle_min_m=config.obstacle_min_m,
+            obstacle_above_camera_m=config.obstacle_above_camera_m,
+            max_depth_m=config.max_depth_m,
+            stride_px=config.stride_px,
+            category_points=config.category_points,
+        )
+        """For the planner, which works on it."""
+        rows, cols = self.core.shape
+        self.map_frame = MapFrame(rows, cols, config.cell_m, self.core.corner_m)
+
+    def integrate(self, view: View, categories: NDArray[np.int32] | None = None) -> None:
+        """Adds what one view shows.
+
+        Args:
+            view: Its depth and camera count.
+            categories: `(H, W)` category index of each pixel, -1 for none; `None`: no pixel has one.
+
+        Raises:
+            InvalidArgumentError: An image has another shape, or a category is out of range; the map stays as it is.
+        """
+        self.core.integrate(
+            view.depth_m,
+            categories,
+            position_m=(view.pose.x_m, view.camera_height_m, view.pose.z_m),
+            yaw_rad=view.pose.yaw_rad,
+            horizon_rad=view.pose.horizon_rad,
+            vertical_fov_rad=view.intrinsics.vertical_fov_rad,
+        )
+
+    def cells_of(self, view: View, mask: NDArray[np.bool_]) -> Cells:
+        """Cells that the marked pixels `(H, W)` of a view lie in, each once, sorted; at any height and distance."""
+        return self.core.cells_of(
+            view.depth_m,
+            mask,
+            position_m=(view.pose.x_m, view.camera_height_m, view.pose.z_m),
+            yaw_rad=view.pose.yaw_rad,
+            horizon_rad=view.pose.horizon_rad,
+            vertical_fov_rad=view.intrinsics.vertical_fov_rad,
+        )
+
+    def cell_of(self, point_m: Point2) -> tuple[int, int] | None:
+        """`(row, col)` of the cell that `(x, z)` lies in; `None` off the map."""
+        frame = self.map_frame
+        col = int(np.floor((point_m[0] - frame.corner_m[0]) / frame.cell_m))
+        row = int(np.floor((point_m[1] - frame.corner_m[1]) / frame.cell_m))
+        return (row, col) if 0 <= row < frame.rows and 0 <= col < frame.cols else None
+
+    def centre_of(self, cell: tuple[int, int]) -> Point2:
+        """`(x, z)` of the middle of a cell `(row, col)`."""
+        (x_m, z_m), cell_m = self.map_frame.corner_m, self.map_frame.cell_m
+        return (x_m + (cell[1] + 0.5) * cell_m, z_m + (cell[0] + 0.5) * cell_m)
+
+    def grown(self, cells: Cells, radius: int) -> Cells:
+        """Cells within `radius` cells of some; those off the map are left out. Sorted, each once."""
+        return self.core.grown(cells, radius)
+
+    @property
+    def obstacles(self) -> NDArray[np.bool_]:
+        """`(R, C)` copy: something once stood in the way there."""
+        return self.core.obstacles
+
+    @property
+    def explored(self) -> NDArray[np.bool_]:
+        """`(R, C)` copy: something was seen there, at any height."""
+        return self.core.explored
+
+    @property
+    def visited(self) -> NDArray[np.bool_]:
+        """`(R, C)` copy: the agent has been there."""
+        return self.core.visited
+
+    @property
+    def collisions(self) -> NDArray[np.bool_]:
+        """`(R, C)` copy: moves have failed there."""
+        return self.core.collisions
+
+    def category(self, index: int) -> NDArray[np.float32]:
+        """`(R, C)` copy: how certain a category is in each cell, 0 to 1."""
+        return self.core.category(index)
+
+    @property
+    def cells(self) -> NDArray[np.uint8]:
+        """`(R, C)`: `UNKNOWN`, `FREE` or `BLOCKED`, as other maps show it."""
+        cells = np.full(self.core.shape, UNKNOWN, np.uint8)
+        cells[self.explored | self.visited] = FREE
+        cells[self.obstacles | self.collisions] = BLOCKED
+        return cells

@@ -1,0 +1,340 @@
+//! UniGoal's map seen from above: obstacles, explored cells and categories, fused by maximum.
+
+use crate::{
+    Error,
+    geometry::{Vec2, Vec3},
+    grid::{GridSpec, MAX_CELLS},
+    memory::bits::BitGrid,
+    planning::{dilate::dilate_disk, fmm::Window, splat::Block},
+    sensors::camera::Camera,
+};
+
+/// What counts as what in a [`BevMap`] (UniGoal's constants).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BevConfig {
+    /// Edge of the map.
+    pub size_m: f64,
+    /// Edge of a cell and of a voxel.
+    pub cell_m: f64,
+    /// Depth and width of the block of voxels before the camera.
+    pub block_m: f64,
+    /// Heights `[lowest, highest]` of the block over the floor.
+    pub heights_m: Vec2,
+    /// Surfaces from this height on are obstacles ...
+    pub obstacle_min_m: f64,
+    /// ... up to this much over the camera.
+    pub obstacle_above_camera_m: f64,
+    /// Depths beyond this are no measurements.
+    pub max_depth_m: f64,
+    /// Pixels from one that is used to the next, along rows and columns.
+    pub stride_px: usize,
+    /// Points of a category in a cell that make it certain.
+    pub category_points: u8,
+}
+
+impl Default for BevConfig {
+    fn default() -> Self {
+        Self {
+            size_m: 36.0,
+            cell_m: 0.05,
+            block_m: 5.0,
+            heights_m: [-0.8, 3.6],
+            obstacle_min_m: 0.35,
+            obstacle_above_camera_m: 0.01,
+            max_depth_m: 29.7,
+            stride_px: 2,
+            category_points: 5,
+        }
+    }
+}
+
+impl BevConfig {
+    /// Checks the values.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] naming the first field outside its domain.
+    pub fn check(&self) -> Result<(), Error> {
+        let is_length = |v: f64| v.is_finite() && v > 0.0;
+        Error::require("cell_m", self.cell_m, "finite and > 0", is_length)?;
+        Error::require("size_m", self.size_m, "finite and > 0", is_length)?;
+        Error::require("max_depth_m", self.max_depth_m, "finite and > 0", is_length)?;
+        let num_cells = (self.size_m / self.cell_m).powi(2);
+        Error::require("size_m / cell_m", num_cells.sqrt(), "at most 8192 cells", |n| {
+            n * n <= MAX_CELLS as f64
+        })?;
+        Error::require("block_m", self.block_m, "10 to 160 cells", |v| {
+            (10.0..=160.0).contains(&(v / self.cell_m))
+        })?;
+        let [low, high] = self.heights_m;
+        Error::require("heights_m[0]", low, "finite and <= 0", |v| v.is_finite() && v <= 0.0)?;
+        Error::require("heights_m[1]", high, "at most 250 cells over heights_m[0]", |v| {
+            v > 0.0 && (v - low) / self.cell_m <= 250.0
+        })?;
+        Error::require("obstacle_min_m", self.obstacle_min_m, "> 0 and below heights_m[1]", |v| {
+            v > 0.0 && v < high
+        })?;
+        Error::require(
+            "obstacle_above_camera_m",
+            self.obstacle_above_camera_m,
+            "finite",
+            f64::is_finite,
+        )?;
+        Error::require("stride_px", self.stride_px, "at least 1", |n| n > 0)?;
+        Error::require("category_points", self.category_points, "at least 1", |n| n > 0)
+    }
+}
+
+/// A depth image, and perhaps a category for each pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct DepthView<'a> {
+    /// Where it was taken; heights count from the floor.
+    pub camera: Camera,
+    /// Planar depth, row-major.
+    pub depth_m: &'a [f32],
+    /// Category index of each pixel, -1 for none.
+    pub categories: Option<&'a [i32]>,
+}
+
+impl DepthView<'_> {
+    fn check(&self, num_categories: usize) -> Result<(), Error> {
+        self.camera.check()?;
+        let num = self.camera.width_px * self.camera.height_px;
+        Error::require("depth_m", self.depth_m.len(), "one value a pixel", |n| n == num)?;
+        let Some(categories) = self.categories else { return Ok(()) };
+        Error::require("categories", categories.len(), "one value a pixel", |n| n == num)?;
+        let is_known = |c: &i32| *c >= -1 && i64::from(*c) < num_categories as i64;
+        match categories.iter().find(|c| !is_known(c)) {
+            None => Ok(()),
+            Some(category) => {
+                let expected = format!("-1 to {}", num_categories as i64 - 1);
+                Err(Error::invalid("categories", category, &expected))
+            }
+        }
+    }
+}
+
+/// What one task has shown so far. Nothing that was seen is ever taken back.
+#[derive(Debug, Clone)]
+pub struct BevMap {
+    spec: GridSpec,
+    config: BevConfig,
+    obstacles: BitGrid,
+    explored: BitGrid,
+    visited: BitGrid,
+    collisions: BitGrid,
+    /// Points in a cell, at most `category_points`; empty until the category is first seen.
+    categories: Vec<Vec<u8>>,
+    /// First and last row and column of what is explored or visited.
+    known: Option<[[usize; 2]; 2]>,
+    block: Block,
+}
+
+impl BevMap {
+    /// A map of nothing, centred on `centre_m`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] as [`BevConfig::check`], if the centre is not finite, or for more
+    /// than 256 categories.
+    pub fn new(centre_m: Vec2, num_categories: usize, config: BevConfig) -> Result<Self, Error> {
+        config.check()?;
+        for value in centre_m {
+            Error::require("centre_m", value, "finite", f64::is_finite)?;
+        }
+        Error::require("num_categories", num_categories, "at most 256", |n| n <= 256)?;
+        let side = (config.size_m / config.cell_m).round().max(1.0) as usize;
+        let half_m = 0.5 * side as f64 * config.cell_m;
+        let corner_m = centre_m.map(|v| v - half_m);
+        let empty = BitGrid::new(side, side);
+        Ok(Self {
+            spec: GridSpec { rows: side, cols: side, cell_m: config.cell_m, corner_m },
+            config,
+            obstacles: empty.clone(),
+            explored: empty.clone(),
+            visited: empty.clone(),
+            collisions: empty,
+            categories: vec![Vec::new(); num_categories],
+            known: None,
+            block: Block::default(),
+        })
+    }
+
+    /// Shape and place.
+    pub fn spec(&self) -> &GridSpec {
+        &self.spec
+    }
+
+    /// Cells where something was once seen that stands in the way.
+    pub fn obstacles(&self) -> &BitGrid {
+        &self.obstacles
+    }
+
+    /// Cells where something was seen at any height.
+    pub fn explored(&self) -> &BitGrid {
+        &self.explored
+    }
+
+    /// Cells where the agent has been.
+    pub fn visited(&self) -> &BitGrid {
+        &self.visited
+    }
+
+    /// Cells that moves have failed at.
+    pub fn collisions(&self) -> &BitGrid {
+        &self.collisions
+    }
+
+    /// Certainty of a category in each cell, row-major, 0 to 1.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such category.
+    pub fn category(&self, index: usize) -> Result<Vec<f32>, Error> {
+        let Some(counts) = self.categories.get(index) else {
+            let expected = format!("below {}", self.categories.len());
+            return Err(Error::invalid("category", index, &expected));
+        };
+        if counts.is_empty() {
+            return Ok(vec![0.0; self.spec.len()]);
+        }
+        let most = f32::from(self.config.category_points);
+        Ok(counts.iter().map(|&count| f32::from(count) / most).collect())
+    }
+
+    /// Adds what one view shows.
+    ///
+    /// A point spreads over the eight voxels around it; a voxel counts the points rounded. A cell
+    /// is explored if it has a point at any height, an obstacle if it has one between
+    /// `obstacle_min_m` and the camera, or some below `-obstacle_min_m` and none around the floor
+    /// (a hole). Points outside the block before the camera do not count.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the images are not of the camera's size, a category is out of
+    /// range or the camera makes no image; the map is then unchanged.
+    ///
+    /// # Complexity
+    /// O(pixels / stride^2).
+    ///
+    /// # Source
+    /// The mapping of UniGoal (Yin et al., CVPR 2025), as in SemExp (Chaplot et al., NeurIPS 2020).
+    pub fn integrate(&mut self, view: &DepthView<'_>) -> Result<(), Error> {
+        view.check(self.categories.len())?;
+        let mut block = std::mem::take(&mut self.block);
+        block.fill(view, &self.spec, &self.config);
+        let spec = self.spec;
+        for (cell, seen) in block.cells(&spec) {
+            self.explored.insert(cell[0], cell[1]);
+            if seen.is_obstacle() {
+                self.obstacles.insert(cell[0], cell[1]);
+            }
+            self.know(cell);
+        }
+        for category in block.categories() {
+            let counts = &mut self.categories[category];
+            if counts.is_empty() {
+                counts.resize(spec.len(), 0);
+            }
+            for (cell, count) in block.count_category(category, &spec) {
+                let count = count.min(u32::from(self.config.category_points)) as u8;
+                let kept = &mut counts[spec.index(cell)];
+                *kept = count.max(*kept);
+            }
+        }
+        self.block = block;
+        Ok(())
+    }
+
+    /// Marks the cells of a straight way visited; what lies off the map is left out.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if a number is not finite.
+    pub fn visit(&mut self, from_m: Vec2, to_m: Vec2) -> Result<(), Error> {
+        for value in [from_m, to_m].concat() {
+            Error::require("visit", value, "finite", f64::is_finite)?;
+        }
+        let far_m = (to_m[0] - from_m[0]).hypot(to_m[1] - from_m[1]);
+        let num_steps = (2.0 * far_m / self.spec.cell_m).ceil().clamp(1.0, 1e5);
+        for step in 0..=num_steps as usize {
+            let share = step as f64 / num_steps;
+            let point_m = [0, 1].map(|i| from_m[i] + share * (to_m[i] - from_m[i]));
+            if let Some(cell) = self.spec.cell_of(point_m) {
+                self.visited.insert(cell[0], cell[1]);
+                self.know(cell);
+            }
+        }
+        Ok(())
+    }
+
+    /// Marks cells that a move failed at; those off the map are left out.
+    pub fn collide(&mut self, cells: &[[usize; 2]]) {
+        cells.iter().for_each(|cell| self.collisions.insert(cell[0], cell[1]));
+    }
+
+    fn know(&mut self, cell: [usize; 2]) {
+        let [low, high] = self.known.get_or_insert([cell; 2]);
+        for axis in 0..2 {
+            low[axis] = low[axis].min(cell[axis]);
+            high[axis] = high[axis].max(cell[axis]);
+        }
+    }
+
+    /// The cell of a place.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if it is off the map.
+    pub fn require_cell(&self, name: &str, point_m: Vec2) -> Result<[usize; 2], Error> {
+        let off = || Error::invalid(name, format!("{point_m:?}"), "a place on the map");
+        self.spec.cell_of(point_m).ok_or_else(off)
+    }
+
+    /// Cells that a path may cross: all but obstacles grown by `radius` cells; where the agent has
+    /// been is free, where a move failed is not, and the 3 x 3 cells around the agent are.
+    pub fn traversable(&self, agent: [usize; 2], radius: usize) -> BitGrid {
+        let mut blocked = dilate_disk(&self.obstacles, radius);
+        blocked.subtract(&self.visited);
+        blocked.unite(&self.collisions);
+        for row in agent[0].saturating_sub(1)..=agent[0] + 1 {
+            for col in agent[1].saturating_sub(1)..=agent[1] + 1 {
+                blocked.remove(row, col);
+            }
+        }
+        blocked.invert();
+        blocked
+    }
+
+    /// The rectangle around everything known and `cells`, grown by `margin` cells.
+    pub fn window(&self, cells: &[[usize; 2]], margin: usize) -> Window {
+        let known = self.known.iter().flatten().chain(cells);
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        for cell in known {
+            for axis in 0..2 {
+                low[axis] = low[axis].min(cell[axis]);
+                high[axis] = high[axis].max(cell[axis]);
+            }
+        }
+        let first = low.map(|v| v.saturating_sub(margin));
+        let sides = [self.spec.rows, self.spec.cols];
+        let end = [0, 1].map(|i| high[i].saturating_add(margin + 1).min(sides[i]));
+        Window { first, shape: [0, 1].map(|i| end[i].saturating_sub(first[i])) }
+    }
+
+    /// Cells that the marked pixels of a view lie in, each once, row-major; off-map ones left out.
+    ///
+    /// # Errors
+    /// As [`Self::integrate`], for a mask of another size.
+    pub fn cells_of(&self, view: &DepthView<'_>, mask: &[bool]) -> Result<Vec<[i32; 2]>, Error> {
+        view.check(self.categories.len())?;
+        Error::require("mask", mask.len(), "one value a pixel", |n| n == view.depth_m.len())?;
+        let width = view.camera.width_px;
+        let mut cells = BitGrid::new(self.spec.rows, self.spec.cols);
+        for (index, _) in mask.iter().enumerate().filter(|(_, marked)| **marked) {
+            let depth_m = f64::from(view.depth_m[index]);
+            if depth_m > 0.0 && depth_m <= self.config.max_depth_m {
+                let pixel = [index % width, index / width].map(|k| k as f64 + 0.5);
+                let point_m: Vec3 = view.camera.unproject(pixel, depth_m);
+                if let Some([row, col]) = self.spec.cell_of([point_m[0], point_m[2]]) {
+                    cells.insert(row, col);
+                }
+            }
+        }
+        Ok(cells.cells().map(|cell| cell.map(|i| i as i32)).collect())
+    }
+}

@@ -1,0 +1,138 @@
+//! Where to explore: frontier cells, scored by how near they are.
+
+use crate::{
+    memory::bits::BitGrid,
+    planning::{bev::BevMap, dilate::dilate_disk, fmm::march},
+};
+
+/// What counts as a frontier, and how frontiers are weighed (UniGoal's constants).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ExploreConfig {
+    /// Obstacles are grown by this many cells before frontiers are sought.
+    pub frontier_obstacle_radius: usize,
+    /// Fewest cells of a frontier.
+    pub min_cells: usize,
+    /// Nearer frontiers do not count.
+    pub min_distance_m: f64,
+    /// Distances beyond `min_distance_m` count up to this.
+    pub span_m: f64,
+    /// Obstacles are grown by this many cells for paths.
+    pub path_obstacle_radius: usize,
+    /// Paths may leave the known part of the map by this many cells.
+    pub margin: usize,
+}
+
+impl Default for ExploreConfig {
+    fn default() -> Self {
+        Self {
+            frontier_obstacle_radius: 4,
+            min_cells: 20,
+            min_distance_m: 1.2,
+            span_m: 10.0,
+            path_obstacle_radius: 3,
+            margin: 20,
+        }
+    }
+}
+
+/// A frontier cell, as it was weighed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ScoredCell {
+    /// `[row, col]`.
+    pub cell: [usize; 2],
+    /// Way from the agent.
+    pub distance_m: f64,
+    /// Way from the mid-term goal, if there is one.
+    pub goal_distance_m: Option<f64>,
+    /// 10 for the nearest frontiers to 0 for those 10 m farther; up to 1 more near the goal.
+    pub score: f64,
+}
+
+/// Explored cells off obstacles that touch unknown ones, in 8-connected groups of some size.
+pub fn frontier_cells(map: &BevMap, config: &ExploreConfig) -> BitGrid {
+    let near_obstacles = dilate_disk(map.obstacles(), config.frontier_obstacle_radius);
+    let mut free = map.explored().clone();
+    free.subtract(&near_obstacles);
+    let mut unknown = map.explored().clone();
+    unknown.unite(&near_obstacles);
+    unknown.invert();
+    let mut frontier = dilate_disk(&unknown, 1);
+    frontier.intersect(&free);
+    keep_large(frontier, config.min_cells)
+}
+
+/// The 8-connected groups of at least `min_cells` cells.
+pub fn keep_large(mut cells: BitGrid, min_cells: usize) -> BitGrid {
+    let mut kept = BitGrid::new(cells.rows(), cells.cols());
+    let all: Vec<[usize; 2]> = cells.cells().collect();
+    for first in all {
+        if !cells.get(first[0], first[1]) {
+            continue;
+        }
+        cells.remove(first[0], first[1]);
+        let mut group = vec![first];
+        let mut next = 0;
+        while let Some(&[row, col]) = group.get(next) {
+            next += 1;
+            for r in row.saturating_sub(1)..=row + 1 {
+                for c in col.saturating_sub(1)..=col + 1 {
+                    if cells.get(r, c) {
+                        cells.remove(r, c);
+                        group.push([r, c]);
+                    }
+                }
+            }
+        }
+        if group.len() >= min_cells {
+            group.iter().for_each(|cell| kept.insert(cell[0], cell[1]));
+        }
+    }
+    kept
+}
+
+/// The frontier cell to explore from `agent`, mostly the nearest; `goal` decides among those about
+/// as near.
+///
+/// # Returns
+/// `None` if no frontier can be reached that is far enough away; of equals the first in row-major
+/// order.
+///
+/// # Source
+/// UniGoal: score 10 - (clip(d, 0, 11.2) - 1.2), plus 1 - (clip(dg, 0, 11.2) - 1.2) / 10.
+pub fn choose_frontier(
+    map: &BevMap,
+    agent: [usize; 2],
+    goal: Option<[usize; 2]>,
+    config: &ExploreConfig,
+) -> Option<ScoredCell> {
+    let frontiers: Vec<[usize; 2]> = frontier_cells(map, config).cells().collect();
+    if frontiers.is_empty() {
+        return None;
+    }
+    let passable = map.traversable(agent, config.path_obstacle_radius);
+    let ends: Vec<[usize; 2]> = [agent].into_iter().chain(goal).collect();
+    let window = map.window(&ends, config.margin);
+    let field_from = |start: [usize; 2]| {
+        let mut seeds = BitGrid::new(map.spec().rows, map.spec().cols);
+        seeds.insert(start[0], start[1]);
+        march(&passable, &seeds, window, Some(&frontiers))
+    };
+    let from_agent = field_from(agent);
+    let from_goal = goal.map(field_from);
+    let cell_m = map.spec().cell_m;
+    let most_m = config.min_distance_m + config.span_m;
+    let score = |cell: [usize; 2]| {
+        let distance_m = f64::from(from_agent.at(cell)) * cell_m;
+        let is_candidate = distance_m.is_finite() && distance_m >= config.min_distance_m;
+        let goal_distance_m = from_goal.as_ref().map(|field| f64::from(field.at(cell)) * cell_m);
+        let near = |d_m: f64| d_m.clamp(0.0, most_m) - config.min_distance_m;
+        let bonus = goal_distance_m.map_or(0.0, |d_m| 1.0 - near(d_m) / config.span_m);
+        let score = config.span_m - near(distance_m) + bonus;
+        is_candidate.then_some(ScoredCell { cell, distance_m, goal_distance_m, score })
+    };
+    let scored = frontiers.iter().filter_map(|&cell| score(cell));
+    scored.fold(None, |best: Option<ScoredCell>, next| match best {
+        Some(best) if next.score <= best.score => Some(best),
+        _ => Some(next),
+    })
+}

@@ -1,0 +1,253 @@
+//! Distances around obstacles by fast marching.
+
+use std::{cmp::Reverse, collections::BinaryHeap};
+
+use crate::memory::bits::BitGrid;
+
+/// A rectangle of cells of a larger grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// `[row, col]` of its first cell.
+    pub first: [usize; 2],
+    /// Rows and columns.
+    pub shape: [usize; 2],
+}
+
+impl Window {
+    /// Place of a cell in row-major storage of the window; `None` outside.
+    pub fn index(&self, cell: [usize; 2]) -> Option<usize> {
+        let row = cell[0].checked_sub(self.first[0])?;
+        let col = cell[1].checked_sub(self.first[1])?;
+        (row < self.shape[0] && col < self.shape[1]).then(|| row * self.shape[1] + col)
+    }
+}
+
+/// Distances from the seeds of [`march`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    /// What `distances` covers.
+    pub window: Window,
+    /// In cells, row-major; infinite where the front did not come.
+    pub distances: Vec<f32>,
+}
+
+impl Field {
+    /// Distance of a cell in cells; infinite outside the window and where the front did not come.
+    pub fn at(&self, cell: [usize; 2]) -> f32 {
+        self.window.index(cell).map_or(f32::INFINITY, |index| self.distances[index])
+    }
+}
+
+const WALL: u8 = 0;
+const FAR: u8 = 1;
+const ACCEPTED: u8 = 2;
+
+/// Distances from the nearest seed over passable cells: the eikonal equation by second-order
+/// upwind differences, cells accepted in the order of their distance.
+///
+/// # Arguments
+/// * `passable` - cells that the front may cross.
+/// * `seeds` - cells at distance 0, of the same grid; they need not be passable.
+/// * `window` - the front stays inside; clipped to the grid.
+/// * `until` - the front stops when it has reached all of these cells that it can reach.
+///
+/// # Returns
+/// Distances in cells. With `until`, cells farther than the farthest of them stay infinite.
+///
+/// # Complexity
+/// O(n log n) for n cells that the front reaches.
+///
+/// # Source
+/// Sethian, "A fast marching level set method for monotonically advancing fronts", PNAS 1996;
+/// second order as in "Fast marching methods", SIAM Review 1999.
+///
+/// # Examples
+/// ```
+/// # use evonav_core::{memory::bits::BitGrid, planning::fmm::{Window, march}};
+/// let mut passable = BitGrid::new(3, 9);
+/// (0..3).for_each(|row| passable.insert_run(row, 0, 9));
+/// let mut seeds = BitGrid::new(3, 9);
+/// seeds.insert(1, 0);
+/// let field = march(&passable, &seeds, Window { first: [0, 0], shape: [3, 9] }, None);
+/// assert_eq!(field.at([1, 8]), 8.0);
+/// ```
+pub fn march(
+    passable: &BitGrid,
+    seeds: &BitGrid,
+    window: Window,
+    until: Option<&[[usize; 2]]>,
+) -> Field {
+    let first = [0, 1].map(|i| window.first[i].min([passable.rows(), passable.cols()][i]));
+    let shape =
+        [0, 1].map(|i| window.shape[i].min([passable.rows(), passable.cols()][i] - first[i]));
+    let mut front = Front::new(passable, Window { first, shape });
+    let mut num_left = 0;
+    for cell in until.unwrap_or(&[]) {
+        if let Some(index) = front.padded(*cell)
+            && !front.is_target[index]
+        {
+            front.is_target[index] = true;
+            num_left += 1;
+        }
+    }
+    front.seed(seeds);
+    let stops = until.is_some();
+    while let Some(Reverse(key)) = front.queue.pop() {
+        let index = (key & u64::from(u32::MAX)) as usize;
+        if front.states[index] == ACCEPTED {
+            continue;
+        }
+        front.states[index] = ACCEPTED;
+        num_left -= usize::from(front.is_target[index]);
+        if stops && num_left == 0 {
+            break;
+        }
+        for step in front.steps() {
+            front.update(index.wrapping_add_signed(step));
+        }
+    }
+    front.into_field()
+}
+
+/// A marching front over a window with a wall two cells wide around it.
+struct Front {
+    window: Window,
+    stride: usize,
+    states: Vec<u8>,
+    distances: Vec<f32>,
+    is_target: Vec<bool>,
+    /// Distance bits above, index below: floats that are not negative sort as their bits.
+    queue: BinaryHeap<Reverse<u64>>,
+}
+
+const PAD: usize = 2;
+
+impl Front {
+    fn new(passable: &BitGrid, window: Window) -> Self {
+        let stride = window.shape[1] + 2 * PAD;
+        let num = stride * (window.shape[0] + 2 * PAD);
+        let mut states = vec![WALL; num];
+        for row in 0..window.shape[0] {
+            let start = (row + PAD) * stride + PAD;
+            let cells = &mut states[start..start + window.shape[1]];
+            for (col, state) in cells.iter_mut().enumerate() {
+                let is_passable = passable.get(window.first[0] + row, window.first[1] + col);
+                *state = if is_passable { FAR } else { WALL };
+            }
+        }
+        Self {
+            window,
+            stride,
+            states,
+            distances: vec![f32::INFINITY; num],
+            is_target: vec![false; num],
+            queue: BinaryHeap::new(),
+        }
+    }
+
+    fn padded(&self, cell: [usize; 2]) -> Option<usize> {
+        self.window.index(cell)?;
+        let [row, col] = [0, 1].map(|i| cell[i] - self.window.first[i] + PAD);
+        Some(row * self.stride + col)
+    }
+
+    fn steps(&self) -> [isize; 4] {
+        let stride = self.stride as isize;
+        [-stride, -1, 1, stride]
+    }
+
+    fn push(&mut self, index: usize, distance: f32) {
+        self.distances[index] = distance;
+        self.queue.push(Reverse(u64::from(distance.to_bits()) << 32 | index as u64));
+    }
+
+    /// Seeds at 0, and their diagonal neighbours at their true distance: upwind differences alone
+    /// would put them at 1.71.
+    fn seed(&mut self, seeds: &BitGrid) {
+        let indices: Vec<usize> = seeds.cells().filter_map(|cell| self.padded(cell)).collect();
+        for &index in &indices {
+            self.states[index] = FAR;
+            self.push(index, 0.0);
+        }
+        let stride = self.stride as isize;
+        for &index in &indices {
+            for (row, col) in [(-stride, -1), (-stride, 1), (stride, -1), (stride, 1)] {
+                let at = |step: isize| index.wrapping_add_signed(step);
+                let is_open = [row, col, row + col].iter().all(|&s| self.states[at(s)] != WALL);
+                let corner = at(row + col);
+                if is_open && self.distances[corner] > std::f32::consts::SQRT_2 {
+                    self.push(corner, std::f32::consts::SQRT_2);
+                }
+            }
+        }
+    }
+
+    /// Brings a cell's distance up to date with its accepted neighbours.
+    fn update(&mut self, index: usize) {
+        if self.states[index] != FAR {
+            return;
+        }
+        let stride = self.stride as isize;
+        let terms = [stride, 1].map(|step| self.upwind(index, step));
+        let distance = solve(terms);
+        if distance < self.distances[index] {
+            self.push(index, distance);
+        }
+    }
+
+    /// Along one axis: weight and offset of `weight * (d - offset)^2`, and the plain neighbour.
+    fn upwind(&self, index: usize, step: isize) -> Option<Term> {
+        let side = |step: isize| {
+            let near = index.wrapping_add_signed(step);
+            (self.states[near] == ACCEPTED).then(|| (self.distances[near], step))
+        };
+        let (near, step) = match (side(-step), side(step)) {
+            (Some(a), Some(b)) => Some(if b.0 < a.0 { b } else { a }),
+            (a, b) => a.or(b),
+        }?;
+        let far = index.wrapping_add_signed(2 * step);
+        let second = (self.states[far] == ACCEPTED).then(|| self.distances[far]);
+        Some(match second.filter(|&second| second < near) {
+            Some(second) => Term { weight: 2.25, offset: (4.0 * near - second) / 3.0, near },
+            None => Term { weight: 1.0, offset: near, near },
+        })
+    }
+
+    fn into_field(self) -> Field {
+        let [rows, cols] = self.window.shape;
+        let mut distances = Vec::with_capacity(rows * cols);
+        for row in 0..rows {
+            let start = (row + PAD) * self.stride + PAD;
+            for index in start..start + cols {
+                let is_accepted = self.states[index] == ACCEPTED;
+                distances.push(if is_accepted { self.distances[index] } else { f32::INFINITY });
+            }
+        }
+        Field { window: self.window, distances }
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Term {
+    weight: f32,
+    offset: f32,
+    near: f32,
+}
+
+/// The larger root of `sum weight * (d - offset)^2 = 1`, not below a neighbour it is taken from.
+fn solve(terms: [Option<Term>; 2]) -> f32 {
+    let alone = |term: Term| term.offset + 1.0 / term.weight.sqrt();
+    match terms {
+        [None, None] => f32::INFINITY,
+        [Some(term), None] | [None, Some(term)] => alone(term),
+        [Some(a), Some(b)] => {
+            let sum = a.weight + b.weight;
+            let mean = (a.weight * a.offset + b.weight * b.offset) / sum;
+            let gap = a.offset - b.offset;
+            let rest = 1.0 - a.weight * b.weight / sum * gap * gap;
+            let both = mean + (rest.max(0.0) / sum).sqrt();
+            // A root below a neighbour would run against the front: one side alone it is.
+            if rest < 0.0 || both < a.near.max(b.near) { alone(a).min(alone(b)) } else { both }
+        }
+    }
+}

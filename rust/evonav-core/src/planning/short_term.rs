@@ -1,0 +1,144 @@
+//! The next few cells of a path, read off a distance field.
+
+use crate::{
+    Error,
+    geometry::{Vec2, distance_2d_m},
+    memory::bits::BitGrid,
+    planning::{
+        bev::BevMap,
+        dilate::dilate_disk,
+        fmm::{Field, march},
+    },
+};
+
+/// A cell to head for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShortTermGoal {
+    /// `[row, col]`.
+    pub cell: [usize; 2],
+    /// How much nearer to the goal it is than the agent, in cells.
+    pub gain: f32,
+}
+
+/// The cell on a circle around the agent that is nearest to the goal by `field`.
+///
+/// A cell that gains more than 1.5 times its straight distance lies beyond a wall that is thinner
+/// than the circle is wide; it is passed over (as in UniGoal).
+///
+/// # Arguments
+/// * `field` - distances to the goal, at least at the agent and nearer ones.
+/// * `position` - `[row, col]` of the agent in cells, fractions counted from a cell's lower corner.
+/// * `radius` - of the circle, in cells; cells farther than `radius - 1` and up to `radius` are on it.
+///
+/// # Returns
+/// `None` if no cell of the circle is nearer to the goal than the agent's own, or the goal cannot
+/// be reached from there; of equals the first in row-major order.
+pub fn short_term_goal(field: &Field, position: [f64; 2], radius: usize) -> Option<ShortTermGoal> {
+    let cell = position.map(f64::floor);
+    if position.iter().any(|p| !p.is_finite() || *p < 0.0) {
+        return None;
+    }
+    let own = field.at(cell.map(|c| c as usize));
+    if !own.is_finite() {
+        return None;
+    }
+    let reach = radius as i64 + 1;
+    let mut best: Option<ShortTermGoal> = None;
+    for d_row in -reach..=reach {
+        for d_col in -reach..=reach {
+            let at = [cell[0] as i64 + d_row, cell[1] as i64 + d_col];
+            let Ok(row) = usize::try_from(at[0]) else { continue };
+            let Ok(col) = usize::try_from(at[1]) else { continue };
+            let offset = [0, 1].map(|i| at[i] as f64 + 0.5 - position[i]);
+            let far = offset[0].hypot(offset[1]);
+            if far > radius as f64 || far <= radius as f64 - 1.0 {
+                continue;
+            }
+            let gain = own - field.at([row, col]);
+            let is_beyond_wall = f64::from(gain) > 1.5 * far.max(radius as f64);
+            if gain > 1e-4 && !is_beyond_wall && best.is_none_or(|b| gain > b.gain) {
+                best = Some(ShortTermGoal { cell: [row, col], gain });
+            }
+        }
+    }
+    best
+}
+
+/// How [`plan`] looks for a way (UniGoal's constants).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlanConfig {
+    /// Obstacles are grown by this many cells.
+    pub obstacle_radius: usize,
+    /// Paths may leave the known part of the map by this many cells.
+    pub margin: usize,
+    /// Radius in cells of the circle that the short-term goal lies on ...
+    pub circle: usize,
+    /// ... and of the one that is tried where the first has none.
+    pub small_circle: usize,
+}
+
+impl Default for PlanConfig {
+    fn default() -> Self {
+        Self { obstacle_radius: 3, margin: 20, circle: 5, small_circle: 2 }
+    }
+}
+
+/// A way to a goal, as far as the agent needs it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// Length of the way to the nearest goal cell; `None` if there is none.
+    pub distance_m: Option<f64>,
+    /// Straight distance to the nearest goal cell's centre; infinite if no goal is on the map.
+    pub straight_m: f64,
+    /// `[x, z]` to head for; `None` on the goal, or without a way.
+    pub short_term_m: Option<Vec2>,
+}
+
+/// Finds the way from a place to the nearest of some goal cells.
+///
+/// # Arguments
+/// * `agent_m` - `[x, z]`, on the map.
+/// * `goals` - `[row, col]`; those off the map are left out.
+/// * `goal_radius` - goal cells are grown by this many cells; they count as passable.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] if the agent is off the map.
+///
+/// # Complexity
+/// O(n log n) for n cells nearer to the goal than the agent.
+pub fn plan(
+    map: &BevMap,
+    agent_m: Vec2,
+    goals: &[[i32; 2]],
+    goal_radius: usize,
+    config: &PlanConfig,
+) -> Result<Plan, Error> {
+    let spec = map.spec();
+    let agent = map.require_cell("agent_m", agent_m)?;
+    let mut on_map = BitGrid::new(spec.rows, spec.cols);
+    for [row, col] in goals {
+        if let (Ok(row), Ok(col)) = (usize::try_from(*row), usize::try_from(*col)) {
+            on_map.insert(row, col);
+        }
+    }
+    let seeds = dilate_disk(&on_map, goal_radius);
+    let mut ends: Vec<[usize; 2]> = seeds.cells().collect();
+    let straight_m = |cell: &[usize; 2]| distance_2d_m(spec.centre_m(*cell), agent_m);
+    let straight_m = ends.iter().map(straight_m).fold(f64::INFINITY, f64::min);
+    if ends.is_empty() {
+        return Ok(Plan { distance_m: None, straight_m, short_term_m: None });
+    }
+    ends.push(agent);
+    let passable = map.traversable(agent, config.obstacle_radius);
+    let window = map.window(&ends, config.margin);
+    let field = march(&passable, &seeds, window, Some(&[agent]));
+    let cells = f64::from(field.at(agent));
+    let position = [1, 0].map(|axis: usize| (agent_m[axis] - spec.corner_m[axis]) / spec.cell_m);
+    let short_term = short_term_goal(&field, position, config.circle)
+        .or_else(|| short_term_goal(&field, position, config.small_circle));
+    Ok(Plan {
+        distance_m: cells.is_finite().then_some(cells * spec.cell_m),
+        straight_m,
+        short_term_m: short_term.map(|goal| spec.centre_m(goal.cell)),
+    })
+}
