@@ -119,8 +119,7 @@ impl BevMap {
     ) -> PyResult<Cells<'py>> {
         let pose =
             Pose { position_m: [position_m[0], 0.0, position_m[1]], yaw_rad, horizon_rad: 0.0 };
-        let cells =
-            strip_cells(self.0.spec(), &pose, Strip { start, length, width });
+        let cells = strip_cells(self.0.spec(), &pose, Strip { start, length, width });
         self.0.collide(&cells);
         arrays::rows_of(py, cells.into_iter().map(|cell| cell.map(|i| i as i32)).collect())
     }

@@ -27,9 +27,8 @@ pub fn strip_cells(spec: &GridSpec, pose: &Pose, strip: Strip) -> Vec<[usize; 2]
         [x + ahead * sin + right * cos, z + ahead * cos - right * sin]
     };
     let half = (strip.width / 2) as f64;
-    let cells = (0..strip.length).flat_map(|i| {
-        (0..strip.width).map(move |j| [(i + strip.start) as f64, j as f64 - half])
-    });
+    let cells = (0..strip.length)
+        .flat_map(|i| (0..strip.width).map(move |j| [(i + strip.start) as f64, j as f64 - half]));
     cells
         .filter_map(|[ahead, right]| spec.cell_of(point(ahead * spec.cell_m, right * spec.cell_m)))
         .collect()

@@ -128,7 +128,8 @@ impl Block {
         for [ahead, right] in
             [[0.0, -half_m], [0.0, half_m], [config.block_m, -half_m], [config.block_m, half_m]]
         {
-            let corner = [camera_x + ahead * sin + right * cos, camera_z + ahead * cos - right * sin];
+            let corner =
+                [camera_x + ahead * sin + right * cos, camera_z + ahead * cos - right * sin];
             low_m = [0, 1].map(|i| low_m[i].min(corner[i]));
         }
         let first = [1, 0].map(|i: usize| ((low_m[i] - spec.corner_m[i]) / cell_m).floor() - 2.0);
@@ -136,7 +137,8 @@ impl Block {
         // The block's diagonal, and a rim for what spreads.
         let side = (2.0_f64.sqrt() * config.block_m / cell_m).ceil() as usize + 6;
         let levels = ((config.heights_m[1] - config.heights_m[0]) / cell_m).round() as usize + 2;
-        let level = |height_m: f64| ((height_m - config.heights_m[0]) / cell_m + 1e-6).max(0.0) as usize;
+        let level =
+            |height_m: f64| ((height_m - config.heights_m[0]) / cell_m + 1e-6).max(0.0) as usize;
         let top_m = view.camera.position_m[1] + config.obstacle_above_camera_m;
         self.levels_of =
             [level(-config.obstacle_min_m), level(config.obstacle_min_m), level(top_m)];
