@@ -7,6 +7,7 @@ import typer
 from evonav.cli.evaluate import demo, evaluate, report, strip
 from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
+from evonav.cli.paper import paper
 from evonav.cli.tasks import tasks_app
 from evonav.cli.view import view
 
@@ -19,7 +20,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (evaluate, demo, report, strip, view, generate):
+for command in (evaluate, demo, report, paper, strip, view, generate):
     app.command()(command)
 app.add_typer(houses_app, name="houses")
 app.add_typer(tasks_app, name="tasks")

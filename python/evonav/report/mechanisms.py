@@ -1,0 +1,119 @@
+"""What agents did, told by their own counters and by how stages ended: to see why one is ahead of another."""
+
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from evonav.evaluation.records import EndState, StageRecord
+from evonav.report.causes import Cause
+from evonav.report.run import Run
+from evonav.report.tables import NONE, Table, percent
+
+STRATA = {"stage_1": "stage 1", "relocated": "relocated", "not_relocated": "not relocated"}
+"""The paper's, in words."""
+
+
+@dataclass(slots=True)
+class Deeds:
+    """Of one agent."""
+
+    counters: Counter[str] = field(default_factory=Counter)
+    """Over all tasks."""
+    ends: Counter[str] = field(default_factory=Counter)
+    """Scored stages by why the agent stopped."""
+    num_stages: int = 0
+
+
+def deeds_of(run: Run) -> dict[str, Deeds]:
+    """Counters and stop reasons of every agent.
+
+    Raises:
+        StoreError: The run cannot be read.
+    """
+    found = {agent: Deeds() for agent in run.agents}
+    for task in run.tasks():
+        for agent in run.agents:
+            records = [record for (name, _), record in sorted(task.records.items()) if name == agent]
+            _add(found[agent], records)
+    return found
+
+
+def _add(deeds: Deeds, records: Sequence[StageRecord]) -> None:
+    # Counters count over a task; an agent that was lost on the way began anew.
+    last: Counter[str] = Counter()
+    for record in records:
+        if record.is_scored:
+            deeds.num_stages += 1
+            deeds.ends[record.stop_reason or "stopped" if record.has_stopped else "budget"] += 1
+        if record.trace:
+            counters = Counter(record.trace[-1].counters)
+            if any(counters[name] < count for name, count in last.items()):
+                deeds.counters.update(last)
+            last = counters
+    deeds.counters.update(last)
+
+
+def counter_table(deeds: Mapping[str, Deeds]) -> Table:
+    """Every counter, summed over tasks."""
+    names = sorted({name for one in deeds.values() for name in one.counters})
+    rows = tuple(
+        (
+            name.replace("_", " "),
+            *(str(one.counters[name]) if name in one.counters else NONE for one in deeds.values()),
+        )
+        for name in names
+    )
+    return Table("What agents counted", ("Counter", *deeds), rows, ("Sums over all tasks.",))
+
+
+def end_table(deeds: Mapping[str, Deeds]) -> Table:
+    """Scored stages by why they ended."""
+    total: Counter[str] = Counter()
+    for one in deeds.values():
+        total.update(one.ends)
+    rows = tuple((reason, *(str(one.ends[reason]) for one in deeds.values())) for reason, _ in total.most_common())
+    return Table("How stages ended", ("The agent stopped for", *deeds), rows, ("Budget: it did not stop.",))
+
+
+def cause_share_table(run: Run, stratum: str) -> Table:
+    """Share of a stratum's scored stages by cause of failure.
+
+    Args:
+        run: With outcomes.
+        stratum: Of `STRATA`.
+    """
+    counts: dict[str, Counter[Cause | None]] = {agent: Counter() for agent in run.agents}
+    for (agent, _, _), outcome in run.outcomes.items():
+        if outcome.record.is_scored and stratum_of(outcome.record) == stratum:
+            counts[agent][outcome.cause] += 1
+    causes = [cause for cause in Cause if any(part[cause] for part in counts.values())]
+    totals = {agent: sum(part.values()) for agent, part in counts.items()}
+    rows = [("n", *(str(total) for total in totals.values()))]
+    for cause in (None, *causes):
+        shares = [part[cause] / totals[agent] if totals[agent] else None for agent, part in counts.items()]
+        rows.append(("success" if cause is None else cause.value, *(percent(share, None) for share in shares)))
+    title = f"Why stages failed: {STRATA[stratum]}"
+    return Table(title, ("% of stages", *run.agents), tuple(rows), ("One cause a stage, the first that fits.",))
+
+
+def stratum_of(record: StageRecord) -> str:
+    """Of `STRATA`."""
+    if record.stage == 1:
+        return "stage_1"
+    return "relocated" if record.target.is_relocated else "not_relocated"
+
+
+def success_by_group(run: Run, group_of: Mapping[str, str]) -> dict[str, dict[str, tuple[int, int]]]:
+    """Successes and scored stages by group of tasks and agent.
+
+    Args:
+        run: With outcomes.
+        group_of: A name for each task.
+    """
+    found: dict[str, dict[str, tuple[int, int]]] = defaultdict(dict)
+    for (agent, task_id, _), outcome in run.outcomes.items():
+        if outcome.record.is_scored:
+            successes, n = found[group_of[task_id]].get(agent, (0, 0))
+            is_success = outcome.record.state is EndState.SUCCESS
+            found[group_of[task_id]][agent] = (successes + is_success, n + 1)
+    return dict(found)

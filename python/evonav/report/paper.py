@@ -1,0 +1,220 @@
+"""The paper's Tables 1 and 2, and its stage-1 results, beside those of a run.
+
+Counts are decoded from the paper's percentages: all twelve overall rates lie on k/365, the strata on k/109 and k/166,
+and what is left of the sums is stage 1. SPL is as printed.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from evonav.evaluation.metrics import AgentSummary, PairedDifference, Rates
+from evonav.report.run import PAPER_ORDER, Run
+from evonav.report.tables import NONE, Table, percent, points, verdict
+from evonav.significance import wilson
+
+Perception = Literal["gt", "prediction"]
+
+NUM_STAGES, NUM_RELOCATED, NUM_NOT_RELOCATED, NUM_FIRST = 365, 109, 166, 90
+"""Stages of the paper's 90 tasks, and of its strata."""
+
+
+@dataclass(frozen=True, slots=True)
+class PaperResult:
+    """An agent's stages that succeeded, and its SPL."""
+
+    num_all: int
+    spl: float
+    num_relocated: int
+    num_not_relocated: int
+
+    @property
+    def num_first(self) -> int:
+        """Successes of stage 1, which is in neither stratum."""
+        return self.num_all - self.num_relocated - self.num_not_relocated
+
+
+PAPER: dict[Perception, dict[str, PaperResult]] = {
+    "gt": {
+        "unigoal": PaperResult(73, 0.149, 14, 31),
+        "3d-mem": PaperResult(174, 0.425, 44, 93),
+        "msgnav": PaperResult(216, 0.413, 56, 107),
+        "fu": PaperResult(223, 0.488, 59, 108),
+        "stage-reset": PaperResult(226, 0.451, 66, 102),
+        "ftu": PaperResult(246, 0.533, 75, 110),
+    },
+    "prediction": {
+        "unigoal": PaperResult(47, 0.079, 10, 18),
+        "3d-mem": PaperResult(161, 0.377, 44, 80),
+        "msgnav": PaperResult(200, 0.382, 55, 96),
+        "fu": PaperResult(154, 0.325, 32, 83),
+        "stage-reset": PaperResult(171, 0.296, 48, 82),
+        "ftu": PaperResult(179, 0.358, 57, 80),
+    },
+}
+_PAPER_NOTE = "Paper: Wilson's 95% interval of its counts, as if its stages were independent."
+_OURS_NOTE = "Ours: bootstrap over houses (one task each), 95%, 10,000 resamples."
+
+
+def paper_tables(run: Run, perception: Perception = "gt") -> list[Table]:
+    """Tables 1 and 2 and stage 1, the order of agents, and differences, the paper's beside the run's.
+
+    Args:
+        run: Agents that the paper does not have stand without its figures.
+        perception: Which half of the paper's tables to compare with.
+    """
+    paper = PAPER[perception]
+    return [
+        _main_table(run.summaries, paper),
+        _relocation_table(run.summaries, paper),
+        _first_stage_table(run.summaries, paper),
+        _order_table(run.summaries, paper),
+        _difference_table(run.pairs, paper),
+    ]
+
+
+def paper_markdown(run: Run, perception: Perception = "gt") -> str:
+    """The tables as one Markdown text."""
+    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in paper_tables(run, perception))
+
+
+def _main_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
+    rows = []
+    for s in summaries:
+        known = paper.get(s.agent)
+        rows.append(
+            (
+                s.agent,
+                NONE if known is None else _of(known.num_all, NUM_STAGES),
+                percent(s.sr, s.sr_ci95),
+                NONE if known is None else f"{100 * known.spl:.1f}",
+                percent(s.spl, s.spl_ci95),
+                f"{s.n} of {s.num_stages}" if s.is_incomplete else str(s.n),
+            )
+        )
+    columns = ("Agent", "SR % paper", "SR % ours", "SPL % paper", "SPL % ours", "n ours")
+    return Table("Table 1: all stages", columns, tuple(rows), (f"Paper: n = {NUM_STAGES}.", _PAPER_NOTE, _OURS_NOTE))
+
+
+def _relocation_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
+    rows = []
+    for s in summaries:
+        known = paper.get(s.agent)
+        moved, unmoved = _split(s, "relocated"), _split(s, "not_relocated")
+        rows.append(
+            (
+                s.agent,
+                NONE if known is None else _of(known.num_relocated, NUM_RELOCATED),
+                _ours(moved),
+                NONE if known is None else _of(known.num_not_relocated, NUM_NOT_RELOCATED),
+                _ours(unmoved),
+                _gap(known),
+                NONE if moved.sr is None or unmoved.sr is None else f"{100 * (moved.sr - unmoved.sr):+.1f}",
+            )
+        )
+    columns = (
+        "Agent",
+        "relocated, paper",
+        "relocated, ours",
+        "not relocated, paper",
+        "not relocated, ours",
+        "gap, paper",
+        "gap, ours",
+    )
+    note = (
+        f"SR %. Relocated: the target had ever moved since stage 1; paper n = {NUM_RELOCATED} and "
+        f"{NUM_NOT_RELOCATED}. Gap: relocated less not relocated, percentage points."
+    )
+    return Table("Table 2: relocated and not relocated targets", columns, tuple(rows), (note,))
+
+
+def _first_stage_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
+    rows = []
+    for s in summaries:
+        known = paper.get(s.agent)
+        rows.append((s.agent, NONE if known is None else _of(known.num_first, NUM_FIRST), _ours(_split(s, "stage_1"))))
+    note = (
+        f"SR %. The paper does not print it: its overall counts less those of its strata (n = {NUM_FIRST}). fu and "
+        "stage-reset are the same program at stage 1, and ftu adds a look on arrival: how far these three lie apart is "
+        "the paper's noise."
+    )
+    return Table("Stage 1", ("Agent", "paper, decoded", "ours"), tuple(rows), (note,))
+
+
+def _order_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
+    agents = [s for s in summaries if s.agent in paper and s.sr is not None]
+    ours = {
+        "SR": {s.agent: s.sr for s in agents},
+        "SPL": {s.agent: s.spl for s in agents},
+        "SR, relocated": {s.agent: _split(s, "relocated").sr for s in agents},
+        "SR, not relocated": {s.agent: _split(s, "not_relocated").sr for s in agents},
+        "SR, stage 1": {s.agent: _split(s, "stage_1").sr for s in agents},
+    }
+    theirs = {
+        "SR": {s.agent: float(paper[s.agent].num_all) for s in agents},
+        "SPL": {s.agent: paper[s.agent].spl for s in agents},
+        "SR, relocated": {s.agent: float(paper[s.agent].num_relocated) for s in agents},
+        "SR, not relocated": {s.agent: float(paper[s.agent].num_not_relocated) for s in agents},
+        "SR, stage 1": {s.agent: float(paper[s.agent].num_first) for s in agents},
+    }
+    rows = tuple((name, order(theirs[name]), order(values)) for name, values in ours.items())
+    return Table("Order of the agents", ("Measure", "paper", "ours"), rows, ("Best first; = for equal rates.",))
+
+
+def order(values: Mapping[str, float | None]) -> str:
+    """Names from the largest value to the smallest, `a > b = c`; those without a value are left out."""
+    known = {agent: value for agent, value in values.items() if value is not None}
+    ranked = sorted(known, key=lambda agent: (-known[agent], PAPER_ORDER.index(agent)))
+    words = ""
+    for before, agent in zip([None, *ranked], ranked, strict=False):
+        words += agent if before is None else f" {'=' if known[before] == known[agent] else '>'} {agent}"
+    return words or NONE
+
+
+def _difference_table(pairs: Sequence[PairedDifference], paper: dict[str, PaperResult]) -> Table:
+    rows = []
+    for pair in pairs:
+        if pair.a not in paper or pair.b not in paper:
+            continue
+        theirs = (paper[pair.b].num_all - paper[pair.a].num_all) / NUM_STAGES
+        low, high = pair.sr_ci95
+        rows.append(
+            (
+                f"{pair.b} less {pair.a}",
+                f"{100 * theirs:+.1f}",
+                points(pair.sr, pair.sr_ci95),
+                points(pair.spl, pair.spl_ci95),
+                str(pair.n),
+                verdict(pair),
+                "yes" if low <= theirs <= high else "no",
+            )
+        )
+    columns = (
+        "Agents",
+        "SR, paper",
+        "SR, ours [95% CI]",
+        "SPL, ours [95% CI]",
+        "n",
+        "ours says",
+        "paper's in our interval",
+    )
+    note = "Percentage points, on the stages that both scored; intervals resample houses."
+    return Table("Differences between agents", columns, tuple(rows), (note,))
+
+
+def _split(summary: AgentSummary, name: str) -> Rates:
+    return summary.splits.get(name, Rates(n=0, sr=None, spl=None))
+
+
+def _ours(part: Rates) -> str:
+    return NONE if part.sr is None else f"{percent(part.sr, part.sr_ci95)}, n = {part.n}"
+
+
+def _of(successes: int, n: int) -> str:
+    return percent(successes / n, wilson(successes, n))
+
+
+def _gap(known: PaperResult | None) -> str:
+    if known is None:
+        return NONE
+    return f"{100 * (known.num_relocated / NUM_RELOCATED - known.num_not_relocated / NUM_NOT_RELOCATED):+.1f}"

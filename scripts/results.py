@@ -1,0 +1,218 @@
+"""Agents against each other and beside the paper: runs them, and writes the marked parts of docs/results.md.
+
+    python scripts/results.py --out out/results --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val TASKS/attr:40
+
+evaluates all six agents on all tasks of the folders (the first 40 of the last), then those of a subset with decisions
+that go wrong at stated rates, and writes tables and figure. Run again, it goes on where it ended; `--write-only` runs
+nothing. A folder of results holds one version of the code: give another version another folder.
+"""
+
+import argparse
+import re
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.engine import Progress, RunConfig, TaskFile, evaluate, task_files
+from evonav.report.findings import effort_table
+from evonav.report.line_chart import Line, line_chart
+from evonav.report.mechanisms import STRATA, cause_share_table, counter_table, deeds_of, end_table, success_by_group
+from evonav.report.paper import paper_tables
+from evonav.report.run import PAPER_ORDER, Run, load_run
+from evonav.report.tables import NONE, Table, percent
+from evonav.significance import wilson
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "results.md"
+FIGURE = ROOT / "docs" / "images" / "decision-errors.svg"
+RATES = (0.0, 0.05, 0.1, 0.2, 0.4)
+"""Shares of decisions that are another valid answer than the model's own."""
+ROOM_GROUPS = ((2, 3), (4, 5), (6, 10))
+
+
+def main() -> None:
+    """See the module."""
+    asked = _arguments()
+    tasks = pooled_tasks(asked.tasks)
+    agents = asked.agents.split(",")
+    subset = tasks[:: max(1, len(tasks) // asked.sweep)][: asked.sweep]
+    if not asked.write_only:
+        _run(asked.out / "main", agents, tasks, Backend(), asked)
+        for rate in RATES:
+            _run(asked.out / f"wrong-{rate:g}", agents, subset, noisy_backend(rate), asked)
+    page = PAGE.read_text(encoding="utf-8")
+    for name, text in parts(asked.out, agents).items():
+        page = with_part(page, name, text)
+    PAGE.write_text(page, encoding="utf-8")
+    sys.stdout.write(f"{PAGE}\n{FIGURE}\n")
+
+
+def pooled_tasks(folders: Sequence[str]) -> list[TaskFile]:
+    """Tasks of all folders, each `FOLDER` or `FOLDER:LIMIT`."""
+    found: list[TaskFile] = []
+    for folder in folders:
+        path, _, limit = folder.partition(":")
+        found += task_files(Path(path), int(limit) if limit else None)
+    return found
+
+
+def noisy_backend(rate: float) -> Backend:
+    """The text matcher, of whose answers a share is another valid one."""
+    return Backend(decision="evonav.decision.backends:noisy", decision_options={"wrong": rate})
+
+
+def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
+    """The marked parts of the page, by name; draws the figure."""
+    run = load_run(out / "main")
+    deeds = deeds_of(run)
+    main_table, relocation, first, order, differences = paper_tables(run)
+    sweep = {rate: load_run(folder) for rate in RATES if (folder := out / f"wrong-{rate:g}").exists()}
+    FIGURE.parent.mkdir(exist_ok=True)
+    if sweep:
+        FIGURE.write_text(_figure(sweep, agents), encoding="utf-8")
+    return {
+        "setting": setting_table(run).markdown(),
+        "table-1": main_table.markdown(),
+        "table-2": relocation.markdown(),
+        "stage-1": first.markdown(),
+        "order": order.markdown(),
+        "differences": differences.markdown(),
+        "rooms": room_table(run).markdown(),
+        "causes": "\n".join(
+            f"**{title.capitalize()}**\n\n{cause_share_table(run, stratum).markdown()}"
+            for stratum, title in STRATA.items()
+        ),
+        "ends": end_table(deeds).markdown(),
+        "counters": counter_table(deeds).markdown(),
+        "effort": effort_table(run).markdown(),
+        "errors": sensitivity_table(sweep, agents).markdown(),
+    }
+
+
+def with_part(page: str, name: str, text: str) -> str:
+    """A page with one of its marked parts replaced.
+
+    Raises:
+        SystemExit: The page has no such part.
+    """
+    marked = re.compile(rf"(<!-- results: {re.escape(name)} -->\n).*?(<!-- end of results -->)", re.DOTALL)
+    if not marked.search(page):
+        raise SystemExit(f"{PAGE}: no part `{name}`")
+    return marked.sub(lambda found: f"{found[1]}{text}{found[2]}", page, count=1)
+
+
+def setting_table(run: Run) -> Table:
+    """Houses and stages by where the tasks come from."""
+    rows = []
+    groups: dict[str, list[tuple[int, int]]] = {}
+    strata: dict[str, Counter[str]] = {}
+    for task in run.tasks():
+        name = _source(task.task_id)
+        num_rooms = len(task.maps[1].rooms) if 1 in task.maps else 0
+        groups.setdefault(name, []).append((num_rooms, task.num_stages))
+        counts = strata.setdefault(name, Counter())
+        first = run.agents[0]
+        for stage in range(1, task.num_stages + 1):
+            record = task.records.get((first, stage))
+            if record is not None:
+                counts["first" if stage == 1 else "moved" if record.target.is_relocated else "unmoved"] += 1
+    groups["all"] = [pair for part in groups.values() for pair in part]
+    strata["all"] = sum(strata.values(), Counter())
+    for name, part in groups.items():
+        rooms = [num_rooms for num_rooms, _ in part]
+        counts = strata[name]
+        rows.append(
+            (
+                name,
+                str(len(part)),
+                f"{min(rooms)}-{max(rooms)} (mean {sum(rooms) / len(rooms):.1f})",
+                str(sum(num for _, num in part)),
+                *(str(counts[stratum]) for stratum in ("first", "moved", "unmoved")),
+            )
+        )
+    columns = ("Houses from", "houses", "rooms", "stages", "stage 1", "relocated", "not relocated")
+    config = run.config
+    note = f"One task a house, seed {config.get('seed', 0)} for tasks and agents, evonav {config.get('evonav', '')}."
+    return Table("Houses", columns, tuple(rows), (note,))
+
+
+def room_table(run: Run) -> Table:
+    """SR by size of the house."""
+    group_of = {}
+    for task in run.tasks():
+        num_rooms = len(task.maps[1].rooms) if 1 in task.maps else 0
+        group_of[task.task_id] = next((f"{a}-{b} rooms" for a, b in ROOM_GROUPS if a <= num_rooms <= b), "other")
+    found = success_by_group(run, group_of)
+    names = sorted(found)
+    rows = tuple((agent, *(_rate(found[name].get(agent, (0, 0))) for name in names)) for agent in run.agents)
+    note = "SR %, Wilson's 95% interval."
+    return Table("By size of the house", ("Agent", *names), rows, (note,))
+
+
+def sensitivity_table(sweep: dict[float, Run], agents: Sequence[str]) -> Table:
+    """SR by share of wrong decisions."""
+    rows = []
+    for agent in agents:
+        cells = []
+        for run in sweep.values():
+            summary = next((s for s in run.summaries if s.agent == agent), None)
+            cells.append(NONE if summary is None else percent(summary.sr, summary.sr_ci95))
+        rows.append((agent, *cells))
+    columns = ("Agent", *(f"{100 * rate:g}% wrong" for rate in sweep))
+    tasks = {len(run.num_stages) for run in sweep.values()}
+    stages = {sum(run.num_stages.values()) for run in sweep.values()}
+    note = f"SR %, {max(tasks, default=0)} houses, {max(stages, default=0)} stages; bootstrap over houses."
+    return Table("Decisions that go wrong", columns, tuple(rows), (note,))
+
+
+def _figure(sweep: dict[float, Run], agents: Sequence[str]) -> str:
+    lines = []
+    for agent in agents:
+        points = []
+        for rate, run in sweep.items():
+            summary = next((s for s in run.summaries if s.agent == agent and s.sr is not None), None)
+            if summary is not None and summary.sr is not None:
+                points.append((100 * rate, 100 * summary.sr, summary.sr_ci95))
+        if points:
+            ends = [None if ci is None else (100 * ci[0], 100 * ci[1]) for _, _, ci in points]
+            lines.append(Line(agent, [(x, y) for x, y, _ in points], ends))
+    return line_chart(lines, "SR by share of wrong decisions", "wrong decisions, %", "SR, %")
+
+
+def _rate(counts: tuple[int, int]) -> str:
+    successes, n = counts
+    return NONE if n == 0 else f"{percent(successes / n, wilson(successes, n))}, n = {n}"
+
+
+def _source(task_id: str) -> str:
+    """The dataset in a task's id, which goes on with the number of the house, a hash and a seed."""
+    return re.sub(r"-\d+-[0-9a-f]{6}-s\d+$", "", task_id)
+
+
+def _run(
+    out: Path, agents: Sequence[str], tasks: Sequence[TaskFile], backend: Backend, asked: argparse.Namespace
+) -> None:
+    def tell(news: Progress) -> None:
+        if news.latest is not None and news.num_done % 50 == 0:
+            sys.stderr.write(f"{out.name}: {news.num_done} of {news.num_stages} stages\n")
+
+    config = RunConfig(seed=asked.seed, backend=backend)
+    evaluate(agents, tasks, out, config=config, num_workers=asked.workers, on_progress=tell)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tasks", nargs="+", required=True, help="folders of tasks, each with an optional :LIMIT")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the runs")
+    parser.add_argument("--agents", default=",".join(PAPER_ORDER))
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--sweep", type=int, default=30, help="houses of the runs with wrong decisions")
+    parser.add_argument("--write-only", action="store_true", help="run nothing, write what is there")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()
