@@ -57,7 +57,10 @@ STALE_MARGIN_M = 0.3
 
 
 class EpisodeObserver(Protocol):
-    """Looks on as an episode runs (`evonav.evaluation.trace`); nothing of it reaches agent or record."""
+    """Looks on as an episode runs (`evonav.evaluation.trace`); nothing of it reaches agent or record.
+
+    What it raises as `AgentFailedError` fails the stage as if the agent had.
+    """
 
     def stage_begins(self, stage: int, simulator: Simulator) -> None:
         """A stage's house is loaded; the agent was not told yet."""
@@ -174,6 +177,10 @@ class Episode:
             else:
                 failure = record
 
+    def replace_agent(self, agent: Agent) -> None:
+        """Another agent from the next stage on, as after the loss of a process; for replays in one process."""
+        self._agent = agent
+
     def _cpu_s(self) -> float:
         """Of this process, and of the agent's where it has one."""
         return time.process_time() + (self._agent.cpu_s if isinstance(self._agent, HasOwnProcess) else 0.0)
@@ -224,8 +231,6 @@ class _StageRun:
         for body in self._simulator.objects:
             self._bodies.setdefault(body.category, []).append(body)
         self.plan = stage_map(self._case, stage, self._simulator.objects)
-        if self._observer is not None:
-            self._observer.stage_begins(stage, self._simulator)
         room_id = room_at(self.plan, (self._requested.x_m, self._requested.z_m))
         evolved_room_id = self._record.transition.room_id
         self._record = self._record.model_copy(
@@ -238,6 +243,8 @@ class _StageRun:
                 ),
             }
         )
+        if self._observer is not None:
+            self._observer.stage_begins(stage, self._simulator)
         with _blame(ErrorKind.AGENT):
             self._tell_goal()
 

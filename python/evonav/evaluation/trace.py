@@ -1,8 +1,9 @@
 """Runs recorded episodes again in this process, and keeps of every round what records leave out (`evonav view`).
 
 A deterministic agent does the same again, with a model's answers taken from the kept exchanges; that the new records
-equal the stored ones, byte for byte, is checked and told. What cannot be run again (a process that died or hung) is
-shown as it was recorded. Nothing here runs in an evaluation.
+equal the stored ones, byte for byte, is checked and told. Where an agent's process died or hung, the replay ends the
+stage in that round without asking the agent, and goes on with a fresh one, as the run did. What cannot be run again
+(the evaluator's own process was lost) is shown as it was recorded. Nothing here runs in an evaluation.
 """
 
 import inspect
@@ -10,7 +11,7 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -26,9 +27,9 @@ from evonav.decision.prompts import Picture
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.engine import agent_seed
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
+from evonav.evaluation.protocol import AgentFailedError, EpisodeCase, ProtocolConfig, StageOutcome
 from evonav.evaluation.records import EndState, ErrorKind, RoundRecord, StageMap, StageRecord
-from evonav.evaluation.rollout import STALE_MARGIN_M, Episode, distance_to_box_m, entry_record, pose_record
+from evonav.evaluation.rollout import LOSSES, STALE_MARGIN_M, Episode, distance_to_box_m, entry_record, pose_record
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.traced import (
     BLOCKED,
@@ -55,8 +56,6 @@ PROMPT_PX = 300
 EXCHANGES_NAME = "exchanges.sqlite"
 """In the folder of a run that asked a model."""
 MAX_DIFFERENCES = 5
-NOT_REPEATED = frozenset({ErrorKind.CRASH, ErrorKind.TIMEOUT, ErrorKind.SIMULATOR_LOST})
-"""What is not run again: it might end or hang this process too."""
 
 
 class RunReplay:
@@ -135,7 +134,7 @@ class RunReplay:
         maps: Mapping[int, StageMap],
         on_round: Callable[[int, int], None],
     ) -> Iterator[TracedStage]:
-        lost = [stage for stage, record in stored.items() if _is_lost(record)]
+        lost = [stage for stage, record in stored.items() if _is_beyond_replay(record)]
         # Run again up to here.
         last = 0 if self._why_not else min([max(stored) + 1, *lost]) - 1
         fov_rad = 0.0
@@ -143,7 +142,7 @@ class RunReplay:
             with closing(self.backend.make_simulator()) as simulator:
                 seed = agent_seed(self.seed, agent_name, case.task_id)
                 agent = make_agent(agent_name, self.backend.make_decision(seed))
-                tracer = Tracer(agent, on_round)
+                tracer = Tracer(agent, on_round, {stage: loss for stage in stored if (loss := _loss(stored[stage]))})
                 perception = self.backend.make_perception()
                 episode = Episode(case, agent_name, agent, simulator, perception, self.protocol, seed, tracer)
                 for outcome in episode.run():
@@ -152,18 +151,44 @@ class RunReplay:
                     yield traced
                     if outcome.record.stage == last:
                         break
+                    if _loss(outcome.record):
+                        tracer.agent = make_agent(agent_name, self.backend.make_decision(seed))
+                        episode.replace_agent(tracer.agent)
         for number, record in stored.items():
             if number > last:
                 why_not = self._why_not or _why_not(record, number == last + 1)
                 yield TracedStage(record, maps.get(number), _recorded_rounds(record), why_not, (), fov_rad)
 
 
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """The end of an agent's process, as recorded."""
+
+    num_rounds: int
+    """Whole ones before it, in its stage."""
+    kind: ErrorKind
+    message: str
+
+
 class Tracer:
     """Looks on as an agent runs, and keeps what it sees until `take`."""
 
-    def __init__(self, agent: Agent, on_round: Callable[[int, int], None] = lambda _stage, _round: None) -> None:
-        self._agent = agent
+    def __init__(
+        self,
+        agent: Agent,
+        on_round: Callable[[int, int], None] = lambda _stage, _round: None,
+        losses: Mapping[int, "Loss"] | None = None,
+    ) -> None:
+        """Looks on.
+
+        Args:
+            agent: The one that runs.
+            on_round: Told the stage and the round, 0-based, as they begin.
+            losses: Where the agent's process was lost, by stage: there it is not asked.
+        """
+        self.agent = agent
         self._on_round = on_round
+        self._losses = losses or {}
         is_small = agent.sensing.motion == "actions"
         self._sizes = (SMALL_HEADING_PX, SMALL_SIDE_PX, SMALL_QUALITY) if is_small else (HEADING_PX, SIDE_PX, QUALITY)
         self._places: list[dict[str, list[SceneObject]]] = []
@@ -186,6 +211,7 @@ class Tracer:
         self._now = {body.id: body for body in simulator.objects}
         self._truths.clear()
         self._rounds, self._pending = [], None
+        self._lose(0)
 
     def round_begins(self, observation: Observation) -> None:
         """Draws the views in colours; the agent's own stay as they are."""
@@ -202,6 +228,12 @@ class Tracer:
             width_px, height_px = view.intrinsics.width_px, view.intrinsics.height_px
             self._fov_rad = 2 * math.atan(math.tan(view.intrinsics.vertical_fov_rad / 2) * width_px / height_px)
         self._pending = TracedRound(None, pose_record(observation.pose), tuple(views))
+        self._lose(len(self._rounds))
+
+    def _lose(self, num_rounds: int) -> None:
+        loss = self._losses.get(self._stage)
+        if loss is not None and loss.num_rounds == num_rounds:
+            raise AgentFailedError(loss.kind, loss.message)
 
     def round_ends(self, record: RoundRecord) -> None:
         """Asks the agent what it holds true."""
@@ -218,10 +250,10 @@ class Tracer:
         return TracedStage(outcome.record, outcome.stage_map, tuple(rounds), "", (), self._fov_rad)
 
     def _with_belief(self, seen: TracedRound) -> TracedRound:
-        if not isinstance(self._agent, InspectableAgent):
+        if not isinstance(self.agent, InspectableAgent):
             return seen
         try:
-            belief = self._agent.belief()
+            belief = self.agent.belief()
             bodies = self._places[-1]
             entries = [entry_record(entry, bodies) for entry in belief.entries]
             return replace(
@@ -272,13 +304,26 @@ def jpeg_of(pixels: NDArray[np.uint8], longest_px: int, quality: int) -> bytes:
     return buffer.getvalue()
 
 
-def _is_lost(record: StageRecord) -> bool:
-    return record.state is EndState.ERRORED and record.error is not None and record.error.kind in NOT_REPEATED
+def _loss(record: StageRecord) -> Loss | None:
+    """The loss of the agent's process in a stage, if there was one."""
+    error = record.error
+    if record.state is not EndState.ERRORED or error is None or error.kind not in LOSSES:
+        return None
+    return Loss(len(record.trace), error.kind, error.message)
+
+
+def _is_beyond_replay(record: StageRecord) -> bool:
+    """Whether more than the agent was lost: a stage that was not even begun, or the simulator."""
+    if record.state is not EndState.ERRORED or record.error is None:
+        return False
+    return record.error.kind is ErrorKind.SIMULATOR_LOST or (
+        _loss(record) is not None and record.effective_start is None
+    )
 
 
 def _why_not(record: StageRecord, is_first: bool) -> str:
     if is_first and record.error is not None:
-        return f"It ended with the loss of a process ({record.error.kind.value}), which is not run again."
+        return f"It ended with the loss of a process ({record.error.kind.value}): {record.error.message}."
     return "A stage before it cannot be run again."
 
 

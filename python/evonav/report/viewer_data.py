@@ -170,7 +170,7 @@ class _Rounds:
         if kind == "frontier" and number.isdecimal():
             found["frontier"] = int(number)
         if record.details:
-            found["details"] = dict(record.details)
+            found["details"] = _plain(record.details)
         counters = {name: count for name, count in record.counters.items() if self._counters.get(name) != count}
         if counters:
             found["counters"] = counters
@@ -196,6 +196,15 @@ class _Rounds:
         gone = [name for name in self._entries if name not in now]
         self._entries = now
         return {**({"e": changed} if changed else {}), **({"x": gone} if gone else {})}
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - JSON
+    """JSON without what JSON cannot say."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def cells_text(cells: NDArray[np.uint8], before: NDArray[np.uint8]) -> str:
