@@ -321,6 +321,17 @@ class ObjectMap:
         horizon_rad: float,
         vertical_fov_rad: float,
     ) -> NDArray[np.float64]: ...
+    def visible_shares(
+        self,
+        targets_m: NDArray[np.float32],
+        eyes_m: NDArray[np.float64],
+        *,
+        radius_m: float,
+        step_m: float,
+        margin_m: float,
+        max_samples: int,
+        max_targets: int,
+    ) -> NDArray[np.float64]: ...
     def begin_stage(self, stage: int) -> None: ...
     def remove(self, entry_id: int) -> bool: ...
     def clear(self) -> None: ...
@@ -442,6 +453,19 @@ def unproject_image(
     horizon_rad: float,
 ) -> NDArray[np.float64]:
     """`(H, W, 3)` world points of an `(H, W)` depth image."""
+
+def unproject_masks(
+    depth_m: NDArray[np.float32],
+    masks: NDArray[np.int32],
+    *,
+    num_detections: int,
+    max_points: int,
+    vertical_fov_rad: float,
+    position_m: tuple[float, float, float],
+    yaw_rad: float,
+    horizon_rad: float,
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """`(N, 3)` world points behind all masks, mask by mask, and where each mask's points end."""
 
 def project_points(
     points_m: NDArray[np.float64],

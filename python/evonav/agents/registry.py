@@ -18,6 +18,7 @@ BUILT_IN: dict[str, tuple[str, str]] = {
     "stage-reset": ("evonav.agents.stage_reset:StageReset", "Frontier-Update that forgets everything at each stage"),
     "ftu": ("evonav.agents.fail_then_update:FailThenUpdate", "Frontier-Update that checks its target on arrival"),
     "3d-mem": ("evonav.agents.three_d_mem:ThreeDMem", "3D-Mem: chooses among snapshots and frontiers, forgets nothing"),
+    "msgnav": ("evonav.agents.msgnav:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
     "random-walk": ("evonav.agents.random_walk:RandomWalk", "yardstick: walks in random directions"),
 }
 """Import path and description by name."""

@@ -14,7 +14,7 @@ from evonav.errors import DecisionError
 
 A = TypeVar("A")
 
-_FAMILIES = ("frontier_update", "three_d_mem", "unigoal")
+_FAMILIES = ("frontier_update", "msgnav", "three_d_mem", "unigoal")
 """Modules of `evonav.decision.rules`; each has `RULES`, which gives the function that answers a class of question."""
 
 

@@ -9,7 +9,7 @@ from evonav import _core
 from evonav._core import ObjectEntry
 from evonav.sensors.observation import View
 
-__all__ = ["Comparison", "ObjectEntry", "ObjectMap", "ObjectMapConfig", "ObjectUpdate"]
+__all__ = ["Comparison", "ObjectEntry", "ObjectMap", "ObjectMapConfig", "ObjectUpdate", "SightConfig"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +44,22 @@ class ObjectMapConfig:
     """Entries merge at a clean-up if one lies in the other by more than this part ..."""
     merge_similarity: float = 0.7
     """... and they look alike by more than this."""
+
+
+@dataclass(frozen=True, slots=True)
+class SightConfig:
+    """When a line from an eye to a point is open (MSGNav's parameters)."""
+
+    radius_m: float = 0.05
+    """A remembered point nearer to a sample of a line than this closes the line."""
+    step_m: float = 0.05
+    """Between two samples of a line."""
+    margin_m: float = 0.15
+    """The first and the last stretch of a line, which are not sampled."""
+    max_samples: int = 1000
+    """Of a line; of a longer one they lie farther apart."""
+    max_targets: int = 1000
+    """A target is thinned to at most so many points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +181,26 @@ class ObjectMap:
             vertical_fov_rad=view.intrinsics.vertical_fov_rad,
         )
         return Comparison(overlap=compared[:, 0], distance_m=compared[:, 1])
+
+    def visible_shares(
+        self, target_m: NDArray[np.float32], eyes_m: NDArray[np.float64], config: SightConfig | None = None
+    ) -> NDArray[np.float64]:
+        """How much of an object can be seen from some places, past the points of all entries and its own.
+
+        Walls are in no entry: one sees through them.
+
+        Args:
+            target_m: `(N, 3)` points of the object, world frame.
+            eyes_m: `(E, 3)` places of the eyes, world frame.
+            config: When a line is open.
+
+        Returns:
+            `(E,)` shares of the target's points in 0..1; 0 without points.
+
+        Raises:
+            InvalidArgumentError: A place is not finite, or a parameter is outside its domain; the message names it.
+        """
+        return self._map.visible_shares(target_m, eyes_m, **asdict(config or SightConfig()))
 
     def is_supported(self, entry_id: int, view: View, *, max_distance_m: float = 0.5, min_overlap: float = 0.2) -> bool:
         """Whether a view still shows the object of an entry where it was.

@@ -9,6 +9,7 @@ use evonav_core::{
         frontiers::{FrontierConfig, extract},
         objects::{DetectedView, ObjectMap, ObjectMapConfig},
         occupancy::OccupancyMap,
+        sight_lines::SightConfig,
     },
     sensors::{camera::Camera, raycast::visible_cells, unproject::MaskedDepth},
 };
@@ -100,6 +101,19 @@ fn bench_objects(c: &mut Criterion) {
             |map| map.update(black_box(&view)).expect("a valid view"),
             BatchSize::LargeInput,
         );
+    });
+    // Twenty eyes around one of the middle boxes, whose neighbours stand in between.
+    let target = map.entries()[44].cloud.points();
+    let [x, _, z] = boxes()[44];
+    let eyes: Vec<[f64; 3]> = (0..20)
+        .map(|i| f64::from(i) * FRAC_PI_2 / 5.0)
+        .map(|angle| [x + 0.75 * angle.sin(), 1.5, z + 0.75 * angle.cos()])
+        .collect();
+    let num_points: usize = map.entries().iter().map(|entry| entry.cloud.points().len()).sum();
+    assert!(num_points > 200_000, "{num_points} points");
+    let sight = SightConfig::default();
+    c.bench_function("objects/visible_shares_20_eyes_100_entries", |b| {
+        b.iter(|| map.visible_shares(black_box(target), &eyes, &sight).expect("valid places"));
     });
     // As many views as fill the map: the next one is due for a clean-up.
     let due = full_map(ObjectMapConfig { views_per_cleanup: 401, ..config });

@@ -6,6 +6,7 @@ use evonav_core::{
     memory::{
         entry::Entry,
         objects::{self, DetectedView, ObjectMapConfig},
+        sight_lines::SightConfig,
     },
     sensors::{camera::Camera, unproject::MaskedDepth},
 };
@@ -150,6 +151,28 @@ impl ObjectMap {
         let view = arrays.view(pose, vertical_fov_rad)?;
         let found = py.detach(|| self.0.compare(entry_id, &view.borrow())).map_err(error::to_py)?;
         arrays::rows_of(py, found.into_iter().map(|c| [c.overlap, c.distance_m]).collect())
+    }
+
+    #[pyo3(signature = (
+        targets_m, eyes_m, *, radius_m, step_m, margin_m, max_samples, max_targets,
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python method")]
+    fn visible_shares<'py>(
+        &self,
+        py: Python<'py>,
+        targets_m: PyReadonlyArray2<'py, f32>,
+        eyes_m: PyReadonlyArray2<'py, f64>,
+        radius_m: f64,
+        step_m: f64,
+        margin_m: f64,
+        max_samples: usize,
+        max_targets: usize,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let config = SightConfig { radius_m, step_m, margin_m, max_samples, max_targets };
+        let (targets, eyes) =
+            (arrays::rows("targets_m", &targets_m)?, arrays::rows("eyes_m", &eyes_m)?);
+        let shares = py.detach(|| self.0.visible_shares(targets, eyes, &config));
+        Ok(PyArray1::from_vec(py, shares.map_err(error::to_py)?))
     }
 
     fn begin_stage(&mut self, stage: u32) {

@@ -10,6 +10,7 @@ pub mod frontiers;
 pub mod objects;
 pub mod occupancy;
 mod regions;
+pub mod sight_lines;
 pub mod snapshots;
 mod viewpoints;
 pub mod voxels;

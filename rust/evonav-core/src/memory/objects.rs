@@ -10,8 +10,9 @@ use crate::{
     memory::{
         cleaning::{centroid_m, clean, denoise},
         entry::{Entry, Sighting},
+        sight_lines::{SightConfig, visible_shares},
     },
-    sensors::unproject::{MaskedDepth, unproject_masks},
+    sensors::unproject::{MaskedDepth, Point, unproject_masks},
 };
 
 /// Parameters of the object map; the defaults are 3D-Mem's.
@@ -246,6 +247,20 @@ impl ObjectMap {
             },
         };
         Ok(self.sightings(view, f64::INFINITY)?.into_iter().map(compare).collect())
+    }
+
+    /// Share of an object's points that each eye sees past the points of all entries and the object's own.
+    ///
+    /// # Errors
+    /// As [`visible_shares`].
+    pub fn visible_shares(
+        &self,
+        targets: &[Point],
+        eyes: &[Vec3],
+        config: &SightConfig,
+    ) -> Result<Vec<f64>, Error> {
+        let entries = self.entries.iter().map(|entry| entry.cloud.points());
+        visible_shares(entries.chain([targets]), targets, eyes, config)
     }
 
     /// Detections as clean clouds, `None` where one is filtered out.

@@ -1,0 +1,323 @@
+"""MSGNav (arXiv 2511.10376) under the paper's protocol: a scene graph with images, and a verified stop.
+
+Specification: agents.md, sections 2 and 7.3. It shares 3D-Mem's mapping, frontiers and object entries, looks around
+with seven views in every round, and forgets nothing: neither cells that contradict it nor entries that were not there.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.agents.agent import (
+    AgentAction,
+    Belief,
+    EntryBelief,
+    NavigateTo,
+    RoundDiagnostics,
+    Sensing,
+    Stop,
+    ViewSchedule,
+)
+from evonav.agents.explorer import ExplorerConfig
+from evonav.agents.msgnav_memory import GraphMemory
+from evonav.agents.navigator import Navigator, NavigatorConfig, belief_of
+from evonav.agents.visible_viewpoint import ViewpointConfig, visible_viewpoint
+from evonav.decision.asking import Asker
+from evonav.decision.questions.candidates import ObjectCandidate, Point2
+from evonav.decision.questions.msgnav import (
+    ArrivalQuestion,
+    FrontierImagesQuestion,
+    GraphObject,
+    GraphQuestion,
+    PastChoice,
+    SubgraphQuestion,
+)
+from evonav.decision.questions.question import DecisionModel
+from evonav.decision.text_match import TextMatch
+from evonav.memory import Frontier
+from evonav.memory.occupancy import FREE
+from evonav.memory.scene_graph import Subgraph
+from evonav.memory.views import pixels_of
+from evonav.sensors.observation import Observation
+from evonav.tasks.public import StageInput, TaskInfo
+
+
+@dataclass(frozen=True, slots=True)
+class MsgNavConfig:
+    """MSGNav's constants."""
+
+    navigator: NavigatorConfig = field(
+        default_factory=lambda: NavigatorConfig(explorer=ExplorerConfig(min_conflict_cells=None), image_px=512)
+    )
+    """The map is never cleared; images of 512 px at most."""
+    max_edge_m: float = 3.5
+    """Entries seen together farther apart than this have no edge."""
+    max_selected: int = 20
+    """Objects that key subgraph selection keeps."""
+    viewpoint: ViewpointConfig = field(default_factory=ViewpointConfig)
+    arrival_rounds: int = 5
+    """Rounds whose views are looked at on arrival..."""
+    arrival_views: int = 35
+    """...and how many of these at most."""
+    num_tries: int = 3
+    """Questions asked before an invalid answer is given up on."""
+
+
+@dataclass(frozen=True, slots=True)
+class MsgNavTarget:
+    """What the agent is committed to until it arrives."""
+
+    candidate: ObjectCandidate
+    """The entry when it was chosen; or what an image shows, with the id -1."""
+    goal_m: Point2
+    """Where to stand."""
+    view_id: int | None = None
+    """The image that it was found in."""
+
+    @property
+    def name(self) -> str:
+        """For diagnostics."""
+        if self.view_id is None:
+            return f"object {self.candidate.entry_id}"
+        return f"image {self.view_id}, {self.candidate.label}"
+
+
+class MsgNav:
+    """Chooses from a graph, goes to where the choice can be seen, asks whether it is the goal, and remembers a no."""
+
+    def __init__(self, config: MsgNavConfig | None = None, decision: DecisionModel | None = None) -> None:
+        self.config = config or MsgNavConfig()
+        model: DecisionModel = decision or TextMatch()
+        every_round = ViewSchedule(7, 40.0)
+        self.sensing = Sensing(every_round, every_round, needs_rgb=model.needs_images)
+        self._asker = Asker(model, num_tries=self.config.num_tries)
+        self._counters: Counter[str] = Counter()
+        self._diagnostics = RoundDiagnostics()
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """Forgets everything."""
+        self._task = task
+        self._counters.clear()
+        self._asker.counters.clear()
+        self._memory = GraphMemory(Navigator(task.map_frame, self.config.navigator), max_edge_m=self.config.max_edge_m)
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """A new goal; graph, images and map stay, target and history do not."""
+        self._goal = stage
+        self._target: MsgNavTarget | None = None
+        self._history: list[PastChoice] = []
+        self._candidates: tuple[int, ...] = ()
+        self._memory.navigator.begin_stage(stage.stage)
+
+    def act(self, observation: Observation) -> AgentAction:
+        """Looks; goes on to what it is committed to; there it asks whether that is the goal; else it decides."""
+        self._asker.begin_round()
+        self._candidates = ()
+        self._memory.observe(observation)
+        target = self._followed()
+        if target is not None and (observation.has_arrived or not observation.is_action_success):
+            self._target = None
+            if self._is_found(target, observation):
+                self._tell(target.name, "verified", target)
+                return Stop("verified")
+            self._reject(target)
+        elif target is not None:
+            return self._approach(target, "")
+        return self._decide(observation)
+
+    def _followed(self) -> MsgNavTarget | None:
+        """The target; an entry that was merged into another goes by that one's id."""
+        target = self._target
+        if target is None or target.view_id is not None:
+            return target
+        entry_id = self._memory.navigator.views.resolve(target.candidate.entry_id)
+        self._target = replace(target, candidate=replace(target.candidate, entry_id=entry_id))
+        return self._target
+
+    def _is_found(self, target: MsgNavTarget, observation: Observation) -> bool:
+        """Asks about all views of the last rounds; without a valid answer it is not."""
+        memory, config = self._memory, self.config
+        navigator = memory.navigator
+        views = memory.recent_views(config.arrival_rounds, config.arrival_views)
+        entry = navigator.objects.entry(target.candidate.entry_id) if target.view_id is None else None
+        images = [pixels_of(view, config.navigator.image_px) for view in views] if self.sensing.needs_rgb else []
+        self._counters["verifications"] += 1
+        is_found = self._asker.ask(
+            ArrivalQuestion(
+                goal=self._goal,
+                target=target.candidate if entry is None else navigator.candidate(entry),
+                seen=memory.detections(views),
+                num_views=len(views),
+                num_frontiers=len(navigator.explorer.frontiers),
+                num_rounds_left=observation.num_rounds_left,
+                views=[image for image in images if image is not None],
+            )
+        )
+        return is_found is True
+
+    def _reject(self, target: MsgNavTarget) -> None:
+        """Remembers the no until the stage ends; the entry stays as it is."""
+        self._counters["rejected_choices"] += 1
+        self._history.append(
+            PastChoice(
+                round=self._memory.navigator.round,
+                kind="object" if target.view_id is None else "image",
+                id=target.candidate.entry_id if target.view_id is None else target.view_id,
+                category=target.candidate.label,
+                place_m=target.candidate.ground_m,
+            )
+        )
+
+    def _decide(self, observation: Observation) -> AgentAction:
+        """Key subgraph, then the choice: an object of it, something in an image, or exploring on."""
+        memory, navigator = self._memory, self._memory.navigator
+        pose = observation.pose
+        here = (pose.x_m, pose.z_m)
+        nodes = memory.nodes()
+        subgraph = Subgraph((), (), ())
+        if nodes:
+            selected = self._asker.ask(SubgraphQuestion(self._goal, nodes, here, self.config.max_selected))
+            if selected is None:
+                return self._random_frontier()
+            subgraph = memory.graph.subgraph(selected)
+        question = self._graph_question(nodes, subgraph, observation)
+        self._candidates = subgraph.entry_ids
+        choice = self._asker.ask(question)
+        if choice is None:
+            return self._random_frontier()
+        if choice.kind == "explore":
+            return self._explore(here)
+        if choice.kind == "object":
+            points_m = navigator.objects.points_m(choice.id)
+            candidate = next((node.candidate for node in question.objects if node.entry_id == choice.id), None)
+            view_id = None
+        else:
+            view_id = question.images[choice.id].view_id
+            label, points_m = memory.largest_detection(view_id, choice.category) or ("", None)
+            candidate = None if points_m is None else _candidate_of(label, points_m)
+        if candidate is None or points_m is None:
+            self._counters["empty_detections"] += 1
+            return self._random_frontier()
+        self._counters[f"{choice.kind}_choices"] += 1
+        return self._approach(self._targeted(candidate, points_m, view_id, here), self._reason())
+
+    def _graph_question(
+        self, nodes: Sequence[GraphObject], subgraph: Subgraph, observation: Observation
+    ) -> GraphQuestion:
+        """The main question, with as few images as show every edge."""
+        memory, config = self._memory, self.config
+        images = memory.images(subgraph.view_ids, config.navigator.image_px if self.sensing.needs_rgb else None)
+        number_of = {image.view_id: number for number, image in enumerate(images)}
+        shown = set(subgraph.entry_ids)
+        edges = []
+        for a, b in subgraph.pairs:
+            numbers = [number_of[view_id] for view_id in memory.graph.views_of((a, b)) if view_id in number_of]
+            if a != b:
+                edges.append((a, b, tuple(sorted(numbers))))
+        return GraphQuestion(
+            goal=self._goal,
+            objects=[node for node in nodes if node.entry_id in shown],
+            edges=edges,
+            images=images,
+            history=tuple(self._history),
+            round=memory.navigator.round,
+            max_rounds=memory.navigator.round + observation.num_rounds_left,
+            num_frontiers=len(memory.navigator.explorer.frontiers),
+        )
+
+    def _targeted(
+        self, candidate: ObjectCandidate, points_m: NDArray[np.float32], view_id: int | None, here: Point2
+    ) -> MsgNavTarget:
+        """A choice with the place from which most of it can be seen."""
+        navigator = self._memory.navigator
+        occupancy = navigator.explorer.map
+        viewpoint = visible_viewpoint(
+            navigator.objects, points_m, occupancy.cells == FREE, occupancy.map_frame, here, self.config.viewpoint
+        )
+        if viewpoint.found != "circle":
+            self._counters[f"viewpoints_{viewpoint.found}"] += 1
+        return MsgNavTarget(candidate, viewpoint.position_m, view_id)
+
+    def _approach(self, target: MsgNavTarget, reason: str) -> AgentAction:
+        """Commits to a target and goes on towards it; the heading on arrival is the direction of travel."""
+        self._target = target
+        self._memory.navigator.explorer.stop_exploring()
+        self._tell(target.name, reason, target)
+        return NavigateTo(target.goal_m)
+
+    def _explore(self, here: Point2) -> AgentAction:
+        """The only frontier, or the one that the model chooses by its image."""
+        navigator = self._memory.navigator
+        frontiers = navigator.explorer.frontiers
+        if len(frontiers) < 2:
+            return self._go_to_frontier(frontiers[0], "the only one") if frontiers else self._give_up()
+        with_images = self.sensing.needs_rgb
+        index = self._asker.ask(
+            FrontierImagesQuestion(
+                goal=self._goal,
+                frontiers=[navigator.frontier_candidate(f, here, with_images=with_images) for f in frontiers],
+                surroundings=[navigator.candidate(entry) for entry in navigator.objects.entries],
+            )
+        )
+        return self._random_frontier() if index is None else self._go_to_frontier(frontiers[index], self._reason())
+
+    def _random_frontier(self) -> AgentAction:
+        """What follows every invalid answer; drawn from the task's seed, the stage and the round alone."""
+        navigator = self._memory.navigator
+        frontiers = navigator.explorer.frontiers
+        if not frontiers:
+            return self._give_up()
+        self._counters["random_frontiers"] += 1
+        stream = np.random.default_rng([self._task.seed % 2**63, navigator.stage, navigator.round])
+        return self._go_to_frontier(frontiers[int(stream.integers(len(frontiers)))], "no valid answer: drawn")
+
+    def _go_to_frontier(self, frontier: Frontier, reason: str) -> AgentAction:
+        self._history.append(PastChoice(self._memory.navigator.round, "explore"))
+        self._tell(f"frontier {frontier.id}", reason)
+        return self._memory.navigator.go_to_frontier(frontier)
+
+    def _give_up(self) -> AgentAction:
+        self._tell("none", "nothing to explore")
+        return Stop("nothing to explore")
+
+    def _reason(self) -> str:
+        """Why the model answered as it did, in its words."""
+        lines = self._asker.asked[-1].text.splitlines() if self._asker.asked else []
+        return " ".join(lines[1:])
+
+    def _tell(self, choice: str, reason: str, target: MsgNavTarget | None = None) -> None:
+        """Notes a round for `diagnostics`."""
+        navigator = self._memory.navigator
+        is_entry = target is not None and target.view_id is None
+        entry = navigator.objects.entry(target.candidate.entry_id) if target is not None and is_entry else None
+        self._diagnostics = RoundDiagnostics(
+            choice=choice,
+            chosen_entry=None if entry is None else belief_of(entry),
+            num_entries=len(navigator.objects),
+            num_frontiers=len(navigator.explorer.frontiers),
+            counters={**self._asker.counters, **self._counters, "edges": len(self._memory.graph)},
+            details={"reason": reason} if reason else {},
+        )
+
+    def diagnostics(self) -> RoundDiagnostics:
+        """Choice and counters of the last round."""
+        return self._diagnostics
+
+    def entries(self) -> Sequence[EntryBelief]:
+        """The object memory."""
+        return self._memory.navigator.beliefs()
+
+    def belief(self) -> Belief:
+        """Entries, map, frontiers, and what was asked."""
+        return self._memory.navigator.belief(self._asker.asked, self._candidates)
+
+
+def _candidate_of(label: str, points_m: NDArray[np.float32]) -> ObjectCandidate:
+    """Something that is no entry, by its points."""
+    low, high = points_m.min(axis=0).astype(np.float64), points_m.max(axis=0).astype(np.float64)
+    x_m, y_m, z_m = ((low + high) / 2.0).tolist()
+    width_m, height_m, depth_m = (high - low).tolist()
+    return ObjectCandidate(-1, label, (x_m, y_m, z_m), (width_m, height_m, depth_m), num_detections=1)

@@ -1,0 +1,132 @@
+"""What MSGNav remembers beyond the shared memory, and its questions made of it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.agents.navigator import Navigator
+from evonav.decision.language import canonical
+from evonav.decision.matching import ROOM_SIGNS, Matcher
+from evonav.decision.questions.candidates import ObjectCandidate
+from evonav.decision.questions.msgnav import GraphImage, GraphObject, SeenObject
+from evonav.memory.clouds import ViewClouds, clouds_of
+from evonav.memory.scene_graph import SceneGraph
+from evonav.memory.views import StoredView, pixels_of
+from evonav.sensors.observation import Observation
+
+_SIGNS = frozenset(sign for signs in ROOM_SIGNS.values() for sign in signs)
+OTHER_ROOM = "others"
+"""The room of entries around which nothing speaks for one; so the original's classifier calls it."""
+
+
+class GraphMemory:
+    """Entries, kept views and their points, and the scene graph over them."""
+
+    def __init__(self, navigator: Navigator, *, max_edge_m: float) -> None:
+        self.navigator = navigator
+        self.graph = SceneGraph(max_edge_m=max_edge_m)
+        self._matcher = Matcher()
+        self._clouds: list[ViewClouds] = []
+
+    def observe(self, observation: Observation) -> None:
+        """Takes over a round's views: entries, map and frontiers, then the graph."""
+        navigator, graph = self.navigator, self.graph
+        navigator.observe(observation)
+        became = {entry_id: navigator.views.resolve(entry_id) for entry_id in graph.entry_ids}
+        graph.follow({old: new for old, new in became.items() if old != new})
+        centres_m = {entry.id: (entry.centre_m[0], entry.centre_m[2]) for entry in navigator.objects.entries}
+        graph.prune(centres_m)
+        for view, stored in zip(observation.views, navigator.round_views, strict=True):
+            self._clouds.append(clouds_of(view))
+            found = {navigator.views.resolve(one.entry_id) for one in stored.seen if one.entry_id is not None}
+            graph.add_view(stored.id, {entry_id: centres_m[entry_id] for entry_id in found if entry_id in centres_m})
+
+    def nodes(self) -> list[GraphObject]:
+        """Every entry with its room and its neighbours.
+
+        MSGNav asks CLIP which kind of room the whole image shows. There is no CLIP here: a room is what the things
+        around an entry speak for (`Matcher.room_around`), as for all other agents.
+        """
+        neighbours = self.graph.neighbours()
+        candidates = [self.navigator.candidate(entry) for entry in self.navigator.objects.entries]
+        signs = [candidate for candidate in candidates if canonical(candidate.label) in _SIGNS]
+        return [
+            GraphObject(
+                candidate,
+                self._matcher.room_around(candidate.ground_m, signs) or OTHER_ROOM,
+                tuple(sorted(neighbours.get(candidate.entry_id, ()))),
+            )
+            for candidate in candidates
+        ]
+
+    def images(self, view_ids: Sequence[int], image_px: int | None) -> list[GraphImage]:
+        """Kept views as questions show them, then those of this round.
+
+        Args:
+            view_ids: That cover the graph. One of this round is shown once, among the first.
+            image_px: Longer edge of the images at most; `None` for none.
+        """
+        views = self.navigator.views.views
+        now = [view.id for view in self.navigator.round_views]
+        shown = [*view_ids, *(view_id for view_id in now if view_id not in view_ids)]
+        return [self._image(views[view_id], view_id in now, image_px) for view_id in shown]
+
+    def _image(self, view: StoredView, is_egocentric: bool, image_px: int | None) -> GraphImage:
+        seen = []
+        for index, one in enumerate(view.seen):
+            box_m = self._clouds[view.id].box_m(index)
+            centre_m = None if box_m is None else (box_m[0][0], box_m[0][2])
+            seen.append(SeenObject(one.label, self._alive(one.entry_id), one.area_px, centre_m))
+        pixels = None if image_px is None else pixels_of(view, image_px)
+        return GraphImage(view.id, is_egocentric, tuple(seen), pixels)
+
+    def _alive(self, entry_id: int | None) -> int | None:
+        """The entry that an entry has become, if it is still there."""
+        if entry_id is None:
+            return None
+        entry = self.navigator.objects.entry(self.navigator.views.resolve(entry_id))
+        return None if entry is None else entry.id
+
+    def recent_views(self, num_rounds: int, max_views: int) -> list[StoredView]:
+        """Views of the last rounds of this stage, the most recent first: in an earlier one the house may have differed.
+
+        Args:
+            num_rounds: This one included.
+            max_views: At most so many.
+        """
+        navigator = self.navigator
+        recent: list[StoredView] = []
+        for view in reversed(navigator.views.views):
+            is_recent = view.stage == navigator.stage and view.round > navigator.round - num_rounds
+            if not is_recent or len(recent) == max_views:
+                break
+            recent.append(view)
+        return recent
+
+    def detections(self, views: Sequence[StoredView]) -> list[ObjectCandidate]:
+        """What was detected in some views, each detection by its own points; those of no entry have negative ids."""
+        found: list[ObjectCandidate] = []
+        for view in views:
+            for index, one in enumerate(view.seen):
+                box_m = self._clouds[view.id].box_m(index)
+                if box_m is not None:
+                    entry_id = self._alive(one.entry_id)
+                    entry_id = -1 - len(found) if entry_id is None else entry_id
+                    found.append(ObjectCandidate(entry_id, one.label, *box_m, num_detections=1))
+        return found
+
+    def largest_detection(self, view_id: int, category: str) -> tuple[str, NDArray[np.float32]] | None:
+        """Label and `(N, 3)` points of the largest thing of a category in a kept view (adaptive vocabulary update).
+
+        MSGNav runs its detector on the image once more, with the category as its only word. Under ground truth the
+        recorded masks answer.
+        """
+        noun = canonical(category)
+        seen = self.navigator.views.views[view_id].seen
+        found = [(one.area_px, -index) for index, one in enumerate(seen) if canonical(one.label) == noun]
+        if not found:
+            return None
+        index = -max(found)[1]
+        points_m = self._clouds[view_id].points_m(index)
+        return (seen[index].label, points_m) if len(points_m) else None

@@ -1,0 +1,110 @@
+"""Where to stand so that remembered points show most of an object (MSGNav's visibility-based viewpoint decision)."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.memory.objects import ObjectMap, SightConfig
+from evonav.sensors.observation import MapFrame
+
+Point2 = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ViewpointConfig:
+    """MSGNav's constants."""
+
+    num_candidates: int = 20
+    """Evenly on a circle around the mean of the object's points."""
+    radius_m: float = 0.75
+    """Of that circle."""
+    eye_height_m: float = 1.5
+    """Over the floor."""
+    sight: SightConfig = field(default_factory=SightConfig)
+
+
+@dataclass(frozen=True, slots=True)
+class Viewpoint:
+    """A place to stand."""
+
+    position_m: Point2
+    share: float
+    """Of the object's points that are seen from there."""
+    found: Literal["circle", "snapped", "box"]
+    """On the circle; on free floor near it; or, as nothing shows the object, at its box."""
+
+
+def visible_viewpoint(
+    objects: ObjectMap,
+    target_m: NDArray[np.float32],
+    is_free: NDArray[np.bool_],
+    frame: MapFrame,
+    here_m: Point2,
+    config: ViewpointConfig | None = None,
+) -> Viewpoint:
+    """The place that shows most of an object, the first of those that show as much.
+
+    Candidates lie on a circle around the object where the floor is free. If none of them shows anything, all of them
+    are moved to the nearest free cells; if those show nothing either, it is the middle of that bottom edge of the box
+    around the object that is nearest to the agent, wherever that is: the planner ends at the nearest free point.
+
+    Args:
+        objects: What may be in the way.
+        target_m: `(N, 3)` points of the object, at least one.
+        is_free: `(R, C)`, cells known to be free.
+        frame: Of the map.
+        here_m: `(x, z)` of the agent.
+        config: MSGNav's constants.
+    """
+    config = config or ViewpointConfig()
+    mean_m = target_m.mean(axis=0, dtype=np.float64)
+    angles_rad = np.arange(config.num_candidates) * (math.tau / config.num_candidates)
+    offsets = np.stack([np.sin(angles_rad), np.cos(angles_rad)], axis=1)
+    circle_m = mean_m[[0, 2]] + config.radius_m * offsets
+    best = _best(objects, target_m, circle_m[_are_free(circle_m, is_free, frame)], config)
+    if best is not None:
+        return Viewpoint(*best, "circle")
+    best = _best(objects, target_m, _snapped(circle_m, is_free, frame), config)
+    if best is not None:
+        return Viewpoint(*best, "snapped")
+    low, high = target_m.min(axis=0).astype(np.float64), target_m.max(axis=0).astype(np.float64)
+    x_m, _, z_m = ((low + high) / 2.0).tolist()
+    (low_x_m, _, low_z_m), (high_x_m, _, high_z_m) = low.tolist(), high.tolist()
+    middles_m = [(low_x_m, z_m), (high_x_m, z_m), (x_m, low_z_m), (x_m, high_z_m)]
+    return Viewpoint(min(middles_m, key=lambda middle_m: math.dist(middle_m, here_m)), 0.0, "box")
+
+
+def _best(
+    objects: ObjectMap, target_m: NDArray[np.float32], places_m: NDArray[np.float64], config: ViewpointConfig
+) -> tuple[Point2, float] | None:
+    """The first of the places that show most; `None` if none shows anything."""
+    if len(places_m) == 0:
+        return None
+    eyes_m = np.insert(places_m, 1, config.eye_height_m, axis=1)
+    shares = objects.visible_shares(target_m, eyes_m, config.sight)
+    index = int(shares.argmax())
+    if shares[index] <= 0.0:
+        return None
+    return (float(places_m[index, 0]), float(places_m[index, 1])), float(shares[index])
+
+
+def _are_free(places_m: NDArray[np.float64], is_free: NDArray[np.bool_], frame: MapFrame) -> NDArray[np.bool_]:
+    cells = np.floor((places_m - np.array(frame.corner_m)) / frame.cell_m).astype(np.int64)
+    cols, rows = cells[:, 0], cells[:, 1]
+    is_inside = (rows >= 0) & (rows < frame.rows) & (cols >= 0) & (cols < frame.cols)
+    found: NDArray[np.bool_] = is_inside & is_free[rows.clip(0, frame.rows - 1), cols.clip(0, frame.cols - 1)]
+    return found
+
+
+def _snapped(places_m: NDArray[np.float64], is_free: NDArray[np.bool_], frame: MapFrame) -> NDArray[np.float64]:
+    """Middles of the free cells that are nearest to some places; none where no cell is free."""
+    cells = np.argwhere(is_free)
+    if len(cells) == 0:
+        return np.empty((0, 2))
+    middles_m = (cells[:, ::-1] + 0.5) * frame.cell_m + np.array(frame.corner_m)
+    nearest = [int(((middles_m - place_m) ** 2).sum(axis=1).argmin()) for place_m in places_m]
+    snapped: NDArray[np.float64] = np.ascontiguousarray(middles_m[nearest])
+    return snapped

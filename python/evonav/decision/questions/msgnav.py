@@ -1,0 +1,330 @@
+"""What MSGNav asks (agents.md 2.3-2.6): which part of the graph matters, where to go, which frontier, whether it is it.
+
+Images are at most 512 px (`MsgNavConfig`); evonav's views have 300 px, so that they are shown as they were seen.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+from evonav.decision.prompts import Prompt, Text
+from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.questions.frontier_update import parse_yes_no
+from evonav.decision.questions.question import AnswerError, Question, first_line, lines_of
+from evonav.decision.questions.wording import goal_parts, merged, titled
+from evonav.tasks.public import StageInput
+
+_ID = re.compile(r"(?:object\s+)?(\d+)[.,:;]?", re.IGNORECASE)
+_OBJECT = re.compile(r"object\s+(\d+)[.]?", re.IGNORECASE)
+_IMAGE = re.compile(r"image\s+(\d+)\s*,\s*([^,.;:\n]*[^\s,.;:])[.]?", re.IGNORECASE)
+_EXPLORE = re.compile(r"continue\s+exploration[.]?", re.IGNORECASE)
+_FRONTIER = re.compile(r"frontier\s+(\d+)[.]?", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class GraphObject:
+    """A node of the scene graph."""
+
+    candidate: ObjectCandidate
+    room: str
+    """`others` where it cannot be told."""
+    neighbour_ids: tuple[int, ...] = ()
+    """Entries one edge away, ascending."""
+
+    @property
+    def entry_id(self) -> int:
+        """Of the object memory."""
+        return self.candidate.entry_id
+
+
+@dataclass(frozen=True, slots=True)
+class SubgraphQuestion(Question[tuple[int, ...]]):
+    """Which objects help to find the goal? Key subgraph selection."""
+
+    kind: ClassVar[str] = "subgraph"
+    goal: StageInput
+    objects: Sequence[GraphObject]
+    """The whole graph."""
+    position_m: Point2
+    """Of the agent. Not part of the prompt."""
+    max_ids: int = 20
+
+    def prompt(self) -> Prompt:
+        """The whole graph as text, one line an object."""
+        lines = [
+            f"{node.entry_id}: {node.candidate.label}, {node.room}, "
+            f"beside {', '.join(map(str, node.neighbour_ids)) or 'nothing'}"
+            for node in self.objects
+        ]
+        graph = "\n".join(lines)
+        text = (
+            "The robot remembers a home as a graph. Its objects, one a line: id, class, room, ids of the objects "
+            f"beside it.\n{graph}\nWhich objects help most to find the goal? Choose different ones, and rather none "
+            "that are beside each other: what is beside a chosen object will be shown as well. Answer with ids, one "
+            f"a line, the most helpful one first, at most {self.max_ids}, and with nothing else."
+        )
+        return Prompt.of(*merged([*goal_parts(self.goal), Text(text)]))
+
+    def parse(self, text: str) -> tuple[int, ...]:
+        """Ids one a line; lines that name no object of the graph are left out, as is what comes after `max_ids`."""
+        known = {node.entry_id for node in self.objects}
+        ids: list[int] = []
+        for line in lines_of(text):
+            match = _ID.fullmatch(line)
+            if match is not None and int(match[1]) in known and int(match[1]) not in ids:
+                ids.append(int(match[1]))
+        if not ids:
+            raise AnswerError("invalid", f"no line is the id of an object: {first_line(text)[:80]!r}", text)
+        return tuple(ids[: self.max_ids])
+
+    def words(self, answer: tuple[int, ...]) -> str:
+        """One id a line."""
+        return "\n".join(map(str, answer))
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """An array of ids."""
+        ids = [str(node.entry_id) for node in self.objects]
+        return {"type": "array", "items": {"type": "string", "enum": ids}, "maxItems": self.max_ids}
+
+    def alternatives(self, answer: tuple[int, ...]) -> Sequence[tuple[int, ...]]:
+        """Any other object alone."""
+        return [(node.entry_id,) for node in self.objects if (node.entry_id,) != answer]
+
+
+@dataclass(frozen=True, slots=True)
+class SeenObject:
+    """A detection of an image."""
+
+    label: str
+    entry_id: int | None
+    """The entry that it is of; `None` if it is of none, as what is far away."""
+    area_px: int
+    centre_m: Point2 | None
+    """`(x, z)`; `None` if it has no depth."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraphImage:
+    """A kept view, on edges of the graph or of this round."""
+
+    view_id: int
+    is_egocentric: bool
+    """Of this round."""
+    seen: Sequence[SeenObject]
+    """For models that do not look at it. Not part of the prompt."""
+    pixels: Pixels | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class PastChoice:
+    """What was chosen in an earlier round of this stage, and has come to nothing."""
+
+    round: int
+    kind: Literal["object", "image", "explore"]
+    id: int = -1
+    """Of the entry or the view."""
+    category: str = ""
+    """What was to be in the image."""
+    place_m: Point2 | None = None
+    """`(x, z)` of what was not the goal. Not part of the prompt."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraphChoice:
+    """An object of the graph, something in an image, or none of it."""
+
+    kind: Literal["object", "image", "explore"]
+    id: int = -1
+    """Of the entry, or number of the image."""
+    category: str = ""
+    """What to go to in the image."""
+
+
+@dataclass(frozen=True, slots=True)
+class GraphQuestion(Question[GraphChoice]):
+    """Where to go? To an object of the graph, to something that an image shows, or on exploring."""
+
+    kind: ClassVar[str] = "graph"
+    goal: StageInput
+    objects: Sequence[GraphObject]
+    """Selected ones and their neighbours."""
+    edges: Sequence[tuple[int, int, tuple[int, ...]]]
+    """Ids of two objects, and numbers of images that show both."""
+    images: Sequence[GraphImage]
+    """Those that cover the edges, then those of this round."""
+    history: Sequence[PastChoice]
+    """Of this stage, oldest first."""
+    round: int
+    """From 0."""
+    max_rounds: int
+    num_frontiers: int
+    """Not part of the prompt."""
+
+    def prompt(self) -> Prompt:
+        """Objects and edges as text, images with numbers, and what was tried before."""
+        objects = [_object_line(node) for node in self.objects]
+        edges = [f"{a}, {b}, [{', '.join(map(str, numbers))}]" for a, b, numbers in self.edges]
+        parts = [
+            *goal_parts(self.goal),
+            Text(
+                "The robot searches a home in which things may have been moved since they were last seen. Objects that "
+                "it remembers, one a line: id, class, x, y and z in metres, room.\n"
+                + ("\n".join(objects) or "none")
+                + "\nPairs of objects that were seen together, one a line: id, id, [numbers of the images].\n"
+                + ("\n".join(edges) or "none")
+            ),
+        ]
+        for number, image in enumerate(self.images):
+            what = "what the robot sees now" if image.is_egocentric else "from its memory"
+            parts += titled(f"Image {number}, {what}:", image.pixels)
+        past = [self._past_line(choice) for choice in self.history]
+        parts.append(
+            Text(
+                "What it chose before in this search:\n" + ("\n".join(past) or "nothing") + "\n"
+                f"This is round {self.round + 1} of {self.max_rounds}. Do not repeat what was not correct. Answer on "
+                'the first line with exactly one of "Object id", if this object is the goal; "Image i, category", if '
+                'image i shows the goal and no object above is it, category being a word for it; or "Continue '
+                'Exploration". '
+                "Give your reason on the second line."
+            )
+        )
+        return Prompt.of(*merged(parts))
+
+    def parse(self, text: str) -> GraphChoice:
+        """`Object id`, `Image i, category` or `Continue Exploration`, of an object or an image that there is."""
+        line = first_line(text)
+        if (match := _OBJECT.fullmatch(line)) is not None:
+            if int(match[1]) not in {node.entry_id for node in self.objects}:
+                raise AnswerError("invalid", f"there is no {line[:80]}", text)
+            return GraphChoice("object", int(match[1]))
+        if (match := _IMAGE.fullmatch(line)) is not None:
+            if int(match[1]) >= len(self.images):
+                raise AnswerError("invalid", f"there is no image {match[1]}", text)
+            return GraphChoice("image", int(match[1]), match[2].strip())
+        if _EXPLORE.fullmatch(line) is not None:
+            return GraphChoice("explore")
+        expected = "neither `Object id`, `Image i, category` nor `Continue Exploration`"
+        raise AnswerError("invalid", f"{expected}: {line[:80]!r}", text)
+
+    def words(self, answer: GraphChoice) -> str:
+        """As the grammar has it."""
+        if answer.kind == "object":
+            return f"Object {answer.id}"
+        return f"Image {answer.id}, {answer.category}" if answer.kind == "image" else "Continue Exploration"
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """One of three forms."""
+        return {"type": "string", "pattern": r"^(Object \d+|Image \d+, [A-Za-z][A-Za-z ]*|Continue Exploration)$"}
+
+    def alternatives(self, answer: GraphChoice) -> Sequence[GraphChoice]:
+        """Every other object, and exploring."""
+        choices = [*(GraphChoice("object", node.entry_id) for node in self.objects), GraphChoice("explore")]
+        return [choice for choice in choices if choice != answer]
+
+    def _past_line(self, choice: PastChoice) -> str:
+        if choice.kind == "explore":
+            return f"Round {choice.round + 1}: chose a frontier."
+        if choice.kind == "object":
+            return f"Round {choice.round + 1}: chose object {choice.id} - not correct."
+        number = next((i for i, image in enumerate(self.images) if image.view_id == choice.id), None)
+        what = "an image that is not shown now" if number is None else f"image {number}"
+        return f"Round {choice.round + 1}: chose {what}, {choice.category} - not correct."
+
+
+def _object_line(node: GraphObject) -> str:
+    x_m, y_m, z_m = node.candidate.centre_m
+    return f"{node.entry_id}, {node.candidate.label}, {x_m:.2f}, {y_m:.2f}, {z_m:.2f}, {node.room}"
+
+
+@dataclass(frozen=True, slots=True)
+class FrontierImagesQuestion(Question[int]):
+    """Behind which frontier may the goal be? The answer is its place in the list."""
+
+    kind: ClassVar[str] = "frontier"
+    goal: StageInput
+    frontiers: Sequence[FrontierCandidate]
+    surroundings: Sequence[ObjectCandidate]
+    """Everything remembered: what the images would show. Not part of the prompt."""
+
+    def prompt(self) -> Prompt:
+        """Each frontier with its image."""
+        parts = [*goal_parts(self.goal), Text("The robot searches a home. It may explore one of these frontiers next.")]
+        for index, frontier in enumerate(self.frontiers):
+            parts += titled(f"Frontier {index}:", frontier.image)
+        parts.append(
+            Text(
+                "Behind which one is the goal most likely found? Answer on the first line with exactly "
+                '"Frontier i", and give your reason on the second.'
+            )
+        )
+        return Prompt.of(*merged(parts))
+
+    def parse(self, text: str) -> int:
+        """`Frontier i`, with a frontier that there is."""
+        line = first_line(text)
+        match = _FRONTIER.fullmatch(line)
+        if match is None or int(match[1]) >= len(self.frontiers):
+            raise AnswerError("invalid", f"no frontier of the list: {line[:80]!r}", text)
+        return int(match[1])
+
+    def words(self, answer: int) -> str:
+        """`Frontier i`."""
+        return f"Frontier {answer}"
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """One of the frontiers."""
+        return {"type": "string", "enum": [self.words(index) for index in range(len(self.frontiers))]}
+
+    def alternatives(self, answer: int) -> Sequence[int]:
+        """Every other frontier."""
+        return [index for index in range(len(self.frontiers)) if index != answer]
+
+
+@dataclass(frozen=True, slots=True)
+class ArrivalQuestion(Question[bool]):
+    """Is the goal here? Asked at an object that was chosen, with all that was seen on the last stretch to it."""
+
+    kind: ClassVar[str] = "arrival"
+    goal: StageInput
+    target: ObjectCandidate
+    """What the agent went to. Not part of the prompt."""
+    seen: Sequence[ObjectCandidate]
+    """Detections of these rounds, each by the points of that view alone. Not part of the prompt."""
+    num_views: int
+    """Of the last rounds; as many images where the model looks at them."""
+    num_frontiers: int
+    """Not part of the prompt."""
+    num_rounds_left: int
+    """Not part of the prompt."""
+    views: Sequence[Pixels] = field(default=(), compare=False, repr=False)
+    """Most recent first."""
+
+    def prompt(self) -> Prompt:
+        """The views."""
+        parts = [*goal_parts(self.goal), Text("The robot may have arrived. What it saw, the most recent view first:")]
+        for index, view in enumerate(self.views):
+            parts += titled(f"View {index}:", view)
+        parts.append(
+            Text(
+                "Has it found the goal, in full agreement with what is said of it? Answer on the first line with "
+                '"yes" or "no", and give your reason on the second.'
+            )
+        )
+        return Prompt.of(*merged(parts))
+
+    def parse(self, text: str) -> bool:
+        """A first line that begins with `yes` or `no`."""
+        return parse_yes_no(text)
+
+    def words(self, answer: bool) -> str:
+        """`yes` or `no`."""
+        return "yes" if answer else "no"
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """`yes` or `no`."""
+        return {"type": "string", "enum": ["yes", "no"]}
+
+    def alternatives(self, answer: bool) -> Sequence[bool]:
+        """The opposite."""
+        return [not answer]

@@ -1,0 +1,139 @@
+"""Rules for what MSGNav asks: the same knowledge of words, geometry and rooms as all other rules.
+
+They look at no image. What an image shows they know by the labels that were recorded with it, and what the arrived
+agent sees by the points of the last rounds' detections; size, form and colour are never judged.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from evonav.decision.language import Goal, canonical, similarity
+from evonav.decision.matching import Matcher, gap_m
+from evonav.decision.questions.candidates import ObjectCandidate, Point2
+from evonav.decision.questions.msgnav import (
+    ArrivalQuestion,
+    FrontierImagesQuestion,
+    GraphChoice,
+    GraphQuestion,
+    SubgraphQuestion,
+)
+from evonav.decision.questions.question import AnswerError
+from evonav.decision.ranking import rank_entries
+
+
+def select(matcher: Matcher, question: SubgraphQuestion) -> tuple[tuple[int, ...], str]:
+    """Entries whose label the instruction speaks of; then others, one a label, none beside one that is chosen.
+
+    Raises:
+        AnswerError: The graph is empty.
+    """
+    if not question.objects:
+        raise AnswerError("invalid", "there is no object")
+    goal = matcher.parsed(question.goal)
+    candidates = [node.candidate for node in question.objects]
+    chosen: list[int] = []
+    labels: set[str] = set()
+    covered: set[int] = set()
+    for index in rank_entries(matcher, question.goal, candidates, question.position_m):
+        node = question.objects[index]
+        label = canonical(node.candidate.label)
+        is_mentioned = matcher.label_score(goal, node.candidate.label) > 0.0
+        if is_mentioned or (label not in labels and node.entry_id not in covered):
+            chosen.append(node.entry_id)
+            labels.add(label)
+            covered.update(node.neighbour_ids)
+    chosen = chosen[: question.max_ids]
+    return tuple(chosen), f"of {len(question.objects)} objects those that have most to do with a {goal.noun}"
+
+
+def choose(matcher: Matcher, question: GraphQuestion) -> tuple[GraphChoice, str]:
+    """An object that the instruction fits and that was not wrong before; else what only an image shows; else explore.
+
+    With no frontier or hardly a round left anything of the right category will do, and then what the goal should be
+    on or near.
+    """
+    goal, config = matcher.parsed(question.goal), matcher.config
+    around = [node.candidate for node in question.objects]
+    rejected_ids = {past.id for past in question.history if past.kind == "object"}
+    left = [candidate for candidate in around if candidate.entry_id not in rejected_ids]
+    named = [
+        (matcher.relations_held(goal, candidate, around), -index)
+        for index, candidate in enumerate(left)
+        if matcher.names_goal(goal, candidate)
+    ]
+    is_last_chance = question.num_frontiers == 0 or question.max_rounds - question.round <= config.hurry_rounds
+    best = max(named, default=None)
+    fits = best is not None and best[0] >= config.min_relations
+    if best is None or not fits:
+        image = _unmapped(matcher, goal, question, around)
+        if image is not None:
+            return image, f"{image.category} seen, but not in the graph"
+    if best is not None and (fits or is_last_chance):
+        candidate = left[-best[1]]
+        return GraphChoice("object", candidate.entry_id), f"{candidate.label}, {best[0]:.0%} of what is said fits"
+    if question.num_frontiers == 0:
+        scored = [(matcher.label_score(goal, candidate.label), -i) for i, candidate in enumerate(left)]
+        score, index = max(scored, default=(0.0, 0))
+        if score > 0.0:
+            return GraphChoice("object", left[-index].entry_id), f"where the {goal.noun} should be"
+    return GraphChoice("explore"), "relations do not hold" if named else "nothing remembered fits"
+
+
+def _unmapped(
+    matcher: Matcher, goal: Goal, question: GraphQuestion, around: Sequence[ObjectCandidate]
+) -> GraphChoice | None:
+    """The largest detection of the goal's category that is of no entry, and by no place that is known already."""
+    known_m = [candidate.ground_m for candidate in around if matcher.names_goal(goal, candidate)]
+    known_m += [past.place_m for past in question.history if past.place_m is not None]
+
+    def is_known(place_m: Point2) -> bool:
+        return any(math.dist(place_m, other_m) <= matcher.config.near_m for other_m in known_m)
+
+    found = [
+        (seen.area_px, -number, seen.label)
+        for number, image in enumerate(question.images)
+        for seen in image.seen
+        if seen.entry_id is None
+        and seen.centre_m is not None
+        and similarity(goal.noun, seen.label) >= matcher.config.min_similarity
+        and not is_known(seen.centre_m)
+    ]
+    if not found:
+        return None
+    _, number, label = max(found)
+    return GraphChoice("image", -number, canonical(label))
+
+
+def explore(matcher: Matcher, question: FrontierImagesQuestion) -> tuple[int, str]:
+    """The cheapest frontier."""
+    goal = matcher.parsed(question.goal)
+    costs_m = [matcher.frontier_cost_m(goal, frontier, question.surroundings) for frontier in question.frontiers]
+    index = min(range(len(costs_m)), key=lambda i: (costs_m[i], i))
+    return index, f"costs {costs_m[index]:.1f} m"
+
+
+def arrive(matcher: Matcher, question: ArrivalQuestion) -> tuple[bool, str]:
+    """Found if the goal's category was seen at the place, and what is said of it holds among what was seen.
+
+    With no frontier or hardly a round left the category is enough.
+    """
+    goal, config = matcher.parsed(question.goal), matcher.config
+    here = [
+        seen
+        for seen in question.seen
+        if matcher.names_goal(goal, seen) and gap_m(seen, question.target) <= config.near_m
+    ]
+    if not here:
+        return False, f"no {goal.noun} seen here"
+    held = max(matcher.relations_held(goal, seen, question.seen) for seen in here)
+    is_last_chance = question.num_frontiers == 0 or question.num_rounds_left <= config.hurry_rounds
+    return held >= config.min_relations or is_last_chance, f"{goal.noun} seen here, {held:.0%} of what is said fits"
+
+
+RULES: dict[type, Callable[[Matcher, Any], tuple[Any, str]]] = {
+    SubgraphQuestion: select,
+    GraphQuestion: choose,
+    FrontierImagesQuestion: explore,
+    ArrivalQuestion: arrive,
+}

@@ -1,0 +1,343 @@
+"""MSGNav on the toy house (design: agents.md 2 and 7.3)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy_house import CHAIR_AWAY, ToySimulator, stage_case
+
+from evonav.agents.msgnav import MsgNav
+from evonav.agents.visible_viewpoint import visible_viewpoint
+from evonav.decision.questions.msgnav import GraphQuestion
+from evonav.decision.scripted import Scripted
+from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.records import EndState
+from evonav.evaluation.rollout import Episode
+from evonav.memory import ObjectMap
+from evonav.memory.scene_graph import SceneGraph
+from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
+from evonav.world.pose import Pose
+from evonav.world.simulator import Intrinsics
+
+START = Pose(1.0, 0.9, 3.0, 0.0)
+
+
+def run(agent, *stages, start=START, protocol=None, seed=7):
+    case = EpisodeCase("toy", "toy", start, stages)
+    episode = Episode(case, "a", agent, ToySimulator(), GroundTruthPerception(), protocol or ProtocolConfig(), seed)
+    records = [outcome.record for outcome in episode.run()]
+    assert all(record.is_scored for record in records), [record.error for record in records]
+    return records
+
+
+def script(graph, *, subgraph=None, arrival="yes", frontier="Frontier 0"):
+    """A model with an answer a kind of question; the whole graph is selected unless said otherwise."""
+
+    def answer(question):
+        if question.kind == "subgraph":
+            return subgraph or "\n".join(str(node.entry_id) for node in question.objects)
+        said = {"graph": graph, "arrival": arrival, "frontier": frontier}[question.kind]
+        return said(question) if callable(said) else said
+
+    return Scripted(answer)
+
+
+def asked(model, kind):
+    return [question for question in model.questions if question.kind == kind]
+
+
+def object_of(label, otherwise="Continue Exploration", *, unless_rejected=False):
+    """Chooses the first object of a label; if asked to, none that the history calls not correct."""
+
+    def answer(question):
+        rejected = {past.id for past in question.history if past.kind == "object"} if unless_rejected else set()
+        ids = [n.entry_id for n in question.objects if n.candidate.label == label and n.entry_id not in rejected]
+        return f"Object {ids[0]}" if ids else otherwise
+
+    return answer
+
+
+@pytest.fixture(scope="module")
+def moved():
+    """The chair is found, the agent goes to the bedroom, and the chair is gone when it is asked for again, twice."""
+    agent = MsgNav()
+    away = {"moves": CHAIR_AWAY, "mode": "SALIENT_OBJECT"}
+    stages = (
+        stage_case(1, "Chair|1"),
+        stage_case(2, "Bed|1"),
+        stage_case(3, "Chair|1", **away),
+        stage_case(4, "Fridge|1", moves=CHAIR_AWAY, before=CHAIR_AWAY),
+    )
+    return agent, run(agent, *stages)
+
+
+def test_static_goals_are_found_and_verified(moved):
+    _, records = moved
+    assert [record.state for record in records[:2]] == [EndState.SUCCESS] * 2
+    assert [record.stop_reason for record in records] == ["verified"] * 4
+
+
+def test_it_says_no_at_a_stale_entry_and_keeps_it(moved):
+    _, records = moved
+    third = records[2]
+    assert third.state is EndState.SUCCESS
+    assert third.trace[-1].counters["rejected_choices"] >= 1
+    stale = [entry for entry in third.entries if entry.is_stale and entry.label == "Chair"]
+    assert len(stale) == 1  # it stays where it was...
+    chosen = [entry.choice for entry in third.trace if entry.choice.startswith("object")]
+    assert chosen[0] != chosen[-1]  # ...and is not gone to again
+    assert chosen.index(chosen[-1]) == sum(choice == chosen[0] for choice in chosen)
+
+
+def test_a_no_holds_for_the_stage_only():
+    """The same stale entry may be chosen again in a later stage; within the stage the history warns of it."""
+    model = script(object_of("Chair", unless_rejected=True), arrival=lambda q: "no" if q.goal.stage < 3 else "yes")
+    stages = [stage_case(number, "Chair|1") for number in (1, 2, 3)]
+    records = run(MsgNav(decision=model), *stages, protocol=ProtocolConfig(max_rounds=12))
+    for stage in (1, 2):
+        questions = [question for question in asked(model, "graph") if question.goal.stage == stage]
+        assert questions[0].history == ()
+        rejected = [past.id for past in questions[-1].history if past.kind == "object"]
+        assert len(rejected) == len(set(rejected)) >= 1
+        assert f"chose object {rejected[0]} - not correct" in text_of(questions[-1])
+    first, again, last = ([e.choice for e in r.trace if e.choice.startswith("object")] for r in records)
+    assert set(first) & set(again) & set(last)
+    assert records[2].stop_reason == "verified"
+    assert not records[0].has_stopped
+
+
+def text_of(question):
+    (turn,) = question.prompt().turns
+    return "\n".join(part.text for part in turn.parts if hasattr(part, "text"))
+
+
+def test_a_target_is_kept_until_arrival_and_a_frontier_for_one_round():
+    model = script(object_of("Fridge"))
+    (record,) = run(MsgNav(decision=model), stage_case(1, "Fridge|1"), start=replace(START, x_m=5.0, z_m=1.0))
+    objects = [entry.choice for entry in record.trace if entry.choice.startswith("object")]
+    assert len(set(objects)) == 1
+    assert len(objects) > 2
+    assert len(asked(model, "graph")) == len(record.trace) - len(objects) + 1
+    assert len(asked(model, "arrival")) == 1
+
+
+def test_only_valid_ids_are_selected_and_twenty_at_most():
+    graph = script("Continue Exploration")
+    run(MsgNav(decision=graph), stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=1))
+    question = asked(graph, "subgraph")[0]
+    assert question.max_ids == 20
+    ids = [node.entry_id for node in question.objects]
+    assert question.parse(f"{ids[1]}\n999\nthe fridge\n{ids[0]}.\n{ids[1]}") == (ids[1], ids[0])
+    many = replace(question, objects=[replace_id(question.objects[0], entry_id) for entry_id in range(1, 40)])
+    assert many.parse("\n".join(str(entry_id) for entry_id in range(39, 0, -1))) == tuple(range(39, 19, -1))
+    with pytest.raises(Exception, match="no line is the id"):
+        question.parse("none of them")
+
+
+def replace_id(node, entry_id):
+    return replace(node, candidate=replace(node.candidate, entry_id=entry_id))
+
+
+def test_objects_shown_are_the_selected_ones_and_their_neighbours_and_images_cover_their_edges():
+    agent = MsgNav(decision=script("Continue Exploration", subgraph="1"))
+    run(agent, stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=8))
+    for question in asked(agent._asker.model, "graph"):
+        first = next(node for node in question.objects if node.entry_id == 1)
+        assert {node.entry_id for node in question.objects} == {1, *first.neighbour_ids}
+        assert all(1 in (a, b) and numbers for a, b, numbers in question.edges)
+        assert {end for a, b, _ in question.edges for end in (a, b)} <= {node.entry_id for node in question.objects}
+        assert [image.is_egocentric for image in question.images[-7:]].count(True) >= 1
+        assert sum(image.is_egocentric for image in question.images) == 7
+
+
+def test_cover_is_greedy_and_complete():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        graph = SceneGraph()
+        for view_id in range(20):
+            ids = rng.choice(12, rng.integers(1, 5), replace=False)
+            graph.add_view(view_id, {int(entry_id): (0.0, 0.0) for entry_id in ids})
+        selected = [int(entry_id) for entry_id in rng.choice(12, 4, replace=False)]
+        part = graph.subgraph(selected)
+        assert part.pairs == tuple(p for p in graph.pairs if set(p) & set(selected))
+        left, expected = set(part.pairs), []
+        while left:
+            best = max(range(20), key=lambda view_id: (len(left & set(graph.edges_of(view_id))), -view_id))
+            expected.append(best)
+            left -= set(graph.edges_of(best))
+        assert part.view_ids == tuple(expected)
+
+
+def test_edges_join_what_one_view_shows_near_each_other_and_follow_merges():
+    graph = SceneGraph(max_edge_m=3.5)
+    graph.add_view(0, {1: (0.0, 0.0), 2: (3.5, 0.0), 3: (3.6, 0.0)})
+    assert graph.pairs == [(1, 1), (1, 2), (2, 2), (2, 3), (3, 3)]
+    graph.add_view(1, {2: (0.0, 0.0), 3: (0.1, 0.0)})
+    assert (graph.views_of((2, 3)), graph.edges_of(1)) == ([0, 1], [(2, 2), (2, 3), (3, 3)])
+    graph.follow({3: 2})
+    assert graph.pairs == [(1, 1), (1, 2), (2, 2)]
+    assert (graph.views_of((2, 2)), graph.edges_of(1)) == ([0, 1], [(2, 2)])
+    graph.prune([2])
+    assert (graph.pairs, graph.edges_of(0), graph.neighbours()) == ([(2, 2)], [(2, 2)], {2: set()})
+
+
+def test_something_far_away_in_a_kept_view_is_gone_to_without_an_entry():
+    """Adaptive vocabulary update: seen from farther than 3.5 m, it is no entry, but its recorded mask has a place."""
+    images = []
+
+    def graph(question):
+        for number, image in enumerate(question.images):
+            for seen in image.seen:
+                if seen.label == "Bed" and seen.entry_id is None:
+                    images.append((image, seen))
+                    return f"Image {number}, bed"
+        return "Continue Exploration"
+
+    start = replace(START, x_m=2.5, z_m=2.5, yaw_rad=np.pi / 2)
+    (record,) = run(MsgNav(decision=script(graph)), stage_case(1, "Bed|1"), start=start)
+    assert images
+    assert record.trace[0].choice == f"image {images[0][0].view_id}, Bed"
+    assert len({entry.choice for entry in record.trace}) == 1
+    assert record.trace[0].counters["image_choices"] == 1
+    assert record.stop_reason == "verified"
+    assert record.state is EndState.SUCCESS
+    assert record.trace[0].chosen_entry is None
+
+
+def test_the_text_matcher_sees_to_that_too():
+    start = replace(START, x_m=2.5, z_m=2.5, yaw_rad=np.pi / 2)
+    (record,) = run(MsgNav(), stage_case(1, "Bed|1"), start=start)
+    assert record.trace[0].choice.startswith("image")
+    assert record.state is EndState.SUCCESS
+
+
+def test_a_word_for_nothing_in_the_image_leads_to_a_random_frontier():
+    (record,) = run(
+        MsgNav(decision=script("Image 0, piano")), stage_case(1, "Bed|1"), protocol=ProtocolConfig(max_rounds=3)
+    )
+    assert record.trace[-1].counters["empty_detections"] == 3
+    assert record.trace[-1].counters["random_frontiers"] == 3
+    assert all(entry.choice.startswith("frontier") for entry in record.trace)
+
+
+def test_invalid_answers_lead_to_a_random_frontier_drawn_from_the_seed():
+    def choices(seed):
+        model = script("Object 999", frontier="none")
+        (record,) = run(
+            MsgNav(decision=model), stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=12), seed=seed
+        )
+        counters = record.trace[-1].counters
+        assert counters["invalid_answers"] == 3 * counters["failed_decisions"] == 36
+        assert counters["random_frontiers"] == 12
+        return [entry.choice for entry in record.trace]
+
+    runs = {seed: choices(seed) for seed in range(4)}
+    assert choices(0) == runs[0]
+    assert len({tuple(run) for run in runs.values()}) > 1
+
+
+def test_one_frontier_is_taken_without_asking():
+    model = script("Continue Exploration")
+    (record,) = run(MsgNav(decision=model), stage_case(1, "Mug|1"))
+    counts = [entry.num_frontiers for entry in record.trace]
+    assert 1 in counts
+    assert len(asked(model, "frontier")) == sum(count > 1 for count in counts)
+    assert all(len(question.frontiers) > 1 for question in asked(model, "frontier"))
+    assert record.stop_reason == "nothing to explore"  # and without one the stage ends
+
+
+def test_verification_looks_at_five_rounds_of_seven_views_of_this_stage():
+    far = object_of("GarbageCan", "Continue Exploration")
+    model = script(far, arrival="no")
+    stages = (stage_case(1, "GarbageCan|1"), stage_case(2, "Fridge|1"))
+    run(MsgNav(decision=model), *stages, protocol=ProtocolConfig(max_rounds=25))
+    questions = asked(model, "arrival")
+    assert max(question.num_views for question in questions) == 35
+    second = [question for question in questions if question.goal.stage == 2]
+    assert second[0].num_views % 7 == 0
+    assert second[0].num_views <= 35
+
+
+def test_no_valid_answer_on_arrival_counts_as_no():
+    model = script(object_of("Chair", unless_rejected=True), arrival="perhaps")
+    (record,) = run(MsgNav(decision=model), stage_case(1, "Chair|1"), protocol=ProtocolConfig(max_rounds=8))
+    assert not record.has_stopped
+    counters = record.trace[-1].counters
+    assert counters["rejected_choices"] == counters["verifications"] >= 1
+    assert counters["invalid_answers"] == 3 * counters["verifications"]
+
+
+def test_the_viewpoint_is_on_the_side_that_shows_the_target():
+    frame = MapFrame(60, 60, 0.1, (-3.0, -3.0))
+    is_free = np.ones((60, 60), bool)
+    target = plate((0.0, 0.8, 0.0), 0.15)
+    objects = ObjectMap()
+    objects.update(view_of(plate((0.0, 1.0, 0.35), 0.6)))
+    assert len(objects) == 1
+    found = visible_viewpoint(objects, target, is_free, frame, (0.0, 2.0))
+    assert found.found == "circle"
+    assert found.share > 0.9
+    assert found.position_m[1] < 0.2
+    assert np.hypot(*found.position_m) == pytest.approx(0.75, abs=0.01)
+    # No free floor on the circle: the nearest free cells.
+    is_free[:] = False
+    is_free[5:10, 30] = True  # z = -2.5 .. -2.1 m
+    snapped = visible_viewpoint(objects, target, is_free, frame, (0.0, 2.0))
+    assert snapped.found == "snapped"
+    assert snapped.position_m == pytest.approx((0.05, -2.05))
+    # Nothing shows it: the bottom edge of its box that is nearest to the agent.
+    is_free[:] = False
+    hidden = visible_viewpoint(objects, target, is_free, frame, (0.0, 2.0))
+    assert (hidden.found, hidden.share) == ("box", 0.0)
+    assert hidden.position_m == pytest.approx((0.0, 0.0), abs=0.02)
+    assert visible_viewpoint(objects, target, is_free, frame, (-2.0, 0.0)).position_m[0] == pytest.approx(
+        -0.14, abs=0.02
+    )
+
+
+def plate(centre, half_m):
+    """Points 2 cm apart on a square that faces z."""
+    steps = np.arange(-half_m, half_m, 0.02)
+    x, y = np.meshgrid(centre[0] + steps, centre[1] + steps)
+    return np.stack([x.ravel(), y.ravel(), np.full(x.size, centre[2])], axis=1).astype(np.float32)
+
+
+def view_of(points_m):
+    """A view from z = 2 m, looking along -z, that shows a plate of points as one detection."""
+    depth_m = np.full((200, 200), np.inf, np.float32)
+    masks = np.full((200, 200), -1, np.int32)
+    distance_m = 2.0 - float(points_m[0, 2])
+    cols = np.floor(100.0 - points_m[:, 0] / distance_m * 100.0).astype(int)
+    rows = np.floor(100.0 - (points_m[:, 1] - 1.0) / distance_m * 100.0).astype(int)
+    depth_m[rows.min() : rows.max(), cols.min() : cols.max()] = distance_m
+    masks[rows.min() : rows.max(), cols.min() : cols.max()] = 0
+    return View(
+        pose=Pose(0.0, 1.0, 2.0, np.pi, 0.0),
+        intrinsics=Intrinsics(200, 200, np.pi / 2),
+        depth_m=depth_m,
+        detections=Detections(masks, ("Screen",), np.ones(1, np.float32)),
+        occupancy=VisibleOccupancy(np.zeros((0, 2), np.int32), np.zeros((0, 2), np.int32)),
+        camera_height_m=1.0,
+    )
+
+
+def test_it_looks_with_seven_views_every_round_and_never_clears_its_map(moved):
+    agent, records = moved
+    assert agent.sensing.later_rounds == agent.sensing.first_round
+    assert (agent.sensing.later_rounds.count, agent.sensing.later_rounds.spacing_deg) == (7, 40.0)
+    assert agent._memory.navigator.explorer.num_conflicts == 0
+    assert len(agent._memory.navigator.views.views) == 7 * sum(record.num_rounds for record in records)
+
+
+def test_answers_go_through_the_grammar():
+    agent = MsgNav(decision=script("Continue Exploration"))
+    run(agent, stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=2))
+    question = asked(agent._asker.model, "graph")[-1]
+    assert isinstance(question, GraphQuestion)
+    first = question.objects[0].entry_id
+    for text in (f"Object {first}", "Image 0, garbage can", "Continue Exploration"):
+        assert question.words(question.parse(text.lower() + "\nsince it is so.")).lower() == text.lower()
+    for text in ("Object 9999", "Image 99, chair", "Image 0", "Image 0,", "Frontier 0", "I think Object 1", ""):
+        with pytest.raises(Exception, match="invalid"):
+            question.parse(text)
