@@ -43,7 +43,12 @@ fn visible_shares_naive(
     eyes.iter().map(share).collect()
 }
 
-fn shares(scene: &[Vec<Point>], targets: &[Point], eyes: &[Vec3], config: &SightConfig) -> Vec<f64> {
+fn shares(
+    scene: &[Vec<Point>],
+    targets: &[Point],
+    eyes: &[Vec3],
+    config: &SightConfig,
+) -> Vec<f64> {
     visible_shares(scene.iter().map(Vec::as_slice), targets, eyes, config).expect("valid arguments")
 }
 
@@ -86,7 +91,8 @@ fn nothing_to_see_and_nothing_in_the_way() {
 fn a_long_line_has_no_more_samples_than_asked_for() {
     // Every tenth metre: the point between two samples is missed.
     let config = SightConfig { max_samples: 10, ..Default::default() };
-    let seen = |x: f32| shares(&[vec![[x, 0.0, 0.0]]], &[[100.3, 0.0, 0.0]], &[[0.0; 3]], &config)[0];
+    let seen =
+        |x: f32| shares(&[vec![[x, 0.0, 0.0]]], &[[100.3, 0.0, 0.0]], &[[0.0; 3]], &config)[0];
     assert_eq!([5.0, 10.15, 15.0, 50.15].map(seen), [1.0, 0.0, 1.0, 0.0]);
 }
 

@@ -127,9 +127,8 @@ impl Obstacles {
         bounds_m: &Aabb,
         radius_m: f64,
     ) -> Self {
-        let is_inside = |p: &Vec3| {
-            (0..3).all(|i| p[i] >= bounds_m.min_m[i] && p[i] <= bounds_m.max_m[i])
-        };
+        let is_inside =
+            |p: &Vec3| (0..3).all(|i| p[i] >= bounds_m.min_m[i] && p[i] <= bounds_m.max_m[i]);
         let inverse_edge = 1.0 / (radius_m * 1.001);
         let points: Vec<Vec3> = scene
             .into_iter()
@@ -139,7 +138,8 @@ impl Obstacles {
             .collect();
         let voxels: Vec<Voxel> = points.iter().map(|&p| voxel_of(p, inverse_edge)).collect();
         let bound = |pick: fn(i32, i32) -> i32, by: i32| {
-            let corner = voxels.iter().copied().reduce(|a, b| std::array::from_fn(|i| pick(a[i], b[i])));
+            let corner =
+                voxels.iter().copied().reduce(|a, b| std::array::from_fn(|i| pick(a[i], b[i])));
             corner.map_or([by; 3], |corner| corner.map(|i| i.saturating_add(by)))
         };
         let (low, high) = (bound(i32::min, -1), bound(i32::max, 1));
@@ -177,7 +177,15 @@ impl Obstacles {
                 }
             }
         }
-        Self { radius2: radius_m * radius_m, inverse_edge, low, high, cells, ranges, points: ordered }
+        Self {
+            radius2: radius_m * radius_m,
+            inverse_edge,
+            low,
+            high,
+            cells,
+            ranges,
+            points: ordered,
+        }
     }
 
     /// Whether a point is nearer than the radius.
@@ -191,7 +199,8 @@ impl Obstacles {
         if self.holds_near(cell, place) {
             return true;
         }
-        let inside: Vec3 = std::array::from_fn(|i| place[i] * self.inverse_edge - f64::from(voxel[i]));
+        let inside: Vec3 =
+            std::array::from_fn(|i| place[i] * self.inverse_edge - f64::from(voxel[i]));
         around(voxel).any(|beside| {
             let gap2: f64 = (0..3)
                 .map(|i| match beside[i] - voxel[i] {
