@@ -1,0 +1,304 @@
+"""3D-Mem on the toy house, in the words of its specification (design: agents.md 7.2)."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, stage_case
+
+from evonav.agents.agent import NavigateTo
+from evonav.agents.three_d_mem import NO_ANSWER, NOTHING_LEFT, ThreeDMem, ThreeDMemConfig
+from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotQuestion
+from evonav.decision.scripted import Scripted
+from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.records import EndState
+from evonav.evaluation.rollout import Episode
+from evonav.memory import ObjectMap
+from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
+from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.world.pose import Pose
+
+START = Pose(1.0, 0.9, 3.0, 0.0)
+
+
+class Watched(ThreeDMem):
+    """Keeps what it held true in each round."""
+
+    def __init__(self, config=None, decision=None):
+        super().__init__(config, decision)
+        self.rounds = []
+
+    def act(self, observation):
+        action = super().act(observation)
+        occupancy = self._navigator.explorer.map
+        snapshots = [(snapshot.view.id, set(snapshot.entry_ids)) for snapshot in self._snapshots.snapshots]
+        seen_in = {
+            view_id: {self._navigator.views.resolve(seen.entry_id) for seen in self._view(view_id).seen if has_id(seen)}
+            for view_id, _ in snapshots
+        }
+        self.rounds.append(
+            {
+                "action": action,
+                "cells": occupancy.cells,
+                "explored": occupancy.explored,
+                "num_views": len(observation.views),
+                "entries": {entry.entry_id: entry for entry in self.entries()},
+                "snapshots": snapshots,
+                "seen_in": seen_in,
+            }
+        )
+        return action
+
+    def _view(self, view_id):
+        return self._navigator.views.views[view_id]
+
+
+def has_id(seen):
+    return seen.entry_id is not None
+
+
+def run(agent, *stages, start=START, max_rounds=50):
+    case = EpisodeCase("toy", "toy", start, stages)
+    protocol = ProtocolConfig(max_rounds=max_rounds)
+    episode = Episode(case, "a", agent, ToySimulator(120, 120), GroundTruthPerception(), protocol, 7)
+    records = [outcome.record for outcome in episode.run()]
+    assert all(record.is_scored for record in records), [record.error for record in records]
+    return records
+
+
+def scripted(choose, prefilter=lambda question: "\n".join(question.class_names)):
+    return Scripted(lambda q: prefilter(q) if isinstance(q, PrefilterQuestion) else choose(q))
+
+
+def object_if_any(question):
+    """The farthest one."""
+    objects = [choice for choice in question.choices() if choice.snapshot is not None]
+    if not objects:
+        return "Frontier 0"
+    here = question.position_m
+    return question.words(
+        max(objects, key=lambda c: math.dist(question.snapshots[c.snapshot].objects[c.index].ground_m, here))
+    )
+
+
+def ground(centre_m):
+    return np.array([centre_m[0], centre_m[2]])
+
+
+@pytest.fixture(scope="module")
+def moved():
+    """The chair is found, then the bed; then the chair has gone to the bedroom, and the agent goes there afterwards."""
+    agent = Watched()
+    records = run(
+        agent,
+        stage_case(1, "Chair|1"),
+        stage_case(2, "Bed|1"),
+        stage_case(3, "Chair|1", moves=CHAIR_AWAY, mode="SALIENT_OBJECT"),
+        stage_case(4, "GarbageCan|1", moves=CHAIR_AWAY, before=CHAIR_AWAY),
+    )
+    return agent, records
+
+
+def test_static_goals_are_found(moved):
+    _, records = moved
+    assert [record.state for record in records[:2]] == [EndState.SUCCESS] * 2
+    assert all(record.stop_reason == "arrived" for record in records)
+
+
+def test_it_walks_to_a_stale_entry_and_stops_there(moved):
+    third = moved[1][2]
+    assert third.state is EndState.FAILURE
+    last = third.trace[-1].chosen_entry
+    assert (last.label, last.is_stale) == ("Chair", True)
+    assert all(entry.choice == third.trace[0].choice for entry in third.trace)
+
+
+def test_the_entry_stays_after_it_was_not_there(moved):
+    chosen = moved[1][2].trace[-1].chosen_entry
+    stale = [entry for entry in moved[1][3].entries if entry.is_stale]
+    assert [(entry.label, entry.entry_id) for entry in stale] == [("Chair", chosen.entry_id)]
+
+
+def test_a_moved_object_becomes_another_entry(moved):
+    """Detections and entries are matched by label and place: simulator ids would have moved the old entry."""
+    agent, _ = moved
+    chairs = [entry for entry in agent.entries() if entry.label == "Chair"]
+    places = [ground(OBJECTS["Chair|1"][1]), ground(CHAIR_AWAY["Chair|1"])]
+    assert len(chairs) == 2
+    for chair, place in zip(sorted(chairs, key=lambda entry: entry.entry_id), places, strict=True):
+        assert np.linalg.norm(ground(chair.centre_m) - place) < 0.4
+
+
+def test_seven_views_open_a_stage_and_three_follow(moved):
+    agent, records = moved
+    # A stage's last call may be a stop, which still has its views.
+    counts = iter(entry["num_views"] for entry in agent.rounds)
+    for record in records:
+        assert [next(counts) for _ in record.trace] == [7] + [3] * (len(record.trace) - 1)
+
+
+@pytest.fixture(scope="module")
+def table_moved():
+    """The table moves, with the mug on it, while the agent is in the other room."""
+    away = {"DiningTable|1": (2.9, 0.4, 3.6), "Mug|1": (2.9, 0.87, 3.6)}
+    agent = Watched()
+    records = run(
+        agent,
+        stage_case(1, "GarbageCan|1"),
+        stage_case(2, "Fridge|1", moves=away, mode="SALIENT_OBJECT"),
+        stage_case(3, "GarbageCan|1", moves=away, before=away),
+    )
+    return agent, records
+
+
+def test_the_last_observation_wins_and_the_map_is_never_cleared(table_moved):
+    """Where the table stood becomes free, where it stands blocked, and no cell is forgotten."""
+    agent, records = table_moved
+    before, after = agent.rounds[len(records[0].trace) - 1]["cells"], agent.rounds[-1]["cells"]
+    # Its edges grown by the agent's radius, up to the chair; [row, col].
+    old, new = np.s_[6:16, 12:29], np.s_[30:43, 21:38]
+    was_blocked = before[old] == BLOCKED
+    assert was_blocked.sum() > 10
+    assert (after[old][was_blocked] == FREE).all()
+    assert (before[new] == FREE).all()
+    assert (after[new] == BLOCKED).sum() > 10
+    for before, after in zip(agent.rounds, agent.rounds[1:], strict=False):
+        assert not np.any((before["cells"] != UNKNOWN) & (after["cells"] == UNKNOWN))
+        assert not np.any(before["explored"] & ~after["explored"])
+    assert all(record.trace[-1].counters["conflicts"] == 0 for record in records)
+    assert all(record.trace[-1].counters["cells_cleared"] == 0 for record in records)
+
+
+def test_an_object_is_kept_until_arrival_without_another_question():
+    model = scripted(object_if_any)
+    agent = Watched(decision=model)
+    agent.sensing = replace(agent.sensing, max_travel_m=0.4)
+    (record,) = run(agent, stage_case(1, "Mug|1"))
+    choices = [entry.choice for entry in record.trace]
+    assert len(choices) > 2
+    assert len(set(choices)) == 1
+    assert choices[0].startswith("object")
+    assert record.stop_reason == "arrived"
+    assert [type(question) for question in model.questions] == [PrefilterQuestion, SnapshotQuestion]
+
+
+def test_a_frontier_is_chosen_anew_in_every_round():
+    model = scripted(lambda question: f"Frontier {len(question.frontiers) - 1}")
+    (record,) = run(Watched(decision=model), stage_case(1, "Mug|1"), max_rounds=6)
+    assert all(entry.choice.startswith("frontier") for entry in record.trace)
+    assert len([q for q in model.questions if isinstance(q, SnapshotQuestion)]) == len(record.trace) == 6
+
+
+def test_the_agent_stands_an_observation_distance_off_and_faces_the_object():
+    agent = Watched(decision=scripted(object_if_any))
+    (record,) = run(agent, stage_case(1, "Mug|1"))
+    going = [entry for entry in agent.rounds if isinstance(entry["action"], NavigateTo)]
+    entry_id = int(record.trace[-1].choice.removeprefix("object "))
+    last = going[-1]
+    centre = ground(last["entries"][entry_id].centre_m)
+    assert last["action"].face_m == pytest.approx(tuple(centre), abs=0.25)
+    assert math.dist(last["action"].position_m, centre) == pytest.approx(1.5, abs=0.3)
+
+
+def test_only_what_the_prefilter_kept_is_shown():
+    kept = ("Chair", "DiningTable")
+    model = scripted(
+        lambda question: f"frontier {len(question.frontiers) - 1}\nbecause",
+        lambda question: "\n".join(("Unicorn", *(name.upper() for name in kept), *question.class_names)),
+    )
+    config = ThreeDMemConfig(max_classes=2)
+    agent = Watched(config, model)
+    (record,) = run(agent, stage_case(1, "Mug|1"), start=replace(START, x_m=1.0, z_m=2.0), max_rounds=8)
+    shown = [question for question in model.questions if isinstance(question, SnapshotQuestion)]
+    labels = {candidate.label for question in shown for one in question.snapshots for candidate in one.objects}
+    assert labels == set(kept)
+    assert {name for entry in record.trace for name in entry.details["prefilter"]} >= set(kept)
+    assert all(len(entry.details["prefilter"]) <= 2 for entry in record.trace)
+    # The memory holds more than is shown.
+    assert {entry.label for entry in agent.entries()} - set(kept)
+
+
+def test_without_an_answer_to_the_prefilter_only_frontiers_are_left():
+    model = scripted(lambda question: "Frontier 0", lambda question: "Unicorn")
+    (record,) = run(Watched(decision=model), stage_case(1, "Mug|1"), max_rounds=3)
+    shown = [question for question in model.questions if isinstance(question, SnapshotQuestion)]
+    assert len(shown) == 3
+    assert all(not question.snapshots for question in shown)
+    assert record.trace[-1].counters["failed_decisions"] >= 1
+
+
+def test_three_invalid_answers_abort_the_stage_in_place():
+    model = scripted(lambda question: "Snapshot 99, Object 0")
+    near = replace(START, x_m=0.6, z_m=3.5)
+    first, second = run(Watched(decision=model), stage_case(1, "Fridge|1"), stage_case(2, "Bed|1"), start=near)
+    assert (first.stop_reason, first.num_rounds) == (NO_ANSWER, 1)
+    assert first.trace[0].counters["invalid_answers"] == 3
+    assert first.trace[0].counters["aborts_no_answer"] == 1
+    assert second.trace[0].counters["aborts_no_answer"] == 2
+    # Scored by distance, as any end.
+    assert (first.state, second.state) == (EndState.SUCCESS, EndState.FAILURE)
+
+
+def test_with_nothing_left_to_choose_the_stage_is_aborted_and_counted_apart():
+    model = scripted(lambda question: "Frontier 0", lambda question: "none")
+    (record,) = run(Watched(decision=model), stage_case(1, "Mug|1"), max_rounds=80)
+    assert record.stop_reason == NOTHING_LEFT
+    counters = record.trace[-1].counters
+    assert counters["aborts_nothing_left"] == 1
+    assert counters.get("aborts_no_answer", 0) == 0
+    assert record.trace[-1].num_frontiers == 0
+
+
+def test_memory_lasts_over_stages(table_moved):
+    _, records = table_moved
+    assert records[2].state is EndState.SUCCESS
+    assert records[2].trace[0].choice == records[0].trace[-1].choice
+    assert records[2].trace[0].details["num_snapshots_before"] == records[1].trace[-1].details["num_snapshots"]
+
+
+def test_each_entry_is_in_one_snapshot_that_shows_it(moved):
+    for entry in moved[0].rounds:
+        owned = [entry_id for _, ids in entry["snapshots"] for entry_id in ids]
+        assert sorted(owned) == sorted(entry["entries"])
+        assert all(ids <= entry["seen_in"][view_id] for view_id, ids in entry["snapshots"])
+
+
+def test_a_co_visible_pair_shares_a_snapshot(moved):
+    last = moved[0].rounds[-1]
+    label = {entry_id: entry.label for entry_id, entry in last["entries"].items()}
+    shared = [{label[entry_id] for entry_id in ids} for _, ids in last["snapshots"]]
+    assert any({"DiningTable", "Mug"} <= labels for labels in shared)
+    assert len(last["snapshots"]) < len(last["entries"])
+
+
+def test_an_object_in_unmapped_surroundings_is_gone_to_by_the_planner(monkeypatch):
+    agent = Watched(decision=scripted(object_if_any))
+    monkeypatch.setattr("evonav.agents.navigator.Navigator.observation_point", lambda self, centre_m: None)
+    (record,) = run(agent, stage_case(1, "Mug|1"))
+    chosen = record.trace[-1].chosen_entry
+    assert record.trace[-1].counters["unmapped_choices"] == 1
+    assert record.stop_reason == "arrived"
+    end = record.trace[-1].path_m[-1]
+    assert math.dist(end, (chosen.centre_m[0], chosen.centre_m[2])) < 1.0
+
+
+def test_a_clean_up_that_drops_the_chosen_entry_does_not_end_the_commitment(monkeypatch):
+    agent = Watched(decision=scripted(object_if_any))
+    agent.sensing = replace(agent.sensing, max_travel_m=0.4)
+    update = ObjectMap.update
+
+    def dropping(self, view):
+        found = update(self, view)
+        target = agent._navigator.target
+        if target is None or not self.remove(target.entry_id):
+            return found
+        return replace(found, removed=(*found.removed, target.entry_id))
+
+    monkeypatch.setattr(ObjectMap, "update", dropping)
+    (record,) = run(agent, stage_case(1, "Mug|1"))
+    choices = [entry.choice for entry in record.trace]
+    assert len(choices) > 2
+    assert len(set(choices)) == 1
+    assert record.trace[-1].chosen_entry is None
+    assert record.stop_reason == "arrived"
