@@ -12,6 +12,7 @@ import pytest
 from toy_house import write_tasks
 
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
+from evonav.evaluation.agent_process import AgentHosting
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
@@ -118,7 +119,10 @@ def test_an_agents_fault_costs_its_stage_alone(tasks, tmp_path, agent, message):
 )
 def test_a_worker_that_is_lost_costs_its_episode_alone(tasks, tmp_path, agent, kind, message):
     config = RunConfig(
-        backend=TOY, protocol=CONFIG.protocol, stage_timeout_s=8.0 if kind is ErrorKind.TIMEOUT else 600.0
+        backend=TOY,
+        protocol=CONFIG.protocol,
+        stage_timeout_s=8.0 if kind is ErrorKind.TIMEOUT else 600.0,
+        hosting=AgentHosting(is_in_process=True),
     )
     evaluate([agent, "toy_agents:Idle"], tasks[:1], tmp_path / "run", config=config, num_workers=1)
     assert all(record.is_scored for record in records(tmp_path / "run", "toy_agents:Idle"))
@@ -232,6 +236,7 @@ INTERRUPTED = """
 import sys
 from pathlib import Path
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.agent_process import AgentHosting
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.protocol import ProtocolConfig
 

@@ -1,9 +1,13 @@
-"""Agents by name: evonav's own, those of installed packages, and any class by its import path."""
+"""Agents by name: evonav's own, those of installed packages, and any class by its import path or file."""
 
 import inspect
+import sys
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import entry_points
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
 from typing import Any, cast
 
 from evonav.agents.agent import Agent
@@ -28,7 +32,8 @@ def agent_factory(name: str) -> Callable[..., Agent]:
     """What makes an agent.
 
     Args:
-        name: A built-in name, an entry point of the group `evonav.agents`, or `package.module:Class`.
+        name: A built-in name, an entry point of the group `evonav.agents`, `package.module:Class`, or
+            `path/to/file.py:Class`.
 
     Raises:
         InvalidArgumentError: There is no such agent, or importing it fails.
@@ -41,7 +46,9 @@ def agent_factory(name: str) -> Callable[..., Agent]:
     if ":" in name:
         return imported(name)
     known = ", ".join(sorted(agent_descriptions()))
-    raise InvalidArgumentError(f"no agent `{name}`; there are {known}, or name a class as `package.module:Class`")
+    raise InvalidArgumentError(
+        f"no agent `{name}`; there are {known}, or name a class as `package.module:Class` or `./file.py:Class`"
+    )
 
 
 def new_agent(factory: Callable[..., Agent], decision: DecisionModel | None = None) -> Agent:
@@ -60,17 +67,44 @@ def agent_descriptions() -> dict[str, str]:
     return {**installed, **{name: description for name, (_, description) in BUILT_IN.items()}}
 
 
-def imported(path: str) -> Callable[..., Agent]:
-    """The callable at `package.module:name`.
+def imported(path: str, what: str = "agent") -> Callable[..., Any]:
+    """The callable at `package.module:name`, or at `path/to/file.py:name`.
+
+    Args:
+        path: Where.
+        what: To call it in errors.
 
     Raises:
         InvalidArgumentError: It cannot be imported, or is not callable.
     """
-    module, _, attribute = path.partition(":")
+    module, _, attribute = path.rpartition(":")
     try:
-        found = getattr(import_module(module), attribute)
+        found = getattr(_file_module(module) if module.endswith(".py") else import_module(module), attribute)
     except Exception as error:  # importing runs a stranger's code: whatever it raises belongs to the name
-        raise InvalidArgumentError(f"agent `{path}` cannot be imported: {type(error).__name__}: {error}") from error
+        raise InvalidArgumentError(f"{what} `{path}` cannot be imported: {type(error).__name__}: {error}") from error
     if not callable(found):
-        raise InvalidArgumentError(f"agent `{path}` is not callable: name a class or a function that makes an agent")
-    return cast("Callable[..., Agent]", found)
+        raise InvalidArgumentError(f"{what} `{path}` is not callable: name a class or a function that makes one")
+    return cast("Callable[..., Any]", found)
+
+
+def _file_module(path: str) -> ModuleType:
+    """A Python file as a module by its own name, which may import its neighbours; loaded once."""
+    file = Path(path).resolve()
+    there = sys.modules.get(file.stem)
+    if there is not None and getattr(there, "__file__", None) == str(file):
+        return there
+    if there is not None:
+        raise ImportError(f"a module `{file.stem}` is there already: give the file another name")
+    spec = spec_from_file_location(file.stem, file)
+    if spec is None or spec.loader is None or not file.is_file():
+        raise FileNotFoundError(f"no file {path}")
+    module = module_from_spec(spec)
+    if str(file.parent) not in sys.path:
+        sys.path.append(str(file.parent))
+    sys.modules[file.stem] = module  # before it runs, as import does: dataclasses look there
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[file.stem]
+        raise
+    return module

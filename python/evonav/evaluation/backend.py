@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from evonav.agents.agent import Agent
-from evonav.agents.registry import agent_factory, new_agent
+from evonav.agents.registry import BUILT_IN, agent_factory, new_agent
 from evonav.decision.questions.question import DecisionModel
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.agent_process import DecisionSpec, check_importable
 from evonav.evaluation.privileged import YARDSTICKS, yardstick
 from evonav.evaluation.protocol import EpisodeCase
 from evonav.evaluation.sensing import Perception
@@ -76,9 +77,14 @@ class Backend:
         finally:
             simulator.close()
 
+    def decision_spec(self) -> DecisionSpec:
+        """How the decision model is made, for an agent in a process of its own."""
+        return DecisionSpec(self.decision, {**self.decision_options, **self.decision_host_options})
+
     def make_decision(self, seed: int) -> DecisionModel:
         """A decision model for one agent's episode."""
-        model: DecisionModel = _imported(self.decision)(seed, **self.decision_options, **self.decision_host_options)
+        spec = self.decision_spec()
+        model: DecisionModel = _imported(spec.path)(seed, **spec.options)
         return model
 
     def make_perception(self) -> Perception:
@@ -100,8 +106,12 @@ def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
     return yardstick(name) if name in YARDSTICKS else new_agent(agent_factory(name), decision)
 
 
-def check_agent_name(name: str) -> None:
+def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
     """Refuses a name that no worker could make an agent of.
+
+    Args:
+        name: Of an agent.
+        is_in_process: Import it here; otherwise in a process of its own, unless it is one of ours.
 
     Raises:
         InvalidArgumentError: There is none of this name, or it cannot be imported.
@@ -109,7 +119,10 @@ def check_agent_name(name: str) -> None:
     if name in YARDSTICKS:
         return
     try:
-        agent_factory(name)
+        if is_in_process or name in BUILT_IN:
+            agent_factory(name)
+        else:
+            check_importable(name)
     except InvalidArgumentError as error:
         raise InvalidArgumentError(f"{error}; yardsticks are {', '.join(sorted(YARDSTICKS))}") from error
 

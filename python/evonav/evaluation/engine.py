@@ -3,15 +3,23 @@
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError, TaskError
+from evonav.evaluation.agent_process import LOG_NAME, AgentHosting
 from evonav.evaluation.backend import Backend, check_agent_name
 from evonav.evaluation.metrics import AgentSummary, paired_differences, summarise, summary_json
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome, as_errored, as_not_run
+from evonav.evaluation.protocol import (
+    EpisodeCase,
+    ProtocolConfig,
+    StageOutcome,
+    as_errored,
+    as_not_run,
+    unknown_case,
+)
 from evonav.evaluation.records import EndState, ErrorKind, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.workers import EpisodeJob, JobEvent, run_here, run_in_workers
@@ -29,7 +37,10 @@ class RunConfig:
     protocol: ProtocolConfig = field(default_factory=ProtocolConfig)
     backend: Backend = field(default_factory=Backend)
     stage_timeout_s: float = 900.0
-    """After which a stage is errored; not part of what makes runs the same."""
+    """After which a stage is errored (of an agent in a process of its own, a round); like all that follows, not part of
+    what makes runs the same."""
+    hosting: AgentHosting = field(default_factory=AgentHosting)
+    """Where agents run; with `num_workers=0`, always in this process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +119,12 @@ def evaluate(
         TaskError: A task is malformed.
     """
     config = config or RunConfig()
-    _check_request(agents, tasks, num_workers)
+    hosting = replace(
+        config.hosting,
+        is_in_process=config.hosting.is_in_process or num_workers == 0,
+        log=config.hosting.log or str(run_dir.absolute() / LOG_NAME),
+    )
+    _check_request(agents, tasks, num_workers, hosting)
     with writing(run_dir), RunStore(run_dir, create=True) as store:
         _claim(store, run_dir, tasks, config)
         store.set_meta("agents", sorted({*(store.meta("agents") or []), *agents}))
@@ -124,6 +140,7 @@ def evaluate(
                 jobs,
                 config.backend,
                 config.protocol,
+                hosting,
                 num_workers=num_workers,
                 stage_timeout_s=config.stage_timeout_s,
             )
@@ -227,7 +244,11 @@ class _Run:
     def _left_behind(self, job: EpisodeJob, kind: ErrorKind, message: str) -> Iterator[StageRecord]:
         """Records of the stages of a job that ended early: the first errored, the rest not run."""
         task = self._tasks[job.task_id]
-        case: EpisodeCase = self._config.backend.load_case(task.path)
+        try:
+            case: EpisodeCase = self._config.backend.load_case(task.path)
+        except Exception as error:  # whatever a broken file does to whatever reads it
+            kind, message = ErrorKind.HARNESS, f"the task cannot be read: {type(error).__name__}: {error}"
+            case = unknown_case(task.task_id, task.num_stages)
         failed: StageRecord | None = None
         for stage in range(1, task.num_stages + 1):
             if (job.agent, job.task_id, stage) in self._states:
@@ -246,7 +267,7 @@ def agent_seed(seed: int, agent: str, task_id: str) -> int:
     return int.from_bytes(digest[:6], "big")
 
 
-def _check_request(agents: Sequence[str], tasks: Sequence[TaskFile], num_workers: int) -> None:
+def _check_request(agents: Sequence[str], tasks: Sequence[TaskFile], num_workers: int, hosting: AgentHosting) -> None:
     if not agents:
         raise InvalidArgumentError("no agent to evaluate")
     if len(set(agents)) != len(agents):
@@ -256,7 +277,7 @@ def _check_request(agents: Sequence[str], tasks: Sequence[TaskFile], num_workers
     if num_workers < 0:
         raise InvalidArgumentError(f"num_workers = {num_workers}: must be >= 0")
     for agent in agents:
-        check_agent_name(agent)
+        check_agent_name(agent, is_in_process=hosting.is_in_process)
 
 
 def _claim(store: RunStore, run_dir: Path, tasks: Sequence[TaskFile], config: RunConfig) -> None:

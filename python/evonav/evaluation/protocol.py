@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from evonav.agents.agent import Sensing
 from evonav.errors import EvonavError, InvalidArgumentError
 from evonav.evaluation.metrics import SUCCESS_RADIUS_M
@@ -120,6 +122,28 @@ class EpisodeCase:
             target=case.target,
             transition=case.transition,
         )
+
+
+def unknown_case(task_id: str, num_stages: int) -> EpisodeCase:
+    """Stands for a task that cannot be read, so that its stages have records: nothing in it is known."""
+    nothing = np.zeros((0, 0, 3), dtype=np.uint8)
+    stages = tuple(
+        StageCase(
+            public=StageInput(stage, "", "", "", "", nothing),
+            house_json="",
+            target=TargetRecord(
+                object_id="",
+                category="",
+                position_m=(0.0, 0.0, 0.0),
+                room_id="",
+                is_relocated=False,
+                is_relocated_now=False,
+            ),
+            transition=TransitionRecord(),
+        )
+        for stage in range(1, num_stages + 1)
+    )
+    return EpisodeCase(task_id, "", Pose(0.0, 0.0, 0.0, 0.0), stages)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,6 @@
-"""Worker processes: an episode each, contained. A worker that dies or hangs costs its stage, not the run.
+"""Worker processes: an episode each, contained. A worker that dies or hangs costs its episode, not the run.
+
+Agents run in processes of their own (`agent_process.py`), unless they are yardsticks or it is switched off.
 
 Parent and workers exchange JSON only: nothing a worker sends is unpickled.
 
@@ -11,21 +13,28 @@ import json
 import multiprocessing
 import time
 from collections import Counter
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass, replace
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
+from evonav.agents.agent import Agent, AgentAction, Sensing
+from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.backend import Backend, make_agent
+from evonav.evaluation.privileged import YARDSTICKS
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
-from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
+from evonav.evaluation.records import EndState, ErrorKind, RoundRecord, StageMap, StageRecord
 from evonav.evaluation.rollout import Episode
 from evonav.parallel import cause_of_death, end_process, end_with_parent, one_thread_each
+from evonav.sensors.observation import Observation
+from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.simulator import Simulator
 
 MAX_SIMULATOR_RESTARTS = 2
 """A stage."""
+SIGN_OF_LIFE_S = 5.0
+"""Between two that a worker gives, at least."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +61,33 @@ class JobEvent:
 
 
 class Workplace:
-    """Where episodes run one after another, with one simulator for all: one with a process takes long to start."""
+    """Where episodes run one after another, with one simulator for all: one with a process takes long to start.
 
-    def __init__(self, backend: Backend, protocol: ProtocolConfig) -> None:
+    So it is with the processes of agents.
+    """
+
+    def __init__(
+        self,
+        backend: Backend,
+        protocol: ProtocolConfig,
+        hosting: AgentHosting,
+        on_round: Callable[[], None] = lambda: None,
+    ) -> None:
         """Makes nothing yet."""
         self.backend = backend
         self.protocol = protocol
+        self.on_round = on_round
         self._simulator: Simulator | None = None
+        self._processes = None if hosting.is_in_process else AgentProcesses(hosting)
+
+    def agent(self, job: EpisodeJob) -> Agent:
+        """A fresh agent. Yardsticks are told oracle data: they stay here."""
+        if self._processes is not None and job.agent not in YARDSTICKS:
+            return RemoteAgent(self._processes, job.agent, self.backend.decision_spec(), job.seed)
+        try:
+            return make_agent(job.agent, self.backend.make_decision(job.seed))
+        except Exception as error:
+            return _Unmade(error)
 
     @contextmanager
     def simulator(self) -> Iterator[Simulator]:
@@ -72,10 +101,52 @@ class Workplace:
         self._simulator = simulator
 
     def close(self) -> None:
-        """Closes the simulator; safe to call twice."""
+        """Closes the simulator and ends the agents' processes; safe to call twice."""
         if self._simulator is not None:
             self._simulator.close()
         self._simulator = None
+        if self._processes is not None:
+            self._processes.close()
+
+
+class _Unmade:
+    """Stands for an agent whose making has failed: its stages are errored with that, each."""
+
+    def __init__(self, error: Exception) -> None:
+        self._error = error
+
+    @property
+    def sensing(self) -> Sensing:
+        raise self._error
+
+    @sensing.setter
+    def sensing(self, _: Sensing) -> None:
+        raise self._error
+
+    def begin_task(self, task: TaskInfo) -> None:
+        raise self._error
+
+    def begin_stage(self, stage: StageInput) -> None:
+        raise self._error
+
+    def act(self, observation: Observation) -> AgentAction:
+        raise self._error
+
+
+class _Heartbeat:
+    """Says of every round that the episode goes on."""
+
+    def __init__(self, on_round: Callable[[], None]) -> None:
+        self._on_round = on_round
+
+    def stage_begins(self, stage: int, simulator: Simulator) -> None:
+        self._on_round()
+
+    def round_begins(self, observation: Observation) -> None:
+        pass
+
+    def round_ends(self, record: RoundRecord) -> None:
+        self._on_round()
 
 
 def run_job(job: EpisodeJob, workplace: Workplace) -> Generator[StageOutcome]:
@@ -103,13 +174,14 @@ def run_job(job: EpisodeJob, workplace: Workplace) -> Generator[StageOutcome]:
 def _attempt(case: EpisodeCase, job: EpisodeJob, workplace: Workplace) -> Generator[StageOutcome]:
     perception = workplace.backend.make_perception()
     with workplace.simulator() as simulator:
-        agent = make_agent(job.agent, workplace.backend.make_decision(job.seed))
-        yield from Episode(case, job.agent, agent, simulator, perception, workplace.protocol, job.seed).run()
+        agent = workplace.agent(job)
+        observer = _Heartbeat(workplace.on_round)
+        yield from Episode(case, job.agent, agent, simulator, perception, workplace.protocol, job.seed, observer).run()
 
 
 def run_here(jobs: Sequence[EpisodeJob], backend: Backend, protocol: ProtocolConfig) -> Iterator[JobEvent]:
-    """Runs jobs one after another in this process: for debuggers. Nothing is contained but exceptions."""
-    with closing(Workplace(backend, protocol)) as workplace:
+    """Runs jobs one after another in this process, agents included: for debuggers. Only exceptions are contained."""
+    with closing(Workplace(backend, protocol, AgentHosting(is_in_process=True))) as workplace:
         for job in jobs:
             try:
                 with closing(run_job(job, workplace)) as outcomes:
@@ -125,6 +197,7 @@ def run_in_workers(
     jobs: Sequence[EpisodeJob],
     backend: Backend,
     protocol: ProtocolConfig,
+    hosting: AgentHosting,
     *,
     num_workers: int,
     stage_timeout_s: float,
@@ -135,25 +208,30 @@ def run_in_workers(
     """
     pending = list(reversed(jobs))
     num_workers = min(num_workers, len(jobs))
-    workers = [_Worker(backend, protocol) for _ in range(num_workers)]
+    # An agent in a process of its own has a limit of its own, for every answer; what is left is for all the rest.
+    limit_s = stage_timeout_s if hosting.is_in_process else stage_timeout_s + hosting.timeout_s
+    workers = [_Worker(backend, protocol, hosting) for _ in range(num_workers)]
     try:
         while True:
             for index, worker in enumerate(workers):
                 if worker.job is None and pending:
                     if not worker.is_alive:
-                        worker = workers[index] = _Worker(backend, protocol)
+                        worker = workers[index] = _Worker(backend, protocol, hosting)
                     worker.start(pending.pop())
             busy = [worker for worker in workers if worker.job is not None]
             if not busy:
                 return
-            timeout_s = max(0.0, min(worker.last_news_s for worker in busy) + stage_timeout_s - time.monotonic())
+            timeout_s = max(0.0, min(worker.last_news_s for worker in busy) + limit_s - time.monotonic())
             ready = wait([worker.connection for worker in busy], timeout_s)
             now_s = time.monotonic()
             for worker in busy:
                 if worker.connection in ready:
-                    yield worker.receive()
-                elif now_s - worker.last_news_s >= stage_timeout_s:
-                    yield worker.give_up(ErrorKind.TIMEOUT, f"no stage ended within {stage_timeout_s:g} s")
+                    event = worker.receive()
+                    if event is not None:
+                        yield event
+                elif now_s - worker.last_news_s >= limit_s:
+                    what = "stage" if hosting.is_in_process else "round"
+                    yield worker.give_up(ErrorKind.TIMEOUT, f"no {what} ended within {limit_s:g} s")
     finally:
         for worker in workers:
             worker.close()
@@ -162,13 +240,12 @@ def run_in_workers(
 class _Worker:
     """The parent's side of a worker process."""
 
-    def __init__(self, backend: Backend, protocol: ProtocolConfig) -> None:
+    def __init__(self, backend: Backend, protocol: ProtocolConfig, hosting: AgentHosting) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, far_end = context.Pipe()
         with one_thread_each():
-            self._process = context.Process(
-                target=_serve, args=(far_end, json.dumps(asdict(backend)), json.dumps(asdict(protocol))), daemon=True
-            )
+            settings = [json.dumps(asdict(part)) for part in (backend, protocol, hosting)]
+            self._process = context.Process(target=_serve, args=(far_end, *settings), daemon=True)
             self._process.start()
         far_end.close()
         self.job: EpisodeJob | None = None
@@ -185,8 +262,8 @@ class _Worker:
         with suppress(BrokenPipeError):
             self.connection.send_bytes(json.dumps(asdict(job)).encode())
 
-    def receive(self) -> JobEvent:
-        """The next event; a closed connection means that the process died."""
+    def receive(self) -> JobEvent | None:
+        """The next event, or a sign of life; a closed connection means that the process died."""
         assert self.job is not None
         try:
             message = json.loads(self.connection.recv_bytes())
@@ -194,6 +271,8 @@ class _Worker:
             return self.give_up(ErrorKind.CRASH, f"the worker process died ({cause_of_death(self._process)})")
         self.last_news_s = time.monotonic()
         job = self.job
+        if message["kind"] == "alive":
+            return None
         if message["kind"] == "stage":
             plan = message["map"]
             outcome = StageOutcome(
@@ -220,13 +299,32 @@ class _Worker:
         end_process(self._process, self.connection)
 
 
-def _serve(connection: Connection, backend_json: str, protocol_json: str) -> None:
+def _serve(connection: Connection, backend_json: str, protocol_json: str, hosting_json: str) -> None:
     """A worker's life: jobs in, stages out, until the parent hangs up."""
     end_with_parent()
-    workplace = Workplace(Backend(**json.loads(backend_json)), ProtocolConfig(**json.loads(protocol_json)))
+    hosting = AgentHosting(**json.loads(hosting_json))
+    workplace = Workplace(
+        Backend(**json.loads(backend_json)),
+        ProtocolConfig(**json.loads(protocol_json)),
+        hosting,
+        on_round=(lambda: None) if hosting.is_in_process else _signs_of_life(connection),
+    )
     with closing(workplace), suppress(EOFError, OSError):  # of the connection: the parent hung up
         while True:
             _serve_job(connection, EpisodeJob(**json.loads(connection.recv_bytes())), workplace)
+
+
+def _signs_of_life(connection: Connection) -> Callable[[], None]:
+    """Tells the parent now and then that an episode goes on."""
+    told_s = time.monotonic()
+
+    def tell() -> None:
+        nonlocal told_s
+        if time.monotonic() - told_s >= SIGN_OF_LIFE_S:
+            told_s = time.monotonic()
+            _send(connection, {"kind": "alive"})
+
+    return tell
 
 
 def _serve_job(connection: Connection, job: EpisodeJob, workplace: Workplace) -> None:

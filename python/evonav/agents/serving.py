@@ -1,0 +1,208 @@
+"""The life of an agent's process: it makes agents of one name and answers for them until the evaluator hangs up.
+
+Started by `evonav.evaluation.agent_process`. Requests are pickled (they come from the evaluator, who is trusted), with
+arrays in one block of shared memory from which they are copied, so that an agent may keep and change them. Answers are
+JSON. The process is given no path of a task and imports nothing that reads one.
+"""
+
+import ctypes
+import faulthandler
+import json
+import mmap
+import os
+import pickle
+import signal
+import socket
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any
+
+from evonav.agents import wire
+from evonav.agents.agent import Agent, ExplainingAgent, RoundDiagnostics
+from evonav.agents.registry import agent_factory, imported, new_agent
+from evonav.errors import DecisionError
+
+LENGTH = struct.Struct("<Q")
+"""Of the message that follows."""
+
+
+def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
+    """Serves on the inherited descriptors.
+
+    Args:
+        socket_fd: Where requests come from and answers go.
+        life_fd: A pipe that the evaluator closes by dying, if by nothing else.
+        block_fd: The shared memory.
+    """
+    for descriptor in (socket_fd, life_fd, block_fd):
+        os.set_inheritable(descriptor, False)
+    sys.argv[1:] = []
+    sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
+    faulthandler.enable()
+    _end_with_parent(life_fd)
+    with socket.socket(fileno=socket_fd) as connection, suppress(BrokenPipeError, ConnectionResetError):
+        _serve(connection, _Block(block_fd))
+
+
+def _end_with_parent(life_fd: int) -> None:
+    """Makes this process leave interrupts to the evaluator, and end with it whatever it is at."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":  # also while an agent holds the interpreter's lock
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+
+    def watch() -> None:
+        with suppress(OSError):
+            os.read(life_fd, 1)
+        _end_group()
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _end_group() -> None:
+    """Ends this process and what it has started."""
+    if os.getpgrp() == os.getpid():
+        os.killpg(os.getpid(), signal.SIGKILL)
+    os._exit(1)
+
+
+class _Block:
+    """The shared memory, from the reader's side."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._map: mmap.mmap | None = None
+
+    def copies(self, places: list[tuple[int, int]]) -> list[bytearray]:
+        """Copies of parts, each by offset and size."""
+        end = max((offset + size for offset, size in places), default=0)
+        if end == 0:
+            return [bytearray() for _ in places]
+        if self._map is None or len(self._map) < end:
+            self._map = mmap.mmap(self._descriptor, os.fstat(self._descriptor).st_size, access=mmap.ACCESS_READ)
+        with memoryview(self._map) as block:
+            return [bytearray(block[offset : offset + size]) for offset, size in places]
+
+
+def _serve(connection: socket.socket, block: _Block) -> None:
+    server = _Server()
+    pid = os.getpid()
+    while True:
+        request = _received(connection)
+        if request is None:
+            return
+        places, message = pickle.loads(request)  # noqa: S301 - of the evaluator
+        operation, arguments = pickle.loads(message, buffers=block.copies(places))  # noqa: S301
+        parts = server.answer(operation, arguments)
+        del arguments
+        if os.getpid() != pid:
+            os._exit(1)  # a fork that an agent made and that came back: there is one answer, its parent's
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(Exception):  # an agent may have closed or replaced it
+                stream.flush()
+        parts["cpu_s"] = json.dumps(time.process_time())
+        text = "{" + ",".join(f'"{name}":{part}' for name, part in parts.items()) + "}"
+        data = text.encode()
+        connection.sendall(LENGTH.pack(len(data)) + data)
+
+
+def _received(connection: socket.socket) -> bytearray | None:
+    """The next message; `None` when there will be none."""
+    header = _exactly(connection, LENGTH.size)
+    return None if header is None else _exactly(connection, LENGTH.unpack(header)[0])
+
+
+def _exactly(connection: socket.socket, size: int) -> bytearray | None:
+    data = bytearray(size)
+    with memoryview(data) as rest:
+        done = 0
+        while done < size:
+            count = connection.recv_into(rest[done:])
+            if count == 0:
+                return None
+            done += count
+    return data
+
+
+class _Server:
+    """The agent at work; answers are parts of a JSON object, each already a text."""
+
+    def __init__(self) -> None:
+        self._factory: Callable[..., Agent] | None = None
+        self._agent: Agent | None = None
+
+    def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, str]:
+        """Does as asked; what the agent raises is an answer too."""
+        try:
+            parts: dict[str, str] = getattr(self, f"do_{operation}")(*arguments)
+        except DecisionError as error:
+            return {"failed": json.dumps(["decision", wire.clean(str(error))])}
+        except Exception as error:
+            return {"failed": json.dumps(["agent", wire.describe(error)])}
+        return parts
+
+    @property
+    def agent(self) -> Agent:
+        """The agent that was made."""
+        assert self._agent is not None, "`make` comes first"
+        return self._agent
+
+    def do_load(self, name: str, memory_mb: int | None) -> dict[str, str]:
+        """Imports what makes agents."""
+        if memory_mb is not None:
+            _limit_memory(memory_mb)
+        self._factory = agent_factory(name)
+        return {}
+
+    def do_make(self, decision: str, seed: int, options: Mapping[str, Any]) -> dict[str, str]:
+        """Makes a decision model, and a fresh agent with it; whatever was there before is dropped."""
+        assert self._factory is not None, "`load` comes first"
+        self._agent = None
+        self._agent = new_agent(self._factory, imported(decision, "decision model")(seed, **options))
+        return self._sensing()
+
+    def do_begin_task(self, task: Any) -> dict[str, str]:  # noqa: ANN401 - `TaskInfo`
+        """A new house."""
+        self.agent.begin_task(task)
+        return self._sensing()
+
+    def do_begin_stage(self, stage: Any) -> dict[str, str]:  # noqa: ANN401 - `StageInput`
+        """A new goal."""
+        self.agent.begin_stage(stage)
+        return self._sensing()
+
+    def do_act(self, observation: Any) -> dict[str, str]:  # noqa: ANN401 - `Observation`
+        """A decision round, and what the agent says of it."""
+        agent = self.agent
+        parts = {"action": wire.action_json(wire.checked_action(agent.act(observation), agent.sensing))}
+        if isinstance(agent, ExplainingAgent):
+            try:
+                told = agent.diagnostics()
+                # What it said before belongs to that round's record.
+                parts["told"] = wire.diagnostics_json(told)
+            except DecisionError as error:
+                parts["told_failed"] = json.dumps(["decision", wire.clean(str(error))])
+            except Exception as error:
+                parts["told_failed"] = json.dumps(["agent", wire.describe(error)])
+        else:
+            parts["told"] = wire.diagnostics_json(RoundDiagnostics())
+        return parts
+
+    def do_entries(self) -> dict[str, str]:
+        """The object memory."""
+        agent = self.agent
+        return {"entries": wire.entries_json(agent.entries() if isinstance(agent, ExplainingAgent) else ())}
+
+    def _sensing(self) -> dict[str, str]:
+        return {"sensing": wire.sensing_json(self.agent.sensing)}
+
+
+def _limit_memory(memory_mb: int) -> None:
+    """Address space that the process may have; more is a `MemoryError`."""
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_AS, (memory_mb << 20, memory_mb << 20))

@@ -1,0 +1,465 @@
+"""Agents in processes of their own: they cannot reach oracle data, and what they break is theirs.
+
+A process serves agents of one name, a fresh object an episode (`evonav.agents.serving` is its side). Observations go
+there pickled, their arrays through one block of shared memory; answers come back as JSON, and nothing that an agent
+says is unpickled or believed to be well-formed. The process inherits no descriptor but three, is given no path, and
+leads a process group, so that what an agent has started ends with it.
+
+This is no sandbox: an agent that goes looking can read what this user can read. For that, run evonav in a container.
+"""
+
+import fcntl
+import mmap
+import os
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from evonav.agents import wire
+from evonav.agents.agent import AgentAction, EntryBelief, RoundDiagnostics, Sensing
+from evonav.agents.serving import LENGTH
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.protocol import AgentFailedError
+from evonav.evaluation.records import ErrorKind
+from evonav.parallel import one_thread_each
+from evonav.sensors.observation import Observation
+from evonav.tasks.public import StageInput, TaskInfo
+
+LOG_NAME = "agents.log"
+"""In a run's folder: all that agents have printed."""
+LOAD_TIMEOUT_S = 300.0
+"""At least, for an agent's module to be imported."""
+MAX_PROCESSES = 8
+"""Kept by a worker, one an agent's name; the one that was used longest ago makes room."""
+MAX_ANSWER_BYTES = 2 * wire.MAX_ENTRIES_BYTES
+MAX_LOG_BYTES = 10_000_000
+"""Of an episode; what an agent prints beyond is dropped, and the log says so."""
+_MAX_LINE_BYTES = 65536
+_ALIGN = 64
+_POLL_S = 0.05
+"""Between looks whether a process lives, where the system cannot be asked to tell."""
+_START = (
+    "import sys; sys.path[:] = sys.argv[4:]; from evonav.agents.serving import main; main(*map(int, sys.argv[1:4]))"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class AgentHosting:
+    """Where agents run; no part of what makes runs the same."""
+
+    is_in_process: bool = False
+    """In the evaluator's own process, where nothing is contained but exceptions."""
+    timeout_s: float = 600.0
+    """For an answer; then the process is ended."""
+    memory_mb: int | None = None
+    """Address space that an agent's process may have."""
+    log: str | None = None
+    """File that what agents print is appended to; default: the evaluator's standard error."""
+
+
+@dataclass(frozen=True, slots=True)
+class DecisionSpec:
+    """How a decision model is made, in the agent's process."""
+
+    path: str = "evonav.decision.backends:text_match"
+    """Import path; called with a seed and `options`."""
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+class AgentProcess:
+    """A process with an agent in it."""
+
+    def __init__(self, name: str, hosting: AgentHosting) -> None:
+        """Starts it; the agent's module is imported there.
+
+        Raises:
+            AgentFailedError: It cannot be imported, dies of it, or takes too long.
+        """
+        self.name = name
+        self.cpu_s = 0.0
+        """CPU time that it has used, by its own account."""
+        self._hosting = hosting
+        self._block = _SharedBlock()
+        self._connection, far_end = socket.socketpair()
+        life, self._life = os.pipe()
+        output = None if hosting.log is None else _Log(Path(hosting.log), name)
+        self._log = output
+        try:
+            arguments = (far_end.fileno(), life, self._block.descriptor)
+            with one_thread_each():
+                self._process = subprocess.Popen(  # noqa: S603 - ourselves
+                    [sys.executable, "-c", _START, *map(str, arguments), *sys.path],
+                    pass_fds=arguments,
+                    stdin=subprocess.DEVNULL,
+                    stdout=sys.__stderr__ if output is None else output.descriptor,
+                    stderr=None if output is None else output.descriptor,
+                    start_new_session=True,
+                )
+        finally:
+            far_end.close()
+            os.close(life)
+            if output is not None:
+                output.begin()
+        self._watch = os.pidfd_open(self._process.pid) if hasattr(os, "pidfd_open") else None
+        self._is_asking = False
+        self._is_closed = False
+        try:
+            self.ask("load", name, hosting.memory_mb, timeout_s=max(hosting.timeout_s, LOAD_TIMEOUT_S))
+        except BaseException:
+            self.close(is_at_once=True)
+            raise
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether it lives and waits for a request."""
+        return not self._is_closed and not self._is_asking and self._process.poll() is None
+
+    def describe(self, label: str) -> None:
+        """Says what it is at, for the log."""
+        if self._log is not None:
+            self._log.begin_part(label)
+
+    def ask(self, operation: str, *arguments: object, timeout_s: float | None = None) -> dict[str, Any]:
+        """A request and its answer.
+
+        Raises:
+            AgentFailedError: The agent raised (`agent`, `decision`); or it died or hung (`crash`, `timeout`), and its
+                process is ended.
+        """
+        timeout_s = timeout_s or self._hosting.timeout_s
+        deadline_s = time.monotonic() + timeout_s
+        self._is_asking = True
+        try:
+            self._send(operation, arguments, deadline_s)
+            said = self._answer(deadline_s)
+        except TimeoutError:
+            self.close(is_at_once=True)
+            message = f"no answer to `{operation}` within {timeout_s:g} s"
+            raise AgentFailedError(ErrorKind.TIMEOUT, message) from None
+        except (OSError, ValueError) as error:
+            died = self._cause_of_death() if isinstance(error, OSError) else None
+            self.close(is_at_once=True)
+            message = died or f"the agent's process answered with what is no answer: {wire.clean(str(error))}"
+            raise AgentFailedError(ErrorKind.CRASH, message) from None
+        self._is_asking = False
+        self.cpu_s = said["cpu_s"]
+        if (failed := said.get("failed")) is not None:
+            raise _failure(failed)
+        return said
+
+    def _send(self, operation: str, arguments: tuple[object, ...], deadline_s: float) -> None:
+        buffers: list[pickle.PickleBuffer] = []
+        message = pickle.dumps((operation, arguments), protocol=5, buffer_callback=buffers.append)
+        request = pickle.dumps((self._block.write(buffers), message), protocol=5)
+        self._connection.settimeout(max(1e-3, deadline_s - time.monotonic()))
+        self._connection.sendall(LENGTH.pack(len(request)) + request)
+
+    def _answer(self, deadline_s: float) -> dict[str, Any]:
+        (size,) = LENGTH.unpack(self._exactly(LENGTH.size, deadline_s))
+        if size > MAX_ANSWER_BYTES:
+            raise ValueError(f"it has {size} bytes")
+        said = wire.read_json(bytes(self._exactly(size, deadline_s)))
+        if not isinstance(said, dict) or not isinstance(said.get("cpu_s"), float):
+            raise ValueError("it has none of our form")
+        return said
+
+    def _exactly(self, size: int, deadline_s: float) -> bytearray:
+        data = bytearray(size)
+        with memoryview(data) as rest:
+            done = 0
+            while done < size:
+                self._wait(deadline_s)
+                count = self._connection.recv_into(rest[done:])
+                if count == 0:
+                    raise ConnectionResetError("hung up")
+                done += count
+        return data
+
+    def _wait(self, deadline_s: float) -> None:
+        """Waits for something to read; not for what a child of a dead agent might still send."""
+        watched: list[Any] = [self._connection] if self._watch is None else [self._connection, self._watch]
+        while True:
+            left_s = deadline_s - time.monotonic()
+            if left_s <= 0.0:
+                raise TimeoutError
+            ready = wait(watched, left_s if self._watch is not None else min(left_s, _POLL_S))
+            if self._connection in ready:
+                return
+            if ready or (self._watch is None and self._process.poll() is not None):
+                raise ConnectionResetError("died")
+
+    def _cause_of_death(self) -> str:
+        try:
+            code = self._process.wait(timeout=2.0)
+        except subprocess.TimeoutExpired:
+            return "the agent's process hung up"
+        how = f"killed by signal {-code}" if code < 0 else f"exit code {code}"
+        return f"the agent's process died ({how})"
+
+    def close(self, *, is_at_once: bool = False) -> None:
+        """Ends it and what it has started; safe to call twice.
+
+        Args:
+            is_at_once: Without a chance to end by itself.
+        """
+        if self._is_closed:
+            return
+        self._is_closed = True
+        self._connection.close()
+        if not is_at_once and not self._is_asking:
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(timeout=2.0)
+        # Its group may live on in a process that it started.
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        os.close(self._life)
+        if self._watch is not None:
+            os.close(self._watch)
+        self._block.close()
+        if self._log is not None:
+            self._log.end()
+
+
+class AgentProcesses:
+    """A worker's processes, by the name of the agent."""
+
+    def __init__(self, hosting: AgentHosting) -> None:
+        """Starts nothing yet."""
+        self.hosting = hosting
+        self._processes: dict[str, AgentProcess] = {}
+
+    def process(self, name: str) -> AgentProcess:
+        """One that waits; another is started where there is none.
+
+        Raises:
+            AgentFailedError: It does not start.
+        """
+        found = self._processes.pop(name, None)
+        if found is not None and not found.is_usable:
+            found.close(is_at_once=True)
+            found = None
+        while found is None and len(self._processes) >= MAX_PROCESSES:
+            self._processes.pop(next(iter(self._processes))).close()
+        self._processes[name] = process = found or AgentProcess(name, self.hosting)
+        return process
+
+    def close(self) -> None:
+        """Ends all; safe to call twice."""
+        while self._processes:
+            self._processes.popitem()[1].close()
+
+
+class RemoteAgent:
+    """An agent in another process: `Agent` and `ExplainingAgent`.
+
+    After the loss of its process it is a fresh agent in a fresh one, that knows no task yet.
+    """
+
+    def __init__(self, processes: AgentProcesses, name: str, decision: DecisionSpec, seed: int) -> None:
+        """Starts nothing yet.
+
+        Args:
+            processes: Where its own is kept between episodes.
+            name: Of the agent.
+            decision: Of the model that it asks, made in its process.
+            seed: Of the model.
+        """
+        self._processes = processes
+        self._name = name
+        self._decision = decision
+        self._seed = seed
+        self._process: AgentProcess | None = None
+        self._sensing: Sensing | None = None
+        self._told: Mapping[str, Any] = {}
+        self._label = name
+        self._cpu_s = 0.0
+
+    @property
+    def cpu_s(self) -> float:
+        """CPU time that its processes have used."""
+        return self._cpu_s
+
+    @property
+    def sensing(self) -> Sensing:
+        """What it asks of its sensors."""
+        if self._sensing is None:
+            self._make()
+        assert self._sensing is not None
+        return self._sensing
+
+    @sensing.setter
+    def sensing(self, _: Sensing) -> None:
+        raise AttributeError("sensing: the agent's own to say")
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """A new house."""
+        self._label = f"{self._name} {task.task_id}"
+        self._describe(self._label)
+        self._sense(self._ask("begin_task", task))
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """A new goal."""
+        self._describe(f"{self._label} stage {stage.stage}")
+        self._sense(self._ask("begin_stage", stage))
+
+    def act(self, observation: Observation) -> AgentAction:
+        """A decision round."""
+        said = self._ask("act", observation)
+        self._told = said
+        return wire.action_of(said.get("action"), self.sensing)
+
+    def diagnostics(self) -> RoundDiagnostics:
+        """What it said of the last round, right after it."""
+        if (failed := self._told.get("told_failed")) is not None:
+            raise _failure(failed)
+        return wire.diagnostics_of(self._told.get("told"))
+
+    def entries(self) -> Sequence[EntryBelief]:
+        """Its object memory."""
+        return wire.entries_of(self._ask("entries").get("entries"))
+
+    def _make(self) -> None:
+        self._process = self._processes.process(self._name)
+        self._describe(self._label)
+        self._sense(self._ask("make", self._decision.path, self._seed, dict(self._decision.options)))
+
+    def _sense(self, said: Mapping[str, Any]) -> None:
+        self._sensing = wire.sensing_of(said.get("sensing"))
+
+    def _describe(self, label: str) -> None:
+        if self._process is not None:
+            self._process.describe(label)
+
+    def _ask(self, operation: str, *arguments: object) -> dict[str, Any]:
+        if self._process is None:
+            self._make()
+        process = self._process
+        assert process is not None
+        before_s = process.cpu_s
+        try:
+            return process.ask(operation, *arguments)
+        except AgentFailedError as error:
+            if error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT) or operation == "make":
+                self._process = self._sensing = None
+            raise
+        finally:
+            self._cpu_s += process.cpu_s - before_s
+
+
+def check_importable(name: str) -> None:
+    """Imports an agent in a process that ends then: this one runs no code of strangers.
+
+    Raises:
+        InvalidArgumentError: It cannot be imported.
+    """
+    try:
+        AgentProcess(name, AgentHosting()).close()
+    except AgentFailedError as error:
+        message = str(error).removeprefix("InvalidArgumentError: ").partition(" [")[0]
+        raise InvalidArgumentError(message) from None
+
+
+def _failure(said: object) -> AgentFailedError:
+    """The failure that a process says its agent had."""
+    if isinstance(said, list) and len(said) == 2 and said[0] in ("agent", "decision") and isinstance(said[1], str):
+        return AgentFailedError(ErrorKind(said[0]), said[1])
+    return AgentFailedError(ErrorKind.AGENT, "it failed and did not say how")
+
+
+class _SharedBlock:
+    """Memory that another process can read, from the writer's side."""
+
+    def __init__(self) -> None:
+        if hasattr(os, "memfd_create"):
+            self.descriptor = os.memfd_create("evonav", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+            # A reader that made the file shorter would have the writer killed by its next write.
+            fcntl.fcntl(self.descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL)
+        else:
+            with tempfile.TemporaryFile() as file:
+                self.descriptor = os.dup(file.fileno())
+        self._map: mmap.mmap | None = None
+
+    def write(self, buffers: Sequence[pickle.PickleBuffer]) -> list[tuple[int, int]]:
+        """Copies buffers into it. Returns offset and size of each."""
+        views = [buffer.raw() for buffer in buffers]
+        places, end = [], 0
+        for view in views:
+            places.append((end, view.nbytes))
+            end += -(-view.nbytes // _ALIGN) * _ALIGN
+        if end and (self._map is None or len(self._map) < end):
+            if self._map is not None:
+                self._map.close()
+            os.ftruncate(self.descriptor, end)
+            self._map = mmap.mmap(self.descriptor, end)
+        if self._map is not None:
+            with memoryview(self._map) as block:
+                for (offset, size), view in zip(places, views, strict=True):
+                    block[offset : offset + size] = view
+        for buffer, view in zip(buffers, views, strict=True):
+            view.release()
+            buffer.release()
+        return places
+
+    def close(self) -> None:
+        """Gives it back; the reader keeps what it has."""
+        if self._map is not None:
+            self._map.close()
+        os.close(self.descriptor)
+
+
+class _Log:
+    """Takes what a process prints to a file, line by line, with what the process was at.
+
+    Through a pipe: a descriptor of the file itself would tell the agent where the run is.
+    """
+
+    def __init__(self, path: Path, name: str) -> None:
+        self._reader, self.descriptor = os.pipe()
+        self._path = path
+        self._label = name
+        self._left = MAX_LOG_BYTES
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def begin(self) -> None:
+        """After the process was started, or was not."""
+        os.close(self.descriptor)
+        self._thread.start()
+
+    def begin_part(self, label: str) -> None:
+        """From here on, lines are of this."""
+        if label != self._label:
+            self._label = label
+            self._left = MAX_LOG_BYTES
+
+    def end(self) -> None:
+        """Waits a little for the last words."""
+        self._thread.join(timeout=1.0)
+
+    def _run(self) -> None:
+        with suppress(OSError), os.fdopen(self._reader, "rb") as output:
+            first = output.readline(_MAX_LINE_BYTES)
+            if first:  # no file where nothing is said
+                with self._path.open("ab", buffering=0) as file:
+                    self._copy(first, output, file)
+
+    def _copy(self, line: bytes, output: BinaryIO, file: BinaryIO) -> None:
+        while line:
+            label, left = self._label, self._left
+            self._left = left - len(line)
+            if left > 0:
+                file.write(f"{label} | ".encode() + line.rstrip(b"\n") + b"\n")
+                if self._left <= 0:
+                    file.write(f"{label} | ... more than {MAX_LOG_BYTES} bytes: the rest is dropped\n".encode())
+            line = output.readline(_MAX_LINE_BYTES)
