@@ -23,6 +23,8 @@ BUILT_IN: dict[str, tuple[str, str]] = {
     "ftu": ("evonav.agents.fail_then_update:FailThenUpdate", "Frontier-Update that checks its target on arrival"),
     "3d-mem": ("evonav.agents.three_d_mem:ThreeDMem", "3D-Mem: chooses among snapshots and frontiers, forgets nothing"),
     "msgnav": ("evonav.agents.msgnav:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
+    "unigoal": ("evonav.agents.unigoal:UniGoal", "UniGoal as released: single actions, detector, nearest frontiers"),
+    "unigoal-paper": ("evonav.agents.unigoal:UniGoalAsPublished", "UniGoal as published: the graphs do match"),
     "random-walk": ("evonav.agents.random_walk:RandomWalk", "yardstick: walks in random directions"),
 }
 """Import path and description by name."""

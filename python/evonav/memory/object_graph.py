@@ -5,6 +5,7 @@ label, so that a caption is the word that most detections at a place gave.
 """
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -98,6 +99,7 @@ class ObjectGraph:
         """What a correction called a node, and what detections called it then."""
         self.seen_ids: frozenset[int] = frozenset()
         """Entries that the last view showed."""
+        self._types: dict[int, Counter[str]] = {}
 
     @property
     def nodes(self) -> list[SceneNode]:
@@ -113,6 +115,10 @@ class ObjectGraph:
         """The node of an id, if it is still there."""
         return self._nodes.get(node_id)
 
+    def type_of(self, node_id: int) -> str:
+        """ProcTHOR's type of most detections at a node: for records, which judge entries by it."""
+        return self._types[node_id].most_common(1)[0][0]
+
     def begin_stage(self, stage: int) -> None:
         """Nodes and edges stay, stale or not."""
         self.objects.begin_stage(stage)
@@ -127,6 +133,10 @@ class ObjectGraph:
         found = relabelled(view.detections, WORD_OF_TYPE)
         shown = View(view.pose, view.intrinsics, view.depth_m, found, view.occupancy, view.rgb, view.camera_height_m)
         update = self.objects.update(shown)
+        types = [label for label in view.detections.labels if label in WORD_OF_TYPE]
+        for entry_id, kind in zip(update.entry_ids, types, strict=True):
+            if entry_id is not None:
+                self._types.setdefault(entry_id, Counter())[kind] += 1
         self.seen_ids = frozenset(entry_id for entry_id in update.entry_ids if entry_id is not None)
         new_ids = []
         for entry_id in sorted(self.seen_ids):  # the others are as they were
@@ -217,6 +227,7 @@ class ObjectGraph:
         """Takes a node out, with its edges and its points; it comes back if it is detected again."""
         self._nodes.pop(node_id, None)
         self._renamed.pop(node_id, None)
+        self._types.pop(node_id, None)
         self.objects.remove(node_id)
         self._drop_edges(node_id)
 

@@ -8,6 +8,7 @@ without a word are invisible to the agent; docs/agents.md says how many goals th
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evonav.sensors.observation import Detections
 
@@ -90,3 +91,12 @@ def relabelled(detections: Detections, words: Mapping[str, str]) -> Detections:
         confidences=detections.confidences[kept],
         features=None if detections.features is None else detections.features[kept],
     )
+
+
+def category_image(detections: Detections) -> NDArray[np.int32]:
+    """`(H, W)` index into `MAP_CATEGORIES` of each pixel, -1 where nothing that the map's detector knows is."""
+    index = [
+        MAP_CATEGORIES.index(CATEGORY_OF_TYPE[label]) if label in CATEGORY_OF_TYPE else -1
+        for label in detections.labels
+    ]
+    return np.array([*index, -1], np.int32)[detections.masks]

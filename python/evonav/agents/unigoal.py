@@ -1,0 +1,252 @@
+"""UniGoal (Yin et al., CVPR 2025) on this protocol: paper, Sec. C.3; design: agents.md sections 3 and 7.1.
+
+It explores frontiers with single actions, goes to what its detector takes for the goal, and lets the match of goal
+graph and scene graph draw exploration a little. What was once an obstacle stays one: its map takes nothing back.
+"""
+
+import math
+import random
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.agents.agent import (
+    AgentAction,
+    Belief,
+    EntryBelief,
+    FrontierBelief,
+    Move,
+    RoundDiagnostics,
+    Sensing,
+    Stop,
+    ViewSchedule,
+)
+from evonav.agents.unigoal_goals import GoalConfig, GoalWatch
+from evonav.agents.unigoal_graphs import Advice, GraphConfig, GraphReasoner
+from evonav.agents.unigoal_planner import PlannedStep, PlannerConfig, UniGoalPlanner
+from evonav.decision.asking import Asker
+from evonav.decision.questions.question import DecisionModel
+from evonav.decision.text_match import TextMatch
+from evonav.memory.bev import BevConfig, BevMap, Cells
+from evonav.memory.object_graph import SceneNode
+from evonav.memory.occupancy import BLOCKED, FREE
+from evonav.memory.vocabulary import MAP_CATEGORIES, category_image
+from evonav.sensors.observation import MapFrame, Observation
+from evonav.tasks.public import StageInput, TaskInfo
+from evonav.world.pose import Pose
+from evonav.world.simulator import Action
+
+Point2 = tuple[float, float]
+
+_BELIEF_STRIDE = 2
+"""Cells of the map that one cell of a picture stands for, along each axis."""
+
+
+@dataclass(frozen=True, slots=True)
+class UniGoalConfig:
+    """UniGoal's constants, and what its paper and its code disagree about."""
+
+    graph: GraphConfig = field(default_factory=GraphConfig)
+    bev: BevConfig = field(default_factory=BevConfig)
+    planner: PlannerConfig = field(default_factory=PlannerConfig)
+    goal: GoalConfig = field(default_factory=GoalConfig)
+    num_tries: int = 3
+    """Questions asked before an invalid answer is given up on, where UniGoal has no rule of its own."""
+
+
+class UniGoal:
+    """Maps, relates, explores, and walks up to what looks like the goal."""
+
+    sensing = Sensing(first_round=ViewSchedule(1, 0.0), later_rounds=ViewSchedule(1, 0.0), motion="actions")
+
+    def __init__(self, config: UniGoalConfig | None = None, decision: DecisionModel | None = None) -> None:
+        self.config = config or UniGoalConfig()
+        model: DecisionModel = decision or TextMatch()
+        self._asker = Asker(model, num_tries=self.config.num_tries)
+        self._diagnostics = RoundDiagnostics()
+        self._task: TaskInfo | None = None
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """Forgets everything; the map begins where the agent first stands."""
+        self._task = task
+        self._asker.counters.clear()
+        self._graphs = GraphReasoner(self.config.graph, self._asker)
+        self._random = random.Random(f"unigoal wander {task.seed}")  # noqa: S311 - not for secrets
+        self._bev: BevMap | None = None
+        self._num_given_up = 0
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """Map, visited cells, collisions and scene graph stay; the goal graph and all goals go."""
+        self._graphs.begin_stage(stage)
+        self._advice: Advice | None = None
+        self._wander_m: Point2 | None = None
+        self._num_steps = 0
+        self._num_explored = 0
+        self._watch: GoalWatch | None = None
+
+    def act(self, observation: Observation) -> AgentAction:
+        """One primitive action."""
+        self._asker.begin_round()
+        view, pose = observation.views[-1], observation.pose
+        bev, planner, watch = self._ready(pose)
+        planner.observe(pose)
+        bev.integrate(view, category_image(view.detections))
+        if self._graphs.goal_graph is None:
+            self._graphs.understand()
+        if self._num_steps % self.config.graph.steps_per_update == 0:
+            self._graphs.observe(view)
+        self._num_steps += 1
+        watch.look(view, self._graphs.category, self._graphs.scene.seen_ids)
+        watch.judge(pose)
+        step = self._step(bev, planner, watch, pose)
+        self._tell(planner, watch, step)
+        if step.action is Action.STOP:
+            return Stop("arrived")
+        return Move(step.action)
+
+    def _ready(self, pose: Pose) -> tuple[BevMap, UniGoalPlanner, GoalWatch]:
+        """Map and planner of the task, goals of the stage; made when first needed."""
+        assert self._task is not None, "begin_task comes first"
+        if self._bev is None:
+            self._bev = BevMap((pose.x_m, pose.z_m), len(MAP_CATEGORIES), self.config.bev)
+            self._planner = UniGoalPlanner(self._bev, self._task.seed, self.config.planner)
+        if self._watch is None:
+            self._planner.begin_stage()
+            self._watch = GoalWatch(self._bev, self._planner, self.config.goal)
+        return self._bev, self._planner, self._watch
+
+    def _step(self, bev: BevMap, planner: UniGoalPlanner, watch: GoalWatch, pose: Pose) -> PlannedStep:
+        """Towards the confirmed goal, else the temporary one, else where there is something to explore."""
+        if watch.goal is None:
+            target_m = self._exploration_target(bev, planner, watch, pose)
+        if watch.confirmed is not None:
+            return planner.step(pose, watch.confirmed.cells, "confirmed")
+        if watch.temporary is not None:
+            return planner.step(pose, watch.temporary.cells, "temporary")
+        return planner.step(pose, target_m, "exploration")
+
+    def _exploration_target(self, bev: BevMap, planner: UniGoalPlanner, watch: GoalWatch, pose: Pose) -> Point2 | None:
+        """A frontier, chosen anew when due, after another match of the graphs.
+
+        Without a frontier left: the mid-term goal; from there, and without one, a random place where it has been.
+        """
+        here = (pose.x_m, pose.z_m)
+        reached_m, wander_m = planner.config.reached_m, self._wander_m
+        self._num_explored += 1
+        if wander_m is None:
+            is_due = planner.needs_target(pose)
+        else:
+            is_due = self._num_explored >= planner.config.replan_steps or math.dist(wander_m, here) < reached_m
+        if is_due:
+            self._num_explored = 0
+            self._advice = advice = self._graphs.advise(self._is_given_up)
+            if advice.target is not None:
+                watch.pursue(advice.target.id, self._cells_of(bev, advice.target))
+            num_targets = planner.counters.targets
+            planner.exploration_target(pose, advice.mid_term_m)
+            is_new = planner.counters.targets > num_targets
+            self._wander_m = None if is_new else self._somewhere(bev, here, advice.mid_term_m, reached_m)
+        return self._wander_m or planner.target_m
+
+    def _somewhere(self, bev: BevMap, here: Point2, mid_term_m: Point2 | None, reached_m: float) -> Point2 | None:
+        """Where to go when nothing is left to explore."""
+        if mid_term_m is not None and math.dist(mid_term_m, here) >= reached_m and self._wander_m != mid_term_m:
+            return mid_term_m
+        cells = np.argwhere(bev.visited)
+        middles = [bev.centre_of((row, col)) for row, col in cells.tolist()]
+        far = [middle for middle in middles if math.dist(middle, here) >= reached_m]
+        return self._random.choice(far) if far else None
+
+    def _cells_of(self, bev: BevMap, node: SceneNode) -> Cells:
+        """Cells under a node's points."""
+        points_m = self._graphs.scene.objects.points_m(node.id)
+        at_m = np.array([node.ground_m]) if points_m is None else points_m[:, [0, 2]].astype(np.float64)
+        frame = bev.map_frame
+        cells = np.floor((at_m - frame.corner_m) / frame.cell_m).astype(np.int32)[:, ::-1]
+        return np.unique(cells, axis=0)
+
+    def _is_given_up(self, node: SceneNode) -> bool:
+        """Whether all of a node lies where the goal was sought in vain."""
+        assert self._bev is not None, "there is a map whenever goals are matched"
+        return len(self._planner.allowed(self._cells_of(self._bev, node))) == 0
+
+    def _tell(self, planner: UniGoalPlanner, watch: GoalWatch, step: PlannedStep) -> None:
+        """Notes a round for `diagnostics`."""
+        advice, goal = self._advice, watch.goal
+        node = None if goal is None or goal.node_id is None else self._graphs.scene.node(goal.node_id)
+        details: dict[str, object] = {"category": self._graphs.category, "step": step.goal}
+        if advice is not None:
+            details |= {"match": advice.stage, "score": round(advice.score, 4), "anchors": advice.num_anchors}
+            details |= {"reason": advice.reason, "mid_term_m": advice.mid_term_m}
+        if goal is not None:
+            details |= {"goal": "temporary" if watch.confirmed is None else "confirmed", "goal_m": goal.centre_m}
+        if step.distance_m is not None:
+            details["distance_m"] = round(step.distance_m, 3)
+        counters = planner.counters
+        self._diagnostics = RoundDiagnostics(
+            choice=step.goal if goal is None else f"{details['goal']} {goal.source}",
+            chosen_entry=None if node is None else self._entry(node),
+            num_entries=len(self._graphs.scene.nodes),
+            counters={
+                **self._asker.counters,
+                "collisions": counters.collisions,
+                "stuck": counters.stuck,
+                "unreachable": counters.unreachable,
+                "targets": counters.targets,
+                "given_up": watch.num_given_up,
+                "blacklisted_cells": planner.num_blacklisted,
+                "edges": len(self._graphs.scene.edges),
+            },
+            details=details,
+        )
+
+    def diagnostics(self) -> RoundDiagnostics:
+        """What the last action serves, how the graphs matched, and counters."""
+        return self._diagnostics
+
+    def _entry(self, node: SceneNode) -> EntryBelief:
+        kind = self._graphs.scene.type_of(node.id)
+        return EntryBelief(node.id, kind, node.centre_m, node.size_m, node.num_detections)
+
+    def entries(self) -> Sequence[EntryBelief]:
+        """The scene graph's nodes, by ProcTHOR's type."""
+        return [self._entry(node) for node in self._graphs.scene.nodes]
+
+    def belief(self) -> Belief:
+        """Nodes, map at half its resolution, and the exploration target."""
+        assert self._bev is not None, "there is a map after the first round"
+        target_m = self._wander_m or self._planner.target_m
+        node_id = None if self._watch is None or self._watch.goal is None else self._watch.goal.node_id
+        cells, frame = _coarser(self._bev.cells, self._bev.map_frame, _BELIEF_STRIDE)
+        return Belief(
+            entries=self.entries(),
+            candidate_ids=() if node_id is None else (node_id,),
+            frontiers=[] if target_m is None else [FrontierBelief(0, target_m, 0.0)],
+            cells=cells,
+            map_frame=frame,
+            asked=tuple(self._asker.asked),
+        )
+
+
+def _coarser(cells: NDArray[np.uint8], frame: MapFrame, stride: int) -> tuple[NDArray[np.uint8], MapFrame]:
+    """A map of larger cells around what is known: blocked if any of theirs is, else free if any is."""
+    known = np.argwhere(cells)
+    low, high = (known.min(axis=0), known.max(axis=0) + 1) if len(known) else (np.zeros(2, int), np.ones(2, int))
+    low = low // stride * stride
+    rows, cols = (-(-(high - low) // stride)).tolist()
+    padded = np.zeros((rows * stride, cols * stride), np.uint8)
+    part = cells[low[0] : low[0] + rows * stride, low[1] : low[1] + cols * stride]
+    padded[: part.shape[0], : part.shape[1]] = part
+    blocks = padded.reshape(rows, stride, cols, stride)
+    coarse = np.where((blocks == BLOCKED).any(axis=(1, 3)), BLOCKED, (blocks == FREE).any(axis=(1, 3)) * FREE)
+    corner_m = (frame.corner_m[0] + int(low[1]) * frame.cell_m, frame.corner_m[1] + int(low[0]) * frame.cell_m)
+    return coarse.astype(np.uint8), MapFrame(rows, cols, frame.cell_m * stride, corner_m)
+
+
+class UniGoalAsPublished(UniGoal):
+    """As its paper has it: captions are compared without their numbers, all mapped categories may be goals."""
+
+    def __init__(self, config: UniGoalConfig | None = None, decision: DecisionModel | None = None) -> None:
+        super().__init__(config or UniGoalConfig(graph=GraphConfig(mode="paper")), decision)

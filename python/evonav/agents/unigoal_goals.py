@@ -1,0 +1,131 @@
+"""From a glimpse of the goal to its confirmation, or to giving the place up (UniGoal; design: agents.md 3.8)."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from evonav.agents.unigoal_planner import UniGoalPlanner
+from evonav.memory.bev import BevMap, Cells
+from evonav.memory.vocabulary import CATEGORY_OF_TYPE
+from evonav.sensors.observation import View
+from evonav.world.pose import Pose
+
+Point2 = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class GoalConfig:
+    """UniGoal's constants."""
+
+    confirm_m: float = 0.15
+    """A temporary goal is confirmed when the way to it, grown as the planner does, is shorter."""
+    redetect_m: float = 1.0
+    """This near, the goal has to be in view, or its place is given up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Glimpse:
+    """Where the goal seems to be."""
+
+    cells: Cells = field(compare=False, repr=False)
+    centre_m: Point2
+    """`(x, z)`: mean of the cells."""
+    source: Literal["detection", "graph"]
+    node_id: int | None = None
+    """Of the matched node."""
+
+
+class GoalWatch:
+    """Temporary goal and confirmed goal of one stage; places given up are the planner's to keep."""
+
+    def __init__(self, bev: BevMap, planner: UniGoalPlanner, config: GoalConfig) -> None:
+        self.config = config
+        self.temporary: Glimpse | None = None
+        self.confirmed: Glimpse | None = None
+        self.num_given_up = 0
+        self.is_in_view = False
+        """Whether the last view showed what the goal is."""
+        self._bev = bev
+        self._planner = planner
+
+    @property
+    def goal(self) -> Glimpse | None:
+        """The confirmed goal, else the temporary one."""
+        return self.confirmed or self.temporary
+
+    def look(self, view: View, category: str | None, seen_ids: frozenset[int]) -> None:
+        """Takes over what a view shows of the goal: its largest detection is the temporary goal from now on.
+
+        Args:
+            view: The present one.
+            category: That the goal goes under, if it goes under one.
+            seen_ids: Scene nodes in view.
+        """
+        mask = None if category is None else largest_detection(view, category)
+        found = None if mask is None else self._glimpse(self._bev.cells_of(view, mask), "detection")
+        is_node_seen = self.temporary is not None and self.temporary.node_id in seen_ids
+        self.is_in_view = mask is not None or is_node_seen
+        if self.confirmed is None and found is not None:
+            self.temporary = found
+
+    def pursue(self, node_id: int, cells: Cells) -> None:
+        """Goes for the node that the goal was matched with, if nothing better is in view."""
+        if self.goal is None:
+            self.temporary = self._glimpse(cells, "graph", node_id)
+
+    def _glimpse(
+        self, cells: Cells, source: Literal["detection", "graph"], node_id: int | None = None
+    ) -> Glimpse | None:
+        """Cells that were not given up; `None` if there are none."""
+        allowed = self._planner.allowed(cells)
+        if not len(allowed):
+            return None
+        row, col = allowed.mean(axis=0).tolist()
+        (x_m, z_m), cell_m = self._bev.map_frame.corner_m, self._bev.map_frame.cell_m
+        centre_m = (x_m + (col + 0.5) * cell_m, z_m + (row + 0.5) * cell_m)
+        return Glimpse(allowed, centre_m, source, node_id)
+
+    def judge(self, pose: Pose) -> None:
+        """Confirms the temporary goal at its place; gives it up where it should be in view and is not."""
+        goal = self.temporary
+        if goal is None or self.confirmed is not None:
+            return
+        if not self.is_in_view and self._straight_m(pose, goal) <= self.config.redetect_m:
+            self._planner.blacklist(goal.cells)
+            self.num_given_up += 1
+            self.temporary = None
+            return
+        way_m = self._planner.distance_m(pose, goal.cells)
+        if way_m is not None and way_m < self.config.confirm_m:
+            self.confirmed, self.temporary = goal, None
+
+    def _straight_m(self, pose: Pose, goal: Glimpse) -> float:
+        (x_m, z_m), cell_m = self._bev.map_frame.corner_m, self._bev.map_frame.cell_m
+        middles_m = (goal.cells[:, ::-1] + 0.5) * cell_m + (x_m, z_m)
+        return float(np.hypot(*(middles_m - (pose.x_m, pose.z_m)).T).min())
+
+
+def largest_detection(view: View, category: str) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]] | None:
+    """Pixels of the detection of a category with the largest box.
+
+    Args:
+        view: With detections labelled with ProcTHOR's types.
+        category: Of the map.
+
+    Returns:
+        `(H, W)` mask; `None` without a detection that has a depth.
+    """
+    found = view.detections
+    best: tuple[int, int] | None = None
+    for index, label in enumerate(found.labels):
+        if CATEGORY_OF_TYPE.get(label) != category:
+            continue
+        mask = found.masks == index
+        rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+        if not len(rows) or not np.isfinite(view.depth_m[mask]).any():
+            continue
+        box_px = int((rows[-1] - rows[0] + 1) * (cols[-1] - cols[0] + 1))
+        if best is None or box_px > best[0]:
+            best = (box_px, index)
+    return None if best is None else found.masks == best[1]

@@ -1,0 +1,222 @@
+"""What UniGoal makes of its graphs: the goal read, the scene related, both matched, and where that says to look."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from evonav.decision.asking import Asker
+from evonav.decision.language import ROOMS, canonical
+from evonav.decision.matching import Matcher
+from evonav.decision.questions.candidates import ObjectCandidate
+from evonav.decision.questions.unigoal import (
+    NO_CATEGORY,
+    CategoryQuestion,
+    DecomposeQuestion,
+    DescribeQuestion,
+    GoalRelationsQuestion,
+    ObjectsQuestion,
+)
+from evonav.decision.questions.unigoal_scene import (
+    CorrectionQuestion,
+    GroupScoreQuestion,
+    LayoutQuestion,
+    RelationLinesQuestion,
+    RoomQuestion,
+)
+from evonav.memory.goal_graph import GoalGraph, Match, MatchMode, match_graphs, similarity_transform
+from evonav.memory.object_graph import Group, ObjectGraph, ObjectGraphConfig, SceneNode
+from evonav.memory.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES
+from evonav.sensors.observation import View
+from evonav.tasks.public import StageInput
+
+Point2 = tuple[float, float]
+MatchStage = Literal["zero", "partial", "perfect"]
+
+ROOM_ZERO = "bedroom"
+"""Where every node is in mode `code`: the released code provides no map of rooms."""
+ELSEWHERE = "other room"
+
+
+@dataclass(frozen=True, slots=True)
+class GraphConfig:
+    """UniGoal's constants."""
+
+    mode: MatchMode = "code"
+    """`code`: as released, six categories and names that never match; `paper`: as published, all that is mapped."""
+    goal_input: Literal["text", "category", "image"] = "text"
+    """What the goal graph is made of: the unified instruction (the paper's setting), the category, or the image."""
+    scene: ObjectGraphConfig = field(default_factory=ObjectGraphConfig)
+    steps_per_update: int = 2
+    """Of the scene graph."""
+    partial_score: float = 0.5
+    perfect_score: float = 0.9
+    num_decompositions: int = 10
+    """Tries before the whole graph is the only subgraph."""
+    correction_hops: int = 2
+    correction_reach_m: float = 2.0
+    """Longest edge of a hop: every two nodes are joined, so that two hops without a limit were the whole house."""
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """Where the graphs say to look."""
+
+    stage: MatchStage
+    score: float
+    """S."""
+    num_anchors: int
+    """Goal nodes found in the scene."""
+    mid_term_m: Point2 | None = None
+    """Draws exploration a little."""
+    target: SceneNode | None = None
+    """What to go to: the goal, found whole."""
+    reason: str = ""
+
+
+class GraphReasoner:
+    """Scene graph of the task, goal graph of the stage."""
+
+    def __init__(self, config: GraphConfig, asker: Asker) -> None:
+        self.config = config
+        self.scene = ObjectGraph(config.scene)
+        self.goal_graph: GoalGraph | None = None
+        self.subgraphs: tuple[GoalGraph, ...] = ()
+        self.category: str | None = None
+        """Of the goal's detections; `None` if the detector has no word for it."""
+        self._asker = asker
+        self._matcher = Matcher()
+
+    def begin_stage(self, goal: StageInput) -> None:
+        """The goal graph goes, the scene graph stays."""
+        self._goal = goal
+        self.scene.begin_stage(goal.stage)
+        self.goal_graph, self.subgraphs, self.category = None, (), None
+
+    def understand(self) -> None:
+        """Reads the goal, once a stage: objects, relations, subgraphs, the detector's category."""
+        goal, ask = self._goal, self._asker.ask
+        text: str | None = goal.unified_instruction
+        objects: tuple[str, ...]
+        if self.config.goal_input == "image":
+            text = ask(DescribeQuestion(goal, goal.reference_image))
+        if self.config.goal_input == "category" or text is None:
+            text, objects = goal.category, (canonical(goal.category),)
+            self.goal_graph = GoalGraph(objects)
+        else:
+            objects = ask(ObjectsQuestion(goal, text)) or (canonical(goal.category),)
+            edges = ask(GoalRelationsQuestion(goal, text, objects)) if len(objects) > 1 else ()
+            self.goal_graph = GoalGraph(objects, edges or ())
+        if len(objects) > 1:
+            parts = ask(DecomposeQuestion(goal, self.goal_graph), self.config.num_decompositions)
+            self.subgraphs = parts or (self.goal_graph,)
+        else:
+            self.subgraphs = (self.goal_graph,)
+        known = CODE_CATEGORIES if self.config.mode == "code" else MAP_CATEGORIES
+        category = ask(CategoryQuestion(goal, text, objects[0], known))
+        self.category = None if category in (None, NO_CATEGORY) else category
+
+    def observe(self, view: View) -> None:
+        """Takes over a view, and relates what is new. A wrong number of relations: these pairs get none."""
+        pairs = self.scene.update(view)
+        if pairs:
+            self.scene.relate(pairs, self._asker.ask(RelationLinesQuestion(self._goal, pairs), 1))
+
+    def advise(self, is_given_up: Callable[[SceneNode], bool]) -> Advice:
+        """Matches the first subgraph (as released, the others are never used) with the scene.
+
+        Args:
+            is_given_up: Whether a node's place was visited in vain; it does not match.
+        """
+        match = self._match(is_given_up)
+        if self._is_perfect(match):
+            self._correct(match)
+            match = self._match(is_given_up)
+        subgraph, num = self.subgraphs[0], len(match.anchors)
+        if self._is_perfect(match):
+            node = self.scene.node(match.anchors[subgraph.nodes[0]])
+            return Advice("perfect", match.score, num, target=node, reason="the goal's own node")
+        if match.score >= self.config.partial_score and num >= 2:
+            place_m = self._predicted(match)
+            return Advice("partial", match.score, num, mid_term_m=place_m, reason="mean predicted place")
+        group = self._best_group()
+        if group is None:
+            return Advice("zero", match.score, num, reason="no group fits")
+        words = ", ".join(node.name for node in group.nodes)
+        return Advice("zero", match.score, num, mid_term_m=group.centre_m, reason=f"by {words}")
+
+    def _match(self, is_given_up: Callable[[SceneNode], bool]) -> Match:
+        nodes = [node for node in self.scene.nodes if not is_given_up(node)]
+        return match_graphs(self.subgraphs[0], nodes, self.scene.edges, self.config.mode, canonical)
+
+    def _is_perfect(self, match: Match) -> bool:
+        """Found whole, its target included; the released code also wants fewer than two common nodes."""
+        if match.score < self.config.perfect_score or self.subgraphs[0].nodes[0] not in match.anchors:
+            return False
+        return self.config.mode == "paper" or len(match.anchors) < 2
+
+    def _correct(self, match: Match) -> None:
+        """Keeps, renames or deletes what is around the matched nodes, as the model says."""
+        config, scene = self.config, self.scene
+        nodes = scene.neighbourhood(tuple(match.anchors.values()), config.correction_hops, config.correction_reach_m)
+        ids = {node.id for node in nodes}
+        edges = [edge for edge in scene.edges if {edge.subject_id, edge.object_id} <= ids]
+        verdicts = self._asker.ask(CorrectionQuestion(self._goal, self.subgraphs[0], nodes, edges))
+        if verdicts is None:
+            return
+        for edge, verdict in zip(edges, verdicts[len(nodes) :], strict=True):
+            if verdict.action != "keep":
+                scene.set_relation(edge, verdict.word if verdict.action == "rename" else None)
+        for node, verdict in zip(nodes, verdicts, strict=False):
+            if verdict.action == "delete":
+                scene.delete(node.id)
+            elif verdict.action == "rename":
+                scene.rename(node.id, verdict.word)
+
+    def _predicted(self, match: Match) -> Point2 | None:
+        """Mean place of the goal nodes that were not found, from the first two that were.
+
+        The original takes guessed relative places over into the scene by the similarity transform of two anchors.
+        """
+        subgraph = self.subgraphs[0]
+        anchors = {word: node for word, i in match.anchors.items() if (node := self.scene.node(i)) is not None}
+        layout = self._asker.ask(LayoutQuestion(self._goal, subgraph, anchors))
+        if layout is None:
+            return None
+        first, second = list(anchors)[:2]
+        ends = (anchors[first].ground_m, anchors[second].ground_m)
+        missing = [word for word in subgraph.nodes if word not in anchors]
+        places = [similarity_transform((layout[first], layout[second]), ends, layout[word]) for word in missing]
+        found = [place for place in places if place is not None]
+        if not found:
+            return ends[0]
+        return (sum(x for x, _ in found) / len(found), sum(z for _, z in found) / len(found))
+
+    def _best_group(self) -> Group | None:
+        """The likeliest group of the likeliest room; `None` if there is none that could be."""
+        groups = self.scene.groups(self._room_of())
+        if not groups:
+            return None
+        goal, subgraph = self._goal, self.subgraphs[0]
+        rooms = tuple(sorted(groups))
+        room = self._asker.ask(RoomQuestion(goal, subgraph, rooms)) or rooms[0]
+        nodes, edges = self.scene.nodes, self.scene.edges
+        best: tuple[float, Group] | None = None
+        for group in groups[room]:
+            ids = {node.id for node in group.nodes}
+            inside = [edge for edge in edges if {edge.subject_id, edge.object_id} <= ids]
+            score = self._asker.ask(GroupScoreQuestion(goal, subgraph, group, inside, nodes), 1) or 0.0
+            if score > (0.0 if best is None else best[0]):
+                best = (score, group)
+        return None if best is None else best[1]
+
+    def _room_of(self) -> Callable[[SceneNode], str]:
+        """In which room a node is; as published by what stands around it, as released always in room 0."""
+        if self.config.mode == "code":
+            return lambda _: ROOM_ZERO
+        around = [ObjectCandidate(n.id, n.caption, n.centre_m, n.size_m, n.num_detections) for n in self.scene.nodes]
+
+        def room_of(node: SceneNode) -> str:
+            room = self._matcher.room_around(node.ground_m, around)
+            return room if room in ROOMS else ELSEWHERE
+
+        return room_of
