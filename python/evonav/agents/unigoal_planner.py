@@ -178,6 +178,11 @@ class UniGoalPlanner:
         grown = self.bev.grown(cells, self.config.blacklist_radius)
         self._blacklist.update((int(row), int(col)) for row, col in grown)
 
+    @property
+    def num_blacklisted(self) -> int:
+        """Cells that goals may not lie in, in this stage."""
+        return len(self._blacklist)
+
     def allowed(self, cells: Cells) -> Cells:
         """Of goal cells those that are not blacklisted."""
         if not self._blacklist:
