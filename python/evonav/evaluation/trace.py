@@ -24,6 +24,8 @@ from evonav.agents.agent import Agent, Belief, InspectableAgent
 from evonav.agents.registry import imported
 from evonav.decision.asking import Asked
 from evonav.decision.prompts import Picture
+from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
+from evonav.decision.questions.question import Question
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.engine import agent_seed
@@ -345,7 +347,23 @@ def _question(asked: Asked) -> TracedQuestion:
         for part in turn.parts:
             shown = jpeg_of(part.pixels, PROMPT_PX, QUALITY) if isinstance(part, Picture) else part.text
             parts.append((turn.role, shown))
-    return TracedQuestion(asked.question.kind, tuple(parts), asked.text, asked.outcome)
+    return TracedQuestion(asked.question.kind, tuple(parts), asked.text, asked.outcome, tuple(_offered(asked.question)))
+
+
+def _offered(question: Question[Any]) -> Iterator[tuple[str, str, int]]:
+    """Entries and frontiers by the names that the prompt gives them, where a question has lists of them."""
+
+    def objects(candidates: Any, before: str) -> Iterator[tuple[str, str, int]]:  # noqa: ANN401
+        for index, candidate in enumerate(candidates):
+            if isinstance(candidate, ObjectCandidate):
+                yield f"{before}Object {index}", candidate.label, candidate.entry_id
+
+    yield from objects(getattr(question, "objects", ()), "")
+    for number, snapshot in enumerate(getattr(question, "snapshots", ())):
+        yield from objects(getattr(snapshot, "objects", ()), f"Snapshot {number}, ")
+    for index, candidate in enumerate(getattr(question, "frontiers", ())):
+        if isinstance(candidate, FrontierCandidate):
+            yield f"Frontier {index}", "frontier", candidate.frontier_id
 
 
 def _differences(stored: str | None, stage: TracedStage) -> tuple[str, ...]:

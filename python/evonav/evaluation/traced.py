@@ -63,6 +63,8 @@ class TracedQuestion:
     """As it came; of a lost one, what happened."""
     outcome: str
     """`answered`, `invalid`, `refusal` or `lost`."""
+    offered: tuple[tuple[str, str, int], ...] = ()
+    """What the prompt's numbers stand for: `("Object 0", "Sofa", 12)` or `("Frontier 1", "frontier", 7)`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -144,7 +144,7 @@ class _Rounds:
         if step.candidate_ids:
             found["cand"] = list(step.candidate_ids)
         if step.asked:
-            found["q"] = [[a.kind, a.outcome, a.answer, self._page.prompt(a)] for a in step.asked]
+            found["q"] = [[a.kind, a.outcome, a.answer, self._page.prompt(a), _offer_words(a)] for a in step.asked]
         return found
 
     def _told(self, record: RoundRecord) -> dict[str, Any]:
@@ -196,6 +196,15 @@ class _Rounds:
         gone = [name for name in self._entries if name not in now]
         self._entries = now
         return {**({"e": changed} if changed else {}), **({"x": gone} if gone else {})}
+
+
+def _offer_words(question: TracedQuestion) -> str:
+    """Which entries and frontiers the numbers of a prompt stand for."""
+    offers = [
+        f"{name} is {what if what == 'frontier' else noun_of(what)} #{number}"
+        for name, what, number in question.offered
+    ]
+    return "; ".join(offers) + ("." if offers else "")
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - JSON
@@ -297,7 +306,7 @@ def _evaluator_words(stage: StageRecord, step: TracedRound) -> str:
         return ""
     if chosen.label == stage.target.category:
         return f"There is a {noun} here, but not the one that is asked for."
-    return f"There is a {noun} here; the target is a {noun_of(stage.target.category)}."
+    return f"There is a {noun} here; what is asked for is another thing: {noun_of(stage.target.category)}."
 
 
 def _stale_words(noun: str, truth: Truth | None, centre_m: Sequence[float], *, is_target: bool) -> str:

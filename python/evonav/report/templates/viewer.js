@@ -26,6 +26,7 @@
     made.alt = alt;
     return made;
   };
+  const cardOf = (id) => $(id).closest(".card");
   const metres = (x, y, [px, py]) => `${(Math.hypot(x - px, y - py) / 100).toFixed(1)} m`;
 
   // Rounds hold what is new in them: here they are made whole, once a stage.
@@ -115,11 +116,12 @@
       }
     }
     // Names of those that matter in this round, none over another.
-    const size = 2.1 * u;
+    const size = 2.1 * u, [left, , wide] = home.split(" ").map(Number);
     for (const [id, label, x, y, width, depth, , isStale] of ordered.filter((entry) => rank(entry)).reverse()) {
       const words = `${label} #${id}`, half = 0.29 * size * words.length, h = Math.max(depth, 1.4 * u) / 2, w = Math.max(width, 1.4 * u) / 2;
       const places = [[x, y - h - 0.5 * size], [x, y + h + 1.1 * size], [x + w + half + 0.4 * u, y + 0.35 * size], [x - w - half - 0.4 * u, y + 0.35 * size], [x, y - h - 1.6 * size], [x, y + h + 2.2 * size]];
       const box = ([cx, cy]) => [cx - half, cy - 0.8 * size, cx + half, cy + 0.3 * size];
+      for (const place of places) place[0] = Math.max(left + half, Math.min(left + wide - half, place[0]));
       const free = places.find((place) => { const b = box(place); return !boxes.some((o) => b[0] < o[2] && o[0] < b[2] && b[1] < o[3] && o[1] < b[3]); });
       if (!free) continue;
       boxes.push(box(free));
@@ -205,7 +207,7 @@
       ...(round.len === undefined ? [] : [["walked", `${round.len.toFixed(2)} m`]]),
       ...(round.n ? [["knows", `${round.n[0]} entries, ${round.n[1]} frontiers`]] : []),
       ["stands at", `x ${(round.p[0] / 100).toFixed(2)} m, z ${(-round.p[1] / 100).toFixed(2)} m, looks ${Math.round(((round.p[2] % 360) + 360) % 360)}°`],
-      ...Object.entries(details).map(([name, value]) => [name, words(value)]),
+      ...Object.entries(details).map(([name, value]) => [name.replaceAll("_", " "), words(value)]),
       ...(round.note ? [["note", round.note]] : []),
     ]);
     tellQuestions(stage, round, rounds);
@@ -220,9 +222,9 @@
     if (!round.q) {
       let last = now - 1;
       while (last >= 0 && !rounds[last].q) last--;
-      const none = !stage.hasBelief ? "This agent tells no questions." : last < 0 ? "None." : "None: it goes on with what it decided in ";
+      const none = last < 0 ? "None." : "None: it goes on with what it decided in ";
       const line = html("p", none, "quiet");
-      if (stage.hasBelief && last >= 0) {
+      if (last >= 0) {
         const link = html("a", `round ${last + 1}`);
         link.href = `#stage=${stage.k}&round=${last + 1}`;
         line.append(link, ".");
@@ -230,7 +232,7 @@
       box.append(line);
       return;
     }
-    round.q.forEach(([kind, outcome, answer, prompt], index) => {
+    round.q.forEach(([kind, outcome, answer, prompt, offered], index) => {
       const div = html("div", "", "question");
       const tries = round.q.length > 1 ? ` ${index + 1} of ${round.q.length}` : "";
       div.append(html("b", `${kind}${tries} `), html("span", outcome, `chip ${outcome}`));
@@ -238,15 +240,33 @@
       text.append(html("b", head), rest.join("\n"));
       const details = html("details", "", "prompt"), summary = html("summary", "What it was asked");
       details.append(summary);
-      let said = "";
+      let said = "", pictures = null;
       for (const part of prompts[prompt]) {
         const [role, content] = Array.isArray(part) ? part : ["user", part];
-        if (role !== "user" || said) { if (role !== said) details.append(html("span", role, "role")); said = role; }
-        details.append(typeof content === "number" ? picture(content, "image of the prompt") : html("p", content));
+        if (role !== said && (role !== "user" || said)) details.append(html("span", role, "role"));
+        if (role !== said) pictures = null;
+        said = role;
+        if (typeof content !== "number") {
+          details.append(html("p", content));
+          pictures = null;
+          continue;
+        }
+        // An image stands under the line that names it; such pairs stand side by side.
+        const before = details.lastElementChild, figure = html("figure");
+        let title = "";
+        if (before?.tagName === "P") {
+          const lines = before.textContent.split("\n");
+          title = lines.pop();
+          if (lines.length) before.textContent = lines.join("\n"); else before.remove();
+          if (details.lastElementChild?.className === "pictures") pictures = details.lastElementChild;
+        }
+        if (!pictures) { pictures = html("div", "", "pictures"); details.append(pictures); }
+        figure.append(html("figcaption", title), picture(content, title || "image of the prompt"));
+        pictures.append(figure);
       }
       details.open = isPromptOpen;
       summary.addEventListener("click", () => { isPromptOpen = !details.open; });
-      div.append(text, details);
+      div.append(text, ...(offered ? [html("p", offered, "quiet offered")] : []), details);
       box.append(div);
     });
   };
@@ -259,7 +279,7 @@
       return row;
     });
     $("counters").tBodies[0].replaceChildren(...rows);
-    $("counters").closest(".card").hidden = !rows.length;
+    cardOf("counters").hidden = !rows.length;
   };
 
   const tellMemory = (stage, round) => {
@@ -268,7 +288,7 @@
     const far = ([, , x, y]) => Math.hypot(x - round.p[0], y - round.p[1]);
     const entries = [...round.entries.values()].sort((a, b) => rank(b) - rank(a) || far(a) - far(b));
     const numStale = entries.filter((entry) => entry[7]).length;
-    $("num-entries").textContent = stage.hasBelief ? `${entries.length}${numStale ? `, ${numStale} stale (evaluator)` : ""}; candidates first, then the nearest` : "this agent tells none";
+    $("num-entries").textContent = `${entries.length}${numStale ? `, ${numStale} stale (evaluator)` : ""}; candidates first, then the nearest`;
     $("memory").hidden = !entries.length;
     $("memory").tBodies[0].replaceChildren(...entries.map((entry) => {
       const row = html("tr", "", ["", "candidate", "chosen"][rank(entry)]);
@@ -295,7 +315,7 @@
     const inset = 50 / Math.max(1, rounds.length);
     slider.style.margin = `0 calc(${inset}% - 8px)`;
     slider.style.width = `calc(${100 - 2 * inset}% + 16px)`;
-    svg("rect", { class: "now", y: 1.5, width: step - gap, height: 13 }, timeline);
+    if (rounds.length) svg("rect", { class: "now", y: 1.5, width: step - gap, height: 13 }, timeline);
   };
 
   const tellStage = (stage) => {
@@ -305,6 +325,7 @@
     });
     for (const part of document.querySelectorAll("[data-of]")) part.style.display = Number(part.dataset.of) === at ? "" : "none";
     $("verdict").replaceChildren(html("b", stage.words), ` · ${stage.sentence}`);
+    $("verdict").title = stage.sentence;
     $("sentence").textContent = stage.sentence;
     list("stage-facts", stage.facts);
     $("goal").textContent = stage.goal;
@@ -334,12 +355,14 @@
       $("cells").removeAttribute("href");
       $("heading").hidden = true;
       $("sides").replaceChildren();
-      for (const id of ["choice", "reason", "truth", "heading-words"]) $(id).textContent = "";
-      for (const id of ["facts", "questions"]) $(id).replaceChildren();
-      for (const id of ["counters", "memory"]) $(id).tBodies[0].replaceChildren();
+      for (const id of ["reason", "truth", "heading-words"]) $(id).textContent = "";
+      $("choice").textContent = `No round: ${stage.sentence}`;
+      $("facts").replaceChildren();
+      for (const id of ["questions", "counters", "memory"]) cardOf(id).hidden = true;
       return;
     }
     const round = rounds[now];
+    for (const id of ["questions", "memory"]) cardOf(id).hidden = !stage.hasBelief;
     $("where").textContent = `round ${now + 1} of ${rounds.length} (budget ${stage.budget})`;
     slider.setAttribute("aria-valuetext", `round ${now + 1}: ${round.choice ?? "error"}`);
     timeline.querySelector(".now").setAttribute("x", now * 1000 / rounds.length);
