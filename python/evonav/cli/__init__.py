@@ -35,6 +35,7 @@ def list_agents() -> None:
     yardsticks = {name: f"yardstick: {kind.description}" for name, kind in YARDSTICKS.items()}
     for name, description in {**agent_descriptions(), **yardsticks}.items():
         typer.echo(f"{name:18}{description}")
+    typer.echo(f"{'./file.py:Class':18}any class of yours, by its file")
     typer.echo(f"{'module:Class':18}any class of yours with the methods of evonav.agents.agent.Agent")
 
 

@@ -131,6 +131,11 @@ def stage_timeout_s(options: DecisionOptions, default_s: float) -> float:
     return default_s if options.decision == "text" else VLM_STAGE_TIMEOUT_S
 
 
+def answer_timeout_s(options: DecisionOptions) -> float:
+    """How long an agent may take for a round: a model that is asked several times in it takes its time."""
+    return 600.0 if options.decision == "text" else 3600.0
+
+
 def _refuse_model_options(options: DecisionOptions) -> None:
     """Says of options that would be overlooked that they are; the model may come from the environment."""
     default = DecisionOptions()

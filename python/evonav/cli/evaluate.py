@@ -9,6 +9,7 @@ import typer
 
 from evonav.cli.decision_options import (
     DecisionOptions,
+    answer_timeout_s,
     print_spending,
     stage_timeout_s,
     with_decision_options,
@@ -17,10 +18,15 @@ from evonav.cli.decision_options import (
 from evonav.cli.display import generation_progress, interruptible, print_table, progress, status
 from evonav.cli.options import (
     HEURISTICS,
+    AgentMemory,
+    AgentNames,
     Agents,
+    AgentTimeout,
     AnyAsset,
     Houses,
+    InProcess,
     Limit,
+    OneAgent,
     Out,
     Seed,
     SimulatorName,
@@ -38,8 +44,9 @@ from evonav.cli.options import (
 )
 
 if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
 
+    from evonav.evaluation.agent_process import AgentHosting
     from evonav.evaluation.backend import Backend
     from evonav.evaluation.engine import RunConfig, TaskFile
     from evonav.evaluation.metrics import AgentSummary
@@ -51,7 +58,8 @@ EXIT_INCOMPLETE = 3
 def evaluate(
     out: Out,
     decisions: DecisionOptions,
-    agents: Agents = HEURISTICS,
+    agents: AgentNames = None,
+    agent: OneAgent = None,
     houses: Houses = None,
     tasks: Tasks = None,
     limit: Limit = None,
@@ -59,6 +67,9 @@ def evaluate(
     seed: Seed = 0,
     workers: Workers = None,
     retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
+    in_process: InProcess = False,
+    agent_timeout: AgentTimeout = None,
+    agent_memory: AgentMemory = None,
     allow_unknown_assets: AnyAsset = False,
     simulator: Which = SimulatorName.EMBEDDED,
     thor_executable: ThorExecutable = None,
@@ -82,8 +93,11 @@ def evaluate(
     host = {"gpu_device": thor_gpu, "x_display": thor_display, "timeout_s": thor_timeout}
     backend = _backend(simulator, allow_unknown_assets, build, host)
     config = _config(seed, backend, decisions, out, num_workers)
+    hosting = _hosting(in_process, agent_timeout or answer_timeout_s(decisions), agent_memory)
+    config = replace(config, hosting=hosting)
+    names = agents if agents is not None else "" if agent else HEURISTICS
     with _tasks(out, houses, tasks, limit, subset, seed, allow_unknown_assets, num_workers) as task_files:
-        summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored)
+        summaries = _evaluate(out, names, task_files, config, num_workers, retry_errored, agent or ())
     print_table(summaries)
     print_spending(out)
     _exit(summaries)
@@ -179,6 +193,7 @@ def _evaluate(
     config: "RunConfig",
     num_workers: int,
     retry_errored: bool,
+    more: "Sequence[str]" = (),
 ) -> "list[AgentSummary]":
     from evonav.evaluation.engine import evaluate
 
@@ -187,7 +202,7 @@ def _evaluate(
             config.backend.check()
         with progress() as show:
             return evaluate(
-                [name.strip() for name in agents.split(",") if name.strip()],
+                [*(name.strip() for name in agents.split(",") if name.strip()), *more],
                 task_files,
                 out,
                 config=config,
@@ -203,6 +218,12 @@ def _config(seed: int, backend: "Backend", decisions: DecisionOptions, out: Path
     backend = with_decisions(backend, decisions, out=out, seed=seed, num_workers=num_workers)
     config = RunConfig(seed=seed, backend=backend)
     return replace(config, stage_timeout_s=stage_timeout_s(decisions, config.stage_timeout_s))
+
+
+def _hosting(in_process: bool, timeout_s: float, memory_mb: int | None) -> "AgentHosting":
+    from evonav.evaluation.agent_process import AgentHosting
+
+    return AgentHosting(is_in_process=in_process, timeout_s=timeout_s, memory_mb=memory_mb)
 
 
 def _backend(

@@ -10,6 +10,22 @@ import typer
 HEURISTICS = "fu,stage-reset,ftu"
 
 Agents = Annotated[str, typer.Option(help="Names, comma-separated; see `evonav agents`.")]
+AgentNames = Annotated[
+    str | None, typer.Option("--agents", help=f"Names, comma-separated; see `evonav agents`. Default: {HEURISTICS}.")
+]
+OneAgent = Annotated[
+    list[str] | None,
+    typer.Option("--agent", help="A name, `module:Class` or `./file.py:Class`; repeat it for more."),
+]
+InProcess = Annotated[
+    bool,
+    typer.Option("--in-process", help="Agents in the evaluator's process, for debuggers: only exceptions are held."),
+]
+AgentTimeout = Annotated[
+    float | None,
+    typer.Option(min=0.1, help="Seconds for an agent's answer, then its stage is errored. Default: 600, vlm 3600."),
+]
+AgentMemory = Annotated[int | None, typer.Option(min=256, help="MB of address space for an agent's process.")]
 HOUSES = "ProcTHOR JSON, JSONL, JSONL.gz, or procthor-10k:SPLIT"
 Houses = Annotated[Path | None, typer.Option(help=f"{HOUSES} to generate tasks from.")]
 Tasks = Annotated[Path | None, typer.Option(help="Folder of tasks; default: the bundled ones.")]
