@@ -7,6 +7,7 @@ import sys
 from benches.table import write_section
 
 SECTIONS = {
+    "agents": "Agents",
     "generation": "Task generation",
     "memory": "Memory",
     "navigation": "Navigation",

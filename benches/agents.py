@@ -1,0 +1,190 @@
+"""What agents themselves cost: time of a decision round with a full memory, and memory of a long task."""
+
+import gc
+import json
+import math
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from evonav.agents.agent import Agent, AgentAction, ExplainingAgent, NavigateTo, Stop
+from evonav.agents.registry import BUILT_IN
+from evonav.decision.questions.question import Question, Reply
+from evonav.decision.text_match import TextMatch
+from evonav.evaluation.backend import Backend, make_agent
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import task_file
+from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.rollout import Episode
+from evonav.evaluation.sensing import Perception, Sensors
+from evonav.report.run import PAPER_ORDER
+from evonav.sensors.observation import Observation
+from evonav.tasks.public import StageInput, TaskInfo
+from evonav.world.simulator import Simulator
+
+A = TypeVar("A")
+
+TASK = "bundled-0101-298696-s0"
+"""Eight rooms, 155 objects, five stages."""
+NUM_ENTRIES = 100
+MAX_ROUND_MS = 50.0
+MAX_GROWTH_MB = 500.0
+
+NOTES = f"""One decision round of each agent in `{TASK}` (8 rooms, 155 objects), on ground-truth views of 300x300:
+mapping, memory, candidates, questions, and the text matcher's answers; rendering and all else outside of the agent is
+not counted. The agent is first led through the whole house; then it plays all stages by its own choices, and rounds
+count while it remembers at least {NUM_ENTRIES} objects. Agents without object entries count from the end of the
+tour. Limit: {MAX_ROUND_MS:g} ms.
+Memory: growth of a fresh process's peak RSS over all five stages with every budget spent to its end, 50 rounds a stage
+(`unigoal`: 500 actions), colours kept and candidates with images as for a VLM; the simulator's growth is in it. Limit:
+{MAX_GROWTH_MB:g} MB.
+"""
+
+
+@dataclass
+class Led:
+    """An agent that has seen the whole house before stage 1, and whose rounds are timed from then on."""
+
+    agent: Agent
+    tour: Callable[[Agent], None]
+    first_goal: StageInput
+    never_stops: bool = False
+    round_ms: list[float] = field(default_factory=list)
+    num_entries: list[int] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.sensing = self.agent.sensing
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """Begins with the tour."""
+        self.agent.begin_task(task)
+        self.agent.begin_stage(self.first_goal)
+        self.tour(self.agent)
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """Of the task."""
+        self.agent.begin_stage(stage)
+
+    def act(self, observation: Observation) -> AgentAction:
+        """The agent's round, timed."""
+        gc.disable()
+        start_s = time.process_time()
+        action = self.agent.act(observation)
+        self.round_ms.append(1e3 * (time.process_time() - start_s))
+        gc.enable()
+        self.num_entries.append(len(self.agent.entries()) if isinstance(self.agent, ExplainingAgent) else 0)
+        if self.never_stops and isinstance(action, Stop):
+            pose = observation.pose
+            return NavigateTo((pose.x_m + math.sin(pose.yaw_rad), pose.z_m + math.cos(pose.yaw_rad)))
+        return action
+
+
+class TextMatchWithImages:
+    """The text matcher, for agents that believe that it looks at images; prompts are made as for a VLM."""
+
+    needs_images = True
+
+    def __init__(self) -> None:
+        self._rules = TextMatch()
+
+    def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
+        """The rule's answer."""
+        question.prompt()
+        return self._rules.answer(question, attempt)
+
+
+def run() -> str:
+    """Measures every built-in agent."""
+    lines = ["| agent | p50 | p95 | rounds | entries | peak memory grows by |", "| --- | --- | --- | --- | --- | --- |"]
+    for name in [name for name in PAPER_ORDER if name in BUILT_IN]:
+        led = timed(name)
+        full = [ms for ms, num in zip(led.round_ms, led.num_entries, strict=True) if num >= NUM_ENTRIES]
+        counted = full or led.round_ms
+        p50, p95 = statistics.median(counted), float(np.quantile(counted, 0.95))
+        entries = f"{min(led.num_entries)}-{max(led.num_entries)}" if max(led.num_entries) else "none"
+        growth = growth_mb(name)
+        lines.append(f"| {name} | {p50:.1f} ms | {p95:.1f} ms | {len(counted)} | {entries} | {growth:.0f} MB |")
+    return "\n".join(lines)
+
+
+def timed(name: str) -> Led:
+    """An agent after its rounds."""
+    backend = Backend()
+    simulator, perception = backend.make_simulator(), backend.make_perception()
+    case = _case(backend)
+    agent = make_agent(name, backend.make_decision(0))
+    led = Led(agent, lambda led: _tour(led, simulator, perception), case.stages[0].public)
+    _play(case, name, led, simulator, perception)
+    return led
+
+
+def growth_mb(name: str) -> float:
+    """Peak memory of a long task in a fresh process, less what the process needs before it."""
+    told = subprocess.run(
+        [sys.executable, "-m", "benches.agents", name], check=True, capture_output=True, text=True
+    ).stdout
+    return float(json.loads(told)["growth_mb"])
+
+
+def _measure_growth(name: str) -> None:
+    backend = Backend()
+    simulator, perception = backend.make_simulator(), backend.make_perception()
+    case = _case(backend)
+    agent: Any = make_agent(name, TextMatchWithImages())
+    simulator.reset(case.stages[0].house_json, case.start)
+    sensors = Sensors(simulator, perception, agent.sensing, case.stages[0].target.object_id, 50)
+    sensors.observe(is_first=True, is_action_success=True, has_arrived=False, num_rounds_left=1)
+    before_mb = _peak_mb()
+    led = Led(agent, lambda _: None, case.stages[0].public, never_stops=agent.sensing.motion == "waypoints")
+    _play(case, name, led, simulator, perception)
+    sys.stdout.write(json.dumps({"growth_mb": _peak_mb() - before_mb, "rounds": len(led.round_ms)}))
+
+
+def _peak_mb() -> float:
+    """Of this process image: `getrusage` would count the parent's."""
+    status = Path("/proc/self/status").read_text(encoding="utf-8")
+    return int(next(line for line in status.splitlines() if line.startswith("VmHWM")).split()[1]) / 1024
+
+
+def _case(backend: Backend) -> EpisodeCase:
+    with bundled_tasks() as folder:
+        return backend.load_case(task_file(folder / TASK).path)
+
+
+def _play(case: EpisodeCase, name: str, led: Led, simulator: Simulator, perception: Perception) -> None:
+    for outcome in Episode(case, name, led, simulator, perception, ProtocolConfig(), 0).run():
+        if outcome.record.error is not None:
+            raise AssertionError(outcome.record.error)
+
+
+def _tour(agent: Agent, simulator: Simulator, perception: Perception) -> None:
+    """Leads an agent through every room: it looks ahead and back from places about 1.5 m apart."""
+    start = simulator.pose
+    sensors = Sensors(simulator, perception, agent.sensing, "", 50)
+    is_first = True
+    for x_m, z_m in _places(simulator):
+        for yaw_rad in (0.0, math.pi):
+            simulator.teleport(replace(start, x_m=x_m, z_m=z_m, yaw_rad=yaw_rad))
+            sensed = sensors.observe(is_first=is_first, is_action_success=True, has_arrived=False, num_rounds_left=50)
+            agent.act(sensed.observation)
+            is_first = False
+    simulator.teleport(start)
+
+
+def _places(simulator: Simulator, spacing_m: float = 1.5) -> Sequence[tuple[float, float]]:
+    found: list[tuple[float, float]] = []
+    for x_m, _, z_m in simulator.reachable_positions().tolist():
+        if all(math.dist((x_m, z_m), other) >= spacing_m for other in found):
+            found.append((x_m, z_m))
+    return found
+
+
+if __name__ == "__main__":
+    _measure_growth(sys.argv[1])
