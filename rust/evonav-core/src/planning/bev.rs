@@ -201,10 +201,10 @@ impl BevMap {
 
     /// Adds what one view shows.
     ///
-    /// A point spreads over the eight voxels around it; a voxel counts the points rounded. A cell
-    /// is explored if it has a point at any height, an obstacle if it has one between
-    /// `obstacle_min_m` and the camera, or some below `-obstacle_min_m` and none around the floor
-    /// (a hole). Points outside the block before the camera do not count.
+    /// A point spreads over the eight voxels around it. A cell is explored if its column of voxels
+    /// has a point at any height, an obstacle if it has one between `obstacle_min_m` and the
+    /// camera, or one below `-obstacle_min_m` and none around the floor (a hole); half a point is
+    /// one. Points outside the block before the camera do not count.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the images are not of the camera's size, a category is out of
@@ -220,7 +220,7 @@ impl BevMap {
         let mut block = std::mem::take(&mut self.block);
         block.fill(view, &self.spec, &self.config);
         let spec = self.spec;
-        for (cell, seen) in block.cells(&spec) {
+        for (cell, seen) in block.explored(&spec) {
             self.explored.insert(cell[0], cell[1]);
             if seen.is_obstacle() {
                 self.obstacles.insert(cell[0], cell[1]);

@@ -1,4 +1,4 @@
-//! A view's points spread over a block of voxels.
+//! A view's points spread over the columns of a block of voxels.
 
 use crate::{
     geometry::Vec2,
@@ -6,81 +6,114 @@ use crate::{
     planning::bev::{BevConfig, DepthView},
 };
 
-/// What a column of voxels holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Column(u8);
+/// Points in a column of voxels, by height; each point counts by its nearness to a voxel's centre.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Column {
+    below: f32,
+    floor: f32,
+    obstacle: f32,
+    above: f32,
+}
 
-const EXPLORED: u8 = 1;
-const OBSTACLE: u8 = 2;
-const FLOOR: u8 = 4;
-const BELOW: u8 = 8;
+/// Half a point, rounded, is one.
+const A_POINT: f32 = 0.5;
 
 impl Column {
+    /// Something at any height.
+    pub fn is_explored(self) -> bool {
+        self.below + self.floor + self.obstacle + self.above >= A_POINT
+    }
+
     /// Something between the lowest obstacle and the camera, or a hole in the floor.
     pub fn is_obstacle(self) -> bool {
-        self.0 & OBSTACLE != 0 || self.0 & (FLOOR | BELOW) == BELOW
+        let is_hole = self.below >= A_POINT && self.floor < A_POINT;
+        self.obstacle >= A_POINT || is_hole
     }
 }
 
-/// A point in units of voxels: column, row and height over the block's lowest corner.
+/// Columns around the field of view, aligned with the map; scratch memory that is kept.
+///
+/// Only sums over heights are asked for, so voxels need not be kept apart: a point goes to the four
+/// columns around it, and at both levels around it to what they count as.
+#[derive(Debug, Clone, Default)]
+pub struct Block {
+    /// `[row, col]` of the map that column (0, 0) stands on; may be negative.
+    first: [i64; 2],
+    /// Columns along an edge.
+    side: usize,
+    columns: Vec<Column>,
+    points: Vec<Point>,
+}
+
+/// A point among the columns.
 #[derive(Debug, Clone, Copy)]
 struct Point {
-    at: [f32; 3],
+    /// `[row, col]` from the first column's centre, in cells.
+    at: [f32; 2],
+    /// Shares of its weight below, around and over the floor, and over the camera.
+    shares: [f32; 4],
     category: i32,
 }
 
-/// Voxels around the field of view, aligned with the map; scratch memory that is kept.
-#[derive(Debug, Clone, Default)]
-pub struct Block {
-    /// `[row, col]` of the map that voxel (0, 0) lies in; may be negative.
-    first: [i64; 2],
-    /// Cells along a side, and voxels over each other.
-    side: usize,
-    levels: usize,
-    /// Points per voxel; all 0 between two calls.
-    weights: Vec<f32>,
-    /// Voxels that are not 0.
-    touched: Vec<u32>,
-    columns: Vec<Column>,
-    counts: Vec<u32>,
-    points: Vec<Point>,
-    /// First level of floor and obstacles, and the level after the last obstacle.
-    levels_of: [usize; 3],
+/// First voxel levels of floor and obstacles, and the first over the obstacles.
+#[derive(Debug, Clone, Copy)]
+struct Levels {
+    low_m: f64,
+    per_m: f64,
+    starts: [i64; 3],
+}
+
+impl Levels {
+    /// Voxel centres are at whole multiples of a cell over the lowest height.
+    fn new(config: &BevConfig, camera_height_m: f64) -> Self {
+        let (low_m, per_m) = (config.heights_m[0], 1.0 / config.cell_m);
+        let level = |height_m: f64| ((height_m - low_m) * per_m + 1e-6).floor() as i64;
+        let top_m = camera_height_m + config.obstacle_above_camera_m;
+        let starts = [level(-config.obstacle_min_m), level(config.obstacle_min_m), level(top_m)];
+        Self { low_m, per_m, starts }
+    }
+
+    fn shares(&self, height_m: f64) -> [f32; 4] {
+        let at = (height_m - self.low_m) * self.per_m;
+        let low = at.floor();
+        let high_share = (at - low) as f32;
+        let [floor, obstacle, above] = self.starts;
+        let kind = |level: i64| {
+            usize::from(level >= floor)
+                + usize::from(level >= obstacle)
+                + usize::from(level >= above)
+        };
+        let mut shares = [0.0; 4];
+        shares[kind(low as i64)] += 1.0 - high_share;
+        shares[kind(low as i64 + 1)] += high_share;
+        shares
+    }
 }
 
 impl Block {
-    /// Takes a view's points, and tells what each column of voxels holds.
+    /// Takes a view's points, and counts them in each column.
     pub fn fill(&mut self, view: &DepthView<'_>, spec: &GridSpec, config: &BevConfig) {
         self.place(view, spec, config);
         self.collect(view, spec, config);
-        let points = std::mem::take(&mut self.points);
-        points.iter().for_each(|point| self.spread(point));
-        self.points = points;
         self.columns.clear();
-        self.columns.resize(self.side * self.side, Column(0));
-        let [floor, obstacle, above] = self.levels_of;
-        for index in self.touched.drain(..) {
-            let weight = std::mem::take(&mut self.weights[index as usize]);
-            if weight < 0.5 {
-                continue;
+        self.columns.resize(self.side * self.side, Column::default());
+        for point in &self.points {
+            for (index, weight) in around(point.at, self.side) {
+                let Some(column) = self.columns.get_mut(index) else { continue };
+                column.below += weight * point.shares[0];
+                column.floor += weight * point.shares[1];
+                column.obstacle += weight * point.shares[2];
+                column.above += weight * point.shares[3];
             }
-            let level = index as usize % self.levels;
-            let kind = match level {
-                l if l < floor => BELOW,
-                l if l < obstacle => FLOOR,
-                l if l < above => OBSTACLE,
-                _ => 0,
-            };
-            self.columns[index as usize / self.levels].0 |= EXPLORED | kind;
         }
     }
 
-    /// Columns that hold a point, with their cells of the map.
-    pub fn cells<'a>(
+    /// Columns on the map that are explored, with their cells.
+    pub fn explored<'a>(
         &'a self,
         spec: &'a GridSpec,
     ) -> impl Iterator<Item = ([usize; 2], Column)> + 'a {
-        let seen = self.columns.iter().enumerate().filter(|(_, column)| column.0 != 0);
+        let seen = self.columns.iter().enumerate().filter(|(_, column)| column.is_explored());
         seen.filter_map(|(index, column)| Some((self.cell(index, spec)?, *column)))
     }
 
@@ -93,23 +126,22 @@ impl Block {
         found
     }
 
-    /// Points of a category among the obstacles of each cell.
-    pub fn count_category(&mut self, category: usize, spec: &GridSpec) -> Vec<([usize; 2], u32)> {
-        let points = std::mem::take(&mut self.points);
-        let of_category = points.iter().filter(|p| usize::try_from(p.category) == Ok(category));
-        of_category.for_each(|point| self.spread(point));
-        self.points = points;
-        self.counts.clear();
-        self.counts.resize(self.side * self.side, 0);
-        let [_, obstacle, above] = self.levels_of;
-        for index in self.touched.drain(..) {
-            let weight = std::mem::take(&mut self.weights[index as usize]);
-            if (obstacle..above).contains(&(index as usize % self.levels)) {
-                self.counts[index as usize / self.levels] += weight.round() as u32;
+    /// Points of a category among the obstacles of each cell, rounded.
+    pub fn count_category(&self, category: usize, spec: &GridSpec) -> Vec<([usize; 2], u32)> {
+        let mut counts = vec![0.0_f32; self.columns.len()];
+        for point in &self.points {
+            if usize::try_from(point.category) == Ok(category) && point.shares[2] > 0.0 {
+                for (index, weight) in around(point.at, self.side) {
+                    if let Some(count) = counts.get_mut(index) {
+                        *count += weight * point.shares[2];
+                    }
+                }
             }
         }
-        let counted = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);
-        counted.filter_map(|(index, count)| Some((self.cell(index, spec)?, *count))).collect()
+        let counted = counts.into_iter().enumerate().filter(|(_, count)| *count >= A_POINT);
+        counted
+            .filter_map(|(index, count)| Some((self.cell(index, spec)?, count.round() as u32)))
+            .collect()
     }
 
     fn cell(&self, index: usize, spec: &GridSpec) -> Option<[usize; 2]> {
@@ -118,9 +150,8 @@ impl Block {
         (row < spec.rows && col < spec.cols).then_some([row, col])
     }
 
-    /// Lays the voxels around the block before the camera, whichever way it is turned.
+    /// Lays the columns around the block before the camera, whichever way it is turned.
     fn place(&mut self, view: &DepthView<'_>, spec: &GridSpec, config: &BevConfig) {
-        let cell_m = config.cell_m;
         let [camera_x, _, camera_z] = view.camera.position_m;
         let (sin, cos) = view.camera.yaw_rad.sin_cos();
         let half_m = 0.5 * config.block_m;
@@ -132,20 +163,11 @@ impl Block {
                 [camera_x + ahead * sin + right * cos, camera_z + ahead * cos - right * sin];
             low_m = [0, 1].map(|i| low_m[i].min(corner[i]));
         }
-        let first = [1, 0].map(|i: usize| ((low_m[i] - spec.corner_m[i]) / cell_m).floor() - 2.0);
-        self.first = first.map(|v| v as i64);
+        self.first = [1, 0].map(|axis: usize| {
+            ((low_m[axis] - spec.corner_m[axis]) / config.cell_m).floor() as i64 - 2
+        });
         // The block's diagonal, and a rim for what spreads.
-        let side = (2.0_f64.sqrt() * config.block_m / cell_m).ceil() as usize + 6;
-        let levels = ((config.heights_m[1] - config.heights_m[0]) / cell_m).round() as usize + 2;
-        let level =
-            |height_m: f64| ((height_m - config.heights_m[0]) / cell_m + 1e-6).max(0.0) as usize;
-        let top_m = view.camera.position_m[1] + config.obstacle_above_camera_m;
-        self.levels_of =
-            [level(-config.obstacle_min_m), level(config.obstacle_min_m), level(top_m)];
-        if self.side != side || self.levels != levels {
-            (self.side, self.levels) = (side, levels);
-            self.weights = vec![0.0; side * side * levels];
-        }
+        self.side = (2.0_f64.sqrt() * config.block_m / config.cell_m).ceil() as usize + 6;
     }
 
     /// The points of every `stride_px`-th pixel that lie in the block before the camera.
@@ -153,11 +175,12 @@ impl Block {
         let camera = &view.camera;
         let [camera_x, camera_y, camera_z] = camera.position_m;
         let (sin, cos) = camera.yaw_rad.sin_cos();
+        let levels = Levels::new(config, camera_y);
         let per_m = 1.0 / config.cell_m;
+        // Place of the camera among the columns; a column's centre is a whole number.
         let origin = [
-            spec.corner_m[0] * per_m + self.first[1] as f64,
-            config.heights_m[0] * per_m,
-            spec.corner_m[1] * per_m + self.first[0] as f64,
+            (camera_z - spec.corner_m[1]) * per_m - self.first[0] as f64 - 0.5,
+            (camera_x - spec.corner_m[0]) * per_m - self.first[1] as f64 - 0.5,
         ];
         let start = config.stride_px / 2;
         self.points.clear();
@@ -173,48 +196,33 @@ impl Block {
                 if !(depth_m > 0.0 && depth_m <= config.max_depth_m) {
                     continue;
                 }
-                let offset: [f64; 3] = std::array::from_fn(|i| {
+                let [x, y, z] = std::array::from_fn(|i| {
                     depth_m * (corner[i] + col as f64 * right[i] + row as f64 * down[i])
                 });
-                let place: Vec2 =
-                    [offset[0] * sin + offset[2] * cos, offset[0] * cos - offset[2] * sin];
-                let height_m = camera_y + offset[1];
-                let is_inside = (0.0..config.block_m).contains(&place[0])
-                    && place[1].abs() < 0.5 * config.block_m
+                let [ahead_m, right_m]: Vec2 = [x * sin + z * cos, x * cos - z * sin];
+                let height_m = camera_y + y;
+                let is_inside = (0.0..config.block_m).contains(&ahead_m)
+                    && right_m.abs() < 0.5 * config.block_m
                     && (config.heights_m[0]..config.heights_m[1]).contains(&height_m);
                 if is_inside {
-                    let at = [
-                        (camera_x + offset[0]) * per_m - origin[0] - 0.5,
-                        height_m * per_m - origin[1],
-                        (camera_z + offset[2]) * per_m - origin[2] - 0.5,
-                    ];
+                    let at = [origin[0] + z * per_m, origin[1] + x * per_m].map(|v| v as f32);
                     let category = view.categories.map_or(-1, |categories| categories[index]);
-                    self.points.push(Point { at: at.map(|v| v as f32), category });
+                    self.points.push(Point { at, shares: levels.shares(height_m), category });
                 }
             }
         }
     }
+}
 
-    /// Adds one point to the eight voxels around it, by its nearness to their centres.
-    fn spread(&mut self, point: &Point) {
-        let low = point.at.map(f32::floor);
-        let share: [f32; 3] = std::array::from_fn(|i| point.at[i] - low[i]);
-        let [col, level, row] = low.map(|v| v.max(0.0) as usize);
-        for (d_row, row_share) in [(0, 1.0 - share[2]), (1, share[2])] {
-            for (d_col, col_share) in [(0, 1.0 - share[0]), (1, share[0])] {
-                let column = (row + d_row) * self.side + col + d_col;
-                for (d_level, level_share) in [(0, 1.0 - share[1]), (1, share[1])] {
-                    let weight = row_share * col_share * level_share;
-                    let index = column * self.levels + level + d_level;
-                    let Some(voxel) = self.weights.get_mut(index) else { continue };
-                    if weight > 0.0 {
-                        if *voxel == 0.0 {
-                            self.touched.push(index as u32);
-                        }
-                        *voxel += weight;
-                    }
-                }
-            }
-        }
-    }
+/// The four columns around a point and its nearness to each.
+fn around(at: [f32; 2], side: usize) -> [(usize, f32); 4] {
+    let low = at.map(f32::floor);
+    let [row_share, col_share] = [at[0] - low[0], at[1] - low[1]];
+    let first = low[0].max(0.0) as usize * side + low[1].max(0.0) as usize;
+    [
+        (first, (1.0 - row_share) * (1.0 - col_share)),
+        (first + 1, (1.0 - row_share) * col_share),
+        (first + side, row_share * (1.0 - col_share)),
+        (first + side + 1, row_share * col_share),
+    ]
 }
