@@ -22,6 +22,8 @@ class GoalConfig:
     """A temporary goal is confirmed when the way to it, grown as the planner does, is shorter."""
     redetect_m: float = 1.0
     """This near, the goal has to be in view, or its place is given up."""
+    same_place_m: float = 0.25
+    """Detections with cells this near each other are of the same thing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,7 @@ class GoalWatch:
         self.temporary: Glimpse | None = None
         self.confirmed: Glimpse | None = None
         self.num_given_up = 0
+        self._has_way = True
         self.is_in_view = False
         """Whether the last view showed what the goal is."""
         self._bev = bev
@@ -55,7 +58,10 @@ class GoalWatch:
         return self.confirmed or self.temporary
 
     def look(self, view: View, category: str | None, seen_ids: frozenset[int]) -> None:
-        """Takes over what a view shows of the goal: its largest detection is the temporary goal from now on.
+        """Takes over what a view shows of the goal: its largest detection becomes the temporary goal.
+
+        One that is held gives way to a detection of the same place, or when there is no way to it. If every largest
+        detection took over, an agent that turns towards one chair would see another, and turn back, for ever.
 
         Args:
             view: The present one.
@@ -66,8 +72,16 @@ class GoalWatch:
         found = None if mask is None else self._glimpse(self._bev.cells_of(view, mask), "detection")
         is_node_seen = self.temporary is not None and self.temporary.node_id in seen_ids
         self.is_in_view = mask is not None or is_node_seen
-        if self.confirmed is None and found is not None:
+        if self.confirmed is None and found is not None and self._gives_way(found):
             self.temporary = found
+
+    def _gives_way(self, found: Glimpse) -> bool:
+        held = self.temporary
+        if held is None or held.source == "graph" or not self._has_way:
+            return True
+        around = self._bev.grown(held.cells, round(self.config.same_place_m / self._bev.map_frame.cell_m))
+        cols = self._bev.map_frame.cols
+        return bool(np.isin(found.cells @ (cols, 1), around @ (cols, 1)).any())
 
     def pursue(self, node_id: int, cells: Cells) -> None:
         """Goes for the node that the goal was matched with, if nothing better is in view."""
@@ -97,6 +111,7 @@ class GoalWatch:
             self.temporary = None
             return
         way_m = self._planner.distance_m(pose, goal.cells)
+        self._has_way = way_m is not None
         if way_m is not None and way_m < self.config.confirm_m:
             self.confirmed, self.temporary = goal, None
 

@@ -217,10 +217,11 @@ class ObjectGraph:
 
     def rename(self, node_id: int, word: str) -> None:
         """Calls a node something else, until detections change their mind about it."""
-        node, entry = self._nodes.get(node_id), self.objects.entry(node_id)
-        if node is None or entry is None or node.caption == word:
+        node = self._nodes.get(node_id)
+        if node is None or node.caption == word:
             return
-        self._renamed[node_id] = (word, entry.label)
+        _, label = self._renamed.get(node_id, ("", node.caption))
+        self._renamed[node_id] = (word, label)
         self._nodes[node_id] = SceneNode(node.id, word, node.centre_m, node.size_m, node.num_detections)
 
     def delete(self, node_id: int) -> None:
