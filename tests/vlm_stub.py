@@ -1,17 +1,17 @@
-"""A real HTTP server that speaks `/v1/chat/completions`, and misbehaves on request."""
+"""The server of `evonav mock-vlm`, holding requests to OpenAI's published API."""
 
 import base64
-import json
-import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from io import BytesIO
 from typing import Any
 
 import jsonschema
 from PIL import Image
+
+from evonav.decision import mock_vlm
+from evonav.decision.mock_vlm import MockReply
+from evonav.decision.mock_vlm import MockServer as Stub
 
 KEY = "sk-test-0123456789abcdefghijklmnop"
 
@@ -111,11 +111,6 @@ def check_strict(schema: dict[str, Any]) -> None:
     assert schema.get("enum") != [], "response_format: enum must not be empty"
 
 
-Reply = dict[str, Any]
-"""`text` or `message`, `finish_reason`, `status`, `headers`, `raw` bytes, `cut` (announce more than is sent),
-`hang_s`."""
-
-
 def images_in(request: dict[str, Any]) -> list[Image.Image]:
     """Decoded, so that a broken image is an error."""
     images = []
@@ -130,97 +125,18 @@ def images_in(request: dict[str, Any]) -> list[Image.Image]:
     return images
 
 
-class Stub:
-    """What the server does and saw."""
-
-    def __init__(self, reply: Callable[[dict[str, Any]], Reply]) -> None:
-        self.reply = reply
-        self.script: list[Reply] = []
-        """Replies that come first, one a request."""
-        self.requests: list[dict[str, Any]] = []
-        self.keys: set[str] = set()
-        self.most_at_once = 0
-        self.at_once = 0
-        self.lock = threading.Lock()
-        self.url = ""
+def check_request(request: dict[str, Any]) -> None:
+    """Raises unless a request is one that OpenAI's API would take."""
+    jsonschema.validate(request, REQUEST)
+    images_in(request)
+    if "response_format" in request:
+        schema = request["response_format"]["json_schema"]
+        assert not schema.get("strict") or schema["schema"]["type"] == "object"
+        check_strict(schema["schema"])
 
 
 @contextmanager
-def serving(reply: Callable[[dict[str, Any]], Reply]) -> Iterator[Stub]:
-    stub = Stub(reply)
-
-    class Handler(BaseHTTPRequestHandler):
-        protocol_version = "HTTP/1.1"
-        wbufsize = -1
-        disable_nagle_algorithm = True
-
-        def do_POST(self) -> None:
-            with stub.lock:
-                stub.at_once += 1
-                stub.most_at_once = max(stub.most_at_once, stub.at_once)
-            try:
-                self.answer()
-            finally:
-                with stub.lock:
-                    stub.at_once -= 1
-
-        def answer(self) -> None:
-            body = self.rfile.read(int(self.headers["Content-Length"]))
-            request = json.loads(body)
-            with stub.lock:
-                stub.keys.add(self.headers.get("Authorization", ""))
-                stub.requests.append(request)
-                scripted = stub.script.pop(0) if stub.script else None
-            try:
-                assert self.path == "/v1/chat/completions", self.path
-                jsonschema.validate(request, REQUEST)
-                images_in(request)
-                if "response_format" in request:
-                    schema = request["response_format"]["json_schema"]
-                    assert not schema.get("strict") or schema["schema"]["type"] == "object"
-                    check_strict(schema["schema"])
-            except Exception as error:
-                return self.send(400, json.dumps({"error": {"message": str(error)[:300]}}).encode())
-            reply = stub.reply(request) if scripted is None else scripted
-            time.sleep(reply.get("hang_s", 0.0))
-            message = reply.get("message", {"role": "assistant", "content": reply.get("text"), "refusal": None})
-            response = {
-                "id": "chatcmpl-1",
-                "object": "chat.completion",
-                "created": 0,
-                "model": request["model"] + "-2024-08-06",
-                "system_fingerprint": "fp_1",
-                "choices": [{"index": 0, "message": message, "finish_reason": reply.get("finish_reason", "stop")}],
-                "usage": {"prompt_tokens": 1000, "completion_tokens": 100, "total_tokens": 1100},
-            }
-            data = reply.get("raw", json.dumps(response).encode())
-            return self.send(reply.get("status", 200), data, reply.get("headers", {}), reply.get("cut", 0))
-
-        def send(self, status: int, data: bytes, headers: dict[str, str] | None = None, cut: int = 0) -> None:
-            self.send_response(status)
-            self.send_header("Content-Type", "application/json")
-            self.send_header("Content-Length", str(len(data) + cut))
-            for name, value in (headers or {}).items():
-                self.send_header(name, value)
-            self.end_headers()
-            try:
-                self.wfile.write(data)
-                self.wfile.flush()
-            except (BrokenPipeError, ConnectionResetError):
-                pass
-            self.close_connection = cut > 0
-
-        def log_message(self, *_: object) -> None:
-            pass
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
-    server.daemon_threads = True
-    stub.url = f"http://127.0.0.1:{server.server_port}/v1"
-    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
-    thread.start()
-    try:
+def serving(reply: Callable[[dict[str, Any]], MockReply]) -> Iterator[Stub]:
+    """Serves `/v1/chat/completions`, and refuses what is not valid."""
+    with mock_vlm.serving(Stub(reply, check_request)) as stub:
         yield stub
-    finally:
-        server.shutdown()
-        server.server_close()
-        thread.join()

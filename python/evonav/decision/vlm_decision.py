@@ -8,7 +8,7 @@ what is in `answer` is read as any other answer is.
 
 import json
 from collections.abc import Mapping
-from typing import Any, Literal, Protocol, TypeVar, cast
+from typing import Any, Literal, Protocol, TypeVar
 
 from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.questions.question import AnswerError, Fault, Question, Reply
@@ -35,6 +35,9 @@ FAULTS: Mapping[VlmFailure, Fault] = {
     "connection": "lost",
 }
 """What counts as which fault of an answer; the other failures would meet every question, and end the stage."""
+
+_MAX_VALUES, _MAX_CHARACTERS = 1000, 15_000
+"""Of an `enum`, and of all its values together: OpenAI's limits."""
 
 _AS_JSON = "Give the answer as JSON: what belongs on the first line as `answer`, the reason as `reason`."
 _LINES_AS_JSON = "Give the answer as JSON: its lines as the items of `answer`, in order, the reason as `reason`."
@@ -108,7 +111,7 @@ class VlmDecision:
                 exchanges that cannot be read or written.
         """
         try:
-            answer = self._ask(question, attempt)
+            answer, is_json = self._ask(question, attempt)
         except StoreError as error:
             raise DecisionError(str(error)) from error
         except VlmError as error:
@@ -116,32 +119,36 @@ class VlmDecision:
             if fault is None:
                 raise
             raise AnswerError(fault, str(error)) from error
-        return read_reply(question, answer.text, is_json=self.structured == "on")
+        if is_json and (self.structured == "on" or _fields(answer.text) is not None):
+            return read_json(question, answer.text)
+        # Servers that overlook a schema answer in lines, which is as good.
+        return Reply(question.parse(answer.text), answer.text)
 
-    def _ask(self, question: Question[A], attempt: int) -> Answer:
+    def _ask(self, question: Question[A], attempt: int) -> tuple[Answer, bool]:
+        """The answer, and whether it was asked for as JSON."""
         plain = question.prompt()
         if self.structured == "off":
-            return self.client.ask(plain, attempt)
+            return self.client.ask(plain, attempt), False
         as_json = with_schema(plain, question.answer_schema())
         if self.structured == "on" or self.client.is_kept(as_json, attempt):
-            return self.client.ask(as_json, attempt)
+            return self.client.ask(as_json, attempt), True
         # In a replay, what is not kept as JSON was asked of a server that knew none.
         if self._is_refused or self.client.never_asks or self.client.is_kept(plain, attempt):
-            return self.client.ask(plain, attempt)
+            return self.client.ask(plain, attempt), False
         try:
-            return self.client.ask(as_json, attempt)
+            return self.client.ask(as_json, attempt), True
         except VlmError as error:
             if not _is_about_format(error):
                 raise
         self._is_refused = True
-        return self.client.ask(plain, attempt)
+        return self.client.ask(plain, attempt), False
 
 
 def with_schema(prompt: Prompt, answer_schema: Mapping[str, Any]) -> Prompt:
     """The same prompt for an answer in JSON: `{"answer": ..., "reason": ...}`, both required, nothing else."""
     schema = {
         "type": "object",
-        "properties": {"answer": dict(answer_schema), "reason": {"type": "string"}},
+        "properties": {"answer": _supported(answer_schema), "reason": {"type": "string"}},
         "required": ["answer", "reason"],
         "additionalProperties": False,
     }
@@ -150,34 +157,44 @@ def with_schema(prompt: Prompt, answer_schema: Mapping[str, Any]) -> Prompt:
     return Prompt((*turns, Turn(last.role, (*last.parts, Text(words)))), schema)
 
 
-def read_reply(question: Question[A], text: str, *, is_json: bool = False) -> Reply[A]:
-    """Reads an answer: JSON by the schema, or lines by the grammar.
-
-    Args:
-        question: What was asked.
-        text: What came.
-        is_json: Refuse lines. Servers that overlook a schema answer in lines, which is as good.
+def read_json(question: Question[A], text: str) -> Reply[A]:
+    """Reads an answer by the schema of `with_schema`: its lines go through the question's grammar.
 
     Raises:
         AnswerError: `invalid`.
     """
-    if not is_json and not text.lstrip().startswith("{"):
-        return Reply(question.parse(text), text)
-    try:
-        content = json.loads(text)
-    except ValueError as error:
-        raise AnswerError("invalid", f"not JSON: {error}: {text[:80]!r}", text) from None
-    answer = content.get("answer") if isinstance(content, dict) else None
+    fields = _fields(text)
+    if fields is None:
+        raise AnswerError("invalid", f"no JSON object with `answer`: {text[:80]!r}", text)
+    answer = fields["answer"]
     lines = answer if isinstance(answer, list) else [answer]
-    if not all(isinstance(line, str | int) and not isinstance(line, bool) for line in lines):
+    if not all(isinstance(line, str | int | float) and not isinstance(line, bool) for line in lines):
         raise AnswerError("invalid", f"no lines in `answer`: {text[:80]!r}", text)
     words = "\n".join(str(line) for line in lines)
-    reason = " ".join(str(cast("dict[str, Any]", content).get("reason", "")).split())
+    reason = " ".join(str(fields.get("reason", "")).split())
     try:
         return Reply(question.parse(words), f"{words}\n{reason}")
     except AnswerError as error:
         error.text = text
         raise
+
+
+def _fields(text: str) -> dict[str, Any] | None:
+    """A JSON object with an answer in it; `None` if the text is none."""
+    try:
+        content = json.loads(text)
+    except ValueError:
+        return None
+    return content if isinstance(content, dict) and "answer" in content else None
+
+
+def _supported(schema: Mapping[str, Any]) -> dict[str, Any]:
+    """A schema without lists of values that servers refuse: empty ones, and very long ones."""
+    kept = {name: _supported(value) if name == "items" else value for name, value in schema.items()}
+    values = kept.get("enum")
+    if values is not None and not (values and len(values) <= _MAX_VALUES and len("".join(values)) <= _MAX_CHARACTERS):
+        del kept["enum"]
+    return kept
 
 
 def _is_about_format(error: VlmError) -> bool:

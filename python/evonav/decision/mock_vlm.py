@@ -1,0 +1,243 @@
+"""A server that speaks the part of OpenAI's API that evonav uses, and misbehaves on request.
+
+It lets everything between an agent and a model be tried without a key: `evonav mock-vlm`. Tests script it.
+"""
+
+import json
+import random
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+from evonav.decision.mock_answers import mock_answer
+from evonav.errors import InvalidArgumentError
+
+JsonObject = dict[str, Any]
+
+MockReply = dict[str, Any]
+"""What the server does with a request; all of it may be left out:
+
+`text` or whole `message` of the answer, `finish_reason`; `status`, `headers` and `raw` bytes of the response; `cut`:
+bytes announced but not sent, then the connection is closed; `hang_s`: seconds before anything is sent."""
+
+FAULTS: dict[str, MockReply] = {
+    "rate_limit": {
+        "status": 429,
+        "headers": {"Retry-After": "1"},
+        "raw": b'{"error": {"message": "Rate limit reached", "type": "requests", "code": "rate_limit_exceeded"}}',
+    },
+    "server_error": {
+        "status": 500,
+        "raw": b'{"error": {"message": "The server had an error", "type": "server_error"}}',
+    },
+    "hang": {"text": "Too late.", "hang_s": 3600.0},
+    "disconnect": {"raw": b'{"choices": [', "cut": 1000},
+    "malformed": {"raw": b'{"id": "chatcmpl-1", "choices": [{"mess'},
+    "broken_json": {"text": '{"answer": "Obj'},
+    "truncated": {"text": "I think that the", "finish_reason": "length"},
+    "refusal": {"message": {"role": "assistant", "content": None, "refusal": "I am sorry, I cannot help with that."}},
+    "filtered": {"text": "", "finish_reason": "content_filter"},
+    "empty": {"text": ""},
+    "off_topic": {"text": "What a nice home! I would look in the kitchen first."},
+}
+"""What goes wrong with models and servers, by name."""
+
+
+class MockServer:
+    """What a server does, and what it saw."""
+
+    def __init__(
+        self, reply: Callable[[JsonObject], MockReply], check: Callable[[JsonObject], None] = lambda request: None
+    ) -> None:
+        """A server.
+
+        Args:
+            reply: To a request's body.
+            check: Raises if a request is not valid; that is answered with 400 and the error's words.
+        """
+        self.reply = reply
+        self.check = check
+        self.script: list[MockReply] = []
+        """Replies that come first, one a request."""
+        self.requests: list[JsonObject] | None = []
+        """Bodies; `None` to keep none."""
+        self.keys: set[str] = set()
+        """`Authorization` headers."""
+        self.num_requests = 0
+        self.most_at_once = 0
+        self.at_once = 0
+        self.lock = threading.Lock()
+        self.url = ""
+        """Of the API, once it serves."""
+
+    def response(self, request: JsonObject) -> MockReply:
+        """The reply to a request, by script or rule; 400 if it is not valid."""
+        with self.lock:
+            self.num_requests += 1
+            if self.requests is not None:
+                self.requests.append(request)
+            scripted = self.script.pop(0) if self.script else None
+        try:
+            self.check(request)
+        except Exception as error:
+            return {"status": 400, "raw": json.dumps({"error": {"message": str(error)[:300]}}).encode()}
+        return self.reply(request) if scripted is None else scripted
+
+
+def faulty(
+    rates: Mapping[str, float], seed: int = 0, answer: Callable[[JsonObject], str] = mock_answer
+) -> Callable[[JsonObject], MockReply]:
+    """Replies of a server on which things go wrong.
+
+    Args:
+        rates: Share of requests by name in `FAULTS`.
+        seed: Decides which requests, by their number.
+        answer: To the others.
+
+    Raises:
+        InvalidArgumentError: A fault is unknown, or the shares are not within 0 to 1.
+    """
+    for name, rate in rates.items():
+        if name not in FAULTS:
+            raise InvalidArgumentError(f"fault `{name}`: expected one of {', '.join(FAULTS)}")
+        if not 0.0 <= rate <= 1.0:
+            raise InvalidArgumentError(f"fault {name}: expected a share from 0 to 1, got {rate!r}")
+    if sum(rates.values()) > 1.0:
+        raise InvalidArgumentError(f"faults: shares add up to {sum(rates.values()):g}, more than 1")
+    draws = random.Random(seed)  # noqa: S311 - not for secrets
+    lock = threading.Lock()
+
+    def reply(request: JsonObject) -> MockReply:
+        with lock:
+            share = draws.random()
+        for name, rate in rates.items():
+            if share < rate:
+                return FAULTS[name]
+            share -= rate
+        return {"text": answer(request)}
+
+    return reply
+
+
+def without_schemas(request: JsonObject) -> None:
+    """A check for servers that hold no answer to a schema.
+
+    Raises:
+        InvalidArgumentError: The request asks for it.
+    """
+    if "response_format" in request:
+        raise InvalidArgumentError("Unsupported parameter: 'response_format' of type 'json_schema'")
+
+
+@contextmanager
+def serving(server: MockServer, *, host: str = "127.0.0.1", port: int = 0) -> Iterator[MockServer]:
+    """Serves while the context lasts; `server.url` says where.
+
+    Raises:
+        InvalidArgumentError: The port cannot be had.
+    """
+    try:
+        http = ThreadingHTTPServer((host, port), _handler(server))
+    except OSError as error:
+        raise InvalidArgumentError(f"{host}:{port}: {error}") from error
+    http.daemon_threads = True
+    server.url = f"http://{host}:{http.server_port}/v1"
+    thread = threading.Thread(target=http.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
+    thread.start()
+    try:
+        yield server
+    finally:
+        http.shutdown()
+        http.server_close()
+        thread.join()
+
+
+def _handler(server: MockServer) -> type[BaseHTTPRequestHandler]:
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+        wbufsize = -1
+        disable_nagle_algorithm = True
+
+        def do_GET(self) -> None:
+            models = {"object": "list", "data": [{"id": "mock", "object": "model", "created": 0, "owned_by": "evonav"}]}
+            is_known = self.path == "/v1/models"
+            self.send(200 if is_known else 404, json.dumps(models if is_known else {"error": {}}).encode())
+
+        def do_POST(self) -> None:
+            with server.lock:
+                server.at_once += 1
+                server.most_at_once = max(server.most_at_once, server.at_once)
+            try:
+                self.answer()
+            finally:
+                with server.lock:
+                    server.at_once -= 1
+
+        def answer(self) -> None:
+            body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+            with server.lock:
+                server.keys.add(self.headers.get("Authorization", ""))
+            if self.path != "/v1/chat/completions":
+                return self.send(404, json.dumps({"error": {"message": f"no {self.path} here"}}).encode())
+            try:
+                request = json.loads(body)
+            except ValueError as error:
+                return self.send(400, json.dumps({"error": {"message": str(error)}}).encode())
+            reply = server.response(request)
+            time.sleep(reply.get("hang_s", 0.0))
+            raw = reply.get("raw") if "raw" in reply else json.dumps(_completion(request, reply)).encode()
+            return self.send(reply.get("status", 200), raw or b"", reply.get("headers", {}), reply.get("cut", 0))
+
+        def send(self, status: int, data: bytes, headers: Mapping[str, str] | None = None, cut: int = 0) -> None:
+            self.send_response(status)
+            self.send_header("Content-Type", "application/json")
+            self.send_header("Content-Length", str(len(data) + cut))
+            for name, value in (headers or {}).items():
+                self.send_header(name, value)
+            try:
+                self.end_headers()
+                self.wfile.write(data)
+                self.wfile.flush()
+            except (BrokenPipeError, ConnectionResetError):
+                pass  # the client did not wait
+            self.close_connection = cut > 0
+
+        def log_message(self, *_: object) -> None:
+            pass
+
+    return Handler
+
+
+def _completion(request: JsonObject, reply: MockReply) -> JsonObject:
+    message = reply.get("message", {"role": "assistant", "content": reply.get("text"), "refusal": None})
+    model = request.get("model", "mock")
+    return {
+        "id": "chatcmpl-1",
+        "object": "chat.completion",
+        "created": 0,
+        "model": f"{model}-2024-08-06",
+        "system_fingerprint": "fp_1",
+        "choices": [{"index": 0, "message": message, "finish_reason": reply.get("finish_reason", "stop")}],
+        "usage": {"prompt_tokens": 1000, "completion_tokens": 100, "total_tokens": 1100},
+    }
+
+
+def read_rates(text: str, known: Sequence[str]) -> dict[str, float]:
+    """Reads `name=number,name=number`.
+
+    Raises:
+        InvalidArgumentError: A name is not known, said twice, or has no number.
+    """
+    rates: dict[str, float] = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        name, _, value = item.partition("=")
+        if name not in known or name in rates:
+            raise InvalidArgumentError(f"{item}: expected each of {', '.join(known)} once, as name=number")
+        try:
+            rates[name] = float(value)
+        except ValueError:
+            raise InvalidArgumentError(f"{item}: expected a number after {name}=") from None
+    return rates

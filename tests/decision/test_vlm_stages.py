@@ -1,0 +1,299 @@
+"""Whole stages with a model behind real HTTP: what is asked, what goes wrong and is counted, and its replay."""
+
+import json
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evonav.decision.exchanges import ExchangeStore
+from evonav.decision.mock_answers import mock_answer
+from evonav.decision.mock_vlm import FAULTS, MockReply, faulty, without_schemas
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.store import RunStore
+from vlm_stub import KEY, Stub, check_request, images_in, serving
+
+AGENTS = ["fu", "ftu"]
+
+
+def answers(request: dict[str, Any]) -> MockReply:
+    return {"text": mock_answer(request)}
+
+
+class Run:
+    """Runs one bundled task against a server, or against what was kept of it."""
+
+    def __init__(self, folder: Path, *, max_rounds: int = 8) -> None:
+        self.folder = folder
+        self.max_rounds = max_rounds
+
+    def __call__(
+        self,
+        name: str,
+        url: str | None,
+        *,
+        agents: list[str] | None = None,
+        num_workers: int = 0,
+        server: dict[str, Any] | None = None,
+        **options: Any,
+    ) -> list[str]:
+        """Records as stored; without a `url` in mode `replay`."""
+        host = {
+            "server": {
+                "base_url": url or "http://127.0.0.1:9/v1",
+                "timeout_s": 20.0,
+                "max_retries": 2,
+                **(server or {}),
+            },
+            "exchanges": str(self.folder / "exchanges.sqlite"),
+            "mode": "auto" if url else "replay",
+        }
+        backend = Backend(
+            decision="evonav.decision.backends:vlm",
+            decision_options={"model": "gpt-4o", **options},
+            decision_host_options=host,
+        )
+        config = RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=self.max_rounds))
+        with bundled_tasks() as directory:
+            evaluate(
+                agents or AGENTS, task_files(directory, 1), self.folder / name, config=config, num_workers=num_workers
+            )
+        with RunStore(self.folder / name) as store:
+            return list(store.record_texts())
+
+
+@pytest.fixture
+def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    monkeypatch.setenv("OPENAI_API_KEY", KEY)
+    return Run(tmp_path)
+
+
+def records(texts: list[str]) -> list[StageRecord]:
+    return [StageRecord.model_validate_json(text) for text in texts]
+
+
+def counters(text: str) -> Counter[str]:
+    """Of a stage's last round, which are of the whole task so far."""
+    return Counter(records([text])[0].trace[-1].counters)
+
+
+def words_of(request: dict[str, Any]) -> list[str]:
+    return [part["text"] for part in request["messages"][-1]["content"] if part["type"] == "text"]
+
+
+def test_whole_stages_ask_what_the_api_takes_with_images_that_can_be_seen(run: Run, tmp_path: Path) -> None:
+    run.max_rounds = 50
+    with serving(answers) as stub:
+        first = run("first", stub.url)
+    assert not [record.error for record in records(first) if record.error]
+    assert any(record.state is EndState.SUCCESS for record in records(first))
+    assert sum((counters(text) for text in first), Counter())["invalid_answers"] == 0
+    assert stub.keys == {f"Bearer {KEY}"}
+    kinds = Counter()
+    for request in stub.requests or []:
+        check_request(request)  # the server has done so too, and answered 400 if it was not valid
+        kinds[_check_images(request)] += 1
+        assert {**request, "messages": 0, "response_format": 0} == {
+            "model": "gpt-4o",
+            "messages": 0,
+            "temperature": 0.7,
+            "top_p": 0.95,
+            "max_tokens": 4096,
+            "seed": 0,
+            "response_format": 0,
+        }
+    assert set(kinds) == {"choose", "verify"}
+    assert run("again", None) == first
+    for file in tmp_path.rglob("*"):
+        assert not file.is_file() or (
+            KEY.encode() not in file.read_bytes() and stub.url.encode() not in file.read_bytes()
+        )
+
+
+def _check_images(request: dict[str, Any]) -> str:
+    """As many images as the words announce, each of a view or cut out of one; the kind of the question."""
+    words = "\n".join(words_of(request))
+    images = images_in(request)
+    if "yes" in words and "There are" not in words:
+        assert len(images) == words.count("\nView ") + words.startswith("View") + ("remembers this object" in words)
+        kind = "verify"
+    else:
+        num_objects, num_frontiers = (
+            int(words.partition(f" {what}")[0].split()[-1]) for what in ("objects", "frontiers.")
+        )
+        heading, views = words.count("sees ahead:"), words.count("was last seen:")
+        assert (heading, views) == (1, num_objects)
+        # A frontier that no kept view shows has words alone.
+        assert heading + 2 * num_objects <= len(images) <= heading + 2 * num_objects + num_frontiers
+        kind = "choose"
+    for image in images:
+        pixels = np.asarray(image)
+        assert pixels.shape[2] == 3
+        assert max(pixels.shape[:2]) <= 300
+        assert pixels.std() > 0.0
+    return kind
+
+
+@pytest.mark.parametrize(
+    ("fault", "num_times", "counter"),
+    [
+        # Passing faults of the way are the client's business: the agent never hears of them.
+        ("rate_limit", 1, None),
+        ("server_error", 1, None),
+        ("disconnect", 1, None),
+        # Lasting ones are lost answers, after as many retries as allowed.
+        ("rate_limit", 3, "lost_answers"),
+        ("server_error", 3, "lost_answers"),
+        ("disconnect", 3, "lost_answers"),
+        ("hang", 3, "lost_answers"),
+        ("malformed", 1, "invalid_answers"),
+        ("broken_json", 1, "invalid_answers"),
+        ("truncated", 1, "invalid_answers"),
+        ("empty", 1, "invalid_answers"),
+        ("off_topic", 1, "invalid_answers"),
+        ("refusal", 1, "refusals"),
+        ("filtered", 1, "refusals"),
+    ],
+)
+def test_faults_are_survived_counted_and_replayed(run: Run, fault: str, num_times: int, counter: str | None) -> None:
+    run.max_rounds = 2
+    reply = {**FAULTS[fault], "hang_s": 1.5} if fault == "hang" else dict(FAULTS[fault])
+    if fault == "server_error":
+        reply["headers"] = {"Retry-After-Ms": "5"}
+    with serving(answers) as stub:
+        stub.script = [reply] * num_times
+        first = run("first", stub.url, agents=["fu"], server={"timeout_s": 0.5} if fault == "hang" else None)
+    counted = counters(first[0])
+    faults = {name: counted[name] for name in ("invalid_answers", "lost_answers", "refusals") if counted[name]}
+    assert faults == ({} if counter is None else {counter: 1})
+    assert counted["failed_decisions"] == 0
+    assert all(record.state is not EndState.ERRORED for record in records(first))
+    assert run("again", None, agents=["fu"]) == first
+
+
+@pytest.mark.parametrize("fault", ["off_topic", "refusal", "malformed"])
+def test_a_question_given_up_is_counted_and_the_fallback_followed(run: Run, fault: str) -> None:
+    run.max_rounds = 1
+    with serving(answers) as stub:
+        stub.script = [FAULTS[fault]] * 3
+        first = run("first", stub.url, agents=["fu"])
+        seeds = [request["seed"] for request in (stub.requests or [])[:3]]
+    (only,) = records(first)[0].trace
+    assert only.counters["failed_decisions"] == 1
+    assert only.counters["decisions"] == 3
+    assert only.details["reason"] == "no valid answer"
+    assert only.choice.startswith("frontier")
+    assert seeds == [0, 1, 2]  # each try is another request, or its record would be another answer's
+    assert run("again", None, agents=["fu"]) == first
+
+
+def test_what_would_fail_every_question_ends_the_stage(run: Run) -> None:
+    with serving(answers) as stub:
+        stub.script = [{"status": 401, "raw": json.dumps({"error": {"message": f"wrong key {KEY}"}}).encode()}] * 9
+        texts = run("first", stub.url, agents=["fu"])
+    assert KEY not in "".join(texts)
+    first = records(texts)[0]
+    assert (first.state, first.error and first.error.kind) == (EndState.ERRORED, "decision")
+    # Nothing of it was kept, and a replay has no answer to anything.
+    replayed = records(run("again", None, agents=["fu"]))[0]
+    assert replayed.error is not None
+    assert (replayed.error.kind, "not_recorded" in replayed.error.message) == ("decision", True)
+
+
+def test_a_server_without_schemas_is_asked_in_lines(run: Run) -> None:
+    run.max_rounds = 3
+
+    def check(request: dict[str, Any]) -> None:
+        check_request(request)
+        without_schemas(request)
+
+    with serving(answers) as stub:
+        stub.check = check
+        first = run("first", stub.url, agents=["fu"])
+        refused = [request for request in stub.requests or [] if "response_format" in request]
+    assert len(refused) == 1
+    assert len(stub.requests or []) > 2
+    assert counters(first[-1])["invalid_answers"] == 0
+    assert run("again", None, agents=["fu"]) == first
+    with serving(answers) as stub:
+        stub.check = check
+        errored = records(run("on", stub.url, agents=["fu"], structured="on"))[0]
+        assert errored.error is not None
+        assert errored.error.kind == "decision"
+
+
+def test_a_server_that_overlooks_schemas_may_answer_in_lines(run: Run) -> None:
+    def in_lines(request: dict[str, Any]) -> MockReply:
+        return {"text": mock_answer(_plain(request))}
+
+    run.max_rounds = 2
+    with serving(in_lines) as stub:
+        first = run("first", stub.url, agents=["fu"])
+        strict = run("strict", stub.url, agents=["fu"], structured="on", request={"seed": 7})
+    assert counters(first[0])["invalid_answers"] == 0
+    assert counters(strict[0])["invalid_answers"] > 0
+
+
+def _plain(request: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in request.items() if name != "response_format"}
+
+
+def changing() -> Callable[[dict[str, Any]], MockReply]:
+    """A model that never answers the same question twice the same way, and often badly."""
+    return faulty({"off_topic": 0.2, "refusal": 0.1, "malformed": 0.1, "empty": 0.1}, seed=3)
+
+
+def test_workers_that_ask_the_same_have_the_same_answer_and_a_replay_is_the_run(run: Run) -> None:
+    run.max_rounds = 6
+    with serving(changing()) as stub:
+        first = run("first", stub.url, num_workers=2)
+    assert sum(counters(text)["invalid_answers"] for text in first) > 0
+    assert run("again", None, num_workers=0) == first
+    # Both agents begin with the same question: they were told the same.
+    rounds = {record.agent: record.trace[0].choice for record in records(first) if record.stage == 1}
+    assert rounds["fu"] == rounds["ftu"]
+
+
+def test_a_run_gone_on_with_is_the_run_that_was_not_interrupted(run: Run, tmp_path: Path) -> None:
+    run.max_rounds = 4
+    with serving(changing()) as stub:
+        first = run("first", stub.url, agents=["fu"])
+    with RunStore(tmp_path / "first") as store:
+        last = records(first)[-1]
+        store.forget_episode(last.agent, last.task_id, last.stage)
+    with serving(lambda _: {"text": "another model altogether"}) as stub:
+        assert run("first", stub.url, agents=["fu"]) == first
+        assert stub.requests == []
+
+
+def test_failures_can_be_asked_again(run: Run, tmp_path: Path) -> None:
+    run.max_rounds = 1
+    with serving(answers) as stub:
+        stub.script = [FAULTS["malformed"], {**FAULTS["server_error"], "headers": {"Retry-After-Ms": "5"}}]
+        first = run("first", stub.url, agents=["fu"], server={"max_retries": 0})
+        assert counters(first[0])["lost_answers"] == 1
+        store = ExchangeStore(tmp_path / "exchanges.sqlite")
+        assert store.num_failures == store.forget_failures() > 0
+        assert counters(run("again", stub.url, agents=["fu"])[0])["lost_answers"] == 0
+
+
+def test_a_model_that_is_not_to_look_gets_no_images(run: Run) -> None:
+    run.max_rounds = 2
+    with serving(answers) as stub:
+        run("blind", stub.url, agents=["fu"], images=False)
+    assert stub.requests
+    assert not any(images_in(request) for request in stub.requests)
+
+
+def test_the_stub_itself_refuses(run: Run) -> None:
+    """The server's check is no formality: a request that OpenAI would not take is a 400."""
+    with serving(answers) as stub:
+        assert stub.response({"model": "m"})["status"] == 400
+        assert isinstance(stub, Stub)
