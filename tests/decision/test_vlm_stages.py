@@ -89,7 +89,7 @@ def words_of(request: dict[str, Any]) -> list[str]:
 
 
 def test_whole_stages_ask_what_the_api_takes_with_images_that_can_be_seen(run: Run, tmp_path: Path) -> None:
-    run.max_rounds = 50
+    run.max_rounds = 12
     with serving(answers) as stub:
         first = run("first", stub.url)
     assert not [record.error for record in records(first) if record.error]
@@ -163,7 +163,7 @@ def _check_images(request: dict[str, Any]) -> str:
     ],
 )
 def test_faults_are_survived_counted_and_replayed(run: Run, fault: str, num_times: int, counter: str | None) -> None:
-    run.max_rounds = 2
+    run.max_rounds = 1
     reply = {**FAULTS[fault], "hang_s": 1.5} if fault == "hang" else dict(FAULTS[fault])
     if fault == "server_error":
         reply["headers"] = {"Retry-After-Ms": "5"}
@@ -208,7 +208,7 @@ def test_what_would_fail_every_question_ends_the_stage(run: Run) -> None:
 
 
 def test_a_server_without_schemas_is_asked_in_lines(run: Run) -> None:
-    run.max_rounds = 3
+    run.max_rounds = 2
 
     def check(request: dict[str, Any]) -> None:
         check_request(request)
@@ -233,7 +233,7 @@ def test_a_server_that_overlooks_schemas_may_answer_in_lines(run: Run) -> None:
     def in_lines(request: dict[str, Any]) -> MockReply:
         return {"text": mock_answer(_plain(request))}
 
-    run.max_rounds = 2
+    run.max_rounds = 1
     with serving(in_lines) as stub:
         first = run("first", stub.url, agents=["fu"])
         strict = run("strict", stub.url, agents=["fu"], structured="on", request={"seed": 7})
@@ -251,7 +251,7 @@ def changing() -> Callable[[dict[str, Any]], MockReply]:
 
 
 def test_workers_that_ask_the_same_have_the_same_answer_and_a_replay_is_the_run(run: Run) -> None:
-    run.max_rounds = 6
+    run.max_rounds = 3
     with serving(changing()) as stub:
         first = run("first", stub.url, num_workers=2)
     assert sum(counters(text)["invalid_answers"] for text in first) > 0

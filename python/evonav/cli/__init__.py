@@ -7,6 +7,7 @@ import typer
 from evonav.cli.evaluate import demo, evaluate, report, strip
 from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
+from evonav.cli.mock_vlm import mock_vlm
 from evonav.cli.paper import paper
 from evonav.cli.tasks import tasks_app
 from evonav.cli.view import view
@@ -22,6 +23,7 @@ app = typer.Typer(
 )
 for command in (evaluate, demo, report, paper, strip, view, generate):
     app.command()(command)
+app.command(name="mock-vlm")(mock_vlm)
 app.add_typer(houses_app, name="houses")
 app.add_typer(tasks_app, name="tasks")
 

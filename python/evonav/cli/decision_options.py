@@ -79,6 +79,9 @@ class DecisionOptions:
     tokens_per_minute: Annotated[float | None, _option("vlm: of the run, spread over its workers.")] = None
     request_timeout: Annotated[float | None, _option("vlm: seconds for a try; default 60.")] = None
     max_retries: Annotated[int | None, _option("vlm: of lost connections, 429 and 5xx; default 4.")] = None
+    noise: Annotated[
+        str, _option("Mistakes on purpose, as shares: wrong=0.1,unparsable=0.05,refusal=0.02,lost=0.01; delay=SECONDS.")
+    ] = ""
 
 
 def with_decision_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -118,12 +121,19 @@ def with_decisions(
         DecisionError: The model cannot be asked from here: no key, no package.
         StoreError: The exchanges cannot be opened.
     """
+    noise = _noise(options.noise)
     if options.decision == "text":
         _refuse_model_options(options)
-        return backend
-    if options.decision == "vlm":
-        return _vlm(backend, options, out, seed, num_workers)
-    raise typer.BadParameter(f"--decision {options.decision}: expected text, vlm or module:name")
+        return replace(backend, decision_options=noise)
+    if options.decision != "vlm" and ":" not in options.decision:
+        raise typer.BadParameter(f"--decision {options.decision}: expected text, vlm or module:name")
+    asked = _vlm(options, out, seed, num_workers) if options.decision == "vlm" else _own(options, out)
+    path, identity, host = asked
+    asking = replace(backend, decision=path, decision_options={**identity, **noise}, decision_host_options=host)
+    check = getattr(asking.make_decision(seed), "check", None)
+    if check is not None:
+        check()
+    return asking
 
 
 def stage_timeout_s(options: DecisionOptions, default_s: float) -> float:
@@ -136,16 +146,34 @@ def answer_timeout_s(options: DecisionOptions) -> float:
     return 600.0 if options.decision == "text" else 3600.0
 
 
-def _refuse_model_options(options: DecisionOptions) -> None:
+def _noise(text: str) -> dict[str, Any]:
+    """The option, read and checked; nothing where nothing is to go wrong."""
+    if not text:
+        return {}
+    from evonav.decision.noisy import NoiseRates
+    from evonav.decision.rates import read_rates
+
+    rates = read_rates(text, [field.name for field in fields(NoiseRates)])
+    NoiseRates.read(rates)
+    return {"noise": rates}
+
+
+def _refuse_model_options(options: DecisionOptions, *allowed: str) -> None:
     """Says of options that would be overlooked that they are; the model may come from the environment."""
     default = DecisionOptions()
     for field in fields(DecisionOptions):
-        if field.name not in ("decision", "model") and getattr(options, field.name) != getattr(default, field.name):
-            raise typer.BadParameter(f"--{field.name.replace('_', '-')} is for --decision vlm or module:name")
+        is_given = getattr(options, field.name) != getattr(default, field.name)
+        if is_given and field.name not in ("decision", "model", "noise", *allowed):
+            raise typer.BadParameter(
+                f"--{field.name.replace('_', '-')} is of no use with --decision {options.decision}"
+            )
 
 
-def _vlm(backend: "Backend", options: DecisionOptions, out: Path, seed: int, num_workers: int) -> "Backend":
-    from evonav.decision.backends import SAMPLING, vlm
+def _vlm(
+    options: DecisionOptions, out: Path, seed: int, num_workers: int
+) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    """A model behind an endpoint: what makes it, what it is, and how it is reached."""
+    from evonav.decision.backends import SAMPLING
 
     if not options.model:
         raise typer.BadParameter(f"--decision vlm needs --model (or {MODEL_VARIABLE})")
@@ -162,18 +190,23 @@ def _vlm(backend: "Backend", options: DecisionOptions, out: Path, seed: int, num
         requests_per_minute=_share(options.requests_per_minute, num_workers),
         tokens_per_minute=_share(options.tokens_per_minute, num_workers),
     )
-    host: dict[str, Any] = {"server": server, **_keeping(options, out), **_spending(options, options.model, out)}
-    identity: dict[str, Any] = {
+    host = {"server": server, **_keeping(options, out), **_spending(options, options.model, out)}
+    identity = {
         "model": options.model,
         "structured": options.structured.value,
         "images": options.images,
         "request": request,
     }
-    model = vlm(0, **identity, **host)
-    model.check()
-    return replace(
-        backend, decision="evonav.decision.backends:vlm", decision_options=identity, decision_host_options=host
-    )
+    return "evonav.decision.backends:vlm", identity, host
+
+
+def _own(options: DecisionOptions, out: Path) -> tuple[str, dict[str, Any], dict[str, Any]]:
+    """A model of the user's own."""
+    from evonav.decision.ledger import LEDGER_NAME
+
+    _refuse_model_options(options, "vlm_mode", "exchanges", "exchange_images")
+    host = {**_keeping(options, out), "ledger": str((out / LEDGER_NAME).absolute())}
+    return "evonav.decision.backends:own", {"path": options.decision}, host
 
 
 def _keeping(options: DecisionOptions, out: Path) -> dict[str, Any]:

@@ -6,13 +6,12 @@ how the model is reached are `decision_host_options`. A key is neither: it is re
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from evonav.decision.questions.question import DecisionModel
 
 if TYPE_CHECKING:  # the text matcher loads none of this
     from evonav.decision.vlm import VlmConfig
-    from evonav.decision.vlm_decision import VlmDecision
 
 SAMPLING: Mapping[str, Any] = {
     "temperature": 0.7,
@@ -24,11 +23,16 @@ SAMPLING: Mapping[str, Any] = {
 """3D-Mem's, whose questions the paper's agents build on; the paper does not state its own. The seed is ours."""
 
 
-def text_match(seed: int) -> DecisionModel:
-    """The rules of `evonav.decision.text_match`, which draw nothing."""
+def text_match(seed: int, *, noise: Mapping[str, float] | None = None) -> DecisionModel:
+    """The rules of `evonav.decision.text_match`, which draw nothing.
+
+    Args:
+        seed: Of the agent.
+        noise: Rates of mistakes, by the names of `NoiseRates`; so for all of these.
+    """
     from evonav.decision.text_match import TextMatch
 
-    return TextMatch()
+    return _with_noise(TextMatch(), noise, seed)
 
 
 def vlm(
@@ -45,7 +49,8 @@ def vlm(
     ledger: str | None = None,
     price: Sequence[float] | None = None,
     max_cost_usd: float | None = None,
-) -> "VlmDecision":
+    noise: Mapping[str, float] | None = None,
+) -> DecisionModel:
     """A model behind an OpenAI-compatible endpoint.
 
     Args:
@@ -61,6 +66,7 @@ def vlm(
         ledger: File that books what all processes of the run spend.
         price: Of the model: dollars a million tokens, in and out.
         max_cost_usd: Most that the run may spend; needs `price`.
+        noise: Rates of mistakes.
 
     Raises:
         InvalidArgumentError: An option makes no sense.
@@ -81,7 +87,56 @@ def vlm(
         model=model,
     )
     client = VlmClient(config, store=store, mode=mode, account=account, keeps_failures=True, keeps_images=keeps_images)
-    return VlmDecision(client, structured=structured, needs_images=images)
+    return _with_noise(VlmDecision(client, structured=structured, needs_images=images), noise, seed)
+
+
+def own(
+    seed: int,
+    *,
+    path: str,
+    exchanges: str | None = None,
+    mode: str | None = None,
+    keeps_images: bool = True,
+    ledger: str | None = None,
+    noise: Mapping[str, float] | None = None,
+) -> DecisionModel:
+    """A model of your own: an object with `answer(question, attempt)`, or just with `ask(prompt) -> str`.
+
+    Args:
+        seed: Of the agent; handed to what has a parameter `seed`.
+        path: Import path `module:name` of a class, or of a function that makes the object.
+        exchanges: File of exchanges, of one with `ask`.
+        mode: Default `auto` with a file, else `live`.
+        keeps_images: Whether that file gets the images too.
+        ledger: File that counts the run's questions.
+        noise: Rates of mistakes.
+
+    Raises:
+        InvalidArgumentError: It cannot be imported or made, or is none such.
+        StoreError: The file of exchanges cannot be opened.
+    """
+    from evonav.decision.account import Account
+    from evonav.decision.exchanges import ExchangeStore
+    from evonav.decision.ledger import Ledger
+    from evonav.decision.own import OwnClient, own_model
+    from evonav.decision.vlm_decision import VlmDecision
+
+    model = own_model(path, seed)
+    if hasattr(model, "answer"):
+        return _with_noise(cast("DecisionModel", model), noise, seed)
+    account = Account(ledger=None if ledger is None else Ledger(ledger), model=path)
+    store = None if exchanges is None else ExchangeStore(Path(exchanges))
+    client = OwnClient(path, model, store=store, mode=mode, account=account, keeps_images=keeps_images)
+    needs_images = bool(getattr(model, "needs_images", True))
+    return _with_noise(VlmDecision(client, structured="off", needs_images=needs_images), noise, seed)
+
+
+def _with_noise(model: DecisionModel, noise: Mapping[str, float] | None, seed: int) -> DecisionModel:
+    if not noise:
+        return model
+    from evonav.decision.noisy import NoiseRates, Noisy
+
+    return Noisy(model, NoiseRates.read(noise), seed)
 
 
 def vlm_config(

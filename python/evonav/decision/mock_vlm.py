@@ -7,7 +7,7 @@ import json
 import random
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
@@ -223,21 +223,3 @@ def _completion(request: JsonObject, reply: MockReply) -> JsonObject:
         "choices": [{"index": 0, "message": message, "finish_reason": reply.get("finish_reason", "stop")}],
         "usage": {"prompt_tokens": 1000, "completion_tokens": 100, "total_tokens": 1100},
     }
-
-
-def read_rates(text: str, known: Sequence[str]) -> dict[str, float]:
-    """Reads `name=number,name=number`.
-
-    Raises:
-        InvalidArgumentError: A name is not known, said twice, or has no number.
-    """
-    rates: dict[str, float] = {}
-    for item in filter(None, (part.strip() for part in text.split(","))):
-        name, _, value = item.partition("=")
-        if name not in known or name in rates:
-            raise InvalidArgumentError(f"{item}: expected each of {', '.join(known)} once, as name=number")
-        try:
-            rates[name] = float(value)
-        except ValueError:
-            raise InvalidArgumentError(f"{item}: expected a number after {name}=") from None
-    return rates

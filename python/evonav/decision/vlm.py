@@ -13,15 +13,14 @@ import os
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from io import BytesIO
 from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from evonav.decision.account import CHARACTERS_PER_TOKEN, Account, Usage, image_tokens
 from evonav.decision.exchanges import ExchangeStore, Failure, JsonObject, image_name, key_of
+from evonav.decision.images import png_of
 from evonav.decision.pacing import Pace
 from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.vlm_answer import Answer, is_malformed, read_answer, usage_of
@@ -163,7 +162,7 @@ class VlmClient:
 
     def _ask_anew(self, prompt: Prompt, attempt: int, kept: JsonObject) -> JsonObject | Failure:
         """Asks the server, and keeps what comes of it as far as the mode and `keeps_failures` say."""
-        images = {image_name(picture.pixels): _png(picture.pixels) for picture in prompt.pictures}
+        images = {image_name(picture.pixels): png_of(picture.pixels) for picture in prompt.pictures}
         request = self.request_of(prompt, lambda pixels: _data_url(images[image_name(pixels)]), attempt)
         outcome: JsonObject | Failure
         try:
@@ -214,7 +213,7 @@ class VlmClient:
             attempt: Counts the seed up.
         """
         config = self.config
-        url_of = url_of or (lambda pixels: _data_url(_png(pixels)))
+        url_of = url_of or (lambda pixels: _data_url(png_of(pixels)))
         request: JsonObject = {
             "model": config.model,
             "messages": [_message(turn, config.image_detail, url_of) for turn in prompt.turns],
@@ -341,9 +340,3 @@ def _message(turn: Turn, detail: str, url_of: Callable[[NDArray[np.uint8]], str]
 
 def _data_url(png: bytes) -> str:
     return "data:image/png;base64," + base64.b64encode(png).decode()
-
-
-def _png(pixels: NDArray[np.uint8]) -> bytes:
-    buffer = BytesIO()
-    Image.fromarray(np.ascontiguousarray(pixels)).save(buffer, "PNG")
-    return buffer.getvalue()

@@ -1,0 +1,43 @@
+"""`evonav mock-vlm`: a model's stand-in, to try everything that leads to a model and back."""
+
+from typing import Annotated
+
+import typer
+
+
+def mock_vlm(
+    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = 8000,
+    faults: Annotated[
+        str, typer.Option(help="Shares of requests that go wrong, such as refusal=0.1,rate_limit=0.05; see below.")
+    ] = "",
+    schemas: Annotated[bool, typer.Option(help="Hold answers to JSON Schemas, as some servers do.")] = True,
+    seed: Annotated[int, typer.Option(min=0, help="Decides which requests go wrong.")] = 0,
+    latency: Annotated[float, typer.Option(min=0.0, help="Seconds that an answer takes.")] = 0.0,
+) -> None:
+    """Serves an OpenAI-compatible API on this machine; answers by simple rules on the prompt's words.
+
+    Faults: rate_limit (429 with Retry-After), server_error (500), hang, disconnect, malformed (broken JSON around the
+    answer), broken_json (in it), truncated, refusal, filtered, empty, off_topic.
+    """
+    import time
+
+    from evonav.decision.mock_answers import mock_answer
+    from evonav.decision.mock_vlm import FAULTS, MockServer, faulty, serving, without_schemas
+    from evonav.decision.rates import read_rates
+
+    def answer(request: dict[str, object]) -> str:
+        time.sleep(latency)
+        return mock_answer(request)
+
+    server = MockServer(faulty(read_rates(faults, list(FAULTS)), seed, answer))
+    server.requests = None
+    if not schemas:
+        server.check = without_schemas
+    with serving(server, port=port):
+        typer.echo(f"serving {server.url}; in another terminal:")
+        typer.echo(f"  evonav evaluate --decision vlm --model mock --base-url {server.url} --limit 1 --out out/mock")
+        try:
+            while True:
+                time.sleep(3600.0)
+        except KeyboardInterrupt:
+            typer.echo(f"{server.num_requests} requests served")

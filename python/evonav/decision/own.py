@@ -1,0 +1,164 @@
+"""Models of your own: any object with `ask(prompt) -> str`, asked and kept as a model behind an endpoint is."""
+
+import inspect
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any, Protocol, cast
+
+from evonav.decision.account import Account, Usage
+from evonav.decision.exchanges import ExchangeStore, Failure, JsonObject, image_name, key_of
+from evonav.decision.images import png_of
+from evonav.decision.prompts import Prompt, Text
+from evonav.decision.questions.question import DecisionModel
+from evonav.decision.vlm_answer import Answer
+from evonav.decision.vlm_errors import LASTING, VlmError, VlmFailure
+from evonav.errors import DecisionError, InvalidArgumentError
+
+
+class OwnModel(Protocol):
+    """What a model of your own has at least. `needs_images = False` on it leaves images out."""
+
+    def ask(self, prompt: Prompt) -> str:
+        """The answer to a prompt, in its grammar.
+
+        Raises:
+            TimeoutError, ConnectionError: No answer came this time; the question is asked again.
+        """
+        ...
+
+
+class OwnClient:
+    """Asks a model of your own, and keeps what came as `VlmClient` does; content-addressed by name and prompt."""
+
+    def __init__(
+        self,
+        name: str,
+        model: OwnModel,
+        *,
+        store: ExchangeStore | None = None,
+        mode: str | None = None,
+        account: Account | None = None,
+        keeps_images: bool = True,
+    ) -> None:
+        """A client.
+
+        Args:
+            name: Part of what exchanges are found by: another name, other exchanges.
+            model: Answers.
+            store: Of exchanges.
+            mode: `live`, `auto` or `replay`; default `auto` with a store, else `live`.
+            account: Counts questions.
+            keeps_images: Keep the images' files beside their hashes.
+
+        Raises:
+            InvalidArgumentError: The mode is unknown, or needs a store.
+        """
+        self.name = name
+        self.model = model
+        self.store = store
+        self.mode = mode or ("live" if store is None else "auto")
+        self.account = account or Account()
+        self.keeps_images = keeps_images
+        if self.mode not in ("live", "auto", "replay") or (self.mode != "live" and store is None):
+            raise InvalidArgumentError(f"mode {self.mode!r}: expected live, or auto or replay with a file of exchanges")
+
+    @property
+    def never_asks(self) -> bool:
+        """Whether there are no answers but those that are kept."""
+        return self.mode == "replay"
+
+    def check(self) -> None:
+        """There is nothing to find out."""
+
+    def is_kept(self, prompt: Prompt, attempt: int = 0) -> bool:
+        """Whether what came of a question is kept."""
+        return self.store is not None and self.store.outcome(key_of(self.kept_request(prompt, attempt))) is not None
+
+    def kept_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
+        """What an exchange is found by."""
+        turns = [
+            {
+                "role": turn.role,
+                "content": [
+                    part.text if isinstance(part, Text) else {"image": image_name(part.pixels)} for part in turn.parts
+                ],
+            }
+            for turn in prompt.turns
+        ]
+        return {"own_model": self.name, "turns": turns, "attempt": attempt}
+
+    def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
+        """The model's answer.
+
+        Raises:
+            VlmError: There is none.
+            DecisionError: The model broke.
+            StoreError: The exchanges cannot be read or written.
+        """
+        kept = self.kept_request(prompt, attempt)
+        key = key_of(kept)
+        outcome = None if self.store is None or self.mode == "live" else self.store.outcome(key)
+        is_replayed = outcome is not None
+        if outcome is not None:
+            self.account.replayed()
+        elif self.never_asks:
+            raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {key}")
+        else:
+            outcome = self._ask_anew(prompt)
+            if self.store is not None and self.mode == "auto":
+                pixels = [picture.pixels for picture in prompt.pictures] if self.keeps_images else []
+                outcome = self.store.keep_first(kept, {image_name(image): png_of(image) for image in pixels}, outcome)
+        if isinstance(outcome, Failure):
+            raise VlmError(cast("VlmFailure", outcome.kind), outcome.message)
+        text = str(outcome["text"])
+        if not text.strip():
+            raise VlmError("empty", "an answer without words")
+        return Answer(text, self.name, Usage(), key, is_replayed)
+
+    def _ask_anew(self, prompt: Prompt) -> JsonObject | Failure:
+        reserved_usd = self.account.reserve(Usage())
+        usage: Usage | None = None
+        try:
+            text = self.model.ask(prompt)
+            usage = Usage()
+        except TimeoutError as error:
+            return Failure("timeout", str(error) or "no answer in time")
+        except ConnectionError as error:
+            return Failure("connection", str(error) or "connection lost")
+        except VlmError as error:
+            if error.kind in LASTING:
+                raise
+            return Failure(error.kind, error.message)
+        except DecisionError:
+            raise
+        except Exception as error:
+            raise DecisionError(f"{self.name}: {type(error).__name__}: {error}") from error
+        finally:
+            self.account.settle(reserved_usd, usage)
+        if not isinstance(text, str):
+            raise DecisionError(f"{self.name}: ask: expected a string, got {type(text).__name__}")
+        return {"text": text}
+
+
+def own_model(path: str, seed: int) -> OwnModel | DecisionModel:
+    """What `module:name` makes: a class's instance, or what a function returns.
+
+    Args:
+        path: Import path.
+        seed: Of the agent; handed to what has a parameter `seed`.
+
+    Raises:
+        InvalidArgumentError: It cannot be imported or made, or has neither `answer` nor `ask`.
+    """
+    module, _, attribute = path.partition(":")
+    try:
+        factory: Callable[..., Any] = getattr(import_module(module), attribute)
+        takes_seed = "seed" in inspect.signature(factory).parameters
+        model: Any = factory(seed=seed) if takes_seed else factory()
+    except Exception as error:  # a stranger's code: whatever it raises belongs to the name
+        raise InvalidArgumentError(f"decision `{path}`: {type(error).__name__}: {error}") from error
+    if callable(getattr(model, "answer", None)) or callable(getattr(model, "ask", None)):
+        return cast("OwnModel | DecisionModel", model)
+    raise InvalidArgumentError(
+        f"decision `{path}`: makes a {type(model).__name__}, which has neither `ask` nor `answer`"
+    )
