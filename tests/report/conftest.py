@@ -3,6 +3,10 @@ from pathlib import Path
 import pytest
 from made_up_run import WriteRun, entry, record_run, stage_record
 
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState
 
 
@@ -29,3 +33,13 @@ def write_run(tmp_path: Path) -> WriteRun:
         return record_run(tmp_path / name, records, dict.fromkeys(tasks, 2), ["fu", "ftu"])
 
     return write
+
+
+@pytest.fixture(scope="session")
+def viewed_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bundled task in which entries go stale, an agent that is shown images, and one that tells nothing."""
+    path = tmp_path_factory.mktemp("run")
+    config = RunConfig(backend=Backend(decision="viewer_run:scripted"), protocol=ProtocolConfig(max_rounds=9))
+    with bundled_tasks() as tasks:
+        evaluate(["fu", "random-walk"], task_files(tasks, 2)[1:], path, config=config, num_workers=0)
+    return path

@@ -1,0 +1,236 @@
+"""Pages of `evonav view`: what they hold is what was traced, small, self-contained, and safe."""
+
+import base64
+import json
+import re
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+from typer.testing import CliRunner
+from viewer_run import MARKUP
+
+from evonav.cli import app
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.store import RunStore
+from evonav.evaluation.trace import RunReplay
+from evonav.evaluation.traced import TracedStage
+from evonav.report.svg import cm
+from evonav.report.viewer import page_name, write_episode
+from evonav.report.viewer_data import cells_text
+
+
+@pytest.fixture(scope="module")
+def run_dir(viewed_run: Path) -> Path:
+    return viewed_run
+
+
+@pytest.fixture(scope="module")
+def task_id(run_dir: Path) -> str:
+    with RunStore(run_dir) as store:
+        return str(*store.meta("num_stages"))
+
+
+@pytest.fixture(scope="module")
+def stages(run_dir: Path, task_id: str) -> list[TracedStage]:
+    with bundled_tasks() as tasks:
+        return list(RunReplay(run_dir, lambda name: tasks / name).episode("fu", task_id))
+
+
+@pytest.fixture(scope="module")
+def pages(run_dir: Path) -> Path:
+    result = CliRunner().invoke(app, ["view", str(run_dir)])
+    assert result.exit_code == 0, result.output
+    assert str(run_dir / "view" / "index.html") in result.output
+    return run_dir / "view"
+
+
+def data_of(page: Path) -> dict:
+    (text,) = re.findall(
+        r'<script type="application/json" id="data">(.*?)</script>', page.read_text("utf-8"), re.DOTALL
+    )
+    return json.loads(text)
+
+
+def decoded(text: str, before: np.ndarray) -> np.ndarray:
+    """What the page's script does, once more."""
+    cells, at = before.copy(), 0
+    for length, letter in re.findall(r"([0-9a-z]+)([A-E])", text):
+        end = at + int(length, 36)
+        if letter != "E":
+            cells[at:end] = "ABCD".index(letter)
+        at = end
+    return cells
+
+
+@given(st.lists(st.lists(st.integers(0, 3), min_size=12, max_size=12), min_size=1, max_size=5))
+def test_maps_come_back_from_their_runs(maps: list[list[int]]) -> None:
+    before = now = np.zeros(12, np.uint8)
+    for values in maps:
+        cells = np.array(values, np.uint8)
+        now = decoded(cells_text(cells, before), now)
+        assert np.array_equal(now, cells)
+        before = cells
+
+
+def test_a_map_that_did_not_change_takes_no_room() -> None:
+    cells = np.repeat(np.array([0, 2, 1], np.uint8), 40)
+    assert cells_text(cells, cells) == ""
+    assert cells_text(cells, np.zeros(120, np.uint8)) == "14E14C14B"
+
+
+def test_entries_frontiers_and_maps_of_every_round_can_be_had_from_the_page(
+    pages: Path, stages: list[TracedStage], task_id: str
+) -> None:
+    data = data_of(pages / page_name(task_id, "fu"))
+    assert [stage["k"] for stage in data["stages"]] == [stage.record.stage for stage in stages]
+    for shown, stage in zip(data["stages"], stages, strict=True):
+        entries: dict[int, list] = {}
+        frontiers: list = []
+        counters: dict[str, int] = {}
+        cells = np.zeros(0, np.uint8)
+        for data_round, step in zip(shown["rounds"], stage.rounds, strict=True):
+            assert data_round["p"][:2] == list(cm((step.pose.x_m, step.pose.z_m)))
+            entries = {name: entry for name, entry in entries.items() if name not in data_round.get("x", ())}
+            entries |= {entry[0]: entry for entry in data_round.get("e", ())}
+            assert set(entries) == {entry.record.entry_id for entry in step.entries}
+            for entry in step.entries:
+                found = entries[entry.record.entry_id]
+                assert found[2:4] == list(cm((entry.record.centre_m[0], entry.record.centre_m[2])))
+                assert (found[6], bool(found[7])) == (entry.record.num_detections, entry.record.is_stale)
+                if entry.record.is_stale and entry.truth is not None and entry.truth.now_m is not None:
+                    assert found[9] == list(cm((entry.truth.now_m[0], entry.truth.now_m[2])))
+                else:
+                    assert found[9] in (None, "gone")
+            frontiers = data_round.get("f", frontiers)
+            assert [frontier[0] for frontier in frontiers] == [f.frontier_id for f in step.frontiers]
+            counters |= data_round.get("counters", {})
+            assert step.record is not None
+            assert counters == step.record.counters
+            assert data_round.get("cand", []) == list(step.candidate_ids)
+            assert step.map is not None
+            if "grid" in data_round:
+                cells = np.zeros(data_round["grid"][0] * data_round["grid"][1], np.uint8)
+            cells = decoded(data_round["cells"], cells)
+            assert np.array_equal(cells, step.map.cells.ravel())
+
+
+def test_questions_have_their_prompt_images_and_outcome(pages: Path, stages: list[TracedStage], task_id: str) -> None:
+    data = data_of(pages / page_name(task_id, "fu"))
+    outcomes = []
+    for shown, stage in zip(data["stages"], stages, strict=True):
+        for data_round, step in zip(shown["rounds"], stage.rounds, strict=True):
+            assert len(data_round.get("q", [])) == len(step.asked)
+            for (kind, outcome, answer, prompt, offered), question in zip(
+                data_round.get("q", []), step.asked, strict=True
+            ):
+                outcomes.append(outcome)
+                assert (kind, answer) == (question.kind, question.answer)
+                parts = data["prompts"][prompt]
+                images = [content for _, content in question.parts if isinstance(content, bytes)]
+                assert images
+                shown_images = [base64.b64decode(data["images"][part]) for part in parts if isinstance(part, int)]
+                assert shown_images == images
+                assert [part for part in parts if isinstance(part, str)] == [
+                    content for _, content in question.parts if isinstance(content, str)
+                ]
+                assert (offered != "") == bool(question.offered)
+    assert {"answered", "refusal", "invalid"} <= set(outcomes)
+    assert len(set(data["images"])) == len(data["images"])
+    for image in data["images"]:
+        assert Image.open(BytesIO(base64.b64decode(image))).format == "JPEG"
+
+
+def test_the_evaluators_words_tell_what_became_of_the_chosen_entry(
+    pages: Path, stages: list[TracedStage], task_id: str
+) -> None:
+    data = data_of(pages / page_name(task_id, "fu"))
+    num_told = num_stale = 0
+    for shown, stage in zip(data["stages"], stages, strict=True):
+        for data_round, step in zip(shown["rounds"], stage.rounds, strict=True):
+            assert step.record is not None
+            chosen = step.record.chosen_entry
+            assert "stale" not in data_round["choice"]
+            if chosen is None:
+                assert "truth" not in data_round
+                continue
+            num_told += 1
+            num_stale += chosen.is_stale
+            assert data_round["truth"].startswith("Stale: ") == chosen.is_stale
+            truth = next(entry.truth for entry in step.entries if entry.record.entry_id == chosen.entry_id)
+            if truth is not None and truth.object_id == stage.record.target.object_id and not chosen.is_stale:
+                assert data_round["truth"].endswith("is the target.")
+    assert num_told > num_stale > 0
+
+
+def test_pages_are_self_contained_and_models_words_are_no_markup(pages: Path, task_id: str) -> None:
+    for agent in ("fu", "random-walk"):
+        text = (pages / page_name(task_id, agent)).read_text("utf-8")
+        assert len(text.encode()) < 2_000_000
+        # Nothing is fetched: no address but XML's name space, and the link to the index.
+        assert set(re.findall(r"https?://[^\"'\s<>]+", text)) <= {"http://www.w3.org/2000/svg"}
+        assert set(re.findall(r'(?:href|src)="([^"#][^"]*)"', text)) <= {"index.html"}
+        assert text.count("</script>") == 2
+    assert MARKUP not in (pages / page_name(task_id, "fu")).read_text("utf-8")
+    index = (pages / "index.html").read_text("utf-8")
+    for agent in ("fu", "random-walk"):
+        assert f"{page_name(task_id, agent)}#stage=1&round=1" in index
+
+
+def test_an_agent_without_belief_has_views_and_way_alone(pages: Path, task_id: str) -> None:
+    for stage in data_of(pages / page_name(task_id, "random-walk"))["stages"]:
+        assert not stage["hasBelief"]
+        assert all(step["v"] and "cells" not in step and "q" not in step for step in stage["rounds"])
+
+
+def test_one_stage_and_pages_a_stage(
+    run_dir: Path, stages: list[TracedStage], task_id: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = ["view", str(run_dir), "--task", task_id, "--agent", "fu", "--stage", "2", "--out", str(tmp_path / "a")]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    (path,) = (tmp_path / "a").glob("*_stage2.html")
+    assert [stage["k"] for stage in data_of(path)["stages"]] == [2]
+    monkeypatch.setattr("evonav.report.viewer.MAX_PAGE_BYTES", 1000)
+    pages = write_episode(stages, tmp_path / "b", budget=9, success_radius_m=2.0)
+    assert [page.path.name for page in pages] == [page_name(task_id, "fu", k + 1) for k in range(len(stages))]
+    # What changed before a stage is drawn although the stage before has another page.
+    changed = next(stage for stage in stages if stage.record.transition.relocations)
+    text = pages[changed.record.stage - 1].path.read_text("utf-8")
+    assert 'class="items ghost"' in text
+
+
+def test_a_replay_that_differs_is_told_on_the_page(run_dir: Path, task_id: str, tmp_path: Path) -> None:
+    with RunStore(run_dir) as store:
+        records = [
+            record.model_copy(update={"stop_reason": "other"}) for record in store.records("random-walk", task_id)
+        ]
+        meta = {key: store.meta(key) for key in ("config", "agents", "num_stages")}
+    with RunStore(tmp_path / "run", create=True) as store:
+        for key, value in meta.items():
+            store.set_meta(key, value)
+        for record in records:
+            store.add_stage(record, wall_s=0.0, cpu_s=0.0)
+    result = CliRunner().invoke(app, ["view", str(tmp_path / "run"), "--task", task_id, "--agent", "random-walk"])
+    assert result.exit_code == 0, result.output
+    assert "the replay differs from the records" in result.output
+    data = data_of(tmp_path / "run" / "view" / page_name(task_id, "random-walk"))
+    assert data["stages"][0]["differences"] == ['stop_reason: "other" stored, "" replayed']
+    assert "replay differs from the records" in (tmp_path / "run" / "view" / "index.html").read_text("utf-8")
+
+
+def test_wrong_usage_is_one_line(run_dir: Path, tmp_path: Path) -> None:
+    from evonav.errors import EvonavError
+
+    for arguments, words in (
+        (["--task", "none", "--agent", "fu"], "no record of task 'none'"),
+        (["--agent", "nobody"], "no task has records of nobody"),
+        (["--tasks", str(tmp_path)], "name the folder of the run's tasks with --tasks"),
+    ):
+        result = CliRunner().invoke(app, ["view", str(run_dir), *arguments])
+        assert isinstance(result.exception, EvonavError)
+        assert words in str(result.exception)

@@ -1,0 +1,98 @@
+"""The viewer's pages in headless Chromium: they load without errors, and every control does what it says."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from evonav.cli import app
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
+PROBE = (Path(__file__).parent / "viewer_probe.js").read_text("utf-8")
+
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+
+
+@pytest.fixture(scope="module")
+def pages(viewed_run: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Pages by agent: one that is shown images, and one that tells nothing."""
+    path = tmp_path_factory.mktemp("view")
+    result = CliRunner().invoke(app, ["view", str(viewed_run), "--out", str(path)])
+    assert result.exit_code == 0, result.output
+    return {agent: next(path.glob(f"*_{agent}.html")) for agent in ("fu", "random-walk")}
+
+
+def probed(page: Path, tmp_path: Path, size: str) -> dict:
+    """What the probe found on a page; console messages are failures."""
+    assert BROWSER is not None
+    copy = tmp_path / "index.html"
+    copy.write_text(page.read_text("utf-8").replace("</body>", f"<script>{PROBE}</script></body>"), "utf-8")
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0"]
+    command += [f"--user-data-dir={tmp_path / 'profile'}", f"--window-size={size}", "--virtual-time-budget=60000"]
+    done = subprocess.run(
+        [*command, "--dump-dom", copy.as_uri()], capture_output=True, text=True, timeout=200, check=True
+    )
+    assert [line for line in done.stderr.splitlines() if "CONSOLE" in line] == []
+    (text,) = re.findall(r'<pre id="probe">(.*?)</pre>', done.stdout, re.DOTALL)
+    return json.loads(html.unescape(text))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", ["1280,800", "420,900"])
+def test_every_round_can_be_gone_to_and_fills_its_panels(pages: dict[str, Path], tmp_path: Path, size: str) -> None:
+    found = probed(pages["fu"], tmp_path, size)
+    assert found["errors"] == []
+    rounds = found["rounds"]
+    text = pages["fu"].read_text("utf-8")
+    stages = json.loads(re.findall(r'id="data">(.*?)</script>', text, re.DOTALL)[0])["stages"]
+    assert len(rounds) == 3 * len(stages)
+    for index, (stage, first, middle, last) in enumerate(
+        zip(stages, rounds[::3], rounds[1::3], rounds[2::3], strict=True)
+    ):
+        num = len(stage["rounds"])
+        for at, shown in ((0, first), ((num - 1) // 2, middle), (num - 1, last)):
+            assert shown["where"] == f"round {at + 1} of {num} (budget 9)"
+            assert shown["hash"] == f"#stage={index + 1}&round={at + 1}"
+            assert shown["slider"] == at
+            assert shown["stage"].startswith(f"Stage {index + 1}")
+            held = stage["rounds"][at]
+            assert shown["goal"] == stage["goal"]
+            assert shown["choice"] == held["choice"]
+            assert shown["truth"] == held.get("truth", "")
+            assert shown["entries"] == shown["memory"] == held["n"][0]
+            assert shown["frontiers"] == held["n"][1]
+            assert shown["way"] == at
+            assert shown["views"] == len(held["v"]) - 1
+            assert shown["cones"] == len(held["v"])
+            assert shown["agent"].startswith(f"translate({held['p'][0]} {held['p'][1]})")
+            assert shown["chips"] == [question[1] for question in held.get("q", [])]
+            assert bool(shown["prompts"]) == ("q" in held)
+            assert shown["candidates"] <= len(held.get("cand", []))
+            assert shown["questions"]
+            assert shown["counters"]
+            assert shown["cells"] > 200
+            assert shown["images"]
+            assert shown["overflow"] <= 0
+            assert shown["bold"] == 0
+            assert shown["terminal"] == (at == num - 1)
+    assert any(shown["stale"] for shown in rounds)
+    last_stage = len(stages[-1]["rounds"])
+    assert (found["left"], found["home"], found["right"]) == (last_stage - 2, 0, 1)
+    assert found["before"].startswith(f"Stage {len(stages) - 1}")
+    assert found["played"] >= 1
+    assert found["linked"].startswith("round 2 of ")
+    assert (found["starsHidden"], found["stars"] > 0) == (0, True)
+    assert all(found[name] for name in ("closeUp", "whole", "labels", "alts"))
+
+
+@pytest.mark.slow
+def test_an_agent_that_tells_nothing_has_a_page_too(pages: dict[str, Path], tmp_path: Path) -> None:
+    found = probed(pages["random-walk"], tmp_path, "1280,800")
+    assert found["errors"] == []
+    assert all(shown["images"] and shown["entries"] == 0 and shown["cells"] == 0 for shown in found["rounds"])
+    assert all(shown["agent"] for shown in found["rounds"])
