@@ -1,15 +1,18 @@
 """A hostile agent searches everything that it is handed; the target and the simulator's ids must not be there."""
 
 import gc
+import json
 import sys
 import types
 from pathlib import Path
 
 import numpy as np
 import pytest
-from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_case
+from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_case, write_tasks
 
 from evonav.agents.agent import NavigateTo, Sensing
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.privileged import PrivilegedAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState
@@ -105,6 +108,50 @@ def test_the_whole_occupancy_is_not_there(loot):
     simulator.reset(episode_case("toy-moved").stages[0].house_json)
     shape = simulator.occupancy().cells.shape
     assert not any(isinstance(thing, np.ndarray) and thing.shape == shape for thing in loot)
+
+
+@pytest.fixture(scope="module")
+def process_loot(tmp_path_factory):
+    """All that an agent finds in a process of its own, after the target has moved."""
+    folder = tmp_path_factory.mktemp("x")
+    write_tasks(folder / "secret-tasks")
+    found = folder / "loot.json"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TOY_LOOT", str(found))
+        config = RunConfig(
+            backend=Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator"),
+            protocol=ProtocolConfig(max_rounds=2),
+        )
+        evaluate(["prying_agent:Prying"], task_files(folder / "secret-tasks", 1), folder / "secret-run", config=config)
+    return json.loads(found.read_text())
+
+
+def test_no_oracle_data_is_in_an_agents_process(process_loot):
+    strings, ids = process_loot["strings"], {*OBJECTS, "room|1", "room|2", "wall|south"}
+    assert "Chair" in strings
+    assert "toy-moved" in strings  # what it may know
+    assert not ids & set(strings)
+    assert not [text for text in strings if any(name in text for name in ids)]
+    places = [*(centre for _, centre, _ in OBJECTS.values()), *CHAIR_AWAY.values()]
+    flat = [[x, z] for x, _, z in places]
+    assert process_loot["points"]
+    assert not [point for point in process_loot["points"] if point in map(list, places) or point in flat]
+    simulator = ToySimulator()
+    simulator.reset(episode_case("toy-moved").stages[0].house_json)
+    assert [8, 8, 3] in process_loot["shapes"]
+    assert list(simulator.occupancy().cells.shape) not in process_loot["shapes"]
+
+
+def test_no_path_of_tasks_or_records_is_told_to_an_agents_process(process_loot):
+    told = [*process_loot["strings"], *process_loot["system"]]
+    assert any("TOY_LOOT=" in text for text in told)
+    assert not [text for text in told if "secret-" in text]
+
+
+def test_an_agents_process_loads_nothing_of_the_evaluator(process_loot):
+    modules = process_loot["modules"]
+    assert "evonav.agents.serving" in modules
+    assert not [name for name in modules if name.startswith(FORBIDDEN) or name == "toy_house"]
 
 
 class Impostor(PrivilegedAgent):

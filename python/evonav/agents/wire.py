@@ -240,17 +240,17 @@ def read_json(text: bytes) -> Any:  # noqa: ANN401 - JSON
             said = json.loads(json.dumps(said, ensure_ascii=False).encode("utf-8", "replace"))
     except RecursionError:
         raise ValueError("lists and dictionaries are too deep") from None
-    _check_depth(said, MAX_DEPTH)
+    _check_depth(said, MAX_DEPTH + 2)  # an answer holds the agent's own words
     return said
 
 
 def _check_depth(said: object, depth: int) -> None:
-    if not isinstance(said, dict | list) or not said:
+    if not isinstance(said, dict | list | tuple) or not said:
         return
     if depth == 0:
         raise ValueError(f"lists and dictionaries are deeper than {MAX_DEPTH}")
     for part in said.values() if isinstance(said, dict) else said:
-        if isinstance(part, dict | list):
+        if isinstance(part, dict | list | tuple):
             _check_depth(part, depth - 1)
 
 
@@ -278,6 +278,7 @@ def _whole(value: Any) -> int:  # noqa: ANN401 - JSON
 
 def _dumped(name: str, value: object, max_bytes: int) -> str:
     try:
+        _check_depth(value, MAX_DEPTH)
         text = json.dumps(value, default=_plain)
     except (TypeError, ValueError, RecursionError) as error:
         raise InvalidArgumentError(f"{name}: not JSON-ready: {error}") from error

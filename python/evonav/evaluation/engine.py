@@ -128,6 +128,7 @@ def evaluate(
     with writing(run_dir), RunStore(run_dir, create=True) as store:
         _claim(store, run_dir, tasks, config)
         store.set_meta("agents", sorted({*(store.meta("agents") or []), *agents}))
+        store.set_meta("tasks_dir", str(tasks[0].path.absolute().parent))  # for `evonav view`, no part of what it is
         run = _Run(store, agents, tasks, config)
         if retry_errored:
             run.forget_errored()

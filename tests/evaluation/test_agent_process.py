@@ -1,0 +1,332 @@
+"""Agents in processes of their own: the same records, and nothing that they do costs more than their stage."""
+
+import hashlib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_engine import CONFIG, TOY, records, texts
+from toy_house import write_tasks
+
+from evonav.agents.registry import BUILT_IN
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.agent_process import (
+    LOG_NAME,
+    AgentHosting,
+    AgentProcesses,
+    DecisionSpec,
+    RemoteAgent,
+    check_importable,
+)
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import AgentFailedError, ProtocolConfig
+from evonav.evaluation.records import EndState, ErrorKind
+from evonav.evaluation.store import RunStore
+from evonav.report import write_report
+from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
+from evonav.tasks.public import StageInput, TaskInfo
+from evonav.world.pose import Pose
+from evonav.world.simulator import Intrinsics
+
+SHORT = ProtocolConfig(max_rounds=3)
+
+CONTAINED = {
+    "toy_agents:Raising": (ErrorKind.AGENT, "RuntimeError: no idea [toy_agents:"),
+    "toy_agents:Speechless": (ErrorKind.AGENT, "'forward' is no action"),
+    "unruly_agents:Undecided": (ErrorKind.DECISION, "no key"),
+    "unruly_agents:Pretending": (ErrorKind.AGENT, "SimulatorLostError: gone"),
+    "unruly_agents:Unspeakable": (ErrorKind.AGENT, "HorribleError: (its message cannot be read)"),
+    "unruly_agents:Verbose": (ErrorKind.AGENT, "must be at most 1000000"),
+    "unruly_agents:Deep": (ErrorKind.AGENT, "deeper than 32"),
+    "unruly_agents:Secretive": (ErrorKind.AGENT, "diagnostics: not JSON-ready"),
+    "unruly_agents:Mistaken": (ErrorKind.AGENT, "'many' is no whole number"),
+}
+"""In any process: the agent goes on with the next stage."""
+
+LOST = {
+    "toy_agents:Dying": (ErrorKind.CRASH, "exit code 3"),
+    "unruly_agents:Exiting": (ErrorKind.CRASH, "exit code 5"),
+    "unruly_agents:Segfaulting": (ErrorKind.CRASH, "killed by signal 11"),
+    "unruly_agents:LeavingChildren": (ErrorKind.CRASH, "exit code 3"),
+    "unruly_agents:Babbling": (ErrorKind.CRASH, "what is no answer"),
+    "unruly_agents:Boasting": (ErrorKind.CRASH, "what is no answer"),
+    "unruly_agents:Deaf": (ErrorKind.CRASH, "the agent's process"),
+    "unruly_agents:Hanging": (ErrorKind.TIMEOUT, "no answer to `act` within 4 s"),
+    "unruly_agents:Promising": (ErrorKind.TIMEOUT, "no answer to `act` within 4 s"),
+}
+"""The process is lost, and with it what the agent remembered."""
+
+UNHARMED = ("unruly_agents:Forking", "unruly_agents:Shrinking", "unruly_agents:Printing", "unruly_agents:Keeping")
+
+
+@pytest.fixture(scope="module")
+def tasks(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("process")
+    write_tasks(folder / "tasks")
+    return task_files(folder / "tasks", 1)
+
+
+@pytest.fixture(scope="module")
+def run_dir(tasks, tmp_path_factory):
+    """All of them in one run, so that they share workers, which have more agents than they keep processes."""
+    config = RunConfig(backend=TOY, protocol=SHORT, hosting=AgentHosting(timeout_s=4.0, memory_mb=8000))
+    folder = tmp_path_factory.mktemp("run")
+    agents = [*CONTAINED, *LOST, *UNHARMED, "unruly_agents:Exotic", "unruly_agents:Unmakeable", "unruly_agents:Hungry"]
+    evaluate(agents, tasks, folder, config=config, num_workers=2)
+    return folder
+
+
+@pytest.mark.parametrize("agent", [*CONTAINED, *LOST, "unruly_agents:Hungry"])
+def test_a_failure_costs_its_stage_alone(run_dir, agent):
+    kind, message = (CONTAINED | LOST).get(agent, (ErrorKind.AGENT, "MemoryError"))
+    first, second, third = records(run_dir, agent)
+    assert (first.is_scored, second.state, third.is_scored) == (True, EndState.ERRORED, True)
+    assert second.error.kind is kind
+    assert message in second.error.message
+    assert second.spl is None
+    assert [record.failed_before for record in (first, second, third)] == [(), (), (2,)]
+    lost_at = 3 if agent in LOST else None
+    assert [record.memory_lost_at for record in (first, second, third)] == [None, None, lost_at]
+    if kind is not ErrorKind.AGENT:
+        assert third.requested_start == second.effective_start  # it had not moved yet
+
+
+@pytest.mark.parametrize("agent", UNHARMED)
+def test_what_harms_nobody_costs_nothing(run_dir, tasks, tmp_path, agent):
+    assert all(record.is_scored for record in records(run_dir, agent))
+    config = RunConfig(backend=TOY, protocol=SHORT)
+    evaluate(["toy_agents:Explorer"], tasks, tmp_path, config=config, num_workers=0)
+    walked = [[entry.path_m for entry in record.trace] for record in records(tmp_path, "toy_agents:Explorer")]
+    assert [[entry.path_m for entry in record.trace] for record in records(run_dir, agent)] == walked
+
+
+def test_an_agent_that_cannot_be_made_is_errored_in_every_stage(run_dir):
+    for record in records(run_dir, "unruly_agents:Unmakeable"):
+        assert record.error.kind is ErrorKind.AGENT
+        assert "RuntimeError: not today" in record.error.message
+        assert record.memory_lost_at is None
+
+
+def test_diagnostics_arrive_as_records_can_hold_them(run_dir):
+    _, second, _ = records(run_dir, "unruly_agents:Exotic")
+    told = second.trace[0]
+    assert told.choice == "half a pair: ?, \U0001f600, \x00"
+    assert told.counters == {"counts": 3}
+    assert told.details["3"] == [1, 2]
+    assert told.details["large"] == 10**30
+    assert told.details["float32"] == float(np.float32(0.1))
+
+
+def test_what_agents_print_is_in_the_log(run_dir):
+    lines = (run_dir / LOG_NAME).read_text().splitlines()
+    about = f"unruly_agents:Printing {records(run_dir, 'unruly_agents:Printing')[0].task_id} stage 2 | "
+    assert f"{about}a word on standard output" in lines
+    assert f"{about}and one on standard error" in lines
+    assert any("Segmentation fault" in line for line in lines if line.startswith("unruly_agents:Segfaulting"))
+
+
+def test_records_are_the_same_in_either_process(run_dir, tasks, tmp_path):
+    agents = [*CONTAINED, "unruly_agents:Exotic", "unruly_agents:Unmakeable"]
+    config = RunConfig(backend=TOY, protocol=SHORT)
+    evaluate(agents, tasks, tmp_path, config=config, num_workers=0)
+    with RunStore(run_dir) as own, RunStore(tmp_path) as shared:
+        for agent in agents:
+            assert list(own.record_texts(agent)) == list(shared.record_texts(agent)), agent
+
+
+@pytest.mark.parametrize("agent", BUILT_IN)
+def test_built_in_agents_do_the_same_in_either_process(tmp_path, agent):
+    protocol = ProtocolConfig(max_rounds=4, max_actions=8)
+    with bundled_tasks() as directory:
+        tasks = task_files(directory, 1)
+        for name, is_in_process in (("own", False), ("shared", True)):
+            config = RunConfig(protocol=protocol, hosting=AgentHosting(is_in_process=is_in_process))
+            evaluate([agent], tasks, tmp_path / name, config=config, num_workers=1)
+    assert any('"num_rounds":4' in text or '"num_rounds":8' in text for text in texts(tmp_path / "own"))
+    assert texts(tmp_path / "own") == texts(tmp_path / "shared")
+
+
+def test_a_retried_episode_is_run_whole(tasks, tmp_path, monkeypatch):
+    """A stage after a loss was run without memory: it is not kept when the lost stage is tried again."""
+    monkeypatch.setenv("TOY_ALIVE", str(tmp_path / "alive"))
+    arguments = (["toy_agents:DyingOnce"], tasks, tmp_path / "run")
+    config = RunConfig(backend=TOY, protocol=SHORT)
+    (summary,) = evaluate(*arguments, config=config, num_workers=1)
+    assert summary.counts["errored"] == 1
+    assert records(tmp_path / "run", "toy_agents:DyingOnce")[2].memory_lost_at == 3
+    before = texts(tmp_path / "run")
+    evaluate(*arguments, config=config, num_workers=1)
+    assert texts(tmp_path / "run") == before
+    (tmp_path / "alive").touch()
+    (summary,) = evaluate(*arguments, config=config, num_workers=1, retry_errored=True)
+    assert not summary.is_incomplete
+    stages = records(tmp_path / "run", "toy_agents:DyingOnce")
+    assert [(record.failed_before, record.memory_lost_at) for record in stages] == [((), None)] * 3
+
+
+def test_a_resumed_run_repeats_its_failures(tasks, tmp_path):
+    """An episode that is not finished runs again with its errored stage, which is not recorded twice."""
+    config = RunConfig(backend=TOY, protocol=SHORT)
+    arguments = (["toy_agents:Dying"], tasks, tmp_path)
+    evaluate(*arguments, config=config, num_workers=1)
+    whole = texts(tmp_path)
+    with RunStore(tmp_path) as store:
+        store.forget_episode("toy_agents:Dying", tasks[0].task_id, 3)
+    seen = []
+    evaluate(*arguments, config=config, num_workers=1, on_progress=seen.append)
+    assert [news.latest.stage for news in seen if news.latest] == [3]
+    assert texts(tmp_path) == whole
+
+
+@pytest.mark.parametrize("num_workers", [0, 1])
+def test_a_task_that_breaks_during_a_run_costs_its_stages_alone(tmp_path, num_workers):
+    """A house of one of two bundled tasks is gone when its turn comes."""
+    with bundled_tasks() as directory:
+        for root in sorted(directory.iterdir())[:2]:
+            shutil.copytree(root, tmp_path / "tasks" / root.name)
+    both = task_files(tmp_path / "tasks")
+    broken = next(path for path in sorted(both[0].path.rglob("*")) if path.is_file() and path.name != "task.json")
+    broken.unlink()
+    config = RunConfig(protocol=ProtocolConfig(max_rounds=1))
+    (summary,) = evaluate(["random-walk"], both, tmp_path / "run", config=config, num_workers=num_workers)
+    states = {(r.task_id, r.stage): r for r in records(tmp_path / "run", "random-walk")}
+    assert len(states) == sum(task.num_stages for task in both) == summary.num_stages
+    first = states[both[0].task_id, 1]
+    assert (first.state, first.error.kind) == (EndState.ERRORED, ErrorKind.HARNESS)
+    assert "cannot be read" in first.error.message
+    assert all(r.state is EndState.NOT_RUN for (task, k), r in states.items() if task == both[0].task_id and k > 1)
+    assert all(r.is_scored for (task, _), r in states.items() if task == both[1].task_id)
+    assert "cannot be read" in write_report(tmp_path / "run").read_text()
+
+
+ENDED = """
+import sys
+from pathlib import Path
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.backend import Backend
+
+if __name__ == "__main__":
+    root = Path(sys.argv[1])
+    config = RunConfig(backend=Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator"))
+    evaluate(["unruly_agents:Announcing"], task_files(Path(sys.argv[2])), root / "run", config=config, num_workers=1)
+"""
+
+
+@pytest.mark.parametrize("kill", [signal.SIGINT, signal.SIGKILL])
+def test_nothing_of_an_agent_outlives_the_run(tasks, tmp_path, kill):
+    script, pids = tmp_path / "script.py", tmp_path / "pids"
+    script.write_text(ENDED)
+    child = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path), str(tasks[0].path.parent)],
+        stderr=subprocess.DEVNULL,
+        env={"PYTHONPATH": str(Path(__file__).parent), "PATH": "", "TOY_PIDS": str(pids)},
+    )
+    while not pids.exists():
+        assert child.poll() is None
+        time.sleep(0.05)
+    alive = [int(pid) for pid in pids.read_text().split()]
+    child.send_signal(kill)
+    child.wait(timeout=30)
+    until_s = time.monotonic() + 20.0
+    while alive and time.monotonic() < until_s:
+        alive = [pid for pid in alive if is_running(pid)]
+        time.sleep(0.05)
+    assert not alive
+
+
+def is_running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def view(rng, side_px, *, features=None, rgb=True):
+    pixels = np.asfortranarray(rng.integers(0, 255, (side_px, side_px, 3), dtype=np.uint8))
+    return View(
+        pose=Pose(0.0, 1.5, 0.0, 0.0),
+        intrinsics=Intrinsics(side_px, side_px, 1.5),
+        depth_m=rng.random((2 * side_px, side_px), dtype=np.float32)[::2],  # with gaps
+        detections=Detections(np.zeros((side_px, side_px), np.int32), (), np.zeros(0, np.float32), features),
+        occupancy=VisibleOccupancy(np.zeros((0, 2), np.int32), np.zeros((3, 2), np.int32)),
+        rgb=pixels if rgb else None,
+    )
+
+
+def digests(observation):
+    arrays = [a for v in observation.views for a in (v.depth_m, v.rgb, v.detections.features)]
+    return [
+        None if a is None else [list(a.shape), str(a.dtype), hashlib.sha256(a.tobytes()).hexdigest()] for a in arrays
+    ]
+
+
+@pytest.fixture
+def echo():
+    processes = AgentProcesses(AgentHosting(timeout_s=30.0))
+    agent = RemoteAgent(processes, "unruly_agents:Echo", DecisionSpec(), 0)
+    agent.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
+    agent.begin_stage(StageInput(1, "Chair", "a", "b", "c", np.zeros((8, 8, 3), np.uint8)))
+    yield agent
+    processes.close()
+
+
+def test_arrays_cross_the_border_whatever_their_layout_and_size(echo):
+    rng = np.random.default_rng(0)
+    for sides in ((4,), (64, 8, 0), (300,) * 7, (16,)):  # memory grows, and is used again
+        features = rng.random((3, 5), dtype=np.float32)[:, ::2]
+        seen = Observation(
+            tuple(view(rng, side, features=features, rgb=side != 8) for side in sides),
+            Pose(1.0, 0.9, 2.0, 0.5),
+            True,
+            3,
+        )
+        assert echo.act(seen).reason == f"{len(sides)} views"
+        assert json.loads(json.dumps(echo.diagnostics().details["seen"])) == digests(seen)
+    assert echo.cpu_s > 0.0
+
+
+def test_processes_are_reused_and_agents_are_not():
+    processes = AgentProcesses(AgentHosting(timeout_s=30.0))
+    first, second = (RemoteAgent(processes, "toy_agents:Explorer", DecisionSpec(), 0) for _ in range(2))
+    first.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
+    nothing = Observation((), Pose(0.0, 0.9, 0.0, 0.0), True, 3)
+    assert first.act(nothing).reason == "nothing left to explore"
+    process = processes.process("toy_agents:Explorer")
+    assert second.sensing == first.sensing
+    assert processes.process("toy_agents:Explorer") is process
+    with pytest.raises(AgentFailedError, match="begin_task comes first"):
+        second.act(nothing)
+    processes.close()
+    processes.close()
+    assert not process.is_usable
+
+
+def test_agents_are_looked_for_in_a_process_of_their_own():
+    check_importable("unruly_agents:Echo")
+    assert "prying_agent" not in sys.modules
+    check_importable("prying_agent:Prying")
+    assert "prying_agent" not in sys.modules
+    for name in ("nobody", "unruly_agents:Nobody", "no_such_module:Agent", f"{os.devnull}.py:Agent"):
+        with pytest.raises(InvalidArgumentError, match=r"no agent|cannot be imported"):
+            check_importable(name)
+
+
+def test_an_agent_is_loaded_from_its_file(tasks, tmp_path):
+    (tmp_path / "neighbour_of_mine.py").write_text("REASON = 'as the file says'\n")
+    (tmp_path / "agent_of_mine.py").write_text(
+        "from evonav.agents.agent import Sensing, Stop\nfrom neighbour_of_mine import REASON\n\n"
+        "class Mine:\n    sensing = Sensing()\n    def begin_task(self, task): pass\n"
+        "    def begin_stage(self, stage): pass\n    def act(self, observation): return Stop(REASON)\n"
+    )
+    name = f"{tmp_path}/agent_of_mine.py:Mine"
+    evaluate([name], tasks, tmp_path / "run", config=CONFIG, num_workers=1)
+    assert [record.stop_reason for record in records(tmp_path / "run", name)] == ["as the file says"] * 3
+    assert "agent_of_mine" not in sys.modules
