@@ -11,7 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 if TYPE_CHECKING:  # the command must start fast
+    from collections.abc import Sequence
+
+    from evonav.decision.account import Price
     from evonav.evaluation.backend import Backend
+    from evonav.evaluation.engine import RunConfig, TaskFile
 
 MODEL_VARIABLE = "EVONAV_VLM_MODEL"
 EXCHANGES_NAME = "exchanges.sqlite"
@@ -82,6 +86,10 @@ class DecisionOptions:
     noise: Annotated[
         str, _option("Mistakes on purpose, as shares: wrong=0.1,unparsable=0.05,refusal=0.02,lost=0.01; delay=SECONDS.")
     ] = ""
+    dry_run: Annotated[
+        bool,
+        _option("vlm: say what the run would cost, from a few tasks with the text matcher; ask nothing."),
+    ] = False
 
 
 def with_decision_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -127,6 +135,10 @@ def with_decisions(
         return replace(backend, decision_options=noise)
     if options.decision != "vlm" and ":" not in options.decision:
         raise typer.BadParameter(f"--decision {options.decision}: expected text, vlm or module:name")
+    if options.dry_run:
+        if options.decision != "vlm":
+            raise typer.BadParameter("--dry-run is for --decision vlm")
+        return replace(backend, decision_options={**_vlm_identity(options, seed), **noise})
     asked = _vlm(options, out, seed, num_workers) if options.decision == "vlm" else _own(options, out)
     path, identity, host = asked
     asking = replace(backend, decision=path, decision_options={**identity, **noise}, decision_host_options=host)
@@ -173,6 +185,21 @@ def _vlm(
     options: DecisionOptions, out: Path, seed: int, num_workers: int
 ) -> tuple[str, dict[str, Any], dict[str, Any]]:
     """A model behind an endpoint: what makes it, what it is, and how it is reached."""
+    server = _given(
+        base_url=options.base_url,
+        timeout_s=options.request_timeout,
+        max_retries=options.max_retries,
+        # Each process keeps to its share of what the run may ask.
+        requests_per_minute=_share(options.requests_per_minute, num_workers),
+        tokens_per_minute=_share(options.tokens_per_minute, num_workers),
+    )
+    identity = _vlm_identity(options, seed)
+    host = {"server": server, **_keeping(options, out), **_spending(options, identity["model"], out)}
+    return "evonav.decision.backends:vlm", identity, host
+
+
+def _vlm_identity(options: DecisionOptions, seed: int) -> dict[str, Any]:
+    """What decides the answers of a model behind an endpoint."""
     from evonav.decision.backends import SAMPLING
 
     if not options.model:
@@ -182,22 +209,12 @@ def _vlm(
         "seed": seed,
         **_given(temperature=options.temperature, top_p=options.top_p, max_tokens=options.max_tokens),
     }
-    server = _given(
-        base_url=options.base_url,
-        timeout_s=options.request_timeout,
-        max_retries=options.max_retries,
-        # Each process keeps to its share of what the run may ask.
-        requests_per_minute=_share(options.requests_per_minute, num_workers),
-        tokens_per_minute=_share(options.tokens_per_minute, num_workers),
-    )
-    host = {"server": server, **_keeping(options, out), **_spending(options, options.model, out)}
-    identity = {
+    return {
         "model": options.model,
         "structured": options.structured.value,
         "images": options.images,
         "request": request,
     }
-    return "evonav.decision.backends:vlm", identity, host
 
 
 def _own(options: DecisionOptions, out: Path) -> tuple[str, dict[str, Any], dict[str, Any]]:
@@ -235,19 +252,67 @@ def _keeping(options: DecisionOptions, out: Path) -> dict[str, Any]:
 
 def _spending(options: DecisionOptions, model: str, out: Path) -> dict[str, Any]:
     """Prices, limit, and where all processes of the run book."""
-    from evonav.decision.account import read_prices
     from evonav.decision.ledger import LEDGER_NAME
-    from evonav.errors import InvalidArgumentError
 
     spending: dict[str, Any] = {"ledger": str((out / LEDGER_NAME).absolute())}
-    if options.prices is not None:
-        table = read_prices(options.prices)
-        if model not in table:
-            raise InvalidArgumentError(f"{options.prices}: has no prices of {model!r}")
-        spending["price"] = [table[model].input_usd, table[model].output_usd]
+    price = _price(options, model)
+    if price is not None:
+        spending["price"] = [price.input_usd, price.output_usd]
     if options.max_cost is not None:
         spending["max_cost_usd"] = options.max_cost
     return spending
+
+
+def _price(options: DecisionOptions, model: str) -> "Price | None":
+    """Of the model, from the table given."""
+    from evonav.decision.account import read_prices
+    from evonav.errors import InvalidArgumentError
+
+    if options.prices is None:
+        return None
+    table = read_prices(options.prices)
+    if model not in table:
+        raise InvalidArgumentError(f"{options.prices}: has no prices of {model!r}")
+    return table[model]
+
+
+def print_estimate(
+    options: DecisionOptions,
+    agents: "Sequence[str]",
+    tasks: "Sequence[TaskFile]",
+    config: "RunConfig",
+    num_workers: int,
+) -> None:
+    """What a run would ask and cost, from a few of its tasks."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from evonav.cli.display import progress
+    from evonav.decision.account import Usage
+    from evonav.decision.counting import OUTPUT_TOKENS
+    from evonav.evaluation.estimate import estimate_run
+
+    price = _price(options, options.model or "")
+    with progress() as show:
+        estimates = estimate_run(
+            agents, tasks, config, dict(config.backend.decision_options), num_workers=num_workers, on_progress=show
+        )
+    first = estimates[0]
+    table = Table(title=f"{first.num_stages} stages, by {first.num_stages_run} of them with the text matcher")
+    for heading in ("agent", "requests", "by kind", "tokens in", "95%", "tokens out", "dollars"):
+        table.add_column(heading, justify="left" if heading in ("agent", "by kind") else "right")
+    for found in estimates:
+        kinds = ", ".join(f"{kind} {count:.0f}" for kind, count in found.kinds.items())
+        error = "?" if found.relative_error == float("inf") else f"+-{100 * found.relative_error:.0f}%"
+        usage = Usage(int(found.input_tokens), int(found.output_tokens))
+        cost = "?" if price is None else f"{price.of(usage):.2f}"
+        figures = (f"{found.num_requests:.0f}", kinds, f"{found.input_tokens:.0f}", error, f"{found.output_tokens:.0f}")
+        table.add_row(found.agent, *figures, cost)
+    Console().print(table)
+    typer.echo(
+        f"Tokens in: images as gpt-4o counts them, 3 characters of text a token; rather too many. Out: {OUTPUT_TOKENS} "
+        "an answer, assumed. The interval is over tasks; a model that decides otherwise is asked more or less often."
+    )
 
 
 def print_spending(out: Path) -> None:

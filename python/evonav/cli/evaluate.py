@@ -10,6 +10,7 @@ import typer
 from evonav.cli.decision_options import (
     DecisionOptions,
     answer_timeout_s,
+    print_estimate,
     print_spending,
     stage_timeout_s,
     with_decision_options,
@@ -97,6 +98,9 @@ def evaluate(
     config = replace(config, hosting=hosting)
     names = agents if agents is not None else "" if agent else HEURISTICS
     with _tasks(out, houses, tasks, limit, subset, seed, allow_unknown_assets, num_workers) as task_files:
+        if decisions.dry_run:
+            print_estimate(decisions, _names(names, agent or ()), task_files, config, num_workers)
+            return
         summaries = _evaluate(out, names, task_files, config, num_workers, retry_errored, agent or ())
     print_table(summaries)
     print_spending(out)
@@ -116,6 +120,9 @@ def demo(
     num_workers = count_of(workers)
     with _tasks(out, None, None, limit, None, seed, False, num_workers) as task_files:
         config = _config(seed, _backend(SimulatorName.EMBEDDED, False, {}, {}), decisions, out, num_workers)
+        if decisions.dry_run:
+            print_estimate(decisions, _names(agents, ()), task_files, config, num_workers)
+            return
         summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored=False)
     print_table(summaries)
     print_spending(out)
@@ -186,6 +193,10 @@ def _tasks(
                 yield [task_file(root) for root in subset_roots(directory, subset)]
 
 
+def _names(agents: str, more: "Sequence[str]") -> list[str]:
+    return [*(name.strip() for name in agents.split(",") if name.strip()), *more]
+
+
 def _evaluate(
     out: Path,
     agents: str,
@@ -202,7 +213,7 @@ def _evaluate(
             config.backend.check()
         with progress() as show:
             return evaluate(
-                [*(name.strip() for name in agents.split(",") if name.strip()), *more],
+                _names(agents, more),
                 task_files,
                 out,
                 config=config,

@@ -131,6 +131,28 @@ def own(
     return _with_noise(VlmDecision(client, structured="off", needs_images=needs_images), noise, seed)
 
 
+def counting(
+    seed: int,
+    *,
+    model: str,
+    ledger: str,
+    structured: str = "auto",
+    images: bool = True,
+    request: Mapping[str, Any] | None = None,
+    noise: Mapping[str, float] | None = None,
+) -> DecisionModel:
+    """The text matcher, booking in `ledger` what `vlm` with the same options would be asked; see `vlm`."""
+    from evonav.decision.counting import Counting
+    from evonav.decision.ledger import Ledger
+    from evonav.decision.text_match import TextMatch
+    from evonav.decision.vlm import VlmClient
+
+    client = VlmClient(vlm_config(model, request))
+    is_json = structured != "off"
+    counted = Counting(TextMatch(), client, Ledger(ledger), str(seed), needs_images=images, is_json=is_json)
+    return _with_noise(counted, noise, seed)
+
+
 def _with_noise(model: DecisionModel, noise: Mapping[str, float] | None, seed: int) -> DecisionModel:
     if not noise:
         return model

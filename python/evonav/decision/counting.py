@@ -1,0 +1,54 @@
+"""What a run would ask a model, found out without asking: the text matcher decides, and every prompt is built."""
+
+from typing import TypeVar
+
+from evonav.decision.account import Usage
+from evonav.decision.ledger import Ledger
+from evonav.decision.questions.question import DecisionModel, Question, Reply
+from evonav.decision.vlm import VlmClient
+from evonav.decision.vlm_decision import with_schema
+
+A = TypeVar("A")
+
+OUTPUT_TOKENS = 100
+"""Taken for an answer: a line and a sentence or two of reasons."""
+
+
+class Counting:
+    """A decision model that books what its questions would cost."""
+
+    def __init__(
+        self, model: DecisionModel, client: VlmClient, ledger: Ledger, name: str, *, needs_images: bool, is_json: bool
+    ) -> None:
+        """Counts the questions to `model`.
+
+        Args:
+            model: Answers.
+            client: Estimates; asks nothing.
+            ledger: Books requests and tokens, a row a kind of question.
+            name: Of the episode, before the kind.
+            needs_images: Whether questions shall hold images, as they would for the model.
+            is_json: Whether requests would come with a JSON Schema.
+        """
+        self.needs_images = needs_images
+        self._model = model
+        self._client = client
+        self._ledger = ledger
+        self._name = name
+        self._is_json = is_json
+
+    def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
+        """The model's answer."""
+        prompt = question.prompt()
+        if self._is_json:
+            prompt = with_schema(prompt, question.answer_schema())
+        used = Usage(self._client.estimate(prompt).input_tokens, OUTPUT_TOKENS)
+        self._ledger.settle(
+            f"{self._name} {question.kind}",
+            0.0,
+            input_tokens=used.input_tokens,
+            output_tokens=used.output_tokens,
+            cost_usd=0.0,
+            is_answered=True,
+        )
+        return self._model.answer(question, attempt)

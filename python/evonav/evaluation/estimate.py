@@ -1,0 +1,124 @@
+"""What a run would cost, before it is run: a few of its tasks with the text matcher, and every prompt counted.
+
+Tokens are the client's estimates, rather too many than too few. A model decides otherwise than the text matcher, walks
+on for longer or stops sooner, and is asked again after answers that cannot be read: the interval holds none of that.
+"""
+
+import math
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from evonav.decision.ledger import Ledger
+from evonav.evaluation.engine import Progress, RunConfig, TaskFile, agent_seed, evaluate
+
+_T_95 = (math.inf, 12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228)
+"""Student's t for 95%, by degrees of freedom; 1.96 beyond."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunEstimate:
+    """Of one agent."""
+
+    agent: str
+    num_stages: int
+    """Of the run."""
+    num_stages_run: int
+    """That the estimate is from."""
+    num_requests: float
+    input_tokens: float
+    output_tokens: float
+    """By an assumed length of answers."""
+    relative_error: float
+    """Half width of a 95% interval of `input_tokens` over tasks, as a share of it; 0 if all were run, `inf` if one."""
+    kinds: dict[str, float]
+    """Requests by kind of question."""
+
+
+def estimate_run(
+    agents: Sequence[str],
+    tasks: Sequence[TaskFile],
+    config: RunConfig,
+    options: dict[str, Any],
+    *,
+    num_tasks: int = 6,
+    num_workers: int = 0,
+    on_progress: Callable[[Progress], None] = lambda _: None,
+) -> list[RunEstimate]:
+    """Runs a few tasks, spread over all, and extrapolates by the number of stages.
+
+    Args:
+        agents: Names.
+        tasks: Of the run.
+        config: Of the run, but for its decision model.
+        options: Of `evonav.decision.backends.counting`, but for `ledger`.
+        num_tasks: That are run.
+        num_workers: Processes.
+        on_progress: Called after every stage.
+
+    Raises:
+        InvalidArgumentError: An agent is unknown, or there is no task.
+        TaskError: A task is malformed.
+    """
+    chosen = [tasks[index * len(tasks) // num_tasks] for index in range(num_tasks)] if len(tasks) > num_tasks else tasks
+    with tempfile.TemporaryDirectory() as folder:
+        ledger = Path(folder) / "counts.sqlite"
+        backend = replace(
+            config.backend,
+            decision="evonav.decision.backends:counting",
+            decision_options={**options, "ledger": str(ledger)},
+            decision_host_options={},
+        )
+        config = replace(config, backend=backend)
+        evaluate(agents, chosen, Path(folder) / "run", config=config, num_workers=num_workers, on_progress=on_progress)
+        booked = Ledger(ledger)
+        rows = booked.spending()
+        booked.close()
+    num_stages = sum(task.num_stages for task in tasks)
+    estimates = []
+    for agent in agents:
+        names = {str(agent_seed(config.seed, agent, task.task_id)): task for task in chosen}
+        mine = [
+            (names[name], kind, row) for row in rows for name, _, kind in (row.model.partition(" "),) if name in names
+        ]
+        num_run = sum(task.num_stages for task in chosen)
+        scale = num_stages / num_run
+        kinds: dict[str, float] = {}
+        for _, kind, row in mine:
+            kinds[kind] = kinds.get(kind, 0.0) + scale * row.num_asked
+        tokens = [
+            (task.num_stages, sum(row.input_tokens for other, _, row in mine if other is task)) for task in chosen
+        ]
+        estimates.append(
+            RunEstimate(
+                agent=agent,
+                num_stages=num_stages,
+                num_stages_run=num_run,
+                num_requests=sum(kinds.values()),
+                input_tokens=scale * sum(row.input_tokens for _, _, row in mine),
+                output_tokens=scale * sum(row.output_tokens for _, _, row in mine),
+                relative_error=0.0 if len(chosen) == len(tasks) else ratio_error(tokens),
+                kinds=dict(sorted(kinds.items())),
+            )
+        )
+    return estimates
+
+
+def ratio_error(tokens: Sequence[tuple[int, int]]) -> float:
+    """Half width of the 95% interval of tokens a stage, as a share of it.
+
+    Args:
+        tokens: Stages and tokens of each task.
+    """
+    num = len(tokens)
+    total = sum(count for _, count in tokens)
+    if num < 2:
+        return math.inf
+    if total == 0:
+        return 0.0
+    mean = total / sum(stages for stages, _ in tokens)
+    variance = sum((count - mean * stages) ** 2 for stages, count in tokens) / (num - 1)
+    t = _T_95[num - 1] if num - 1 < len(_T_95) else 1.96
+    return t * math.sqrt(variance / num) / (total / num)
