@@ -1,12 +1,12 @@
 """Mapping and exploration, as all agents but UniGoal share it."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.memory import Frontier, OccupancyMap
+from evonav.memory import Frontier, FrontierConfig, OccupancyMap
 from evonav.memory.occupancy import FREE, UNKNOWN
 from evonav.sensors.observation import MapFrame, Observation
 
@@ -32,6 +32,7 @@ class ExplorerConfig:
     the noise of predicted occupancy, whose edges waver."""
     reached_m: float = 0.3
     """A frontier this near that is still there after a look is given up."""
+    frontiers: FrontierConfig = field(default_factory=FrontierConfig)
 
 
 class Explorer:
@@ -49,7 +50,8 @@ class Explorer:
         self._last: Frontier | None = None
 
     def _new_map(self) -> OccupancyMap:
-        return OccupancyMap(self._map_frame, explored_range_m=self.config.explored_range_m)
+        config = self.config
+        return OccupancyMap(self._map_frame, config.frontiers, explored_range_m=config.explored_range_m)
 
     def clear(self) -> None:
         """Forgets cells, frontiers with their ids, and what was given up."""
