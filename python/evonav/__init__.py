@@ -1,5 +1,8 @@
 """EvoNav-Bench: lifelong navigation in homes that change."""
 
+from importlib import import_module
+from typing import Any
+
 from evonav._core import __version__
 from evonav.errors import (
     DecisionError,
@@ -20,4 +23,12 @@ __all__ = [
     "StoreError",
     "TaskError",
     "__version__",
+    "check_agent",
 ]
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - of a module
+    """What is imported when it is first used, so that the package starts fast."""
+    if name == "check_agent":
+        return import_module("evonav.evaluation.agent_check").check_agent
+    raise AttributeError(f"module `evonav` has no attribute `{name}`")

@@ -138,7 +138,7 @@ def test_no_oracle_data_is_in_an_agents_process(process_loot):
     assert not [point for point in process_loot["points"] if point in map(list, places) or point in flat]
     simulator = ToySimulator()
     simulator.reset(episode_case("toy-moved").stages[0].house_json)
-    assert [8, 8, 3] in process_loot["shapes"]
+    assert [48, 48, 3] in process_loot["shapes"]
     assert list(simulator.occupancy().cells.shape) not in process_loot["shapes"]
 
 

@@ -4,6 +4,7 @@ import sys
 
 import typer
 
+from evonav.cli.check_agent import check_agent
 from evonav.cli.evaluate import demo, evaluate, report, strip
 from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
@@ -21,7 +22,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (evaluate, demo, report, paper, strip, view, generate):
+for command in (evaluate, demo, report, paper, strip, view, generate, check_agent):
     app.command()(command)
 app.command(name="mock-vlm")(mock_vlm)
 app.add_typer(houses_app, name="houses")

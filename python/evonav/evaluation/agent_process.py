@@ -125,6 +125,16 @@ class AgentProcess:
         """Whether it lives and waits for a request."""
         return not self._is_closed and not self._is_asking and self._process.poll() is None
 
+    @property
+    def memory_mb(self) -> float | None:
+        """Resident memory, at its most so far; `None` where the system does not tell, or it has ended."""
+        try:
+            status = Path(f"/proc/{self._process.pid}/status").read_text()
+        except OSError:
+            return None
+        found = next((line.split()[1] for line in status.splitlines() if line.startswith("VmHWM")), None)
+        return None if found is None else int(found) / 1024
+
     def describe(self, label: str) -> None:
         """Says what it is at, for the log."""
         if self._log is not None:

@@ -1,0 +1,103 @@
+"""check_agent finds what is wrong, says so, and raises nothing."""
+
+import subprocess
+import sys
+
+import contract_breakers
+import pytest
+from typer.testing import CliRunner
+
+import evonav
+from evonav.cli import app
+
+CHECKS = [
+    *("importable", "made", "sensing", "begin_task", "begin_stage", "act", "actions", "budget", "observations"),
+    *("diagnostics", "entries", "time", "same seed twice", "own process", "memory", "new task"),
+]
+
+
+def verdicts(report):
+    return {check.name: check.verdict for check in report.checks}
+
+
+def test_a_good_agent_passes_every_check():
+    report = evonav.check_agent("contract_breakers:Turning")
+    assert [check.name for check in report.checks] == CHECKS
+    assert set(verdicts(report).values()) == {"pass"}, str(report)
+    assert report.is_ok
+    assert str(report).startswith("contract_breakers:Turning: keeps the contract\npass  importable")
+
+
+@pytest.mark.parametrize(
+    ("agent", "check", "verdict", "words"),
+    [
+        ("Moody", "same seed twice", "fail", "TaskInfo.seed"),
+        ("Collective", "same seed twice", "fail", "keep nothing in modules or classes"),
+        ("Remembering", "new task", "fail", "must forget everything"),
+        ("Scribbling", "observations", "warn", "detections.masks"),
+        ("Greedy", "sensing", "fail", "first_round.count = 100"),
+        ("Displaced", "entries", "fail", "entry 4 (Mug)"),
+        ("Halting", "begin_stage", "fail", "KeyError"),
+        ("Wordless", "actions", "fail", "None is no action"),
+        ("Opaque", "diagnostics", "fail", "not JSON-ready"),
+        ("Plain", "diagnostics", "warn", "no `diagnostics()`"),
+        ("Needy", "made", "fail", "must do without arguments"),
+        ("Quitting", "own process", "fail", "exit code 1"),
+        ("Dying", "own process", "fail", "exit code 3"),
+        ("Slow", "own process", "fail", "within 3 s"),
+        ("Dependent", "own process", "fail", "does it read what is not there"),
+        ("Missing", "importable", "fail", "cannot be imported"),
+    ],
+)
+def test_a_broken_point_is_named(agent, check, verdict, words):
+    report = evonav.check_agent(f"contract_breakers:{agent}", timeout_s=3.0)
+    found = {found.name: found for found in report.checks}
+    assert found[check].verdict == verdict, str(report)
+    assert words in found[check].said
+    assert report.is_ok == (verdict == "warn")
+    others = {name: other.verdict for name, other in found.items() if name != check}
+    assert "fail" not in others.values(), str(report)
+
+
+def test_names_that_are_no_agents_are_told():
+    for name in ("nobody", "shortest-path", "no_such_module:Agent", "./no_such_file.py:Agent"):
+        report = evonav.check_agent(name)
+        assert verdicts(report) == {"importable": "fail"}
+
+
+def test_classes_and_objects_are_checked_too():
+    for agent in (contract_breakers.Turning, contract_breakers.Turning()):
+        report = evonav.check_agent(agent)
+        assert report.agent == "contract_breakers:Turning"
+        assert set(verdicts(report).values()) == {"pass"}
+
+    class Local(contract_breakers.Turning):
+        pass
+
+    report = evonav.check_agent(Local)
+    assert report.is_ok
+    assert verdicts(report)["own process"] == "warn"
+
+
+def test_a_class_of_a_script_is_found_by_its_file(tmp_path):
+    script = tmp_path / "an_agent_of_mine.py"
+    script.write_text(
+        "import evonav\nfrom evonav.agents.agent import Sensing, Stop\n\n"
+        "class Mine:\n    sensing = Sensing()\n    def begin_task(self, task): pass\n"
+        "    def begin_stage(self, stage): pass\n    def act(self, observation): return Stop()\n\n"
+        "if __name__ == '__main__':\n    print(evonav.check_agent(Mine))\n"
+    )
+    printed = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True).stdout
+    assert "an_agent_of_mine.py:Mine: keeps the contract" in printed
+    assert "pass  own process" in printed
+    assert "it never did anything else" in printed
+
+
+def test_the_command_prints_a_table_and_fails_with_the_agent():
+    good = CliRunner().invoke(app, ["check-agent", "contract_breakers:Turning"])
+    assert good.exit_code == 0
+    assert "keeps the contract" in good.stdout
+    assert "same seed twice" in good.stdout
+    bad = CliRunner().invoke(app, ["check-agent", "contract_breakers:Wordless"])
+    assert bad.exit_code == 1
+    assert "breaks the contract" in bad.stdout
