@@ -42,6 +42,8 @@ Point2 = tuple[float, float]
 
 _BELIEF_STRIDE = 2
 """Cells of the map that one cell of a picture stands for, along each axis."""
+_NUM_DRAWS = 10
+"""Of a random place, until there is a way to one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +132,7 @@ class UniGoal:
     def _exploration_target(self, bev: BevMap, planner: UniGoalPlanner, watch: GoalWatch, pose: Pose) -> Point2 | None:
         """A frontier, chosen anew when due, after another match of the graphs.
 
-        Without a frontier left: the mid-term goal; from there, and without one, a random place where it has been.
+        Without a frontier left, a random place of what is explored: there the house may look different by now.
         """
         here = (pose.x_m, pose.z_m)
         reached_m, wander_m = planner.config.reached_m, self._wander_m
@@ -147,17 +149,21 @@ class UniGoal:
             num_targets = planner.counters.targets
             planner.exploration_target(pose, advice.mid_term_m)
             is_new = planner.counters.targets > num_targets
-            self._wander_m = None if is_new else self._somewhere(bev, here, advice.mid_term_m, reached_m)
+            self._wander_m = None if is_new else self._somewhere(bev, planner, pose)
         return self._wander_m or planner.target_m
 
-    def _somewhere(self, bev: BevMap, here: Point2, mid_term_m: Point2 | None, reached_m: float) -> Point2 | None:
-        """Where to go when nothing is left to explore."""
-        if mid_term_m is not None and math.dist(mid_term_m, here) >= reached_m and self._wander_m != mid_term_m:
-            return mid_term_m
-        cells = np.argwhere(bev.visited)
-        middles = [bev.centre_of((row, col)) for row, col in cells.tolist()]
-        far = [middle for middle in middles if math.dist(middle, here) >= reached_m]
-        return self._random.choice(far) if far else None
+    def _somewhere(self, bev: BevMap, planner: UniGoalPlanner, pose: Pose) -> Point2 | None:
+        """A random place to go to when nothing is left to explore; `None` if ten draws bring none with a way to it."""
+        open_cells = bev.explored & ~bev.obstacles
+        rows, cols = np.nonzero(open_cells)
+        for _ in range(_NUM_DRAWS if len(rows) else 0):
+            index = self._random.randrange(len(rows))
+            place_m = bev.centre_of((int(rows[index]), int(cols[index])))
+            cell = np.array([[rows[index], cols[index]]], np.int32)
+            is_far = math.dist(place_m, (pose.x_m, pose.z_m)) >= planner.config.reached_m
+            if is_far and planner.distance_m(pose, cell) is not None:
+                return place_m
+        return None
 
     def _cells_of(self, bev: BevMap, node: SceneNode) -> Cells:
         """Cells under a node's points."""
