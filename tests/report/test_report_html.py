@@ -9,7 +9,7 @@ import pytest
 from made_up_run import WriteRun, record_run, stage_record
 
 from evonav.errors import StoreError
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records import EndState, ErrorKind, StageError, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.report import findings, html, tables, write_report
 from evonav.report.run import load_run
@@ -244,3 +244,36 @@ def test_places_off_the_planet_do_not_stop_a_report(tmp_path: Path) -> None:
     target = record.target.model_copy(update={"position_m": (1e308, 0.0, -1e308)})
     run_dir = record_run(tmp_path, [record.model_copy(update={"target": target})], {"t": 1}, ["fu"])
     Page(write_report(run_dir))
+
+
+def failing(record: StageRecord, counts: list[int], **changes: object) -> StageRecord:
+    """The record with a counter of failed decisions, cumulative over the task, in each of its rounds."""
+    trace = tuple(
+        entry.model_copy(update={"counters": {"failed_decisions": count}})
+        for entry, count in zip(record.trace, counts, strict=False)
+    )
+    return record.model_copy(update={"trace": trace, **changes})
+
+
+def test_failures_of_agents_and_their_models_are_counted(tmp_path: Path) -> None:
+    lost = StageError(kind=ErrorKind.TIMEOUT, message="no answer")
+    won, errored = EndState.SUCCESS, EndState.ERRORED
+    records = [
+        failing(stage_record("fu", "a", 1, won), [0, 1, 2, 2]),
+        failing(stage_record("fu", "a", 2, won), [2, 2, 2, 2]),
+        failing(stage_record("fu", "b", 1, errored), [1, 1], error=lost),
+        failing(stage_record("fu", "b", 2, won), [0, 3, 3, 3], failed_before=(1,), memory_lost_at=2),
+        stage_record("ftu", "a", 1, won),
+    ]
+    run = load_run(record_run(tmp_path / "run", records, {"a": 2, "b": 2}, ["fu", "ftu"]))
+    table = findings.failure_table(run)
+    assert table.rows == (("fu", "1 timeout", "6", "3", "1", "1"),)
+    page = write_report(tmp_path / "run").read_text()
+    assert "What failed" in page
+    assert "1 timeout" in page
+    assert "What failed" in (tmp_path / "run" / "table.md").read_text()
+
+
+def test_a_run_without_failures_does_not_speak_of_them(write_run: WriteRun) -> None:
+    assert findings.failure_table(load_run(write_run())).rows == ()
+    assert "What failed" not in write_report(write_run("again")).read_text()

@@ -1,5 +1,8 @@
 """What a run shows: all its tables, and sentences that claim no more than the numbers allow."""
 
+from collections import Counter
+
+from evonav.evaluation.records import EndState
 from evonav.report import tables
 from evonav.report.run import Run
 
@@ -25,6 +28,7 @@ def run_tables(run: Run) -> list[tables.Table]:
         tables.mode_table(run.summaries),
         tables.cause_count_table(run.cause_counts()),
         effort_table(run),
+        failure_table(run),
     ]
 
 
@@ -49,6 +53,35 @@ def effort_table(run: Run) -> tables.Table:
         "label there. Stale entries: in memory at the end of a stage."
     )
     return tables.Table("Effort and staleness", columns, tuple(rows), (note,))
+
+
+def failure_table(run: Run) -> tables.Table:
+    """What went wrong with agents and their models, and the stages that were scored after it; no row where nothing."""
+    columns = ("Agent", "errored stages", "failed decisions", "in stages", "scored after a failure", "without memory")
+    rows = []
+    for agent in run.agents:
+        outcomes = [outcome for key, outcome in run.outcomes.items() if key[0] == agent]
+        kinds = Counter(
+            outcome.record.error.kind.value.replace("_", " ")
+            for outcome in outcomes
+            if outcome.record.error is not None and outcome.record.state is EndState.ERRORED
+        )
+        scored = [outcome.record for outcome in outcomes if outcome.record.is_scored]
+        counts = (
+            sum(outcome.num_failed_decisions for outcome in outcomes),
+            sum(outcome.num_failed_decisions > 0 for outcome in outcomes),
+            sum(bool(record.failed_before) for record in scored),
+            sum(record.memory_lost_at is not None for record in scored),
+        )
+        if kinds or any(counts):
+            errored = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or tables.NONE
+            rows.append((agent, errored, *map(str, counts)))
+    note = (
+        "Failed decisions: no valid answer of the model in all tries; the agent then did what it does without one. "
+        "Scored after a failure: an earlier stage of the task is errored; without memory: the agent's process was lost "
+        "in it."
+    )
+    return tables.Table("What failed", columns, tuple(rows), (note,))
 
 
 def statements(run: Run) -> list[str]:

@@ -33,6 +33,8 @@ class StageOutcome:
     """In memory at the end."""
     stale_path_m: float
     """Walked in rounds that had chosen a stale entry."""
+    num_failed_decisions: int = 0
+    """Questions that the agent's model did not answer, in spite of all tries: the agent did what it does then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,10 +129,11 @@ def load_run(run_dir: Path) -> Run:
         digests = {}
         for agent in agents:
             digest = hashlib.sha256()
+            failed_before: dict[str, int] = {}
             for text in store.record_texts(agent):
                 digest.update(text.encode())
                 digest.update(b"\n")
-                outcome = _outcome(text, run_dir)
+                outcome = _outcome(text, run_dir, failed_before)
                 outcomes[agent, outcome.record.task_id, outcome.record.stage] = outcome
             digests[agent] = digest.hexdigest()
         num_stages = _num_stages(store.meta("num_stages"), outcomes)
@@ -155,13 +158,20 @@ def load_run(run_dir: Path) -> Run:
     )
 
 
-def _outcome(text: str, run_dir: Path) -> StageOutcome:
+def _outcome(text: str, run_dir: Path, failed_before: dict[str, int]) -> StageOutcome:
+    """A stage in a line; `failed_before` counts the decisions of the tasks so far, whose counters are cumulative."""
     try:
         record = StageRecord.model_validate_json(text)
     except ValidationError as error:
         raise StoreError(f"{run_dir}: {error}") from error
+    counted = [
+        decision.counters["failed_decisions"] for decision in record.trace if "failed_decisions" in decision.counters
+    ]
+    so_far = 0 if record.memory_lost_at == record.stage else failed_before.get(record.task_id, 0)
+    failed_before[record.task_id] = max([so_far, *counted])
     return StageOutcome(
         record=record.model_copy(update={"trace": (), "entries": ()}),
+        num_failed_decisions=failed_before[record.task_id] - so_far,
         cause=cause_of(record),
         num_stale_entries=sum(entry.is_stale for entry in record.entries),
         stale_path_m=sum(
