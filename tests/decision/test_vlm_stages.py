@@ -33,6 +33,7 @@ class Run:
     def __init__(self, folder: Path, *, max_rounds: int = 8) -> None:
         self.folder = folder
         self.max_rounds = max_rounds
+        self.max_actions = 500
 
     def __call__(
         self,
@@ -60,7 +61,9 @@ class Run:
             decision_options={"model": "gpt-4o", **options},
             decision_host_options=host,
         )
-        config = RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=self.max_rounds))
+        config = RunConfig(
+            backend=backend, protocol=ProtocolConfig(max_rounds=self.max_rounds, max_actions=self.max_actions)
+        )
         with bundled_tasks() as directory:
             evaluate(
                 agents or AGENTS, task_files(directory, 1), self.folder / name, config=config, num_workers=num_workers
@@ -271,6 +274,26 @@ def test_a_run_gone_on_with_is_the_run_that_was_not_interrupted(run: Run, tmp_pa
     with serving(lambda _: {"text": "another model altogether"}) as stub:
         assert run("first", stub.url, agents=["fu"]) == first
         assert stub.requests == []
+
+
+@pytest.mark.parametrize("agent", ["3d-mem", "msgnav", "unigoal", "unigoal-paper"])
+def test_every_agent_asks_what_the_api_takes_and_goes_on_after_bad_answers(run: Run, agent: str) -> None:
+    """With rules that follow every grammar nothing is invalid; with a bad model all is counted, and replayed."""
+    run.max_rounds, run.max_actions = 2, 40
+    with serving(answers) as stub:
+        good = run("good", stub.url, agents=[agent])
+    assert [record.error for record in records(good) if record.error] == []
+    asked = counters(good[-1])
+    assert asked["decisions"] > 0
+    assert asked["invalid_answers"] + asked["refusals"] + asked["lost_answers"] == 0
+    run.folder = run.folder / "bad"
+    with serving(faulty({"off_topic": 0.3, "refusal": 0.2, "malformed": 0.2, "empty": 0.2}, seed=1)) as stub:
+        bad = run("first", stub.url, agents=[agent])
+    assert [record.error for record in records(bad) if record.error] == []
+    faults = counters(bad[-1])
+    assert faults["invalid_answers"] > 0
+    assert faults["failed_decisions"] > 0
+    assert run("again", None, agents=[agent]) == bad
 
 
 def test_failures_can_be_asked_again(run: Run, tmp_path: Path) -> None:

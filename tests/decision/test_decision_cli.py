@@ -1,0 +1,123 @@
+"""The options on who answers: what a run is given, what is refused, and what is printed."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.decision.mock_answers import mock_answer
+from evonav.evaluation.store import RunStore
+from vlm_stub import KEY, check_request, serving
+
+COMMON = ("--agents", "fu", "--limit", "1", "--workers", "0", "--in-process")
+
+
+def run(*arguments: object) -> tuple[int, str]:
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    return result.exit_code, result.output + str(result.exception or "")
+
+
+@pytest.fixture
+def prices(tmp_path: Path) -> Path:
+    path = tmp_path / "prices.json"
+    path.write_text('{"m": {"input_usd": 1.0, "output_usd": 10.0}}')
+    return path
+
+
+def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
+    tmp_path: Path, prices: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("EVONAV_VLM_MODEL", "m")
+    monkeypatch.setenv("OPENAI_API_KEY", KEY)
+    out, again = tmp_path / "out", tmp_path / "again"
+    with serving(lambda request: {"text": mock_answer(request)}) as stub:
+        options = ("--decision", "vlm", "--base-url", stub.url, "--prices", prices, "--max-cost", 5)
+        code, printed = run("evaluate", *COMMON, *options, "--temperature", 0.2, "--seed", 3, "--out", out)
+        num_asked = len(stub.requests or [])
+        # Going on asks nothing, and counts on.
+        assert run("evaluate", *COMMON, *options, "--temperature", 0.2, "--seed", 3, "--out", out)[0] == 0
+        assert len(stub.requests or []) == num_asked > 0
+        for request in stub.requests or []:
+            check_request(request)
+            assert (request["temperature"], request["seed"]) == (0.2, 3)
+        # Another temperature is another run.
+        code_other, told = run("evaluate", *COMMON, *options, "--out", out, "--seed", 3)
+    assert code == 0, printed
+    assert f"m: {num_asked} questions asked" in printed
+    assert f"${num_asked * 0.002:.4f}" in printed  # 1000 tokens in, 100 out
+    assert code_other != 0
+    assert "temperature" in told
+    replay = ("--decision", "vlm", "--vlm-mode", "replay", "--exchanges", out / "exchanges.sqlite")
+    monkeypatch.delenv("OPENAI_API_KEY")
+    code, printed = run("evaluate", *COMMON, *replay, "--temperature", 0.2, "--seed", 3, "--out", again)
+    assert code == 0, printed
+    assert f"m: 0 questions asked, {num_asked} answered from exchanges" in printed
+    with RunStore(out) as first, RunStore(again) as second:
+        assert list(first.record_texts()) == list(second.record_texts())
+        identity = json.dumps(first.meta("config"))
+        assert KEY not in identity
+        assert stub.url not in identity
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--decision", "vlm"), "needs --model"),
+        (("--decision", "gpt"), "expected text, vlm or module:name"),
+        (("--temperature", 0.5), "--temperature is of no use"),
+        (("--decision", "own_vlm:OwnVlm", "--max-tokens", 5), "--max-tokens is of no use"),
+        (("--decision", "nothing:Here"), "nothing"),
+        (("--decision", "vlm", "--model", "m"), "OPENAI_API_KEY"),
+        (("--decision", "vlm", "--model", "m", "--vlm-mode", "replay"), "no exchanges here"),
+        (("--decision", "vlm", "--model", "x", "--prices", "PRICES", "--base-url", "http://x/v1"), "no prices of"),
+        (("--decision", "vlm", "--model", "m", "--max-cost", 1, "--base-url", "http://x"), "the model's prices"),
+        (("--decision", "vlm", "--model", "m", "--temperature", 9, "--base-url", "http://x/v1"), "temperature"),
+        (("--noise", "wrong=2"), "noise wrong"),
+        (("--noise", "wrnog=0.1"), "wrnog"),
+        (("--noise", "wrong=many"), "expected a number"),
+        (("--dry-run",), "--dry-run is of no use"),
+        (("--dry-run", "--decision", "own_vlm:OwnVlm"), "--dry-run is for --decision vlm"),
+    ],
+)
+def test_options_that_make_no_sense_are_told(
+    tmp_path: Path, prices: Path, monkeypatch: pytest.MonkeyPatch, options: tuple[object, ...], words: str
+) -> None:
+    for name in ("OPENAI_API_KEY", "OPENAI_BASE_URL", "EVONAV_VLM_MODEL"):
+        monkeypatch.delenv(name, raising=False)
+    options = tuple(prices if option == "PRICES" else option for option in options)
+    code, told = run("evaluate", *COMMON, *options, "--out", tmp_path / "out")
+    assert code != 0
+    assert words in " ".join(told.replace("│", " ").split())
+    assert not (tmp_path / "out" / "records.sqlite").exists()
+
+
+def test_recording_wants_a_new_file(tmp_path: Path) -> None:
+    common = ("evaluate", *COMMON, "--decision", "vlm", "--model", "m", "--vlm-mode", "record")
+    with serving(lambda request: {"text": mock_answer(request)}) as stub:
+        options = (*common, "--base-url", stub.url, "--exchanges", tmp_path / "e.sqlite")
+        assert run(*options, "--out", tmp_path / "a")[0] == 0
+        assert run(*options, "--out", tmp_path / "a")[0] == 0  # goes on with its own
+        code, told = run(*options, "--out", tmp_path / "b")
+    assert code != 0
+    assert "holds exchanges already" in told
+
+
+def test_noise_is_part_of_what_a_run_is(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("evaluate", *COMMON, "--noise", "wrong=0.5", "--out", out)[0] == 0
+    with RunStore(out) as store:
+        assert store.meta("config")["backend"]["decision_options"] == {"noise": {"wrong": 0.5}}
+    code, told = run("evaluate", *COMMON, "--out", out)
+    assert code != 0
+    assert "noise" in told
+
+
+def test_a_dry_run_asks_nothing_and_leaves_nothing(tmp_path: Path, prices: Path) -> None:
+    options = ("--decision", "vlm", "--model", "m", "--base-url", "http://127.0.0.1:9/v1", "--prices", prices)
+    code, printed = run("evaluate", *COMMON, *options, "--dry-run", "--out", tmp_path / "out")
+    assert code == 0, printed
+    assert "choose" in printed
+    assert "+-0%" in printed  # the one task is all of the run
+    assert not (tmp_path / "out").exists()
