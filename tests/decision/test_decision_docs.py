@@ -1,0 +1,51 @@
+"""docs/decision.md says what there is: every question, every option, every fault."""
+
+import inspect
+from dataclasses import fields
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+from evonav.cli.decision_options import DecisionOptions
+from evonav.decision import questions
+from evonav.decision.noisy import NoiseRates
+from evonav.decision.questions.question import Question
+from evonav.decision.vlm_decision import FAULTS
+from evonav.decision.vlm_errors import LASTING
+
+TEXT = (Path(__file__).parents[2] / "docs" / "decision.md").read_text(encoding="utf-8")
+
+
+def kinds() -> dict[str, str]:
+    """Kinds of all questions, by class."""
+    found = {}
+    for module in iter_modules(questions.__path__, f"{questions.__name__}."):
+        for name, kind in inspect.getmembers(import_module(module.name), inspect.isclass):
+            if issubclass(kind, Question) and not inspect.isabstract(kind):
+                found[name] = kind.kind
+    return found
+
+
+def test_every_question_has_a_kind_of_its_own_and_a_row() -> None:
+    found = kinds()
+    assert len(found) >= 18
+    assert len(set(found.values())) == len(found)
+    for kind in found.values():
+        assert f"| `{kind}` |" in TEXT, kind
+
+
+def test_options_and_noise_are_told_of() -> None:
+    for field in fields(DecisionOptions):
+        name = "--no-exchange-images" if field.name == "exchange_images" else f"--{field.name.replace('_', '-')}"
+        assert name in TEXT, name
+    for rate in fields(NoiseRates):
+        assert f"{rate.name}=" in TEXT, rate.name
+
+
+def test_every_failure_of_a_model_has_a_consequence() -> None:
+    from typing import get_args
+
+    from evonav.decision.vlm_errors import VlmFailure
+
+    assert set(FAULTS) | LASTING == set(get_args(VlmFailure))
+    assert not set(FAULTS) & LASTING
