@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from evonav.evaluation.agent_process import AgentHosting
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.engine import Progress, RunConfig, TaskFile, evaluate, task_files
 from evonav.report.findings import effort_table
@@ -60,7 +61,7 @@ def pooled_tasks(folders: Sequence[str]) -> list[TaskFile]:
 
 def noisy_backend(rate: float) -> Backend:
     """The text matcher, of whose answers a share is another valid one."""
-    return Backend(decision="evonav.decision.backends:noisy", decision_options={"wrong": rate})
+    return Backend(decision_options={"noise": {"wrong": rate}} if rate else {})
 
 
 def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
@@ -198,7 +199,8 @@ def _run(
         if news.latest is not None and news.num_done % 50 == 0:
             sys.stderr.write(f"{out.name}: {news.num_done} of {news.num_stages} stages\n")
 
-    config = RunConfig(seed=asked.seed, backend=backend)
+    # Our own agents need no process of their own.
+    config = RunConfig(seed=asked.seed, backend=backend, hosting=AgentHosting(is_in_process=True))
     evaluate(agents, tasks, out, config=config, num_workers=asked.workers, on_progress=tell)
 
 
