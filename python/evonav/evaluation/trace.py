@@ -23,6 +23,7 @@ from PIL import Image
 from evonav.agents.agent import Agent, Belief, InspectableAgent
 from evonav.agents.registry import imported
 from evonav.decision.asking import Asked
+from evonav.decision.own import own_model
 from evonav.decision.prompts import Picture
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.questions.question import Question
@@ -51,7 +52,7 @@ from evonav.world.simulator import SceneObject, Simulator
 
 HEADING_PX, SIDE_PX, QUALITY = 300, 150, 78
 """Longer edges of a round's heading view and of the others, and their JPEG quality ..."""
-SMALL_HEADING_PX, SMALL_SIDE_PX, SMALL_QUALITY = 200, 100, 62
+SMALL_HEADING_PX, SMALL_SIDE_PX, SMALL_QUALITY = 192, 96, 55
 """... and those of agents whose rounds are single actions: ten times as many."""
 PROMPT_PX = 300
 """Longer edge of an image of a prompt, at most."""
@@ -88,8 +89,9 @@ class RunReplay:
         self._why_not = ""
         if "exchanges" in inspect.signature(imported(backend.decision)).parameters:
             path = exchanges or run_dir / EXCHANGES_NAME
-            self.backend = replace(backend, decision_host_options={"exchanges": str(path), "mode": "replay"})
-            if not path.is_file():
+            if path.is_file():
+                self.backend = replace(backend, decision_host_options={"exchanges": str(path), "mode": "replay"})
+            elif not _answers_itself(backend):
                 self._why_not = f"The model's answers were not kept: {path} not found."
 
     def budget(self, agent: str) -> int:
@@ -304,6 +306,12 @@ def jpeg_of(pixels: NDArray[np.uint8], longest_px: int, quality: int) -> bytes:
     buffer = BytesIO()
     picture.save(buffer, "JPEG", quality=quality, optimize=True)
     return buffer.getvalue()
+
+
+def _answers_itself(backend: Backend) -> bool:
+    """Whether the model is one of the user's own that is put the questions themselves: nothing of it is kept."""
+    path = backend.decision_options.get("path")
+    return path is not None and hasattr(own_model(str(path), 0), "answer")
 
 
 def _loss(record: StageRecord) -> Loss | None:

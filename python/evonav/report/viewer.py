@@ -22,7 +22,7 @@ from evonav.report.viewer_data import PageData
 
 VIEW_DIR = "view"
 INDEX_NAME = "index.html"
-MAX_PAGE_BYTES = 8_000_000
+MAX_PAGE_BYTES = 10_000_000
 """An episode whose page would be larger is written a stage a page."""
 _SHARED_MARKS = ("start", "end, success", "end, no success", "target", "where it stood in stage 1", "success radius")
 
@@ -75,12 +75,12 @@ def write_episode(
     """
     shown = [stage for stage in stages if only is None or stage.record.stage == only]
     maps = {stage.record.stage: stage.stage_map for stage in stages if stage.stage_map is not None}
-    page = _page(shown, maps, budget, success_radius_m)
+    page = _page(shown, maps, _tabs(shown, shown), budget, success_radius_m)
     if len(page.encode()) <= MAX_PAGE_BYTES or len(shown) == 1:
         return [_write(page, shown, out_dir, only)]
     pages = []
     for stage in shown:
-        text = _page([stage], maps, budget, success_radius_m)
+        text = _page([stage], maps, _tabs(shown, [stage]), budget, success_radius_m)
         pages.append(_write(text, [stage], out_dir, stage.record.stage))
     return pages
 
@@ -109,7 +109,25 @@ def write_index(pages: Iterable[WrittenPage], out_dir: Path, run_name: str) -> P
     return _save(out_dir / INDEX_NAME, text)
 
 
-def _page(stages: Sequence[TracedStage], maps: Mapping[int, StageMap], budget: int, radius_m: float) -> str:
+def _tabs(stages: Sequence[TracedStage], here: Sequence[TracedStage]) -> list[tuple[str, int, str, int]]:
+    """State, number, page of those that are on another one, and index of those that are on this."""
+    tabs, index = [], 0
+    for stage in stages:
+        record = stage.record
+        is_here = any(stage is other for other in here)
+        href = "" if is_here else page_name(record.task_id, record.agent, record.stage)
+        tabs.append((record.state.value, record.stage, href, index))
+        index += is_here
+    return tabs
+
+
+def _page(
+    stages: Sequence[TracedStage],
+    maps: Mapping[int, StageMap],
+    tabs: Sequence[tuple[str, int, str, int]],
+    budget: int,
+    radius_m: float,
+) -> str:
     first = stages[0].record
     frame = task_frame(maps, [stage.record for stage in stages])
     data = PageData()
@@ -120,7 +138,7 @@ def _page(stages: Sequence[TracedStage], maps: Mapping[int, StageMap], budget: i
         task_id=first.task_id,
         house=first.house,
         agent=first.agent,
-        stages=[stage.record for stage in stages],
+        tabs=tabs,
         drawings=[_drawing(stage, maps, frame, radius_m) for stage in stages],
         view_box=frame.view_box,
         legend=_legend(),

@@ -33,6 +33,14 @@ from evonav.tasks.language import noun_of
 
 _DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
 _SAME = 4
+_KINDS = {
+    "object": "object",
+    "frontier": "frontier",
+    "exploration": "frontier",
+    "confirmed": "object",
+    "temporary": "object",
+}
+"""First words of choices, UniGoal's last, and their mark in the timeline."""
 
 
 class PageData:
@@ -285,9 +293,7 @@ def _kind(record: RoundRecord | None) -> str:
         return "stop"
     if record.chosen_entry is not None:
         return "stale" if record.chosen_entry.is_stale else "object"
-    if record.choice.startswith("object"):
-        return "object"
-    return "frontier" if record.choice.startswith("frontier") else "other"
+    return next((kind for prefix, kind in _KINDS.items() if record.choice.startswith(prefix)), "other")
 
 
 def _evaluator_words(stage: StageRecord, step: TracedRound) -> str:

@@ -215,7 +215,7 @@
     tellMemory(stage, round);
   };
 
-  let isPromptOpen = true;
+  let isPromptOpen = null;  // as the reader left it
   const tellQuestions = (stage, round, rounds) => {
     const box = $("questions");
     box.replaceChildren();
@@ -264,7 +264,7 @@
         figure.append(html("figcaption", title), picture(content, title || "image of the prompt"));
         pictures.append(figure);
       }
-      details.open = isPromptOpen;
+      details.open = isPromptOpen ?? round.q.length < 4;
       summary.addEventListener("click", () => { isPromptOpen = !details.open; });
       div.append(text, ...(offered ? [html("p", offered, "quiet offered")] : []), details);
       box.append(div);
