@@ -101,6 +101,31 @@ def test_objects_are_made_by_import_path() -> None:
             own(0, path=path)
 
 
+class Heavy:
+    """Takes long to load."""
+
+    num_made = 0
+    needs_images = False
+
+    def __init__(self) -> None:
+        Heavy.num_made += 1
+
+    def ask(self, prompt: Prompt) -> str:
+        return "a"
+
+
+def test_models_are_loaded_once_and_only_to_be_asked(tmp_path: Path) -> None:
+    path = str(tmp_path / "e.sqlite")
+    models = [own(seed, path="test_own:Heavy", exchanges=path) for seed in range(2)]
+    assert models[0].needs_images is False
+    assert Heavy.num_made == 0
+    assert [model.answer(Letter(), attempt).answer for attempt, model in enumerate(models)] == ["a", "a"]
+    assert Heavy.num_made == 1
+    replay = own(5, path="test_own:Heavy", exchanges=path, mode="replay")
+    assert replay.answer(Letter(), 1).answer == "a"
+    assert Heavy.num_made == 1
+
+
 def test_the_example_runs_and_replays_without_its_model(tmp_path: Path) -> None:
     """As docs/decision.md tells a user to; the replay finds no picture to look at."""
     command = [sys.executable, "-m", "evonav", "evaluate", "--decision", "own_vlm:OwnVlm", "--agents", "fu"]

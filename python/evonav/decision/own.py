@@ -140,8 +140,25 @@ class OwnClient:
         return {"text": text}
 
 
+class _MadeWhenAsked:
+    """A class's instance with `ask`, made at the first question: a replay loads no weights."""
+
+    def __init__(self, path: str, factory: Callable[..., Any], seed: int) -> None:
+        self.needs_images = bool(getattr(factory, "needs_images", True))
+        self._origin = (path, factory, seed)
+        self._model: Any = None
+
+    def ask(self, prompt: Prompt) -> str:
+        if self._model is None:
+            self._model = _made(*self._origin)
+        answer: str = self._model.ask(prompt)
+        return answer
+
+
 def own_model(path: str, seed: int) -> OwnModel | DecisionModel:
     """What `module:name` makes: a class's instance, or what a function returns.
+
+    Made once a process and used for all its episodes, unless it has a parameter `seed`: then once an episode.
 
     Args:
         path: Import path.
@@ -153,12 +170,27 @@ def own_model(path: str, seed: int) -> OwnModel | DecisionModel:
     module, _, attribute = path.partition(":")
     try:
         factory: Callable[..., Any] = getattr(import_module(module), attribute)
-        takes_seed = "seed" in inspect.signature(factory).parameters
-        model: Any = factory(seed=seed) if takes_seed else factory()
     except Exception as error:  # a stranger's code: whatever it raises belongs to the name
         raise InvalidArgumentError(f"decision `{path}`: {type(error).__name__}: {error}") from error
+    is_class = inspect.isclass(factory)
+    if is_class and hasattr(factory, "ask") and not hasattr(factory, "answer"):
+        return _MadeWhenAsked(path, factory, seed)
+    model = _made(path, factory, seed)
     if callable(getattr(model, "answer", None)) or callable(getattr(model, "ask", None)):
         return cast("OwnModel | DecisionModel", model)
-    raise InvalidArgumentError(
-        f"decision `{path}`: makes a {type(model).__name__}, which has neither `ask` nor `answer`"
-    )
+    raise InvalidArgumentError(f"decision `{path}`: a {type(model).__name__} has neither `ask` nor `answer`")
+
+
+_MADE: dict[str, Any] = {}
+"""By import path; weights are loaded once."""
+
+
+def _made(path: str, factory: Callable[..., Any], seed: int) -> Any:  # noqa: ANN401 - a stranger's
+    try:
+        if "seed" in inspect.signature(factory).parameters:
+            return factory(seed=seed)
+        if path not in _MADE:
+            _MADE[path] = factory()
+    except Exception as error:
+        raise InvalidArgumentError(f"decision `{path}`: {type(error).__name__}: {error}") from error
+    return _MADE[path]
