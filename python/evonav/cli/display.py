@@ -26,9 +26,9 @@ def print_table(summaries: "list[AgentSummary]") -> None:
     from rich.table import Table
 
     table = Table(title="SR and SPL in % with 95% intervals; SR by whether the target was moved")
-    table.add_column("agent", no_wrap=True)
+    table.add_column("agent", overflow="fold", min_width=12)  # may be a long path
     for heading in ("n", "SR", "", "SPL", "", "moved", "not moved"):
-        table.add_column(heading, justify="right")
+        table.add_column(heading, justify="right", no_wrap=True)
     for summary in summaries:
         splits = (summary.splits.get(name) for name in ("relocated", "not_relocated"))
         table.add_row(

@@ -1,0 +1,1 @@
+"""An agent for EvoNav-Bench with a question of its own."""
