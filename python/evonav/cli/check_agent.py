@@ -1,17 +1,22 @@
 """`evonav check-agent`: does an agent keep the contract?"""
 
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import typer
 
+from evonav.cli.decision_options import DecisionOptions, with_decision_options, with_decisions
 from evonav.cli.options import Seed
 
 EXIT_BROKEN = 1
 _STYLES = {"pass": "green", "warn": "yellow", "fail": "bold red", "skip": "dim"}
 
 
+@with_decision_options
 def check_agent(
     agent: Annotated[str, typer.Argument(help="A name, `module:Class` or `./file.py:Class`.")],
+    decisions: DecisionOptions,
     seed: Seed = 0,
     timeout: Annotated[float, typer.Option(min=0.1, help="Seconds for an answer of the agent.")] = 60.0,
 ) -> None:
@@ -22,9 +27,11 @@ def check_agent(
 
     from evonav.cli.display import status
     from evonav.evaluation.agent_check import check_agent
+    from evonav.evaluation.backend import Backend
 
-    with status(f"Running {agent}"):
-        report = check_agent(agent, seed=seed, timeout_s=timeout)
+    with TemporaryDirectory() as folder, status(f"Running {agent}"):  # a model's exchanges are kept between episodes
+        backend = with_decisions(Backend(), decisions, out=Path(folder), seed=seed, num_workers=1)
+        report = check_agent(agent, backend=backend, seed=seed, timeout_s=timeout)
     table = Table(title=f"{agent}: {'keeps the contract' if report.is_ok else 'breaks the contract'}")
     for column in ("check", "", "what was found"):
         table.add_column(column, no_wrap=column != "what was found")

@@ -2,7 +2,8 @@
 
 It stands where the paper's agents ask GPT-4o. It is deterministic, free, and blind to images: it knows objects by label
 and box, so it judges "on" and "next to" by geometry and a room by what stands in it. `evonav.decision.rules` holds its
-answers, a file an agent family.
+answers, a file an agent family. A question of somebody else's agent may bring its own: a method `by_rule(matcher)` that
+gives an answer and the reason for it.
 """
 
 from importlib import import_module
@@ -38,7 +39,14 @@ class TextMatch:
             DecisionError: There is no rule for such questions.
         """
         rule = self._rules.get(type(question))
+        if rule is None and hasattr(question, "by_rule"):
+            rule = _own_rule
         if rule is None:
             raise DecisionError(f"the text matcher has no rule for {type(question).__name__}: ask a model")
         answer, reason = rule(self.matcher, question)
         return Reply(answer, f"{question.words(answer)}\n{reason}")
+
+
+def _own_rule(matcher: Matcher, question: Any) -> tuple[Any, str]:  # noqa: ANN401 - of a class with `by_rule`
+    answer, reason = question.by_rule(matcher)
+    return answer, str(reason)

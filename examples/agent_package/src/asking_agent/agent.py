@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
 from evonav.decision.asking import Asker
+from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.question import AnswerError, DecisionModel, Question, first_line
 from evonav.memory import ObjectMap, OccupancyMap
@@ -43,6 +44,11 @@ class WhichObject(Question[int]):
     def words(self, answer: int) -> str:
         """The number."""
         return str(answer)
+
+    def by_rule(self, matcher: Matcher) -> tuple[int, str]:
+        """What `--decision text`, the default, answers: the first of the category."""
+        fitting = [number for number, label in enumerate(self.labels, start=1) if label == self.goal.category]
+        return (fitting[0] if fitting else 0), "the first of the asked-for category"
 
 
 class AskingAgent:
