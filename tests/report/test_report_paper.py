@@ -1,0 +1,189 @@
+import importlib.util
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from made_up_run import WriteRun, entry, record_run, stage_record
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.evaluation.records import EndState
+from evonav.report import paper
+from evonav.report.line_chart import Line, line_chart
+from evonav.report.mechanisms import cause_share_table, counter_table, deeds_of, end_table, success_by_group
+from evonav.report.run import load_run
+
+# Tables 1 and 2 of the paper as printed: SR, SPL, SR of relocated and of not relocated targets.
+PRINTED = {
+    "gt": {
+        "unigoal": (20.0, 14.9, 12.8, 18.7),
+        "3d-mem": (47.7, 42.5, 40.4, 56.0),
+        "msgnav": (59.2, 41.3, 51.4, 64.5),
+        "fu": (61.1, 48.8, 54.1, 65.1),
+        "stage-reset": (61.9, 45.1, 60.6, 61.4),
+        "ftu": (67.4, 53.3, 68.8, 66.3),
+    },
+    "prediction": {
+        "unigoal": (12.9, 7.9, 9.2, 10.8),
+        "3d-mem": (44.1, 37.7, 40.4, 48.1),
+        "msgnav": (54.8, 38.2, 50.7, 57.8),
+        "fu": (42.2, 32.5, 29.4, 50.0),
+        "stage-reset": (46.8, 29.6, 44.0, 49.4),
+        "ftu": (49.0, 35.8, 52.3, 47.9),
+    },
+}
+# No whole number of stages gives what is printed; the nearest one is taken.
+OFF_GRID = {("prediction", "msgnav", 2), ("prediction", "3d-mem", 3), ("prediction", "ftu", 3)}
+
+
+@pytest.mark.parametrize("perception", ["gt", "prediction"])
+def test_decoded_counts_give_what_the_paper_prints(perception) -> None:
+    assert list(paper.PAPER[perception]) == list(PRINTED[perception])
+    for agent, printed in PRINTED[perception].items():
+        known = paper.PAPER[perception][agent]
+        decoded = (
+            100 * known.num_all / 365,
+            100 * known.spl,
+            100 * known.num_relocated / 109,
+            100 * known.num_not_relocated / 166,
+        )
+        for i, (ours, theirs) in enumerate(zip(decoded, printed, strict=True)):
+            tolerance = 0.35 if (perception, agent, i) in OFF_GRID else 0.051
+            assert ours == pytest.approx(theirs, abs=tolerance), (agent, i)
+    assert 109 + 166 + 90 == 365
+
+
+def test_stage_one_is_what_is_left_of_the_counts() -> None:
+    first = {agent: known.num_first for agent, known in paper.PAPER["gt"].items()}
+    assert first == {"unigoal": 28, "3d-mem": 37, "msgnav": 53, "fu": 56, "stage-reset": 58, "ftu": 61}
+
+
+def cells(table) -> dict[str, dict[str, str]]:
+    return {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
+
+
+def test_ours_stand_beside_the_papers(write_run: WriteRun) -> None:
+    run = load_run(write_run())
+    main, relocation, first, order, differences = paper.paper_tables(run)
+    ftu = next(s for s in run.summaries if s.agent == "ftu")
+    assert ftu.sr_ci95 is not None
+    low, high = (100 * end for end in ftu.sr_ci95)
+    assert cells(main)["ftu"]["SR % ours"] == f"91.7 [{low:.1f}, {high:.1f}]"
+    assert cells(main)["ftu"]["SR % paper"].startswith("67.4 [62.4, 72.")
+    assert (cells(main)["fu"]["SPL % paper"], cells(main)["fu"]["n ours"]) == ("48.8", "12")
+    # fu fails in every second stage, where the target has moved; ftu in none.
+    assert cells(relocation)["fu"]["relocated, ours"] == "0.0, n = 6"
+    assert cells(relocation)["fu"]["relocated, paper"].startswith("54.1 [")
+    assert cells(relocation)["ftu"]["gap, paper"] == "+2.5"
+    assert cells(relocation)["ftu"]["not relocated, ours"] == "–"
+    assert cells(first)["fu"]["ours"] == "100.0, n = 6"
+    assert cells(first)["ftu"]["paper, decoded"].startswith("67.8 [")
+    assert cells(order)["SR"] == {"Measure": "SR", "paper": "ftu > fu", "ours": "ftu > fu"}
+    assert cells(order)["SR, stage 1"]["ours"] == "fu > ftu"
+    (pair,) = differences.rows
+    assert pair[:2] == ("ftu less fu", "+6.3")
+    assert pair[2].startswith("+41.7 [")
+    assert pair[5:] == ("ftu is ahead beyond the interval", "no")
+
+
+def test_agents_that_the_paper_lacks_stand_without_its_figures(tmp_path: Path) -> None:
+    records = [stage_record(agent, "task", 1, EndState.SUCCESS) for agent in ("mine", "fu")]
+    run = load_run(record_run(tmp_path / "run", records, {"task": 1}, ["mine", "fu"]))
+    main, *_, differences = paper.paper_tables(run, "prediction")
+    assert cells(main)["mine"]["SR % paper"] == "–"
+    assert cells(main)["fu"]["SR % paper"].startswith("42.2 [")
+    assert not differences.rows
+
+
+def test_order_tells_ties_and_leaves_out_what_has_no_rate() -> None:
+    values = {"fu": 0.5, "ftu": 0.7, "stage-reset": 0.5, "3d-mem": None}
+    assert paper.order(values) == "ftu > fu = stage-reset"
+    assert paper.order({"fu": None}) == "–"
+
+
+def test_the_command_prints_and_writes_the_tables(write_run: WriteRun, tmp_path: Path) -> None:
+    run_dir, out = write_run(), tmp_path / "paper.md"
+    result = CliRunner().invoke(app, ["paper", str(run_dir), "--out", str(out)], env={"COLUMNS": "200"})
+    assert result.exit_code == 0, result.output
+    assert "Table 2: relocated and not relocated targets" in result.output
+    text = out.read_text(encoding="utf-8")
+    assert text == paper.paper_markdown(load_run(run_dir))
+    assert text.count("\n| ftu |") == 3
+    assert text.count("\n| ftu less fu |") == 1
+
+
+def counted(record, **counters):
+    last = record.trace[-1].model_copy(update={"counters": counters})
+    return record.model_copy(update={"trace": (*record.trace[:-1], last), "stop_reason": "arrived"})
+
+
+def test_counters_are_summed_over_tasks_and_over_what_a_lost_agent_began_anew(tmp_path: Path) -> None:
+    success, failure = EndState.SUCCESS, EndState.FAILURE
+    stale = entry("Plate", (2.3, 0.8, 2.0), is_stale=True)
+    records = [
+        counted(stage_record("fu", "a", 1, success), decisions=4, conflicts=1),
+        counted(stage_record("fu", "a", 2, failure, chosen=stale), decisions=9, conflicts=1),
+        counted(stage_record("fu", "b", 1, success), decisions=7, conflicts=0),
+        counted(stage_record("fu", "b", 2, failure, has_stopped=False), decisions=2, conflicts=0),  # began anew
+    ]
+    run = load_run(record_run(tmp_path / "run", records, {"a": 2, "b": 2}, ["fu"]))
+    deeds = deeds_of(run)
+    assert counter_table(deeds).rows == (("conflicts", "1"), ("decisions", "18"))
+    assert end_table(deeds).rows == (("arrived", "3"), ("budget", "1"))
+    shares = {row[0]: row[1] for row in cause_share_table(run, "relocated").rows}
+    assert shares == {"n": "2", "success": "0.0", "stopped at a stale entry": "50.0", "target never in view": "50.0"}
+    assert success_by_group(run, {"a": "x", "b": "x"}) == {"x": {"fu": (2, 4)}}
+
+
+def test_a_line_chart_draws_every_point_and_name_where_it_belongs() -> None:
+    lines = [
+        Line("fu", [(0.0, 60.0), (20.0, 30.0)], [(50.0, 70.0), None]),
+        Line("a<b", [(0.0, 60.0), (20.0, 31.0)], [None, None]),
+    ]
+    root = ElementTree.fromstring(line_chart(lines, "SR", "wrong, %", "SR, %"))
+    svg = "{http://www.w3.org/2000/svg}"
+    circles = root.findall(f"{svg}circle")
+    assert [circle.findtext(f"{svg}title") for circle in circles] == [
+        "fu: 60.0 at 0",
+        "fu: 30.0 at 20",
+        "a<b: 60.0 at 0",
+        "a<b: 31.0 at 20",
+    ]
+    x, y = ([float(circle.get(axis, "")) for circle in circles] for axis in ("cx", "cy"))
+    assert x[0] < x[1]
+    assert y[0] == y[2] < y[3] < y[1]  # up is more
+    names = {node.text: float(node.get("y", "")) for node in root.findall(f"{svg}text") if node.get("style")}
+    assert set(names) == {"fu", "a<b"}
+    assert abs(names["fu"] - names["a<b"]) >= 14.0
+
+
+@pytest.fixture(scope="module")
+def script():
+    path = Path(__file__).parents[2] / "scripts" / "results.py"
+    spec = importlib.util.spec_from_file_location("results_script", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_script_replaces_marked_parts_alone(script) -> None:
+    page = "a\n<!-- results: x -->\nold\n<!-- end of results -->\nb\n<!-- results: y -->\n<!-- end of results -->\n"
+    renewed = script.with_part(page, "x", r"| \1 new |" + "\n")
+    assert renewed == page.replace("old", r"| \1 new |")
+    assert script.with_part(renewed, "x", "old\n") == page
+    with pytest.raises(SystemExit, match="no part `z`"):
+        script.with_part(page, "z", "")
+
+
+def test_the_page_has_every_part_that_the_script_writes(script, write_run: WriteRun, monkeypatch) -> None:
+    run_dir = write_run("main")
+    monkeypatch.setattr(script, "FIGURE", run_dir.parent / "figure.svg")
+    page = script.PAGE.read_text(encoding="utf-8")
+    parts = script.parts(run_dir.parent, ["fu", "ftu"])
+    marked = re.findall(r"<!-- results: (\S+) -->", page)
+    assert sorted(marked) == sorted(parts)
+    assert "| ftu" in parts["table-1"]
+    assert script._source("attr-onav-0001k-val-0100-0003-f47224-s0") == "attr-onav-0001k-val-0100"
