@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+import shutil
 from io import BytesIO
 from pathlib import Path
 
@@ -19,8 +20,10 @@ from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.trace import RunReplay
 from evonav.evaluation.traced import TracedStage
+from evonav.report.html import write_report
+from evonav.report.maps import page_name
 from evonav.report.svg import cm
-from evonav.report.viewer import page_name, write_episode
+from evonav.report.viewer import write_episode
 from evonav.report.viewer_data import cells_text
 
 
@@ -181,6 +184,21 @@ def test_pages_are_self_contained_and_models_words_are_no_markup(pages: Path, ta
         assert f"{page_name(task_id, agent)}#stage=1&round=1" in index
 
 
+def test_the_index_keeps_earlier_pages_and_the_report_links_to_them(
+    run_dir: Path, task_id: str, tmp_path: Path
+) -> None:
+    run = Path(shutil.copytree(run_dir, tmp_path / "run", ignore=shutil.ignore_patterns("view")))
+    assert "round by round" not in write_report(run).read_text("utf-8")
+    for agent in ("random-walk", "fu"):
+        assert CliRunner().invoke(app, ["view", str(run), "--agent", agent, "--task", task_id]).exit_code == 0
+    index = (run / "view" / "index.html").read_text("utf-8")
+    assert all(f'<a href="{page_name(task_id, agent)}">' in index for agent in ("fu", "random-walk"))
+    (run / "view" / page_name(task_id, "random-walk")).unlink()
+    links = re.findall(r'<a href="([^"]+)">round by round</a>', write_report(run).read_text("utf-8"))
+    assert links == [f"view/{page_name(task_id, 'fu')}#stage={k}&amp;round=1" for k in (1, 2, 3)]
+    assert "round by round" not in write_report(run, tmp_path / "elsewhere").read_text("utf-8")
+
+
 def test_an_agent_without_belief_has_views_and_way_alone(pages: Path, task_id: str) -> None:
     for stage in data_of(pages / page_name(task_id, "random-walk"))["stages"]:
         assert not stage["hasBelief"]
@@ -232,6 +250,7 @@ def test_wrong_usage_is_one_line(run_dir: Path, tmp_path: Path) -> None:
 
     for arguments, words in (
         (["--task", "none", "--agent", "fu"], "no record of task 'none'"),
+        (["--agent", "fu", "--stage", "9"], "no record of stage 9"),
         (["--agent", "nobody"], "no task has records of nobody"),
         (["--tasks", str(tmp_path)], "name the folder of the run's tasks with --tasks"),
     ):

@@ -8,9 +8,9 @@ import typer
 from evonav.cli.display import status
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
-    from evonav.report.run import Run
+    from evonav.report.viewer import WrittenPage
 
 
 def view(
@@ -26,23 +26,8 @@ def view(
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
     """Shows episodes round by round: views, map, memory, questions and answers, as pages of HTML (docs/viewer.md)."""
-    from evonav.evaluation.trace import RunReplay
-    from evonav.report.run import load_run
-    from evonav.report.viewer import VIEW_DIR, write_episode, write_index
-
-    found = load_run(run)
-    agents = [name.strip() for name in agent.split(",") if name.strip()] or list(found.agents)
-    task_id = task if task is not None else _telling_task(found, agents)
-    replay = RunReplay(run, _task_path(run, tasks), exchanges)
-    out_dir = out or run / VIEW_DIR
-    pages = []
-    with status("Replaying") as tell:
-        for name in agents:
-            stages = list(replay.episode(name, task_id, _teller(tell, name, task_id), last_stage=stage))
-            pages += write_episode(
-                stages, out_dir, budget=replay.budget(name), success_radius_m=found.success_radius_m, only=stage
-            )
-    index = write_index(pages, out_dir, run.resolve().name)
+    agents = [name.strip() for name in agent.split(",") if name.strip()]
+    pages, index = make_pages(run, task, agents, stage=stage, tasks=tasks, exchanges=exchanges, out=out)
     for page in pages:
         typer.echo(f"page: {page.path}{' (the replay differs from the records)' if page.differs else ''}")
     typer.echo(f"index: {index}")
@@ -52,16 +37,52 @@ def view(
         webbrowser.open((pages[0].path if len(pages) == 1 else index).resolve().as_uri())
 
 
+def make_pages(
+    run: Path,
+    task: str | None = None,
+    agents: "Sequence[str]" = (),
+    *,
+    stage: int | None = None,
+    tasks: Path | None = None,
+    exchanges: Path | None = None,
+    out: Path | None = None,
+) -> "tuple[list[WrittenPage], Path]":
+    """Replays episodes and writes their pages and the index.
+
+    Args:
+        run: A run.
+        task: Default the most telling one.
+        agents: Default all of the run's.
+        stage: The one to show.
+        tasks: Folder of the run's tasks.
+        exchanges: File of a model's answers.
+        out: Where to write.
+    """
+    from evonav.evaluation.trace import RunReplay
+    from evonav.report.maps import VIEW_DIR
+    from evonav.report.run import load_run
+    from evonav.report.strip import most_telling
+    from evonav.report.viewer import write_episode, write_index
+
+    found = load_run(run)
+    agents = agents or found.agents
+    # Telling is a task in which memory misleads some, the first named, and not the last one.
+    ranked = sorted(agents, key=lambda name: name not in ("fu", "stage-reset"))
+    task_id = task if task is not None else most_telling(found, ranked)[0]
+    replay = RunReplay(run, _task_path(run, tasks), exchanges)
+    out_dir = out or run / VIEW_DIR
+    pages = []
+    with status("Replaying") as tell:
+        for name in agents:
+            stages = list(replay.episode(name, task_id, _teller(tell, name, task_id), last_stage=stage))
+            pages += write_episode(
+                stages, out_dir, budget=replay.budget(name), success_radius_m=found.success_radius_m, only=stage
+            )
+    return pages, write_index(pages, out_dir, run.resolve().name)
+
+
 def _teller(tell: "Callable[[str], None]", agent: str, task_id: str) -> "Callable[[int, int], None]":
     return lambda stage, round_: tell(f"{agent} in {task_id}, stage {stage}, round {round_ + 1}")
-
-
-def _telling_task(run: "Run", agents: list[str]) -> str:
-    """The most telling task; of the longest list of agents that have one in common."""
-    from evonav.report.strip import most_telling
-
-    ranked = sorted(agents, key=lambda name: name not in ("fu", "stage-reset"))
-    return most_telling(run, ranked)[0]
 
 
 def _task_path(run: Path, tasks: Path | None) -> "Callable[[str], Path]":

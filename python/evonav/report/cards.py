@@ -6,7 +6,7 @@ from markupsafe import Markup
 
 from evonav.evaluation.records import EndState, StageRecord
 from evonav.report.causes import sentence
-from evonav.report.maps import change_words, outcome_words, task_frame
+from evonav.report.maps import change_words, outcome_words, page_href, task_frame
 from evonav.report.overlay import change, course, rounds
 from evonav.report.plan import Frame, furniture, ground, item_labels, labels, moving_ids
 from evonav.report.run import Run, Task
@@ -24,6 +24,8 @@ class Cell:
     rounds: list[str]
     svg: Markup
     change: str
+    href: str | None = None
+    """Where `evonav view` shows it round by round."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +43,15 @@ class TaskView:
     data: dict[str, str]
 
 
-def task_view(run: Run, task: Task, prefix: str) -> TaskView:
-    """Draws a task: the house once, what moves once a stage, every agent's stages over them."""
+def task_view(run: Run, task: Task, prefix: str, to_run: str | None = None) -> TaskView:
+    """Draws a task: the house once, what moves once a stage, every agent's stages over them.
+
+    Args:
+        run: Its run.
+        task: With its records and maps.
+        prefix: Of names in the page.
+        to_run: Way from the page to the run's folder, empty or ending in `/`; `None` for pages that are elsewhere.
+    """
     records = list(task.records.values())
     frame = task_frame(task.maps, records)
     shared = list(task.maps.values())
@@ -77,6 +86,7 @@ def task_view(run: Run, task: Task, prefix: str) -> TaskView:
             rounds(record.trace),
             drawn,
             change_words(record, task.maps),
+            None if to_run is None or (href := page_href(run.run_dir, record)) is None else f"{to_run}{href}",
         )
 
     goals = []

@@ -70,7 +70,7 @@ def _inline_views(run: Run, out_dir: Path) -> Iterator[TaskView]:
             maps.mkdir(exist_ok=True)
             drawn = stage_svg(record, task.maps, success_radius_m=run.success_radius_m)
             (maps / map_name(record)).write_text(drawn, encoding="utf-8")
-        yield task_view(run, task, f"h{i}")
+        yield task_view(run, task, f"h{i}", "" if out_dir == run.run_dir else None)
 
 
 def _paged_views(run: Run, out_dir: Path) -> Iterator[TaskView]:
@@ -80,7 +80,7 @@ def _paged_views(run: Run, out_dir: Path) -> Iterator[TaskView]:
     template = page_environment().get_template("task.html.j2")
     context = {"css": text_of("report.css") + map_css(), "js": text_of("report.js"), "legend": legend()}
     for task in run.tasks():
-        view = task_view(run, task, "h")
+        view = task_view(run, task, "h", "../" if out_dir == run.run_dir else None)
         (pages / f"{view.anchor}.html").write_text(template.render(view=view, **context), encoding="utf-8")
     yield from ()
 

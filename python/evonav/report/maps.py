@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
+from pathlib import Path
 
 from evonav.evaluation.metrics import SUCCESS_RADIUS_M
 from evonav.evaluation.records import EndState, StageMap, StageRecord
@@ -13,6 +14,8 @@ from evonav.report.svg import escape, slug
 from evonav.tasks.language import noun_of
 
 STAGE_WIDTH_PX = 900
+VIEW_DIR = "view"
+"""Of a run, with the pages of `evonav view`."""
 
 
 def map_css() -> str:
@@ -60,6 +63,20 @@ def stage_svg(
 def map_name(record: StageRecord) -> str:
     """File name of a stage's map."""
     return f"{slug(record.task_id)}_{slug(record.agent)}_stage{record.stage}.svg"
+
+
+def page_name(task_id: str, agent: str, stage: int | None = None) -> str:
+    """File name of a viewer's page, of an episode or one stage of it."""
+    return f"{slug(task_id)}_{slug(agent)}{'' if stage is None else f'_stage{stage}'}.html"
+
+
+def page_href(run_dir: Path, record: StageRecord) -> str | None:
+    """Where a stage is shown round by round, from the run's folder; `None` where it is not."""
+    for stage in (None, record.stage):
+        name = page_name(record.task_id, record.agent, stage)
+        if (run_dir / VIEW_DIR / name).is_file():
+            return f"{VIEW_DIR}/{name}#stage={record.stage}&round=1"
+    return None
 
 
 def change_words(record: StageRecord, maps: Mapping[int, StageMap]) -> str:

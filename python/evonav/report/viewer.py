@@ -3,25 +3,26 @@
 What is drawn comes from `evonav.evaluation.traced`; no agent, model or task is read here.
 """
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from markupsafe import Markup
 
-from evonav.errors import StoreError
+from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records import StageMap, StageRecord
 from evonav.evaluation.traced import TracedStage
 from evonav.report.html import page_environment, text_of
 from evonav.report.legend import ENTRIES, legend_html
-from evonav.report.maps import map_css, outcome_words, task_frame
+from evonav.report.maps import map_css, outcome_words, page_name, task_frame
 from evonav.report.overlay import change, end_mark, ring, start_mark, target_mark
 from evonav.report.plan import Frame, floors, furniture, item_labels, labels, structure
-from evonav.report.svg import cm, slug
+from evonav.report.svg import cm
 from evonav.report.viewer_data import PageData
 
-VIEW_DIR = "view"
-INDEX_NAME = "index.html"
+INDEX_NAME, LIST_NAME = "index.html", "pages.json"
 MAX_PAGE_BYTES = 10_000_000
 """An episode whose page would be larger is written a stage a page."""
 _SHARED_MARKS = ("start", "end, success", "end, no success", "target", "where it stood in stage 1", "success radius")
@@ -53,11 +54,6 @@ class WrittenPage:
     differs: bool
 
 
-def page_name(task_id: str, agent: str, stage: int | None = None) -> str:
-    """File name of an episode's page."""
-    return f"{slug(task_id)}_{slug(agent)}{'' if stage is None else f'_stage{stage}'}.html"
-
-
 def write_episode(
     stages: Sequence[TracedStage], out_dir: Path, *, budget: int, success_radius_m: float, only: int | None = None
 ) -> list[WrittenPage]:
@@ -71,9 +67,12 @@ def write_episode(
         only: The one stage to show.
 
     Raises:
+        InvalidArgumentError: The one stage has no record.
         StoreError: A file cannot be written.
     """
     shown = [stage for stage in stages if only is None or stage.record.stage == only]
+    if not shown:
+        raise InvalidArgumentError(f"no record of stage {only}")
     maps = {stage.record.stage: stage.stage_map for stage in stages if stage.stage_map is not None}
     page = _page(shown, maps, _tabs(shown, shown), budget, success_radius_m)
     if len(page.encode()) <= MAX_PAGE_BYTES or len(shown) == 1:
@@ -86,27 +85,41 @@ def write_episode(
 
 
 def write_index(pages: Iterable[WrittenPage], out_dir: Path, run_name: str) -> Path:
-    """Writes `index.html`, which links to the pages.
+    """Writes `index.html`, which links to these pages and to those that were written there before.
 
     Raises:
         StoreError: It cannot be written.
     """
-    rows = [
-        (
-            page.agent,
-            page.task_id,
-            page.path.name,
-            [(record.stage, record.state.value, outcome_words(record)) for record in page.stages],
-            page.differs,
-        )
-        for page in pages
-    ]
+    listed = out_dir / LIST_NAME
+    rows = {row["href"]: row for row in _read_rows(listed) if (out_dir / row["href"]).is_file()}
+    for page in pages:
+        stages = [[record.stage, record.state.value, outcome_words(record)] for record in page.stages]
+        name = page.path.name
+        rows[name] = {
+            "agent": page.agent,
+            "task_id": page.task_id,
+            "href": name,
+            "stages": stages,
+            "differs": page.differs,
+        }
+    ordered = sorted(rows.values(), key=lambda row: (row["task_id"], row["agent"], row["stages"][0][0]))
+    _save(listed, json.dumps(ordered, indent=1) + "\n")
     text = (
         page_environment()
         .get_template("viewer_index.html.j2")
-        .render(name=run_name, rows=rows, css=text_of("report.css"))
+        .render(name=run_name, rows=ordered, css=text_of("report.css"))
     )
     return _save(out_dir / INDEX_NAME, text)
+
+
+def _read_rows(path: Path) -> list[dict[str, Any]]:
+    """Pages of earlier calls; a list that cannot be read is begun anew."""
+    try:
+        rows = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return []
+    keys = {"agent", "task_id", "href", "stages", "differs"}
+    return [row for row in rows if isinstance(row, dict) and set(row) == keys] if isinstance(rows, list) else []
 
 
 def _tabs(stages: Sequence[TracedStage], here: Sequence[TracedStage]) -> list[tuple[str, int, str, int]]:
