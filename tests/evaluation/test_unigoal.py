@@ -7,7 +7,7 @@ import pytest
 from toy_house import OBJECTS, ToySimulator, stage_case
 
 from evonav.agents.unigoal import UniGoal, UniGoalAsPublished, UniGoalConfig
-from evonav.agents.unigoal_goals import largest_detection
+from evonav.agents.unigoal_goals import Glimpse, largest_detection
 from evonav.agents.unigoal_graphs import GraphConfig
 from evonav.decision.questions.unigoal import DecomposeQuestion, DescribeQuestion, ObjectsQuestion
 from evonav.decision.questions.unigoal_scene import (
@@ -332,3 +332,64 @@ def test_the_largest_box_is_the_one_taken():
 def test_runs_are_the_same_every_time():
     first, second = (run(UniGoal(), stage_case(1, "GarbageCan|1"), stage_case(2, "Bed|1")) for _ in range(2))
     assert [r.trace for r in first] == [r.trace for r in second]
+
+
+def watching(agent, distances):
+    """An agent's goals with a detection held, the planner saying how long the way is; the agent is 0.9 m from it."""
+    run(agent, stage_case(1, "Bed|1"), protocol=ProtocolConfig(max_actions=1))
+    watch, planner = agent._watch, agent._planner
+    planner.distance_m = lambda pose, cells: distances.pop(0)
+    watch.temporary = Glimpse(np.array([agent._bev.cell_of((1.9, 3.0))], np.int32), (1.9, 3.0), "detection")
+    return watch
+
+
+@pytest.mark.parametrize(
+    ("way_m", "is_in_view", "held", "confirmed", "given_up"),
+    [
+        (0.14, True, False, True, 0),
+        (0.16, True, True, False, 0),
+        (1.7, True, True, False, 0),
+        (1.9, True, False, True, 0),  # more than twice the straight distance: behind something
+        (None, True, False, True, 0),
+        (0.14, False, False, False, 1),
+    ],
+)
+def test_a_temporary_goal_nearby_is_confirmed_kept_or_given_up(way_m, is_in_view, held, confirmed, given_up):
+    watch = watching(UniGoal(), [way_m])
+    watch.is_in_view = is_in_view
+    watch.judge(START)
+    assert (watch.temporary is not None, watch.confirmed is not None, watch.num_given_up) == (held, confirmed, given_up)
+
+
+def test_a_goal_out_of_reach_is_let_go_without_being_given_up():
+    watch = watching(UniGoal(), [None, 3.0])
+    watch.judge(replace(START, x_m=4.5))
+    assert (watch.goal, watch.num_given_up) == (None, 0)
+
+
+def test_of_two_goals_in_view_the_one_held_is_kept():
+    agent = UniGoal()
+    views = []
+
+    def detect(view):
+        masks = np.full((64, 64), -1, np.int32)
+        masks[30:40, 2:14], masks[30:50, 40:62] = 0, 1
+        return replace(view.detections, masks=masks, labels=("Chair", "Chair"), confidences=np.ones(2, np.float32))
+
+    class Seeing(UniGoal):
+        def act(self, observation):
+            views.append(observation.views[-1])
+            return super().act(observation)
+
+    run(Seeing(), stage_case(1, "Chair|1"), protocol=ProtocolConfig(max_actions=1))
+    run(agent, stage_case(1, "Chair|1"), protocol=ProtocolConfig(max_actions=1))
+    view, watch = replace(views[0], detections=detect(views[0])), agent._watch
+    only_left = replace(view.detections, labels=("Chair", "Mug"))
+    watch.temporary = None
+    watch.look(replace(view, detections=only_left), "chair", frozenset())
+    left = watch.temporary
+    watch.look(view, "chair", frozenset())
+    assert watch.temporary is left  # the larger one, on the right, does not take over
+    watch.temporary = None
+    watch.look(view, "chair", frozenset())
+    assert watch.temporary.centre_m != left.centre_m

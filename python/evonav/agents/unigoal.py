@@ -154,7 +154,9 @@ class UniGoal:
 
     def _somewhere(self, bev: BevMap, planner: UniGoalPlanner, pose: Pose) -> Point2 | None:
         """A random place to go to when nothing is left to explore; `None` if ten draws bring none with a way to it."""
-        open_cells = bev.explored & ~bev.obstacles
+        open_cells = bev.explored
+        blocked = bev.grown(np.ascontiguousarray(np.argwhere(bev.obstacles), np.int32), planner.config.obstacle_radius)
+        open_cells[blocked[:, 0], blocked[:, 1]] = False
         rows, cols = np.nonzero(open_cells)
         for _ in range(_NUM_DRAWS if len(rows) else 0):
             index = self._random.randrange(len(rows))
@@ -171,7 +173,7 @@ class UniGoal:
         at_m = np.array([node.ground_m]) if points_m is None else points_m[:, [0, 2]].astype(np.float64)
         frame = bev.map_frame
         cells = np.floor((at_m - frame.corner_m) / frame.cell_m).astype(np.int32)[:, ::-1]
-        return np.unique(cells, axis=0)
+        return np.ascontiguousarray(np.unique(cells, axis=0))
 
     def _is_given_up(self, node: SceneNode) -> bool:
         """Whether all of a node lies where the goal was sought in vain."""
