@@ -230,6 +230,15 @@ fn who_shares_a_snapshot_with_a_near_object_is_clustered_with_it() {
 }
 
 #[test]
+fn what_a_snapshot_does_not_show_any_more_leaves_it() {
+    let objects = located(&[[20.0, 0.0], [21.0, 0.0]]);
+    let frames = [frame(&[0]), frame(&[1])];
+    let kept = [Snapshot { frame: 0, objects: vec![0, 1] }];
+    let found = update_snapshots(&objects, &frames, &kept, [0.0, 0.0], 4.0).unwrap();
+    assert_eq!(as_sets(&found), [(0, Set::from([0])), (1, Set::from([1]))]);
+}
+
+#[test]
 fn what_no_frame_shows_ends_the_search() {
     let objects = located(&[[1.0, 1.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0], [1.0, 1.0]]);
     let found = update_snapshots(&objects, &[frame(&[3])], &[], [0.0, 0.0], 4.0).unwrap();

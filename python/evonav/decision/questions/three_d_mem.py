@@ -123,7 +123,7 @@ class SnapshotQuestion(Question[SnapshotChoice]):
             parts += titled(f"Frontier {index}:", frontier.image)
         parts.append(
             Text(
-                f"There are {len(self.snapshots)} snapshots and {len(self.frontiers)} frontiers. Answer on the first "
+                f"Snapshots: {len(self.snapshots)}, frontiers: {len(self.frontiers)}. Answer on the first "
                 'line with exactly "Snapshot i, Object j" or "Frontier i", and give your reason on the next.'
             )
         )
