@@ -104,6 +104,17 @@ def test_recording_wants_a_new_file(tmp_path: Path) -> None:
     assert "holds exchanges already" in told
 
 
+def test_models_that_think_first_are_asked_as_they_want_to_be(tmp_path: Path) -> None:
+    options = ("--decision", "vlm", "--model", "o9", "--reasoning", "--vlm-mode", "live", "--out", tmp_path / "out")
+    with serving(lambda request: {"status": 401, "raw": b"{}"}) as stub:
+        run("evaluate", *COMMON, *options, "--base-url", stub.url)
+    request = (stub.requests or [])[0]
+    check_request(request)
+    assert request["max_completion_tokens"] == 4096
+    assert not {"max_tokens", "temperature", "top_p"} & request.keys()
+    assert not (tmp_path / "out" / "exchanges.sqlite").exists()
+
+
 def test_noise_is_part_of_what_a_run_is(tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert run("evaluate", *COMMON, "--noise", "wrong=0.5", "--out", out)[0] == 0

@@ -155,7 +155,15 @@ def test_keys_are_in_no_file_and_no_words(stub: Stub, config: VlmConfig, path: P
     stub.script = [{"status": 401, "raw": json.dumps({"error": {"message": f"Incorrect key: {KEY}"}}).encode()}]
     client = VlmClient(config, store=ExchangeStore(path))
     assert told(client) == "unauthorized"
-    client.ask(QUESTION)
+    # Not even if the model says them, or a server that fails.
+    stub.script = [
+        {"text": f"Your key is {KEY}, and I live at {stub.url}."},
+        {"status": 500, "raw": f"{KEY} at {stub.url}".encode(), "headers": {"Retry-After-Ms": "5"}},
+    ]
+    assert client.ask(QUESTION).text == "Your key is ***, and I live at ***."
+    keeping = VlmClient(replace(config, max_retries=0), store=client.store, keeps_failures=True)
+    assert told(keeping, Prompt.of(Text("Well?"))) == "server"
+    assert client.store.num_failures == 1
     client.store.close()
     assert KEY not in repr(config)
     assert KEY not in repr(client)
@@ -199,6 +207,14 @@ def test_passing_faults_are_tried_again(stub: Stub, config: VlmConfig, fault: di
         (
             {"status": 429, "raw": b'{"error": {"message": "quota"}}', "headers": {"Retry-After-Ms": "5"}},
             "rate_limited",
+        ),
+        (
+            {
+                "status": 429,
+                "raw": b'{"error": {"message": "You exceeded your quota", "code": "insufficient_quota"}}',
+                "headers": {"Retry-After-Ms": "5"},
+            },
+            "over_budget",
         ),
         ({"status": 500, "raw": b"oops", "headers": {"Retry-After-Ms": "5"}}, "server"),
         ({"status": 502, "raw": b"<html>", "headers": {"Retry-After-Ms": "5"}}, "server"),

@@ -75,6 +75,10 @@ class DecisionOptions:
     temperature: Annotated[float | None, _option("vlm: default 0.7.")] = None
     top_p: Annotated[float | None, _option("vlm: default 0.95.")] = None
     max_tokens: Annotated[int | None, _option("vlm: of an answer; default 4096.")] = None
+    reasoning: Annotated[
+        bool,
+        _option("vlm: the model knows max_completion_tokens alone, and no temperature, as OpenAI's that think first."),
+    ] = False
     structured: Annotated[
         StructuredMode, _option("vlm: JSON by schema; auto: until the server says that it cannot.")
     ] = StructuredMode.AUTO
@@ -204,16 +208,15 @@ def _vlm_identity(options: DecisionOptions, seed: int) -> dict[str, Any]:
 
     if not options.model:
         raise typer.BadParameter(f"--decision vlm needs --model (or {MODEL_VARIABLE})")
-    request = {
-        **SAMPLING,
-        "seed": seed,
-        **_given(temperature=options.temperature, top_p=options.top_p, max_tokens=options.max_tokens),
-    }
+    sampling: dict[str, Any] = {**SAMPLING, "seed": seed}
+    if options.reasoning:
+        sampling |= {"temperature": None, "top_p": None, "max_tokens_field": "max_completion_tokens"}
+    given = _given(temperature=options.temperature, top_p=options.top_p, max_tokens=options.max_tokens)
     return {
         "model": options.model,
         "structured": options.structured.value,
         "images": options.images,
-        "request": request,
+        "request": {**sampling, **given},
     }
 
 
