@@ -1,6 +1,9 @@
 """The options on who answers: what a run is given, what is refused, and what is printed."""
 
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -8,6 +11,9 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.decision.mock_answers import mock_answer
+from evonav.decision.prompts import Prompt, Text, Turn
+from evonav.decision.vlm import VlmClient, VlmConfig
+from evonav.decision.vlm_errors import VlmError
 from evonav.evaluation.store import RunStore
 from vlm_stub import KEY, check_request, serving
 
@@ -113,6 +119,21 @@ def test_models_that_think_first_are_asked_as_they_want_to_be(tmp_path: Path) ->
     assert request["max_completion_tokens"] == 4096
     assert not {"max_tokens", "temperature", "top_p"} & request.keys()
     assert not (tmp_path / "out" / "exchanges.sqlite").exists()
+
+
+def test_the_stand_in_serves_until_it_is_stopped() -> None:
+    command = [sys.executable, "-m", "evonav", "mock-vlm", "--port", "0", "--faults", "refusal=1.0", "--no-schemas"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout
+        url = server.stdout.readline().split()[1].rstrip(";")
+        client = VlmClient(VlmConfig("m", base_url=url, api_key=KEY))
+        with pytest.raises(VlmError, match="refusal"):
+            client.ask(Prompt.of(Text("Well?")))
+        with pytest.raises(VlmError, match="response_format"):
+            client.ask(Prompt((Turn("user", (Text("Well?"),)),), {"type": "object"}))
+        server.send_signal(signal.SIGINT)
+        assert server.wait(20) == 0
+        assert "2 requests served" in server.stdout.read()
 
 
 def test_noise_is_part_of_what_a_run_is(tmp_path: Path) -> None:
