@@ -212,21 +212,26 @@ def test_a_loop_of_failed_moves_is_left():
     assert walk.bev.collisions.any()
 
 
-def test_without_a_way_it_wanders_among_places_where_it_has_been():
+def test_without_a_way_it_goes_as_near_as_it_gets_and_from_there_to_where_it_has_been():
     bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
     planner = UniGoalPlanner(bev, 0)
     bev.core.visit((0.0, 0.0), (1.5, 0.0))
     # Bumps all around the goal, wider than its growth.
     for yaw in np.arange(0.0, 2 * math.pi, 0.02):
         bev.core.collide((-3.0, 0.0), float(yaw), start=20, length=3, width=3)
-    pose = Pose(0.0, 0.9, 0.0, 0.0)
-    planner.observe(pose)
     goal = np.array([bev.cell_of((-3.0, 0.0))], np.int32)
+    pose = Pose(0.0, 0.9, 0.0, -math.pi / 2)
+    planner.observe(pose)
     assert planner.distance_m(pose, goal) is None
     step = planner.step(pose, goal, "confirmed")
-    assert step.goal == "stuck"
-    assert step.distance_m is not None
+    assert (step.goal, step.distance_m, step.action) == ("confirmed", None, Action.MOVE_FORWARD)
     assert planner.counters.unreachable == 1
+    # The ring's outer side is at 1.1 m.
+    steps = [planner.step(replace(pose, x_m=x_m), goal, "temporary") for x_m in np.arange(-1.5, -1.9, -0.01).tolist()]
+    assert steps[0].goal == "temporary"
+    detour = next(step for step in steps if step.goal == "stuck")
+    assert detour.distance_m is not None
+    assert detour.distance_m > 0.8
     planner.exploration_target(pose)
     planner.step(pose, (-3.0, 0.0), "exploration")
     assert planner.needs_target(pose)

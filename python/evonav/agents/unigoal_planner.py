@@ -254,9 +254,9 @@ class UniGoalPlanner:
     def step(self, pose: Pose, goal: Cells | Point2 | None, kind: GoalKind) -> PlannedStep:
         """The next action towards a goal. `observe` comes first.
 
-        A stuck agent heads for a random place where it has been, until it moves, unless its goal is confirmed. While
-        the map shows no way to the goal, the agent wanders from one such place to the next, and an exploration target
-        is dropped. An agent that has nothing to head for turns right.
+        A stuck agent heads for a random place where it has been, until it moves, unless its goal is confirmed. Where
+        the map shows no way to the goal, the agent goes to the reachable place nearest to it, from there to one where
+        it has been, and back; an exploration target is dropped. An agent with nothing to head for turns right.
 
         Args:
             pose: The agent's.
@@ -268,15 +268,19 @@ class UniGoalPlanner:
                 self._stuck.goal_m = self._visited_place(pose)
             return self._act(self._step_to(pose, self._stuck.goal_m, "stuck"))
         step = self._step_to(pose, goal, kind)
-        if step.goal == "none" or step.action is Action.STOP or step.distance_m is not None:
+        if step.goal == "none" or step.action is Action.STOP:
+            return self._act(step)
+        if step.distance_m is not None:
             self._detour_m = None
             return self._act(step)
         self.counters.unreachable += 1
         self._exploration.target_m = None
-        if self._detour_m is None or math.dist(self._detour_m, (pose.x_m, pose.z_m)) < self.config.stop_m:
+        if self._detour_m is None and step.short_term_m is None:
             self._detour_m = self._visited_place(pose)
+        if self._detour_m is None:
+            return self._act(step)
         detour = self._step_to(pose, self._detour_m, "stuck")
-        if detour.distance_m is None:
+        if detour.distance_m is None or detour.distance_m < self.config.stop_m:
             self._detour_m = None
         return self._act(detour)
 

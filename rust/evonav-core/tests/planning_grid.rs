@@ -10,7 +10,7 @@ use evonav_core::{
         collision::{Strip, strip_cells},
         dilate::dilate_disk,
         explore::keep_large,
-        fmm::{Field, Window, march},
+        fmm::{Field, Until, Window, flood, march},
         short_term::short_term_goal,
     },
 };
@@ -161,14 +161,15 @@ proptest! {
             let at = pick.index(bits.len());
             seeds.insert(at / cols, at % cols);
         }
-        let field = march(&passable, &seeds, whole(&passable), None);
+        let field = march(&passable, &seeds, whole(&passable), Until::Never);
         let naive = march_naive(&passable, &seeds);
         let (fewest, most) = (dijkstra(&passable, &seeds, true), dijkstra(&passable, &seeds, false));
         for (i, &distance) in field.distances.iter().enumerate() {
             let (distance, naive) = (f64::from(distance), naive[i]);
             prop_assert_eq!(distance.is_finite(), naive.is_finite());
             if naive.is_finite() {
-                prop_assert!((distance - naive).abs() < 1e-2, "{distance} {naive}");
+                // Rounding may decide between first and second order, which are so far apart.
+                prop_assert!((distance - naive).abs() < 0.01 + 0.005 * naive, "{distance} {naive}");
                 // Steps along the axes are the longest way there is; diagonal ones are at most 8.3% too long.
                 prop_assert!(distance <= most[i] + 1e-3, "{distance} {}", most[i]);
                 prop_assert!(distance >= fewest[i] / 1.083 - 0.3, "{distance} {}", fewest[i]);
@@ -185,19 +186,42 @@ proptest! {
         let mut seeds = BitGrid::new(passable.rows(), cols);
         let (seed, end) = (seed.index(bits.len()), end.index(bits.len()));
         seeds.insert(seed / cols, seed % cols);
-        let full = march(&passable, &seeds, whole(&passable), None);
+        let full = march(&passable, &seeds, whole(&passable), Until::Never);
         let target = [end / cols, end % cols];
-        let part = march(&passable, &seeds, whole(&passable), Some(&[target]));
+        let part = march(&passable, &seeds, whole(&passable), Until::All(&[target]));
         prop_assert_eq!(part.at(target), full.at(target));
-        for (part, full) in part.distances.iter().zip(&full.distances) {
-            prop_assert!(part == full || (part.is_infinite() && *full >= full.min(f32::MAX)));
-            if *full < part.min(f32::MAX) {
-                prop_assert!(*full >= full.min(part.min(f32::MAX)));
-            }
-        }
         let nearer = |d: f32| d < full.at(target);
         for (part, full) in part.distances.iter().zip(&full.distances) {
             prop_assert!(!nearer(*full) || part == full);
+        }
+    }
+
+    /// The nearest of the cells that the front may stop at is where it stops.
+    #[test]
+    fn a_front_that_may_stop_anywhere_stops_at_the_nearest(
+        (cols, bits) in cells(true), seed in any::<prop::sample::Index>(),
+        ends in vec(any::<prop::sample::Index>(), 1..6),
+    ) {
+        let passable = grid_of(&bits, cols);
+        let at = |index: &prop::sample::Index| [index.index(bits.len()) / cols, index.index(bits.len()) % cols];
+        let mut seeds = BitGrid::new(passable.rows(), cols);
+        seeds.insert(at(&seed)[0], at(&seed)[1]);
+        let mut goals = BitGrid::new(passable.rows(), cols);
+        ends.iter().for_each(|end| goals.insert(at(end)[0], at(end)[1]));
+        let full = march(&passable, &seeds, whole(&passable), Until::Never);
+        let nearest = goals.cells().map(|c| full.at(c)).fold(f32::INFINITY, f32::min);
+        let part = march(&passable, &seeds, whole(&passable), Until::Any(&goals));
+        let last = part.last.unwrap();
+        if nearest.is_finite() {
+            prop_assert!(goals.get(last[0], last[1]));
+            prop_assert_eq!(full.at(last), nearest);
+        }
+        // What a front reaches over passable cells is what a flood reaches.
+        let reached = flood(&passable, at(&seed), whole(&passable));
+        for row in 0..passable.rows() {
+            for col in 0..cols {
+                prop_assert_eq!(reached.get(row, col), full.at([row, col]).is_finite());
+            }
         }
     }
 
@@ -236,7 +260,7 @@ proptest! {
         let mut seeds = BitGrid::new(passable.rows(), cols);
         let seed = seed.index(bits.len());
         seeds.insert(seed / cols, seed % cols);
-        let field = march(&passable, &seeds, whole(&passable), None);
+        let field = march(&passable, &seeds, whole(&passable), Until::Never);
         let own = field.at(position.map(|p| p as usize));
         let mut best: Option<([usize; 2], f32)> = None;
         for row in 0..passable.rows() {
@@ -287,7 +311,7 @@ fn open(rows: usize, cols: usize) -> BitGrid {
 fn front(passable: &BitGrid, seed: [usize; 2]) -> Field {
     let mut seeds = BitGrid::new(passable.rows(), passable.cols());
     seeds.insert(seed[0], seed[1]);
-    march(passable, &seeds, whole(passable), None)
+    march(passable, &seeds, whole(passable), Until::Never)
 }
 
 #[test]
@@ -339,9 +363,9 @@ fn a_wall_is_walked_around_its_end() {
 fn a_window_off_the_grid_and_an_empty_grid_are_no_trouble() {
     let passable = open(5, 5);
     let window = Window { first: [9, 9], shape: [usize::MAX, 3] };
-    assert!(march(&passable, &passable, window, None).distances.is_empty());
+    assert!(march(&passable, &passable, window, Until::Never).distances.is_empty());
     let nothing = BitGrid::new(0, 0);
-    assert!(march(&nothing, &nothing, whole(&nothing), Some(&[[3, 3]])).distances.is_empty());
+    assert!(march(&nothing, &nothing, whole(&nothing), Until::All(&[[3, 3]])).distances.is_empty());
     assert_eq!(dilate_disk(&nothing, 3).count(), 0);
     let field = front(&passable, [0, 0]);
     for position in [[f64::NAN, 1.0], [-1.0, 1.0], [1e300, 2.0], [f64::INFINITY, 0.0]] {

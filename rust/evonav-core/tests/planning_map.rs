@@ -306,6 +306,31 @@ fn what_stood_in_the_way_stays_in_the_way_when_it_is_gone() {
 }
 
 #[test]
+fn without_a_way_it_goes_where_the_goal_is_nearest() {
+    let mut map = new_map();
+    // A closed ring of bumps around the goal, 1 m off it.
+    for step in 0..400_u32 {
+        let angle = f64::from(step) * 0.0157;
+        let cells: Vec<[usize; 2]> = [0.95, 1.0, 1.05]
+            .iter()
+            .filter_map(|r| map.spec().cell_of([3.0 + r * angle.sin(), r * angle.cos()]))
+            .collect();
+        map.collide(&cells);
+    }
+    let goal = map.spec().cell_of([3.0, 0.0]).unwrap().map(|i| i as i32);
+    let config = PlanConfig::default();
+    let far = plan(&map, [0.0, 0.0], &[goal], 3, &config).unwrap();
+    assert!(far.distance_m.is_none() && far.short_term_m.unwrap()[0] > 0.15, "{far:?}");
+    let behind = plan(&map, [3.0, 3.0], &[goal], 3, &config).unwrap();
+    assert!(behind.distance_m.is_none() && behind.short_term_m.unwrap()[1] < 2.85, "{behind:?}");
+    let near = plan(&map, [1.9, 0.0], &[goal], 3, &config).unwrap();
+    assert!(
+        near.distance_m.is_none() && near.short_term_m.is_none_or(|p| (p[0] - 1.9).abs() < 0.1),
+        "{near:?}"
+    );
+}
+
+#[test]
 fn a_hole_in_the_floor_is_an_obstacle_and_a_step_down_beside_floor_is_none() {
     let mut map = new_map();
     let camera = Camera { width_px: 300, height_px: 300, ..camera([0.0, 1.5, 0.0], 0.0, 0.6) };

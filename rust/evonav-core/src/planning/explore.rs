@@ -2,7 +2,11 @@
 
 use crate::{
     memory::bits::BitGrid,
-    planning::{bev::BevMap, dilate::dilate_disk, fmm::march},
+    planning::{
+        bev::BevMap,
+        dilate::dilate_disk,
+        fmm::{Until, march},
+    },
 };
 
 /// What counts as a frontier, and how frontiers are weighed (UniGoal's constants).
@@ -115,7 +119,7 @@ pub fn choose_frontier(
     let field_from = |start: [usize; 2]| {
         let mut seeds = BitGrid::new(map.spec().rows, map.spec().cols);
         seeds.insert(start[0], start[1]);
-        march(&passable, &seeds, window, Some(&frontiers))
+        march(&passable, &seeds, window, Until::All(&frontiers))
     };
     let from_agent = field_from(agent);
     let from_goal = goal.map(field_from);

@@ -29,6 +29,8 @@ pub struct Field {
     pub window: Window,
     /// In cells, row-major; infinite where the front did not come.
     pub distances: Vec<f32>,
+    /// The last cell that the front came to.
+    pub last: Option<[usize; 2]>,
 }
 
 impl Field {
@@ -36,6 +38,17 @@ impl Field {
     pub fn at(&self, cell: [usize; 2]) -> f32 {
         self.window.index(cell).map_or(f32::INFINITY, |index| self.distances[index])
     }
+}
+
+/// When a front may stop.
+#[derive(Debug, Clone, Copy)]
+pub enum Until<'a> {
+    /// When there is nowhere left to go.
+    Never,
+    /// When it has reached all of these cells.
+    All(&'a [[usize; 2]]),
+    /// When it has reached one of these cells.
+    Any(&'a BitGrid),
 }
 
 const WALL: u8 = 0;
@@ -49,10 +62,10 @@ const ACCEPTED: u8 = 2;
 /// * `passable` - cells that the front may cross.
 /// * `seeds` - cells at distance 0, of the same grid; they need not be passable.
 /// * `window` - the front stays inside; clipped to the grid.
-/// * `until` - the front stops when it has reached all of these cells that it can reach.
+/// * `until` - when to stop; what lies farther stays infinite.
 ///
 /// # Returns
-/// Distances in cells. With `until`, cells farther than the farthest of them stay infinite.
+/// Distances in cells.
 ///
 /// # Complexity
 /// O(n log n) for n cells that the front reaches.
@@ -63,50 +76,62 @@ const ACCEPTED: u8 = 2;
 ///
 /// # Examples
 /// ```
-/// # use evonav_core::{memory::bits::BitGrid, planning::fmm::{Window, march}};
+/// # use evonav_core::{memory::bits::BitGrid, planning::fmm::{Until, Window, march}};
 /// let mut passable = BitGrid::new(3, 9);
 /// (0..3).for_each(|row| passable.insert_run(row, 0, 9));
 /// let mut seeds = BitGrid::new(3, 9);
 /// seeds.insert(1, 0);
-/// let field = march(&passable, &seeds, Window { first: [0, 0], shape: [3, 9] }, None);
+/// let field = march(&passable, &seeds, Window { first: [0, 0], shape: [3, 9] }, Until::Never);
 /// assert_eq!(field.at([1, 8]), 8.0);
 /// ```
-pub fn march(
-    passable: &BitGrid,
-    seeds: &BitGrid,
-    window: Window,
-    until: Option<&[[usize; 2]]>,
-) -> Field {
+pub fn march(passable: &BitGrid, seeds: &BitGrid, window: Window, until: Until<'_>) -> Field {
     let first = [0, 1].map(|i| window.first[i].min([passable.rows(), passable.cols()][i]));
     let shape =
         [0, 1].map(|i| window.shape[i].min([passable.rows(), passable.cols()][i] - first[i]));
     let mut front = Front::new(passable, Window { first, shape });
-    let mut num_left = 0;
-    for cell in until.unwrap_or(&[]) {
-        if let Some(index) = front.padded(*cell)
-            && !front.is_target[index]
-        {
-            front.is_target[index] = true;
-            num_left += 1;
-        }
-    }
+    let num_ends = front.aim(until);
     front.seed(seeds);
-    let stops = until.is_some();
+    let mut num_reached = 0;
+    let mut last = None;
     while let Some(Reverse(key)) = front.queue.pop() {
         let index = (key & u64::from(u32::MAX)) as usize;
         if front.states[index] == ACCEPTED {
             continue;
         }
         front.states[index] = ACCEPTED;
-        num_left -= usize::from(front.is_target[index]);
-        if stops && num_left == 0 {
+        last = Some(index);
+        num_reached += usize::from(front.is_end[index]);
+        if num_ends.is_some_and(|num_ends| num_reached >= num_ends) {
             break;
         }
         for step in front.steps() {
             front.update(index.wrapping_add_signed(step));
         }
     }
-    front.into_field()
+    let last = last.map(|index| front.cell(index));
+    front.into_field(last)
+}
+
+/// Passable cells 4-connected with `start`, which counts as passable.
+pub fn flood(passable: &BitGrid, start: [usize; 2], window: Window) -> BitGrid {
+    let mut reached = BitGrid::new(passable.rows(), passable.cols());
+    let mut stack = vec![start];
+    reached.insert(start[0], start[1]);
+    while let Some([row, col]) = stack.pop() {
+        let around = [
+            [row.wrapping_sub(1), col],
+            [row + 1, col],
+            [row, col.wrapping_sub(1)],
+            [row, col + 1],
+        ];
+        for [r, c] in around {
+            if window.index([r, c]).is_some() && passable.get(r, c) && !reached.get(r, c) {
+                reached.insert(r, c);
+                stack.push([r, c]);
+            }
+        }
+    }
+    reached
 }
 
 /// A marching front over a window with a wall two cells wide around it.
@@ -115,7 +140,7 @@ struct Front {
     stride: usize,
     states: Vec<u8>,
     distances: Vec<f32>,
-    is_target: Vec<bool>,
+    is_end: Vec<bool>,
     /// Distance bits above, index below: floats that are not negative sort as their bits.
     queue: BinaryHeap<Reverse<u64>>,
 }
@@ -140,7 +165,7 @@ impl Front {
             stride,
             states,
             distances: vec![f32::INFINITY; num],
-            is_target: vec![false; num],
+            is_end: vec![false; num],
             queue: BinaryHeap::new(),
         }
     }
@@ -149,6 +174,23 @@ impl Front {
         self.window.index(cell)?;
         let [row, col] = [0, 1].map(|i| cell[i] - self.window.first[i] + PAD);
         Some(row * self.stride + col)
+    }
+
+    fn cell(&self, index: usize) -> [usize; 2] {
+        let cell = [index / self.stride, index % self.stride];
+        [0, 1].map(|i| cell[i] - PAD + self.window.first[i])
+    }
+
+    /// Marks the cells to stop at, and says how many of them have to be reached.
+    fn aim(&mut self, until: Until<'_>) -> Option<usize> {
+        let ends: Vec<usize> = match until {
+            Until::Never => return None,
+            Until::All(cells) => cells.iter().filter_map(|&cell| self.padded(cell)).collect(),
+            Until::Any(cells) => cells.cells().filter_map(|cell| self.padded(cell)).collect(),
+        };
+        ends.iter().for_each(|&index| self.is_end[index] = true);
+        let num_ends = self.is_end.iter().filter(|is_end| **is_end).count();
+        Some(if matches!(until, Until::Any(_)) { num_ends.min(1) } else { num_ends })
     }
 
     fn steps(&self) -> [isize; 4] {
@@ -213,7 +255,7 @@ impl Front {
         })
     }
 
-    fn into_field(self) -> Field {
+    fn into_field(self, last: Option<[usize; 2]>) -> Field {
         let [rows, cols] = self.window.shape;
         let mut distances = Vec::with_capacity(rows * cols);
         for row in 0..rows {
@@ -223,7 +265,7 @@ impl Front {
                 distances.push(if is_accepted { self.distances[index] } else { f32::INFINITY });
             }
         }
-        Field { window: self.window, distances }
+        Field { window: self.window, distances, last }
     }
 }
 

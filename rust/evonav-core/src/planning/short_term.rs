@@ -7,7 +7,7 @@ use crate::{
     planning::{
         bev::BevMap,
         dilate::dilate_disk,
-        fmm::{Field, march},
+        fmm::{Field, Until, Window, flood, march},
     },
 };
 
@@ -90,7 +90,8 @@ pub struct Plan {
     pub distance_m: Option<f64>,
     /// Straight distance to the nearest goal cell's centre; infinite if no goal is on the map.
     pub straight_m: f64,
-    /// `[x, z]` to head for; `None` on the goal, or without a way.
+    /// `[x, z]` to head for: without a way to the goal, on the way to the reachable place nearest
+    /// to it. `None` on the goal or at that place.
     pub short_term_m: Option<Vec2>,
 }
 
@@ -131,8 +132,12 @@ pub fn plan(
     ends.push(agent);
     let passable = map.traversable(agent, config.obstacle_radius);
     let window = map.window(&ends, config.margin);
-    let field = march(&passable, &seeds, window, Some(&[agent]));
+    let mut field = march(&passable, &seeds, window, Until::All(&[agent]));
     let cells = f64::from(field.at(agent));
+    if !cells.is_finite() {
+        let nearest = nearest_reachable(&passable, agent, &seeds, window);
+        field = march(&passable, &nearest, window, Until::All(&[agent]));
+    }
     let position = [1, 0].map(|axis: usize| (agent_m[axis] - spec.corner_m[axis]) / spec.cell_m);
     let short_term = short_term_goal(&field, position, config.circle)
         .or_else(|| short_term_goal(&field, position, config.small_circle));
@@ -141,4 +146,22 @@ pub fn plan(
         straight_m,
         short_term_m: short_term.map(|goal| spec.centre_m(goal.cell)),
     })
+}
+
+/// The cell that a way leads to and that is nearest to some goals.
+fn nearest_reachable(
+    passable: &BitGrid,
+    agent: [usize; 2],
+    goals: &BitGrid,
+    window: Window,
+) -> BitGrid {
+    let reachable = flood(passable, agent, window);
+    let mut open = BitGrid::new(passable.rows(), passable.cols());
+    open.invert();
+    let field = march(&open, goals, window, Until::Any(&reachable));
+    let mut nearest = BitGrid::new(passable.rows(), passable.cols());
+    if let Some([row, col]) = field.last {
+        nearest.insert(row, col);
+    }
+    nearest
 }
