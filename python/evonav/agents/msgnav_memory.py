@@ -28,6 +28,7 @@ class GraphMemory:
         self.graph = SceneGraph(max_edge_m=max_edge_m)
         self._matcher = Matcher()
         self._clouds: list[ViewClouds] = []
+        self._entry_ids: frozenset[int] = frozenset()
 
     def observe(self, observation: Observation) -> None:
         """Takes over a round's views: entries, map and frontiers, then the graph."""
@@ -37,6 +38,7 @@ class GraphMemory:
         graph.follow({old: new for old, new in became.items() if old != new})
         centres_m = {entry.id: (entry.centre_m[0], entry.centre_m[2]) for entry in navigator.objects.entries}
         graph.prune(centres_m)
+        self._entry_ids = frozenset(centres_m)
         for view, stored in zip(observation.views, navigator.round_views, strict=True):
             self._clouds.append(clouds_of(view))
             found = {navigator.views.resolve(one.entry_id) for one in stored.seen if one.entry_id is not None}
@@ -74,8 +76,7 @@ class GraphMemory:
 
     def _image(self, view: StoredView, is_egocentric: bool, image_px: int | None) -> GraphImage:
         seen = []
-        for index, one in enumerate(view.seen):
-            box_m = self._clouds[view.id].box_m(index)
+        for one, box_m in zip(view.seen, self._clouds[view.id].boxes_m, strict=True):
             centre_m = None if box_m is None else (box_m[0][0], box_m[0][2])
             seen.append(SeenObject(one.label, self._alive(one.entry_id), one.area_px, centre_m))
         pixels = None if image_px is None else pixels_of(view, image_px)
@@ -83,10 +84,8 @@ class GraphMemory:
 
     def _alive(self, entry_id: int | None) -> int | None:
         """The entry that an entry has become, if it is still there."""
-        if entry_id is None:
-            return None
-        entry = self.navigator.objects.entry(self.navigator.views.resolve(entry_id))
-        return None if entry is None else entry.id
+        entry_id = None if entry_id is None else self.navigator.views.resolve(entry_id)
+        return entry_id if entry_id in self._entry_ids else None
 
     def recent_views(self, num_rounds: int, max_views: int) -> list[StoredView]:
         """Views of the last rounds of this stage, the most recent first: in an earlier one the house may have differed.
@@ -108,8 +107,7 @@ class GraphMemory:
         """What was detected in some views, each detection by its own points; those of no entry have negative ids."""
         found: list[ObjectCandidate] = []
         for view in views:
-            for index, one in enumerate(view.seen):
-                box_m = self._clouds[view.id].box_m(index)
+            for one, box_m in zip(view.seen, self._clouds[view.id].boxes_m, strict=True):
                 if box_m is not None:
                     entry_id = self._alive(one.entry_id)
                     entry_id = -1 - len(found) if entry_id is None else entry_id

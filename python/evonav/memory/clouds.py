@@ -12,33 +12,28 @@ from numpy.typing import NDArray
 from evonav import _core
 from evonav.sensors.observation import View
 
+Point3 = tuple[float, float, float]
+Box = tuple[Point3, Point3]
+"""Middle and edges of an axis-aligned box, metres."""
+
 
 @dataclass(frozen=True, slots=True)
 class ViewClouds:
     """The detections of one view, as millimetres from its camera."""
 
-    camera_m: tuple[float, float, float]
+    camera_m: Point3
     offsets_mm: NDArray[np.int16]
     """`(N, 3)`, detection by detection."""
     ends: NDArray[np.int64]
     """`(D,)` where each detection's points end."""
+    boxes_m: tuple[Box | None, ...]
+    """Around each detection's points; `None` for one without depth."""
 
     def points_m(self, index: int) -> NDArray[np.float32]:
         """`(N, 3)` points of a detection, world frame."""
         first = int(self.ends[index - 1]) if index else 0
         offsets_m = self.offsets_mm[first : int(self.ends[index])].astype(np.float32) * np.float32(1e-3)
         return offsets_m + np.array(self.camera_m, np.float32)
-
-    def box_m(self, index: int) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
-        """Middle and edges of the axis-aligned box around a detection; `None` for one without depth."""
-        first = int(self.ends[index - 1]) if index else 0
-        offsets = self.offsets_mm[first : int(self.ends[index])]
-        if len(offsets) == 0:
-            return None
-        low, high = offsets.min(axis=0).tolist(), offsets.max(axis=0).tolist()
-        x_m, y_m, z_m = (origin + (a + b) / 2e3 for origin, a, b in zip(self.camera_m, low, high, strict=True))
-        width_m, height_m, depth_m = ((b - a) / 1e3 for a, b in zip(low, high, strict=True))
-        return (x_m, y_m, z_m), (width_m, height_m, depth_m)
 
 
 def clouds_of(view: View, *, max_points: int = 500) -> ViewClouds:
@@ -64,4 +59,19 @@ def clouds_of(view: View, *, max_points: int = 500) -> ViewClouds:
     )
     limit = np.iinfo(np.int16).max
     offsets_mm = np.rint((points_m - np.array(camera_m, np.float32)) * np.float32(1e3))
-    return ViewClouds(camera_m, np.clip(offsets_mm, -limit, limit).astype(np.int16), ends)
+    return ViewClouds(
+        camera_m, np.clip(offsets_mm, -limit, limit).astype(np.int16), ends, _boxes_m(points_m.astype(np.float64), ends)
+    )
+
+
+def _boxes_m(points_m: NDArray[np.float64], ends: NDArray[np.int64]) -> tuple[Box | None, ...]:
+    starts = np.concatenate([[0], ends[:-1]])
+    has_points = starts < ends
+    boxes: list[Box | None] = [None] * len(ends)
+    if has_points.any():
+        low = np.minimum.reduceat(points_m, starts[has_points])
+        high = np.maximum.reduceat(points_m, starts[has_points])
+        both = zip(((low + high) / 2.0).tolist(), (high - low).tolist(), strict=True)
+        for index, (middle_m, size_m) in zip(np.flatnonzero(has_points).tolist(), both, strict=True):
+            boxes[index] = ((middle_m[0], middle_m[1], middle_m[2]), (size_m[0], size_m[1], size_m[2]))
+    return tuple(boxes)

@@ -1,6 +1,5 @@
 """Views kept for prompts and for looking again: a small picture each, and what was detected in them."""
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -145,19 +144,22 @@ def crop_of(view: StoredView, box_px: Box, margin_px: int = 20) -> NDArray[np.ui
 
 def boxes_of(detections: Detections) -> list[tuple[int, Box]]:
     """Pixels and bounding box of each detection; `(0, (0, 0, 0, 0))` of one without pixels."""
-    rows, cols = np.nonzero(detections.masks >= 0)
-    owners = detections.masks[rows, cols]
-    order = np.argsort(owners, kind="stable")
-    rows, cols = rows[order], cols[order]
-    ends = np.searchsorted(owners[order], np.arange(len(detections.labels) + 1)).tolist()
-    found: list[tuple[int, Box]] = []
-    for first, last in itertools.pairwise(ends):
-        if first == last:
-            found.append((0, (0, 0, 0, 0)))
-            continue
-        y, x = rows[first:last], cols[first:last]
-        # Stable sorting keeps rows ascending.
-        found.append((last - first, (int(x.min()), int(y[0]), int(x.max()) + 1, int(y[-1]) + 1)))
+    masks = detections.masks
+    found: list[tuple[int, Box]] = [(0, (0, 0, 0, 0))] * len(detections.labels)
+    pixels = np.flatnonzero(masks.ravel() >= 0)
+    if len(pixels) == 0:
+        return found
+    owners = masks.ravel()[pixels]
+    # Sorting is linear for short integers, and stable: rows stay in order.
+    order = np.argsort(owners.astype(np.int16) if len(found) <= np.iinfo(np.int16).max else owners, kind="stable")
+    owners, rows, cols = owners[order], *np.divmod(pixels[order], masks.shape[1])
+    starts = np.flatnonzero(np.diff(owners, prepend=-1))
+    ends = np.append(starts[1:], len(owners))
+    edges = (np.minimum.reduceat(cols, starts), rows[starts], np.maximum.reduceat(cols, starts) + 1, rows[ends - 1] + 1)
+    for owner, area_px, box_px in zip(
+        owners[starts].tolist(), (ends - starts).tolist(), np.stack(edges, axis=1).tolist(), strict=True
+    ):
+        found[owner] = (area_px, (box_px[0], box_px[1], box_px[2], box_px[3]))
     return found
 
 
