@@ -9,8 +9,9 @@ use crate::{
     geometry::{Vec3, distance_2d_m},
     memory::{
         cleaning::{centroid_m, clean, denoise},
+        cloud::Cloud,
         entry::{Entry, Sighting},
-        sight_lines::{SightConfig, visible_shares},
+        sight_lines::{SightConfig, reach_m, visible_shares},
     },
     sensors::unproject::{MaskedDepth, Point, unproject_masks},
 };
@@ -259,8 +260,10 @@ impl ObjectMap {
         eyes: &[Vec3],
         config: &SightConfig,
     ) -> Result<Vec<f64>, Error> {
-        let entries = self.entries.iter().map(|entry| entry.cloud.points());
-        visible_shares(entries.chain([targets]), targets, eyes, config)
+        let reach_m = reach_m(targets, eyes, config);
+        let clouds = self.entries.iter().map(|entry| &entry.cloud);
+        let near = clouds.filter(|cloud| cloud.bounds_m().intersects(&reach_m));
+        visible_shares(near.map(Cloud::points).chain([targets]), targets, eyes, config)
     }
 
     /// Detections as clean clouds, `None` where one is filtered out.

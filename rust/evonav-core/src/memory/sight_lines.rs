@@ -77,16 +77,23 @@ pub fn visible_shares<'a>(
         Error::require("eyes", value, "-10000 to 10000", is_place)?;
     }
     let stride = targets.len().div_ceil(config.max_targets).max(1);
-    let targets: Vec<Vec3> = targets.iter().step_by(stride).map(|p| p.map(f64::from)).collect();
-    let mut bounds_m = Aabb::of_points(targets.iter().chain(eyes).copied());
-    bounds_m.min_m = bounds_m.min_m.map(|v| v - config.radius_m);
-    bounds_m.max_m = bounds_m.max_m.map(|v| v + config.radius_m);
-    let obstacles = Obstacles::within(scene, &bounds_m, config.radius_m);
+    let thinned = targets.iter().step_by(stride);
+    let obstacles = Obstacles::within(scene, &reach_m(targets, eyes, config), config.radius_m);
+    let targets: Vec<Vec3> = thinned.map(|p| p.map(f64::from)).collect();
     let share = |&eye: &Vec3| {
         let num_seen = targets.iter().filter(|&&t| is_open(&obstacles, eye, t, config)).count();
         num_seen as f64 / targets.len().max(1) as f64
     };
     Ok(eyes.iter().map(share).collect())
+}
+
+/// Smallest box outside of which nothing is in the way of any line.
+pub(crate) fn reach_m(targets: &[Point], eyes: &[Vec3], config: &SightConfig) -> Aabb {
+    let ends = targets.iter().map(|p| p.map(f64::from)).chain(eyes.iter().copied());
+    let mut bounds_m = Aabb::of_points(ends);
+    bounds_m.min_m = bounds_m.min_m.map(|v| v - config.radius_m);
+    bounds_m.max_m = bounds_m.max_m.map(|v| v + config.radius_m);
+    bounds_m
 }
 
 /// Whether no sample of a line has an obstacle by it; the end at the target first, where most are.
