@@ -31,7 +31,7 @@ def run(agent, *stages, start=START, protocol=None, seed=7):
     return records
 
 
-def script(graph, *, subgraph=None, arrival="yes", frontier="Frontier 0"):
+def script(graph, *, subgraph=None, arrival="yes", frontier="Frontier 0", needs_images=False):
     """A model with an answer a kind of question; the whole graph is selected unless said otherwise."""
 
     def answer(question):
@@ -40,7 +40,7 @@ def script(graph, *, subgraph=None, arrival="yes", frontier="Frontier 0"):
         said = {"graph": graph, "arrival": arrival, "frontier": frontier}[question.kind]
         return said(question) if callable(said) else said
 
-    return Scripted(answer)
+    return Scripted(answer, needs_images=needs_images)
 
 
 def asked(model, kind):
@@ -257,6 +257,27 @@ def test_verification_looks_at_five_rounds_of_seven_views_of_this_stage():
     second = [question for question in questions if question.goal.stage == 2]
     assert second[0].num_views % 7 == 0
     assert second[0].num_views <= 35
+
+
+def test_a_model_that_looks_is_shown_the_numbered_views_frontiers_and_recent_views():
+    model = script(object_of("GarbageCan"), arrival="no", needs_images=True)
+    run(MsgNav(decision=model), stage_case(1, "GarbageCan|1"), protocol=ProtocolConfig(max_rounds=15))
+    assert all(not pictures_of(question) for question in asked(model, "subgraph"))
+    for question in asked(model, "graph"):
+        assert len(pictures_of(question)) == len(question.images) >= 7
+        for number, image in enumerate(question.images):
+            assert f"Image {number}, {'what the robot sees now' if image.is_egocentric else 'from'}" in text_of(
+                question
+            )
+    for question in asked(model, "frontier"):
+        assert len(pictures_of(question)) == len(question.frontiers)
+    assert asked(model, "arrival")
+    assert all(len(pictures_of(question)) == question.num_views for question in asked(model, "arrival"))
+
+
+def pictures_of(question):
+    (turn,) = question.prompt().turns
+    return [part.pixels for part in turn.parts if hasattr(part, "pixels")]
 
 
 def test_no_valid_answer_on_arrival_counts_as_no():

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.agents.navigator import Navigator
-from evonav.decision.language import canonical
+from evonav.decision.language import canonical, similarity
 from evonav.decision.matching import ROOM_SIGNS, Matcher
 from evonav.decision.questions.candidates import ObjectCandidate
 from evonav.decision.questions.msgnav import GraphImage, GraphObject, SeenObject
@@ -16,6 +16,8 @@ from evonav.memory.views import StoredView, pixels_of
 from evonav.sensors.observation import Observation
 
 _SIGNS = frozenset(sign for signs in ROOM_SIGNS.values() for sign in signs)
+_MIN_SIMILARITY = 0.4
+"""From which on a word may be for a label, as for `Matcher.label_score`."""
 OTHER_ROOM = "others"
 """The room of entries around which nothing speaks for one; so the original's classifier calls it."""
 
@@ -118,13 +120,14 @@ class GraphMemory:
         """Label and `(N, 3)` points of the largest thing of a category in a kept view (adaptive vocabulary update).
 
         MSGNav runs its detector on the image once more, with the category as its only word. Under ground truth the
-        recorded masks answer.
+        recorded masks answer: those whose label names it best, a dining table where a table is asked for.
         """
         noun = canonical(category)
         seen = self.navigator.views.views[view_id].seen
-        found = [(one.area_px, -index) for index, one in enumerate(seen) if canonical(one.label) == noun]
-        if not found:
+        scored = [(similarity(noun, one.label), one.area_px, -index) for index, one in enumerate(seen)]
+        score, _, index = max(scored, default=(0.0, 0, 0))
+        if score < _MIN_SIMILARITY:
             return None
-        index = -max(found)[1]
+        index = -index
         points_m = self._clouds[view_id].points_m(index)
         return (seen[index].label, points_m) if len(points_m) else None
