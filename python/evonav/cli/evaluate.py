@@ -43,6 +43,7 @@ from evonav.cli.options import (
     Workers,
     count_of,
 )
+from evonav.cli.view import make_pages
 
 if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
     from collections.abc import Iterator, Mapping, Sequence
@@ -116,7 +117,7 @@ def demo(
     seed: Seed = 0,
     workers: Workers = None,
 ) -> None:
-    """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report."""
+    """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report, one task round by round."""
     num_workers = count_of(workers)
     with _tasks(out, None, None, limit, None, seed, False, num_workers) as task_files:
         config = _config(seed, _backend(SimulatorName.EMBEDDED, False, {}, {}), decisions, out, num_workers)
@@ -126,7 +127,9 @@ def demo(
         summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored=False)
     print_table(summaries)
     print_spending(out)
+    _, index = make_pages(out)
     _report(out)
+    typer.echo(f"round by round: {index}")
     _exit(summaries)
 
 
@@ -248,7 +251,7 @@ def _backend(
     if simulator is SimulatorName.AI2THOR:
         means = {key: value for key, value in host.items() if value is not None}
         return Backend(simulator=f"{module}:ai2thor_simulator", simulator_options=given, host_options=means)
-    if given or any(host[key] is not None for key in ("gpu_device", "x_display")):
+    if given or any(host.get(key) is not None for key in ("gpu_device", "x_display")):
         raise typer.BadParameter("--thor-... options are for --simulator ai2thor")
     return Backend(simulator=f"{module}:lenient_simulator") if allow_unknown_assets else Backend()
 
