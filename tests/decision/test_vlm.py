@@ -4,16 +4,18 @@ import json
 import sqlite3
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from evonav.decision.account import Account, Price, Usage, image_tokens, read_prices
-from evonav.decision.exchanges import ExchangeStore
+from evonav.decision.exchanges import ExchangeStore, Failure, key_of
 from evonav.decision.prompts import Picture, Prompt, Text, Turn
 from evonav.decision.vlm import Answer, VlmClient, VlmConfig
 from evonav.decision.vlm_errors import VlmError
@@ -193,11 +195,14 @@ def test_keys_come_from_the_environment(stub: Stub, config: VlmConfig, monkeypat
         {"raw": b'{"choices": [', "cut": 100},
     ],
 )
-def test_passing_faults_are_tried_again(stub: Stub, config: VlmConfig, fault: dict[str, object]) -> None:
+def test_passing_faults_are_tried_again(stub: Stub, config: VlmConfig, fault: dict[str, Any]) -> None:
     stub.script = [fault]
     client = VlmClient(config)
+    began_s = time.monotonic()
     assert client.ask(QUESTION).text.startswith("A mug")
     assert len(stub.requests) == 2
+    # By itself the client would wait half a second at most.
+    assert time.monotonic() - began_s > float(fault.get("headers", {}).get("Retry-After", 0.0)) - 0.05
     assert client.account.num_asked == 1
 
 
@@ -255,6 +260,20 @@ def test_answers_that_are_none_are_kept_but_broken_ones_are_not(stub: Stub, conf
     stub.script = [{"raw": b"{}"}, {"text": "No", "finish_reason": "length"}]
     assert [told(client) for _ in range(3)] == ["malformed", "truncated", "truncated"]
     assert len(stub.requests) == 2
+
+
+def test_the_first_outcome_kept_is_everybodys(path: Path) -> None:
+    """Two processes that asked the same: the second to come back takes over what the first has kept."""
+    first, second = ExchangeStore(path), ExchangeStore(path)
+    for number, (ours, theirs) in enumerate(
+        (({"a": 1}, {"a": 2}), (Failure("timeout", "late"), {"a": 3}), ({"a": 4}, Failure("server", "500")))
+    ):
+        request = {"number": number}
+        assert first.keep_first(request, {}, ours) == ours
+        assert second.keep_first(request, {}, theirs) == ours
+        assert second.outcome(key_of(request)) == ours
+    assert (len(first), first.num_failures) == (2, 1)
+    assert (second.forget_failures(), first.num_failures) == (1, 0)
 
 
 def test_no_more_questions_at_a_time_than_asked_for(stub: Stub, config: VlmConfig) -> None:

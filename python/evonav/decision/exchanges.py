@@ -9,10 +9,7 @@ wants it to happen again in a replay.
 
 import hashlib
 import json
-import sqlite3
-import threading
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.decision.shared_file import SharedFile
 from evonav.errors import StoreError
 
 JsonObject = dict[str, Any]
@@ -62,7 +60,7 @@ class Failure:
     message: str
 
 
-class ExchangeStore:
+class ExchangeStore(SharedFile):
     """Exchanges in one SQLite file (WAL); any number of threads and processes may use it."""
 
     def __init__(self, path: Path | str) -> None:
@@ -71,24 +69,17 @@ class ExchangeStore:
         Raises:
             StoreError: It cannot be opened or is no such file.
         """
-        self.path = Path(path)
-        self._lock = threading.Lock()
-        with self._told():
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(self.path, timeout=60.0, check_same_thread=False, isolation_level=None)
-            self._db.execute("PRAGMA journal_mode = WAL")
-            self._db.execute("PRAGMA synchronous = NORMAL")
-            self._db.executescript(_SCHEMA)
+        super().__init__(path, _SCHEMA, "exchanges")
 
     def __len__(self) -> int:
         """Number of exchanges."""
-        with self._lock, self._told():
+        with self._reading():
             return int(self._db.execute("SELECT count(*) FROM exchanges").fetchone()[0])
 
     @property
     def num_failures(self) -> int:
         """Number of questions of which something else came."""
-        with self._lock, self._told():
+        with self._reading():
             return int(self._db.execute("SELECT count(*) FROM failures").fetchone()[0])
 
     def get(self, key: str) -> JsonObject | None:
@@ -97,7 +88,7 @@ class ExchangeStore:
         Raises:
             StoreError: The file cannot be read, or the response in it is no JSON object.
         """
-        with self._lock, self._told():
+        with self._reading():
             row = self._db.execute("SELECT response FROM exchanges WHERE key = ?", (key,)).fetchone()
         if row is None:
             return None
@@ -118,7 +109,7 @@ class ExchangeStore:
         response = self.get(key)
         if response is not None:
             return response
-        with self._lock, self._told():
+        with self._reading():
             return self._failure(key)
 
     def put(self, request: JsonObject, images: Mapping[str, bytes], response: JsonObject) -> str:
@@ -136,7 +127,7 @@ class ExchangeStore:
             StoreError: The file cannot be written.
         """
         key = key_of(request)
-        with self._transaction():
+        with self._writing():
             self._db.execute("DELETE FROM failures WHERE key = ?", (key,))
             self._db.execute("DELETE FROM exchanges WHERE key = ?", (key,))
             self._insert(key, request, images, response)
@@ -154,7 +145,7 @@ class ExchangeStore:
             StoreError: The file cannot be written.
         """
         key = key_of(request)
-        with self._transaction():
+        with self._writing():
             row = self._db.execute("SELECT response FROM exchanges WHERE key = ?", (key,)).fetchone()
             there: JsonObject | Failure | None = self._failure(key) if row is None else json.loads(row[0])
             if there is None:
@@ -163,7 +154,7 @@ class ExchangeStore:
 
     def forget_failures(self) -> int:
         """Drops what came instead of responses, so that it is asked again; the number of them."""
-        with self._transaction():
+        with self._writing():
             return self._db.execute("DELETE FROM failures").rowcount
 
     def _failure(self, key: str) -> Failure | None:
@@ -182,36 +173,13 @@ class ExchangeStore:
 
     def image(self, name: str) -> bytes | None:
         """An image's PNG file."""
-        with self._lock, self._told():
+        with self._reading():
             row = self._db.execute("SELECT png FROM images WHERE name = ?", (name,)).fetchone()
         return None if row is None else bytes(row[0])
 
     def requests(self) -> Iterator[JsonObject]:
         """What was asked, in order of key; images as hashes."""
-        with self._lock, self._told():
+        with self._reading():
             rows = self._db.execute("SELECT request FROM exchanges ORDER BY key").fetchall()
         for (text,) in rows:
             yield json.loads(text)
-
-    def close(self) -> None:
-        """Closes the file."""
-        with self._lock, self._told():
-            self._db.close()
-
-    @contextmanager
-    def _transaction(self) -> Iterator[None]:
-        with self._lock, self._told():
-            self._db.execute("BEGIN IMMEDIATE")
-            try:
-                yield
-                self._db.execute("COMMIT")
-            except BaseException:
-                self._db.execute("ROLLBACK")
-                raise
-
-    @contextmanager
-    def _told(self) -> Iterator[None]:
-        try:
-            yield
-        except (sqlite3.Error, OSError, ValueError) as error:
-            raise StoreError(f"{self.path}: exchanges: {error}") from error

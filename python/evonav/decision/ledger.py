@@ -4,15 +4,11 @@ Costs are set aside before a question is asked, so that no number of processes p
 with a question under way leaves what it had set aside: the server may have counted it.
 """
 
-import sqlite3
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from evonav.decision.shared_file import SharedFile
 from evonav.decision.vlm_errors import VlmError
-from evonav.errors import StoreError
 
 LEDGER_NAME = "spending.sqlite"
 """In the folder of a run."""
@@ -45,7 +41,7 @@ class Spending:
     """For questions under way, or of processes that died with one."""
 
 
-class Ledger:
+class Ledger(SharedFile):
     """The file; any number of threads and processes may use it."""
 
     def __init__(self, path: Path | str) -> None:
@@ -54,14 +50,7 @@ class Ledger:
         Raises:
             StoreError: It cannot be opened.
         """
-        self.path = Path(path)
-        self._lock = threading.Lock()
-        with self._told():
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._db = sqlite3.connect(self.path, timeout=60.0, check_same_thread=False, isolation_level=None)
-            self._db.execute("PRAGMA journal_mode = WAL")
-            self._db.execute("PRAGMA synchronous = NORMAL")
-            self._db.executescript(_SCHEMA)
+        super().__init__(path, _SCHEMA, "spending")
 
     def reserve(self, model: str, cost_usd: float, max_cost_usd: float | None) -> None:
         """Sets the cost of a question aside.
@@ -70,7 +59,7 @@ class Ledger:
             VlmError: With all that is spent and set aside, it might pass the limit.
             StoreError: The file cannot be written.
         """
-        with self._transaction():
+        with self._writing():
             query = "SELECT coalesce(sum(cost_usd + set_aside_usd), 0) FROM spending"
             spent_usd = float(self._db.execute(query).fetchone()[0])
             if max_cost_usd is not None and spent_usd + cost_usd > max_cost_usd:
@@ -93,7 +82,7 @@ class Ledger:
         Raises:
             StoreError: The file cannot be written.
         """
-        with self._transaction():
+        with self._writing():
             self._add(
                 model,
                 num_asked=1,
@@ -106,38 +95,15 @@ class Ledger:
 
     def replayed(self, model: str) -> None:
         """Counts an answer that was had for nothing."""
-        with self._transaction():
+        with self._writing():
             self._add(model, num_replayed=1)
 
     def spending(self) -> list[Spending]:
         """What was spent, by model."""
-        with self._lock, self._told():
+        with self._reading():
             return [Spending(*row) for row in self._db.execute("SELECT * FROM spending ORDER BY model")]
-
-    def close(self) -> None:
-        """Closes the file."""
-        with self._lock, self._told():
-            self._db.close()
 
     def _add(self, model: str, **amounts: float) -> None:
         self._db.execute("INSERT OR IGNORE INTO spending VALUES (?, 0, 0, 0, 0, 0, 0, 0)", (model,))
         changes = ", ".join(f"{column} = {column} + ?" for column in amounts)  # columns are ours
         self._db.execute(f"UPDATE spending SET {changes} WHERE model = ?", (*amounts.values(), model))  # noqa: S608
-
-    @contextmanager
-    def _transaction(self) -> Iterator[None]:
-        with self._lock, self._told():
-            self._db.execute("BEGIN IMMEDIATE")
-            try:
-                yield
-                self._db.execute("COMMIT")
-            except BaseException:
-                self._db.execute("ROLLBACK")
-                raise
-
-    @contextmanager
-    def _told(self) -> Iterator[None]:
-        try:
-            yield
-        except (sqlite3.Error, OSError) as error:
-            raise StoreError(f"{self.path}: spending: {error}") from error
