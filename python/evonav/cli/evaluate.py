@@ -117,7 +117,7 @@ def demo(
     seed: Seed = 0,
     workers: Workers = None,
 ) -> None:
-    """Evaluates the paper's three heuristics on the bundled tasks and writes an HTML report, one task round by round."""
+    """Evaluates the paper's three heuristics on the bundled tasks and writes a report and pages of one task."""
     num_workers = count_of(workers)
     with _tasks(out, None, None, limit, None, seed, False, num_workers) as task_files:
         config = _config(seed, _backend(SimulatorName.EMBEDDED, False, {}, {}), decisions, out, num_workers)

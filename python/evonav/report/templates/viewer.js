@@ -118,7 +118,7 @@
     // Names of those that matter in this round, none over another.
     const size = 2.1 * u, [left, , wide] = home.split(" ").map(Number);
     for (const [id, label, x, y, width, depth, , isStale] of ordered.filter((entry) => rank(entry)).reverse()) {
-      const words = `${label} #${id}`, half = 0.29 * size * words.length, h = Math.max(depth, 1.4 * u) / 2, w = Math.max(width, 1.4 * u) / 2;
+      const words = `${label} #${id}`, half = 0.32 * size * words.length, h = Math.max(depth, 1.4 * u) / 2, w = Math.max(width, 1.4 * u) / 2;
       const places = [[x, y - h - 0.5 * size], [x, y + h + 1.1 * size], [x + w + half + 0.4 * u, y + 0.35 * size], [x - w - half - 0.4 * u, y + 0.35 * size], [x, y - h - 1.6 * size], [x, y + h + 2.2 * size]];
       const box = ([cx, cy]) => [cx - half, cy - 0.8 * size, cx + half, cy + 0.3 * size];
       for (const place of places) place[0] = Math.max(left + half, Math.min(left + wide - half, place[0]));
