@@ -224,14 +224,20 @@ def test_without_a_way_it_goes_as_near_as_it_gets_and_from_there_to_where_it_has
     planner.observe(pose)
     assert planner.distance_m(pose, goal) is None
     step = planner.step(pose, goal, "confirmed")
-    assert (step.goal, step.distance_m, step.action) == ("confirmed", None, Action.MOVE_FORWARD)
+    assert (step.goal, step.distance_m, step.short_term_m is None) == ("confirmed", None, False)
     assert planner.counters.unreachable == 1
-    # The ring's outer side is at 1.1 m.
-    steps = [planner.step(replace(pose, x_m=x_m), goal, "temporary") for x_m in np.arange(-1.5, -1.9, -0.01).tolist()]
-    assert steps[0].goal == "temporary"
-    detour = next(step for step in steps if step.goal == "stuck")
-    assert detour.distance_m is not None
-    assert detour.distance_m > 0.8
+    # It follows its short-term goals up to the ring, which is 1.1 m wide, and turns back there.
+    at = pose
+    for _ in range(60):
+        step = planner.step(at, goal, "temporary")
+        if step.goal == "stuck":
+            break
+        assert step.short_term_m is not None
+        at = replace(at, x_m=step.short_term_m[0], z_m=step.short_term_m[1])
+    assert step.goal == "stuck"
+    assert math.dist((at.x_m, at.z_m), (-3.0, 0.0)) == pytest.approx(1.13, abs=0.08)
+    assert step.distance_m is not None
+    assert step.distance_m > 0.8
     planner.exploration_target(pose)
     planner.step(pose, (-3.0, 0.0), "exploration")
     assert planner.needs_target(pose)
