@@ -221,7 +221,7 @@ proptest! {
 /// A map after looks to four sides, into distances that repeat.
 fn seen_around(depths: &[f32], horizon_rad: f64) -> BevMap {
     let config = BevConfig { size_m: 12.0, stride_px: 1, cell_m: 0.1, ..Default::default() };
-    let mut map = BevMap::new([0.0, 0.0], 0, config).unwrap();
+    let mut map = BevMap::new([0.0, 0.0], 0, config).expect("a valid map");
     for quarter in 0..4 {
         let camera = Camera {
             width_px: 120,
@@ -229,7 +229,8 @@ fn seen_around(depths: &[f32], horizon_rad: f64) -> BevMap {
             ..camera([0.0, 1.5, 0.0], f64::from(quarter) * std::f64::consts::FRAC_PI_2, horizon_rad)
         };
         let depth_m = room_depth(&camera, depths[quarter as usize % depths.len()]);
-        map.integrate(&DepthView { camera, depth_m: &depth_m, categories: None }).unwrap();
+        map.integrate(&DepthView { camera, depth_m: &depth_m, categories: None })
+            .expect("a valid view");
     }
     map
 }
@@ -252,11 +253,12 @@ fn look(map: &mut BevMap, yaw_rad: f64, horizon_rad: f64, wall_m: f32) {
     let camera =
         Camera { width_px: 300, height_px: 300, ..camera([0.0, 1.575, 0.0], yaw_rad, horizon_rad) };
     let depth_m = room_depth(&camera, wall_m);
-    map.integrate(&DepthView { camera, depth_m: &depth_m, categories: None }).unwrap();
+    map.integrate(&DepthView { camera, depth_m: &depth_m, categories: None })
+        .expect("a valid view");
 }
 
 fn new_map() -> BevMap {
-    BevMap::new([0.0, 0.0], 0, BevConfig::default()).unwrap()
+    BevMap::new([0.0, 0.0], 0, BevConfig::default()).expect("a valid map")
 }
 
 #[test]
