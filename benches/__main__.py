@@ -7,6 +7,7 @@ import sys
 from benches.table import write_section
 
 SECTIONS = {
+    "agent_process": "Agents in processes of their own",
     "agents": "Agents",
     "generation": "Task generation",
     "memory": "Memory",

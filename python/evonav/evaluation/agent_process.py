@@ -2,13 +2,13 @@
 
 A process serves agents of one name, a fresh object an episode (`evonav.agents.serving` is its side). Observations go
 there pickled, their arrays through one block of shared memory; answers come back as JSON, and nothing that an agent
-says is unpickled or believed to be well-formed. The process inherits no descriptor but three, is given no path, and
-leads a process group, so that what an agent has started ends with it.
+says is unpickled or believed to be well-formed. The process inherits no descriptor but three and its output, is given
+no path but those of its decision model's files, and leads a process group, so that what an agent has started ends with
+it.
 
 This is no sandbox: an agent that goes looking can read what this user can read. For that, run evonav in a container.
 """
 
-import fcntl
 import mmap
 import os
 import pickle
@@ -40,6 +40,8 @@ LOG_NAME = "agents.log"
 """In a run's folder: all that agents have printed."""
 LOAD_TIMEOUT_S = 300.0
 """At least, for an agent's module to be imported."""
+IS_SUPPORTED = os.name == "posix"
+"""Elsewhere agents run in the evaluator's process."""
 MAX_PROCESSES = 8
 """Kept by a worker, one an agent's name; the one that was used longest ago makes room."""
 MAX_ANSWER_BYTES = 2 * wire.MAX_ENTRIES_BYTES
@@ -393,6 +395,8 @@ class _SharedBlock:
 
     def __init__(self) -> None:
         if hasattr(os, "memfd_create"):
+            import fcntl
+
             self.descriptor = os.memfd_create("evonav", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
             # A reader that made the file shorter would have the writer killed by its next write.
             fcntl.fcntl(self.descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL)

@@ -9,7 +9,7 @@ from typing import Any
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError, TaskError
-from evonav.evaluation.agent_process import LOG_NAME, AgentHosting
+from evonav.evaluation.agent_process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.backend import Backend, check_agent_name
 from evonav.evaluation.metrics import AgentSummary, paired_differences, summarise, summary_json
 from evonav.evaluation.protocol import (
@@ -121,7 +121,7 @@ def evaluate(
     config = config or RunConfig()
     hosting = replace(
         config.hosting,
-        is_in_process=config.hosting.is_in_process or num_workers == 0,
+        is_in_process=config.hosting.is_in_process or num_workers == 0 or not IS_SUPPORTED,
         log=config.hosting.log or str(run_dir.absolute() / LOG_NAME),
     )
     _check_request(agents, tasks, num_workers, hosting)
