@@ -1,5 +1,6 @@
 """UniGoal on the toy house (design: agents.md 3 and 7.1)."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -330,8 +331,19 @@ def test_the_largest_box_is_the_one_taken():
 
 
 def test_runs_are_the_same_every_time():
-    first, second = (run(UniGoal(), stage_case(1, "GarbageCan|1"), stage_case(2, "Bed|1")) for _ in range(2))
+    agents = (UniGoal(), UniGoal())
+    stages = (stage_case(1, "GarbageCan|1"), stage_case(2, "Bed|1"))
+    first, second = (run(agent, *stages) for agent in agents)
     assert [r.trace for r in first] == [r.trace for r in second]
+    # Places drawn when nothing is left to explore: the same ones, explored, and not where it stands.
+    drawn = [[agent._somewhere(agent._bev, agent._planner, START) for _ in range(3)] for agent in agents]
+    assert drawn[0] == drawn[1]
+    assert len(set(drawn[0])) == 3
+    bev = agents[0]._bev
+    for place_m in drawn[0]:
+        assert math.dist(place_m, (START.x_m, START.z_m)) >= 0.5
+        assert bev.explored[bev.cell_of(place_m)]
+        assert not bev.obstacles[bev.cell_of(place_m)]
 
 
 def watching(agent, distances):

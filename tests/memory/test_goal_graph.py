@@ -73,6 +73,8 @@ def test_similarity_transform_turns_scales_and_shifts():
     ends = ((10.0, 20.0), (10.0, 22.0))
     assert similarity_transform(((0.0, 0.0), (1.0, 0.0)), ends, (1.0, 1.0)) == pytest.approx((8.0, 22.0))
     assert similarity_transform(((3.0, 1.0), (4.0, 1.0)), ends, (3.5, 1.0)) == pytest.approx((10.0, 21.0))
+    # Turned the other way in the layout: its y axis is the scene's z axis, its x axis the scene's x axis.
+    assert similarity_transform(((0.0, 0.0), (0.0, 1.0)), ends, (1.0, 0.0)) == pytest.approx((12.0, 20.0))
     assert similarity_transform(((1.0, 1.0), (1.0, 1.0)), ends, (0.0, 0.0)) is None
 
 
