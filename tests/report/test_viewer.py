@@ -11,20 +11,23 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_up_run import entry, stage_record
 from PIL import Image
 from typer.testing import CliRunner
 from viewer_run import MARKUP
 
 from evonav.cli import app
 from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.records import EndState
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.trace import RunReplay
-from evonav.evaluation.traced import TracedStage
+from evonav.evaluation.traced import TracedEntry, TracedMap, TracedRound, TracedStage, Truth
 from evonav.report.html import write_report
 from evonav.report.maps import page_name
+from evonav.report.plan import Frame
 from evonav.report.svg import cm
 from evonav.report.viewer import write_episode
-from evonav.report.viewer_data import cells_text
+from evonav.report.viewer_data import PageData, cells_text
 
 
 @pytest.fixture(scope="module")
@@ -101,12 +104,12 @@ def test_entries_frontiers_and_maps_of_every_round_can_be_had_from_the_page(
             entries = {name: entry for name, entry in entries.items() if name not in data_round.get("x", ())}
             entries |= {entry[0]: entry for entry in data_round.get("e", ())}
             assert set(entries) == {entry.record.entry_id for entry in step.entries}
-            for entry in step.entries:
-                found = entries[entry.record.entry_id]
-                assert found[2:4] == list(cm((entry.record.centre_m[0], entry.record.centre_m[2])))
-                assert (found[6], bool(found[7])) == (entry.record.num_detections, entry.record.is_stale)
-                if entry.record.is_stale and entry.truth is not None and entry.truth.now_m is not None:
-                    assert found[9] == list(cm((entry.truth.now_m[0], entry.truth.now_m[2])))
+            for traced in step.entries:
+                found = entries[traced.record.entry_id]
+                assert found[2:4] == list(cm((traced.record.centre_m[0], traced.record.centre_m[2])))
+                assert (found[6], bool(found[7])) == (traced.record.num_detections, traced.record.is_stale)
+                if traced.record.is_stale and traced.truth is not None and traced.truth.now_m is not None:
+                    assert found[9] == list(cm((traced.truth.now_m[0], traced.truth.now_m[2])))
                 else:
                     assert found[9] in (None, "gone")
             frontiers = data_round.get("f", frontiers)
@@ -120,6 +123,60 @@ def test_entries_frontiers_and_maps_of_every_round_can_be_had_from_the_page(
                 cells = np.zeros(data_round["grid"][0] * data_round["grid"][1], np.uint8)
             cells = decoded(data_round["cells"], cells)
             assert np.array_equal(cells, step.map.cells.ravel())
+
+
+def made_up_round(number: int, truth: Truth | None, agent_map: TracedMap | None, **changes: object) -> TracedRound:
+    chosen = entry("Plate", (2.3, 0.8, 2.0), is_stale=True)
+    record = stage_record("a", "t", 2, EndState.FAILURE, chosen=chosen).trace[number].model_copy(update=changes)
+    return TracedRound(record, record.pose, (), (TracedEntry(chosen, truth),), map=agent_map)
+
+
+def made_up_page(rounds: list[TracedRound]) -> list[dict]:
+    record = stage_record("a", "t", 2, EndState.FAILURE)
+    page = PageData()
+    page.add_stage(TracedStage(record, None, tuple(rounds), "", (), 1.0), {}, Frame(0, 0, 900, 400), 50)
+    return json.loads(page.text())["stages"][0]["rounds"]
+
+
+def test_a_map_that_grows_begins_anew_and_one_that_stays_does_not() -> None:
+    small = TracedMap(np.full((2, 3), 2, np.uint8), 0.1, (1.0, 2.0))
+    large = TracedMap(np.array([[0, 1, 1, 1]] * 3, np.uint8), 0.1, (0.9, 1.9))
+    rounds = made_up_page([made_up_round(i, None, agent_map) for i, agent_map in enumerate((small, small, large))])
+    assert [step.get("grid") for step in rounds] == [[2, 3, 10.0, 100, -200], None, [3, 4, 10.0, 90, -190]]
+    assert [step["cells"] for step in rounds] == ["6C", "", "1E3B1E3B1E3B"]
+
+
+@pytest.mark.parametrize(
+    ("truth", "now", "words"),
+    [
+        (None, None, "Stale: no plate ever stood here."),
+        (
+            Truth("plate", 1, (5.3, 0.8, 6.0)),
+            [530, -600],
+            "Stale: the plate that is asked for stood here in stage 1 and stands 5.0 m away now.",
+        ),
+        (Truth("other", 1, None), "gone", "Stale: the plate stood here in stage 1 and is no longer in the house."),
+    ],
+)
+def test_what_became_of_a_stale_entry(truth: Truth | None, now: object, words: str) -> None:
+    (step,) = made_up_page([made_up_round(0, truth, TracedMap(np.zeros((1, 1), np.uint8), 0.1, (0.0, 0.0)))])
+    assert (step["truth"], step["e"][0][9]) == (words, now)
+    assert (step["kind"], step["choice"]) == ("stale", "object 7 (plate)")
+
+
+def test_a_lost_memory_is_told() -> None:
+    record = stage_record("a", "t", 2, EndState.FAILURE).model_copy(update={"failed_before": (1,), "memory_lost_at": 2})
+    page = PageData()
+    page.add_stage(TracedStage(record, None, (), "", (), 1.0), {}, Frame(0, 0, 900, 400), 50)
+    (stage,) = json.loads(page.text())["stages"]
+    told = "the agent failed in stage 1; its process was lost, and it began anew, without memory, in stage 2"
+    assert stage["lost"] == told
+
+
+def test_what_json_cannot_say_is_still_shown() -> None:
+    details = {"cost": float("inf"), "list": [float("nan"), 1], "text": "</script><b>"}
+    (step,) = made_up_page([made_up_round(0, None, None, details=details)])
+    assert step["details"] == {"cost": "inf", "list": ["nan", 1], "text": "</script><b>"}
 
 
 def test_questions_have_their_prompt_images_and_outcome(pages: Path, stages: list[TracedStage], task_id: str) -> None:

@@ -99,7 +99,7 @@ class PageData:
             "noun": noun_of(record.goal.category),
             "reference": None if stage.stage_map is None else stage.stage_map.reference_image,
             "changed": change_words(record, maps) + _target_words(record),
-            "isStatic": record.transition.kind == "static" or record.stage == 1,
+            "lost": _lost_words(record),
             "facts": _facts(record),
             "budget": budget,
             "fov": round(math.degrees(stage.fov_rad), 1),
@@ -330,6 +330,17 @@ def _target_words(record: StageRecord) -> str:
     if record.target.is_relocated_now:
         return ", the target among them"
     return "; target moved earlier" if record.target.is_relocated else ""
+
+
+def _lost_words(record: StageRecord) -> str:
+    """What an earlier failure of the agent cost it."""
+    words = []
+    if record.failed_before:
+        stages = ", ".join(map(str, record.failed_before))
+        words.append(f"the agent failed in stage{'s' if len(record.failed_before) > 1 else ''} {stages}")
+    if record.memory_lost_at is not None:
+        words.append(f"its process was lost, and it began anew, without memory, in stage {record.memory_lost_at}")
+    return "; ".join(words)
 
 
 def _facts(record: StageRecord) -> list[list[str]]:

@@ -26,6 +26,7 @@
     made.alt = alt;
     return made;
   };
+  const count = (num, noun, nouns) => `${num} ${num === 1 ? noun : nouns}`;
   const cardOf = (id) => $(id).closest(".card");
   const metres = (x, y, [px, py]) => `${(Math.hypot(x - px, y - py) / 100).toFixed(1)} m`;
 
@@ -97,7 +98,7 @@
     const candidates = new Set(round.cand ?? []);
     const rank = ([id, label]) => (id === round.chosen ? 3 : candidates.has(id) ? 2 : label === stage.noun ? 1 : 0);
     const ordered = [...round.entries.values()].sort((a, b) => rank(a) - rank(b) || b[4] * b[5] - a[4] * a[5]);
-    const boxes = [];
+    const [ax, ay] = round.p, boxes = [[ax - 2 * u, ay - 2 * u, ax + 2 * u, ay + 2 * u]];
     for (const entry of ordered) {
       const [id, label, x, y, width, depth, seen, isStale, isTarget, place] = entry;
       const w = Math.max(width, 1.4 * u), h = Math.max(depth, 1.4 * u);
@@ -205,7 +206,7 @@
     list("facts", [
       ...(isError ? [] : [["action", round.action + (round.failed ? ", failed" : "") + (round.why ? ` (${round.why})` : "")]]),
       ...(round.len === undefined ? [] : [["walked", `${round.len.toFixed(2)} m`]]),
-      ...(round.n ? [["knows", `${round.n[0]} entries, ${round.n[1]} frontiers`]] : []),
+      ...(round.n ? [["knows", `${count(round.n[0], "entry", "entries")}, ${count(round.n[1], "frontier", "frontiers")}`]] : []),
       ["stands at", `x ${(round.p[0] / 100).toFixed(2)} m, z ${(-round.p[1] / 100).toFixed(2)} m, looks ${Math.round(((round.p[2] % 360) + 360) % 360)}°`],
       ...Object.entries(details).map(([name, value]) => [name.replaceAll("_", " "), words(value)]),
       ...(round.note ? [["note", round.note]] : []),
@@ -330,6 +331,7 @@
     list("stage-facts", stage.facts);
     $("goal").textContent = stage.goal;
     $("changed").textContent = stage.changed;
+    $("lost").textContent = stage.lost;
     $("reference").hidden = !stage.reference;
     if (stage.reference) $("reference").src = stage.reference;
     const badge = $("replay"), warning = $("warning");
