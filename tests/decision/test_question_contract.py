@@ -1,0 +1,117 @@
+"""What holds for every question that any agent really asks: words and grammar, schema and other answers agree."""
+
+import json
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from evonav.decision.noisy import GARBAGE
+from evonav.decision.prompts import Picture, Text
+from evonav.decision.questions.question import AnswerError, Question, Reply
+from evonav.decision.text_match import TextMatch
+from evonav.decision.vlm_decision import read_json, with_schema
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.store import RunStore
+from vlm_stub import check_strict
+
+NUM_OF_A_KIND = 12
+WITH_CASE = ("decompose", "goal-relations", "scene-relations")
+"""JSON, and lines in which small words are part of the grammar."""
+ASKED: dict[str, list[tuple[Question[Any], Reply[Any]]]] = defaultdict(list)
+
+
+class Collecting:
+    """The text matcher, with images, keeping some questions of each kind."""
+
+    needs_images = True
+
+    def __init__(self, seed: int) -> None:
+        self.model = TextMatch()
+        self.num = 0
+
+    def answer(self, question: Question[Any], attempt: int = 0) -> Reply[Any]:
+        reply = self.model.answer(question, attempt)
+        self.num += 1
+        asked = ASKED[question.kind]
+        if not asked or (len(asked) < NUM_OF_A_KIND and self.num % 3 == 1):
+            asked.append((question, reply))
+        return reply
+
+
+@pytest.fixture(scope="module")
+def asked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[Question[Any], Reply[Any]]]]:
+    folder: Path = tmp_path_factory.mktemp("runs")
+    config = RunConfig(
+        backend=Backend(decision=f"{__name__}:Collecting"), protocol=ProtocolConfig(max_rounds=9, max_actions=60)
+    )
+    with bundled_tasks() as directory:
+        agents = ["ftu", "3d-mem", "msgnav", "unigoal", "unigoal-paper"]
+        evaluate(agents, task_files(directory, 1), folder, config=config, num_workers=0)
+    with RunStore(folder) as store:
+        assert [record.error for record in store.records() if record.error] == []
+    return ASKED
+
+
+def test_all_agents_ask(asked: dict[str, list[tuple[Question[Any], Reply[Any]]]]) -> None:
+    assert {"choose", "prefilter", "choose_snapshot", "subgraph", "graph", "goal-objects", "category"} <= set(asked)
+
+
+def test_words_are_what_the_grammar_reads(asked: dict[str, list[tuple[Question[Any], Reply[Any]]]]) -> None:
+    for kind, pairs in asked.items():
+        for question, reply in pairs:
+            assert question.parse(question.words(reply.answer)) == reply.answer, kind
+            if kind not in WITH_CASE:
+                question.parse(question.words(reply.answer).upper())
+            others = list(question.alternatives(reply.answer))
+            assert reply.answer not in others, kind
+            for other in others:
+                assert question.parse(question.words(other)) == other, kind
+
+
+def test_schemas_are_strict_and_hold_every_answer(asked: dict[str, list[tuple[Question[Any], Reply[Any]]]]) -> None:
+    for kind, pairs in asked.items():
+        for question, reply in pairs:
+            schema = with_schema(question.prompt(), question.answer_schema()).schema
+            assert schema is not None
+            check_strict(dict(schema))
+            for answer in (reply.answer, *question.alternatives(reply.answer)):
+                words = question.words(answer)
+                is_array = question.answer_schema()["type"] == "array"
+                content = {"answer": words.split("\n") if is_array else words, "reason": "Because\nof it."}
+                jsonschema.validate(content, schema)
+                assert read_json(question, json.dumps(content)).answer == answer, kind
+
+
+def test_prompts_say_their_grammar_and_are_the_same_again(
+    asked: dict[str, list[tuple[Question[Any], Reply[Any]]]],
+) -> None:
+    for kind, pairs in asked.items():
+        for question, _ in pairs:
+            parts, again = question.prompt().parts, question.prompt().parts
+            assert isinstance(parts[-1], Text), kind
+            assert "nswer" in parts[-1].text or kind == "describe", kind
+            assert len(parts) == len(again)
+            for part, other in zip(parts, again, strict=True):
+                if isinstance(part, Picture):
+                    assert isinstance(other, Picture)
+                    assert part.pixels.dtype == np.uint8
+                    assert part.pixels.ndim == 3
+                    assert np.array_equal(part.pixels, other.pixels)
+                else:
+                    assert part == other
+                    assert part.text.strip()
+
+
+def test_garbage_is_no_answer(asked: dict[str, list[tuple[Question[Any], Reply[Any]]]]) -> None:
+    for kind, pairs in asked.items():
+        for garbage in GARBAGE:
+            with pytest.raises(AnswerError) as caught:
+                pairs[0][0].parse(garbage)
+            assert caught.value.fault == "invalid", kind
