@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from evonav.agents.navigator import Navigator
 from evonav.decision.language import canonical, similarity
-from evonav.decision.matching import ROOM_SIGNS, Matcher
+from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import ObjectCandidate
 from evonav.decision.questions.msgnav import GraphImage, GraphObject, SeenObject
 from evonav.memory.clouds import ViewClouds, clouds_of
@@ -15,7 +15,6 @@ from evonav.memory.scene_graph import SceneGraph
 from evonav.memory.views import StoredView, pixels_of
 from evonav.sensors.observation import Observation
 
-_SIGNS = frozenset(sign for signs in ROOM_SIGNS.values() for sign in signs)
 _MIN_SIMILARITY = 0.4
 """From which on a word may be for a label, as for `Matcher.label_score`."""
 OTHER_ROOM = "others"
@@ -54,11 +53,11 @@ class GraphMemory:
         """
         neighbours = self.graph.neighbours()
         candidates = [self.navigator.candidate(entry) for entry in self.navigator.objects.entries]
-        signs = [candidate for candidate in candidates if canonical(candidate.label) in _SIGNS]
+        signs = self._matcher.room_signs(candidates)
         return [
             GraphObject(
                 candidate,
-                self._matcher.room_around(candidate.ground_m, signs) or OTHER_ROOM,
+                self._matcher.room_of_signs(candidate.ground_m, signs) or OTHER_ROOM,
                 tuple(sorted(neighbours.get(candidate.entry_id, ()))),
             )
             for candidate in candidates

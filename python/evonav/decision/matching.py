@@ -127,12 +127,18 @@ class Matcher:
 
     def room_around(self, place_m: Point2, around: Sequence[ObjectCandidate]) -> str | None:
         """The type of room that things around a place speak for, the nearer the louder; `None` if none does."""
+        return self.room_of_signs(place_m, self.room_signs(around))
+
+    def room_signs(self, around: Sequence[ObjectCandidate]) -> list[tuple[str, Point2]]:
+        """The things that speak for a type of room: that room, and where they stand."""
+        rooms = ((_ROOM_OF_SIGN.get(canonical(other.label)), other) for other in around)
+        return [(room, other.ground_m) for room, other in rooms if room is not None]
+
+    def room_of_signs(self, place_m: Point2, signs: Sequence[tuple[str, Point2]]) -> str | None:
+        """As `room_around`, of things that were read before: for many places among the same ones."""
         votes: dict[str, list[float]] = defaultdict(list)
-        for other in around:
-            room = _ROOM_OF_SIGN.get(canonical(other.label))
-            if room is None:
-                continue
-            weight = 1.0 - math.dist(other.ground_m, place_m) / self.config.room_radius_m
+        for room, other_m in signs:
+            weight = 1.0 - math.dist(other_m, place_m) / self.config.room_radius_m
             if weight > 0.0:
                 votes[room].append(weight)
         return max(sorted(votes), key=lambda room: math.fsum(votes[room]), default=None)
