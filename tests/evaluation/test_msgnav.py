@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 
-from evonav.agents.msgnav import MsgNav
+from evonav.agents.msgnav import MsgNav, MsgNavConfig
 from evonav.agents.visible_viewpoint import visible_viewpoint
 from evonav.decision.questions.msgnav import GraphQuestion
 from evonav.decision.scripted import Scripted
@@ -210,6 +210,28 @@ def test_the_text_matcher_sees_to_that_too():
     (record,) = run(MsgNav(), stage_case(1, "Bed|1"), start=start)
     assert record.trace[0].choice.startswith("image")
     assert record.state is EndState.SUCCESS
+
+
+class Noting(MsgNav):
+    """Keeps the places to stand of all rounds."""
+
+    def act(self, observation):
+        action = super().act(observation)
+        self.noted = [*getattr(self, "noted", []), self._target and self._target.viewpoint]
+        return action
+
+
+def test_the_place_to_stand_is_chosen_once_or_again_while_it_is_off_the_circle():
+    """Floor around a far target is not mapped yet: the nearest free cells are far from it."""
+    start = replace(START, x_m=2.5, z_m=2.5, yaw_rad=np.pi / 2)
+    kept = Noting()
+    run(kept, stage_case(1, "Bed|1"), start=start)
+    assert kept.noted[0].found == "snapped"
+    assert len(set(kept.noted[:-1])) == 1
+    again = Noting(MsgNavConfig(is_viewpoint_kept=False))
+    run(again, stage_case(1, "Bed|1"), start=start)
+    assert again.noted[0] == kept.noted[0]
+    assert again.noted[-2] != again.noted[0]
 
 
 def test_a_word_for_nothing_in_the_image_leads_to_a_random_frontier():

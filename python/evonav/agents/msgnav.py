@@ -24,7 +24,7 @@ from evonav.agents.agent import (
 from evonav.agents.explorer import ExplorerConfig
 from evonav.agents.msgnav_memory import GraphMemory
 from evonav.agents.navigator import Navigator, NavigatorConfig, belief_of
-from evonav.agents.visible_viewpoint import ViewpointConfig, visible_viewpoint
+from evonav.agents.visible_viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
 from evonav.decision.asking import Asker
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
 from evonav.decision.questions.msgnav import (
@@ -58,6 +58,9 @@ class MsgNavConfig:
     max_selected: int = 20
     """Objects that key subgraph selection keeps."""
     viewpoint: ViewpointConfig = field(default_factory=ViewpointConfig)
+    is_viewpoint_kept: bool = True
+    """Whether the place to stand stays what it was when the target was chosen, as in the original. `False`: a place off
+    the circle, as that of a far target on floor that is not mapped yet, is looked for again in every round."""
     arrival_rounds: int = 5
     """Rounds whose views are looked at on arrival..."""
     arrival_views: int = 35
@@ -72,10 +75,14 @@ class MsgNavTarget:
 
     candidate: ObjectCandidate
     """The entry when it was chosen; or what an image shows, with the id -1."""
-    goal_m: Point2
+    viewpoint: Viewpoint
     """Where to stand."""
     view_id: int | None = None
     """The image that it was found in."""
+    points_m: NDArray[np.float32] = field(
+        default_factory=lambda: np.empty((0, 3), np.float32), compare=False, repr=False
+    )
+    """`(N, 3)` when it was chosen."""
 
     @property
     def name(self) -> str:
@@ -125,7 +132,7 @@ class MsgNav:
                 return Stop("verified")
             self._reject(target)
         elif target is not None:
-            return self._approach(target, "")
+            return self._approach(self._aimed(target, observation), "")
         return self._decide(observation)
 
     def _followed(self) -> MsgNavTarget | None:
@@ -136,6 +143,13 @@ class MsgNav:
         entry_id = self._memory.navigator.views.resolve(target.candidate.entry_id)
         self._target = replace(target, candidate=replace(target.candidate, entry_id=entry_id))
         return self._target
+
+    def _aimed(self, target: MsgNavTarget, observation: Observation) -> MsgNavTarget:
+        """The target with the place to stand that the map now allows, if it may change."""
+        if self.config.is_viewpoint_kept or target.viewpoint.found == "circle":
+            return target
+        here = (observation.pose.x_m, observation.pose.z_m)
+        return replace(target, viewpoint=self._viewpoint(target.points_m, here))
 
     def _is_found(self, target: MsgNavTarget, observation: Observation) -> bool:
         """Asks about all views of the last rounds; without a valid answer it is not."""
@@ -202,7 +216,10 @@ class MsgNav:
             self._counters["empty_detections"] += 1
             return self._random_frontier()
         self._counters[f"{choice.kind}_choices"] += 1
-        return self._approach(self._targeted(candidate, points_m, view_id, here), self._reason())
+        viewpoint = self._viewpoint(points_m, here)
+        if viewpoint.found != "circle":
+            self._counters[f"viewpoints_{viewpoint.found}"] += 1
+        return self._approach(MsgNavTarget(candidate, viewpoint, view_id, points_m), self._reason())
 
     def _graph_question(
         self, nodes: Sequence[GraphObject], subgraph: Subgraph, observation: Observation
@@ -228,25 +245,20 @@ class MsgNav:
             num_frontiers=len(memory.navigator.explorer.frontiers),
         )
 
-    def _targeted(
-        self, candidate: ObjectCandidate, points_m: NDArray[np.float32], view_id: int | None, here: Point2
-    ) -> MsgNavTarget:
-        """A choice with the place from which most of it can be seen."""
+    def _viewpoint(self, points_m: NDArray[np.float32], here: Point2) -> Viewpoint:
+        """The place from which most of a target can be seen."""
         navigator = self._memory.navigator
         occupancy = navigator.explorer.map
-        viewpoint = visible_viewpoint(
+        return visible_viewpoint(
             navigator.objects, points_m, occupancy.cells == FREE, occupancy.map_frame, here, self.config.viewpoint
         )
-        if viewpoint.found != "circle":
-            self._counters[f"viewpoints_{viewpoint.found}"] += 1
-        return MsgNavTarget(candidate, viewpoint.position_m, view_id)
 
     def _approach(self, target: MsgNavTarget, reason: str) -> AgentAction:
         """Commits to a target and goes on towards it; the heading on arrival is the direction of travel."""
         self._target = target
         self._memory.navigator.explorer.stop_exploring()
         self._tell(target.name, reason, target)
-        return NavigateTo(target.goal_m)
+        return NavigateTo(target.viewpoint.position_m)
 
     def _explore(self, here: Point2) -> AgentAction:
         """The only frontier, or the one that the model chooses by its image."""
