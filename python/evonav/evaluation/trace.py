@@ -54,7 +54,7 @@ HEADING_PX, SIDE_PX, QUALITY = 300, 150, 78
 """Longer edges of a round's heading view and of the others, and their JPEG quality ..."""
 SMALL_HEADING_PX, SMALL_SIDE_PX, SMALL_QUALITY = 192, 96, 55
 """... and those of agents whose rounds are single actions: ten times as many."""
-PROMPT_PX = 300
+PROMPT_PX = 256
 """Longer edge of an image of a prompt, at most."""
 EXCHANGES_NAME = "exchanges.sqlite"
 """In the folder of a run that asked a model."""
@@ -355,7 +355,10 @@ def _question(asked: Asked) -> TracedQuestion:
         for part in turn.parts:
             shown = jpeg_of(part.pixels, PROMPT_PX, QUALITY) if isinstance(part, Picture) else part.text
             parts.append((turn.role, shown))
-    return TracedQuestion(asked.question.kind, tuple(parts), asked.text, asked.outcome, tuple(_offered(asked.question)))
+    answer = asked.text
+    while answer.startswith(f"{asked.outcome}: "):  # what is told of a fault begins with its name
+        answer = answer.removeprefix(f"{asked.outcome}: ")
+    return TracedQuestion(asked.question.kind, tuple(parts), answer, asked.outcome, tuple(_offered(asked.question)))
 
 
 def _offered(question: Question[Any]) -> Iterator[tuple[str, str, int]]:

@@ -116,9 +116,10 @@
         }
       }
     }
-    // Names of those that matter in this round, none over another.
+    // Names of those that matter in this round, none over another; a whole memory on offer is not named.
+    const isNamed = (entry) => rank(entry) > 1 + (candidates.size > 8) || rank(entry) === 1;
     const size = 2.1 * u, [left, , wide] = home.split(" ").map(Number);
-    for (const [id, label, x, y, width, depth, , isStale] of ordered.filter((entry) => rank(entry)).reverse()) {
+    for (const [id, label, x, y, width, depth, , isStale] of ordered.filter(isNamed).reverse()) {
       const words = `${label} #${id}`, half = 0.32 * size * words.length, h = Math.max(depth, 1.4 * u) / 2, w = Math.max(width, 1.4 * u) / 2;
       const places = [[x, y - h - 0.5 * size], [x, y + h + 1.1 * size], [x + w + half + 0.4 * u, y + 0.35 * size], [x - w - half - 0.4 * u, y + 0.35 * size], [x, y - h - 1.6 * size], [x, y + h + 2.2 * size]];
       const box = ([cx, cy]) => [cx - half, cy - 0.8 * size, cx + half, cy + 0.3 * size];
@@ -267,7 +268,8 @@
       }
       details.open = isPromptOpen ?? round.q.length < 4;
       summary.addEventListener("click", () => { isPromptOpen = !details.open; });
-      div.append(text, ...(offered ? [html("p", offered, "quiet offered")] : []), details);
+      const isAgain = index > 0 && round.q[index - 1][3] === prompt;
+      div.append(text, ...(isAgain ? [html("p", "It was asked the same again.", "quiet")] : [...(offered ? [html("p", offered, "quiet offered")] : []), details]));
       box.append(div);
     });
   };
@@ -413,6 +415,10 @@
   });
   for (const name of ["pointerup", "pointercancel"]) svgMap.addEventListener(name, () => { grip = null; });
   svgMap.addEventListener("dblclick", () => { $("follow").checked = false; wholeMap(); });
+
+  addEventListener("click", ({ target }) => {
+    if (target.matches?.("#sides img, .pictures img")) target.parentElement.classList.toggle("big");
+  });
 
   const layers = [...document.querySelectorAll("[data-layer]")];
   const applyLayers = () => {
