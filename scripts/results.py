@@ -71,8 +71,11 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
     main_table, relocation, first, order, differences = paper_tables(run)
     sweep = {rate: load_run(folder) for rate in RATES if (folder := out / f"wrong-{rate:g}").exists()}
     FIGURE.parent.mkdir(exist_ok=True)
+    errors = ""
     if sweep:
         FIGURE.write_text(_figure(sweep, agents), encoding="utf-8")
+        picture = f"![SR by share of wrong decisions](images/{FIGURE.name})"
+        errors = f"{picture}\n\n{sensitivity_table(sweep, agents).markdown()}"
     return {
         "setting": setting_table(run).markdown(),
         "table-1": main_table.markdown(),
@@ -88,7 +91,7 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
         "ends": end_table(deeds).markdown(),
         "counters": counter_table(deeds).markdown(),
         "effort": effort_table(run).markdown(),
-        "errors": sensitivity_table(sweep, agents).markdown(),
+        "errors": errors,
     }
 
 
