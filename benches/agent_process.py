@@ -32,7 +32,7 @@ of pairs of runs in turn; stages a second are wall time, with the start of all p
 SIDE_PX = 300
 NUM_ROUNDS = 200
 NUM_TASKS = 4
-NUM_PAIRS = 3
+NUM_PAIRS = 2
 
 
 class Idle:

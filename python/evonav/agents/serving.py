@@ -95,7 +95,7 @@ def _serve(connection: socket.socket, block: _Block) -> None:
         request = _received(connection)
         if request is None:
             return
-        places, message = pickle.loads(request)  # noqa: S301 - of the evaluator
+        number, places, message = pickle.loads(request)  # noqa: S301 - of the evaluator
         operation, arguments = pickle.loads(message, buffers=block.copies(places))  # noqa: S301
         parts = server.answer(operation, arguments)
         del arguments
@@ -104,7 +104,7 @@ def _serve(connection: socket.socket, block: _Block) -> None:
         for stream in (sys.stdout, sys.stderr):
             with suppress(Exception):  # an agent may have closed or replaced it
                 stream.flush()
-        parts["cpu_s"] = json.dumps(time.process_time())
+        parts.update(number=str(number), cpu_s=json.dumps(time.process_time()))
         text = "{" + ",".join(f'"{name}":{part}' for name, part in parts.items()) + "}"
         data = text.encode()
         connection.sendall(LENGTH.pack(len(data)) + data)

@@ -3,21 +3,17 @@
 First in a process of its own, where it may break what it likes, then here, where it can be looked at.
 """
 
-import hashlib
 import sys
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from evonav.agents import wire
-from evonav.agents.agent import Agent, AgentAction, EntryBelief, ExplainingAgent, RoundDiagnostics, Sensing
+from evonav.agents.agent import Agent, Sensing
 from evonav.agents.registry import agent_factory, new_agent
+from evonav.evaluation.agent_probe import Probe
 from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
@@ -25,15 +21,11 @@ from evonav.evaluation.privileged import YARDSTICKS
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import ErrorKind, StageRecord
 from evonav.evaluation.rollout import Episode
-from evonav.sensors.observation import MapFrame, Observation
-from evonav.tasks.public import StageInput, TaskInfo
 
 PROTOCOL = ProtocolConfig(max_rounds=10, max_actions=40)
 """Shorter than an evaluation's."""
 SLOW_ROUND_S = 1.0
 LARGE_MEMORY_MB = 2000.0
-MAP_MARGIN_M = 0.5
-"""An entry may lie this far outside the map: walls and what hangs on them do."""
 
 Verdict = Literal["pass", "warn", "fail", "skip"]
 
@@ -91,7 +83,7 @@ class _Run:
     """What became of one or more episodes of one agent object."""
 
     records: list[StageRecord] = field(default_factory=list)
-    probe: "_Probe | None" = None
+    probe: Probe | None = None
     memory_mb: float | None = None
 
     @property
@@ -171,9 +163,9 @@ class _Examination:
         self._say("importable", "pass", f"`{self._name}` is found by a process of its own")
         return run
 
-    def _here(self, factory: Callable[..., Agent], cases: Sequence[EpisodeCase], probe: "_Probe | None" = None) -> _Run:
+    def _here(self, factory: Callable[..., Agent], cases: Sequence[EpisodeCase], probe: Probe | None = None) -> _Run:
         """Episodes of one agent object in this process."""
-        probe = probe or _Probe(new_agent(factory, self._backend.make_decision(self._seed)))
+        probe = probe or Probe(new_agent(factory, self._backend.make_decision(self._seed)))
         run = _Run(probe=probe)
         for case in cases:
             run.records += self._episode(probe, case)
@@ -212,7 +204,7 @@ class _Examination:
             self._check_entries(probe)
             self._check_time(probe)
 
-    def _check_sensing(self, probe: "_Probe") -> None:
+    def _check_sensing(self, probe: "Probe") -> None:
         try:
             sensing = wire.sensing_of(wire.read_json(wire.sensing_json(probe.sensing).encode()))
             PROTOCOL.check(sensing)
@@ -246,14 +238,14 @@ class _Examination:
         at_once = len(scored) > 1 and all(record.num_rounds == 1 for record in scored)
         self._say("budget", "warn" if at_once else "pass", said + ("; it never did anything else" if at_once else ""))
 
-    def _check_observations(self, probe: "_Probe") -> None:
+    def _check_observations(self, probe: "Probe") -> None:
         changed = probe.changed()
         if changed:
             self._say("observations", "warn", f"it writes into what it is given ({changed}): copy arrays first")
         else:
             self._say("observations", "pass", "arrays that it was given are as they were, to the end")
 
-    def _check_diagnostics(self, probe: "_Probe") -> None:
+    def _check_diagnostics(self, probe: "Probe") -> None:
         if not probe.explains:
             self._say("diagnostics", "warn", "no `diagnostics()` and `entries()`: reports cannot show what it believes")
         elif (error := probe.errors.get("diagnostics")) is not None:
@@ -261,7 +253,7 @@ class _Examination:
         else:
             self._say("diagnostics", "pass", f"JSON-ready, {probe.largest_diagnostics} bytes a round at most")
 
-    def _check_entries(self, probe: "_Probe") -> None:
+    def _check_entries(self, probe: "Probe") -> None:
         if not probe.explains:
             return
         if (error := probe.errors.get("entries")) is not None:
@@ -271,7 +263,7 @@ class _Examination:
         else:
             self._say("entries", "pass", f"{probe.num_entries} at the end of stages, all within the map")
 
-    def _check_time(self, probe: "_Probe") -> None:
+    def _check_time(self, probe: "Probe") -> None:
         if not probe.seconds:
             return
         mean_s, worst_s = sum(probe.seconds) / len(probe.seconds), max(probe.seconds)
@@ -316,110 +308,6 @@ class _Examination:
         if alone.memory_mb is not None:
             verdict: Verdict = "warn" if alone.memory_mb > LARGE_MEMORY_MB else "pass"
             self._say("memory", verdict, f"{alone.memory_mb:.0f} MB in a process of its own")
-
-
-class _Probe:
-    """An agent, and what it does."""
-
-    def __init__(self, agent: Agent) -> None:
-        self.agent = agent
-        self.explains = isinstance(agent, ExplainingAgent)
-        self.calls = {"begin_task": 0, "begin_stage": 0, "act": 0, "diagnostics": 0, "entries": 0}
-        self.errors: dict[str, BaseException] = {}
-        self.seconds: list[float] = []
-        self.largest_diagnostics = 0
-        self.num_entries = 0
-        self.outside: list[str] = []
-        self._frame: MapFrame | None = None
-        self._given: list[tuple[str, NDArray[Any], str]] = []
-        self._changed = ""
-
-    @property
-    def sensing(self) -> Sensing:
-        return self.agent.sensing
-
-    @sensing.setter
-    def sensing(self, sensing: Sensing) -> None:
-        self.agent.sensing = sensing
-
-    def begin_task(self, task: TaskInfo) -> None:
-        self._frame = task.map_frame
-        self._call("begin_task", lambda: self.agent.begin_task(task))
-
-    def begin_stage(self, stage: StageInput) -> None:
-        self._note("reference_image", stage.reference_image)
-        self._call("begin_stage", lambda: self.agent.begin_stage(stage))
-
-    def act(self, observation: Observation) -> AgentAction:
-        for view in observation.views:
-            self._note("depth_m", view.depth_m)
-            self._note("detections.masks", view.detections.masks)
-            self._note("occupancy.free", view.occupancy.free)
-            self._note("occupancy.blocked", view.occupancy.blocked)
-            if view.rgb is not None:
-                self._note("rgb", view.rgb)
-        began_s = time.perf_counter()
-        action: AgentAction = self._call("act", lambda: self.agent.act(observation))
-        self.seconds.append(time.perf_counter() - began_s)
-        return action
-
-    def diagnostics(self) -> RoundDiagnostics:
-        if not isinstance(self.agent, ExplainingAgent):
-            return RoundDiagnostics()
-        agent = self.agent
-
-        def ask() -> RoundDiagnostics:
-            text = wire.diagnostics_json(agent.diagnostics())
-            self.largest_diagnostics = max(self.largest_diagnostics, len(text))
-            return wire.diagnostics_of(wire.read_json(text.encode()))
-
-        told: RoundDiagnostics = self._call("diagnostics", ask)
-        return told
-
-    def entries(self) -> Sequence[EntryBelief]:
-        if not isinstance(self.agent, ExplainingAgent):
-            return ()
-        agent = self.agent
-
-        def ask() -> list[EntryBelief]:
-            return wire.entries_of(wire.read_json(wire.entries_json(agent.entries()).encode()))
-
-        found: list[EntryBelief] = self._call("entries", ask)
-        self.num_entries += len(found)
-        self.outside += [said for entry in found if (said := self._misplaced(entry)) is not None]
-        return found
-
-    def changed(self) -> str:
-        """Which of the arrays that it was given are not as they were."""
-        for name, array, digest in self._given:
-            if _digest(array) != digest:
-                self._changed = self._changed or name
-        self._given.clear()
-        return self._changed
-
-    def _note(self, name: str, array: NDArray[Any]) -> None:
-        self._given.append((name, array, _digest(array)))
-
-    def _misplaced(self, entry: EntryBelief) -> str | None:
-        frame = self._frame
-        if frame is None:
-            return None
-        low = np.array(frame.corner_m) - MAP_MARGIN_M
-        high = np.array(frame.corner_m) + np.array([frame.cols, frame.rows]) * frame.cell_m + MAP_MARGIN_M
-        place = np.array([entry.centre_m[0], entry.centre_m[2]])
-        if np.isfinite(entry.centre_m).all() and (low <= place).all() and (place <= high).all():
-            return None
-        return f"entry {entry.entry_id} ({entry.label}) is at {entry.centre_m}, outside the map"
-
-    def _call(self, name: str, function: Callable[[], Any]) -> Any:  # noqa: ANN401 - of the function
-        self.calls[name] += 1
-        try:
-            return function()
-        except BaseException as error:
-            self.errors.setdefault(name, error)
-            if isinstance(error, Exception):
-                raise
-            raise RuntimeError(f"{type(error).__name__} ends the process") from error
 
 
 def _named(agent: str | Callable[..., Agent] | Agent) -> tuple[str, Callable[..., Agent] | None]:
@@ -473,7 +361,3 @@ def _words(action: Any) -> str:  # noqa: ANN401 - `ActionRecord`
 def _sensing(run: _Run) -> Sensing:
     assert run.probe is not None
     return run.probe.sensing
-
-
-def _digest(array: NDArray[Any]) -> str:
-    return hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()

@@ -9,27 +9,25 @@ it.
 This is no sandbox: an agent that goes looking can read what this user can read. For that, run evonav in a container.
 """
 
-import mmap
 import os
 import pickle
+import select
 import signal
 import socket
 import subprocess
 import sys
-import tempfile
-import threading
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from multiprocessing.connection import wait
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from evonav.agents import wire
 from evonav.agents.agent import AgentAction, EntryBelief, RoundDiagnostics, Sensing
 from evonav.agents.serving import LENGTH
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.agent_channel import OutputLog, SharedBlock
 from evonav.evaluation.protocol import AgentFailedError
 from evonav.evaluation.records import ErrorKind
 from evonav.parallel import one_thread_each
@@ -45,10 +43,8 @@ IS_SUPPORTED = os.name == "posix"
 MAX_PROCESSES = 8
 """Kept by a worker, one an agent's name; the one that was used longest ago makes room."""
 MAX_ANSWER_BYTES = 2 * wire.MAX_ENTRIES_BYTES
-MAX_LOG_BYTES = 10_000_000
-"""Of an episode; what an agent prints beyond is dropped, and the log says so."""
-_MAX_LINE_BYTES = 65536
-_ALIGN = 64
+_PART_BYTES = 1 << 18
+_LONGEST_WAIT_S = 3600.0
 _POLL_S = 0.05
 """Between looks whether a process lives, where the system cannot be asked to tell."""
 _START = (
@@ -92,10 +88,10 @@ class AgentProcess:
         self.cpu_s = 0.0
         """CPU time that it has used, by its own account."""
         self._hosting = hosting
-        self._block = _SharedBlock()
+        self._block = SharedBlock()
         self._connection, far_end = socket.socketpair()
         life, self._life = os.pipe()
-        output = None if hosting.log is None else _Log(Path(hosting.log), name)
+        output = None if hosting.log is None else OutputLog(Path(hosting.log), name)
         self._log = output
         try:
             arguments = (far_end.fileno(), life, self._block.descriptor)
@@ -114,6 +110,11 @@ class AgentProcess:
             if output is not None:
                 output.begin()
         self._watch = os.pidfd_open(self._process.pid) if hasattr(os, "pidfd_open") else None
+        self._poll = select.poll()
+        for descriptor in (self._connection.fileno(), self._watch):
+            if descriptor is not None:
+                self._poll.register(descriptor, select.POLLIN)
+        self._num_asked = 0
         self._is_asking = False
         self._is_closed = False
         try:
@@ -173,40 +174,45 @@ class AgentProcess:
     def _send(self, operation: str, arguments: tuple[object, ...], deadline_s: float) -> None:
         buffers: list[pickle.PickleBuffer] = []
         message = pickle.dumps((operation, arguments), protocol=5, buffer_callback=buffers.append)
-        request = pickle.dumps((self._block.write(buffers), message), protocol=5)
+        self._num_asked += 1
+        request = pickle.dumps((self._num_asked, self._block.write(buffers), message), protocol=5)
         self._connection.settimeout(max(1e-3, deadline_s - time.monotonic()))
         self._connection.sendall(LENGTH.pack(len(request)) + request)
 
     def _answer(self, deadline_s: float) -> dict[str, Any]:
-        (size,) = LENGTH.unpack(self._exactly(LENGTH.size, deadline_s))
-        if size > MAX_ANSWER_BYTES:
-            raise ValueError(f"it has {size} bytes")
-        said = wire.read_json(bytes(self._exactly(size, deadline_s)))
+        said = wire.read_json(self._message(deadline_s))
         if not isinstance(said, dict) or not isinstance(said.get("cpu_s"), float):
             raise ValueError("it has none of our form")
+        if said.get("number") != self._num_asked:
+            raise ValueError("it answers something else")
         return said
 
-    def _exactly(self, size: int, deadline_s: float) -> bytearray:
-        data = bytearray(size)
-        with memoryview(data) as rest:
-            done = 0
-            while done < size:
-                self._wait(deadline_s)
-                count = self._connection.recv_into(rest[done:])
-                if count == 0:
-                    raise ConnectionResetError("hung up")
-                done += count
-        return data
+    def _message(self, deadline_s: float) -> bytes:
+        """One message, and nothing after it."""
+        data, size = bytearray(), LENGTH.size
+        while len(data) < size:
+            self._wait(deadline_s)
+            part = self._connection.recv(_PART_BYTES)
+            if not part:
+                raise ConnectionResetError("hung up")
+            data += part
+            if size == LENGTH.size <= len(data):
+                size += LENGTH.unpack_from(data)[0]
+                if size > MAX_ANSWER_BYTES:
+                    raise ValueError(f"it has {size} bytes")
+        if len(data) > size:
+            raise ValueError("there is more than one")
+        return bytes(data[LENGTH.size :])
 
     def _wait(self, deadline_s: float) -> None:
         """Waits for something to read; not for what a child of a dead agent might still send."""
-        watched: list[Any] = [self._connection] if self._watch is None else [self._connection, self._watch]
         while True:
             left_s = deadline_s - time.monotonic()
             if left_s <= 0.0:
                 raise TimeoutError
-            ready = wait(watched, left_s if self._watch is not None else min(left_s, _POLL_S))
-            if self._connection in ready:
+            limit_s = left_s if self._watch is not None else min(left_s, _POLL_S)
+            ready = {descriptor for descriptor, _ in self._poll.poll(1000.0 * min(limit_s, _LONGEST_WAIT_S))}
+            if self._connection.fileno() in ready:
                 return
             if ready or (self._watch is None and self._process.poll() is not None):
                 raise ConnectionResetError("died")
@@ -388,92 +394,3 @@ def _failure(said: object) -> AgentFailedError:
     if isinstance(said, list) and len(said) == 2 and said[0] in ("agent", "decision") and isinstance(said[1], str):
         return AgentFailedError(ErrorKind(said[0]), said[1])
     return AgentFailedError(ErrorKind.AGENT, "it failed and did not say how")
-
-
-class _SharedBlock:
-    """Memory that another process can read, from the writer's side."""
-
-    def __init__(self) -> None:
-        if hasattr(os, "memfd_create"):
-            import fcntl
-
-            self.descriptor = os.memfd_create("evonav", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
-            # A reader that made the file shorter would have the writer killed by its next write.
-            fcntl.fcntl(self.descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL)
-        else:
-            with tempfile.TemporaryFile() as file:
-                self.descriptor = os.dup(file.fileno())
-        self._map: mmap.mmap | None = None
-
-    def write(self, buffers: Sequence[pickle.PickleBuffer]) -> list[tuple[int, int]]:
-        """Copies buffers into it. Returns offset and size of each."""
-        views = [buffer.raw() for buffer in buffers]
-        places, end = [], 0
-        for view in views:
-            places.append((end, view.nbytes))
-            end += -(-view.nbytes // _ALIGN) * _ALIGN
-        if end and (self._map is None or len(self._map) < end):
-            if self._map is not None:
-                self._map.close()
-            os.ftruncate(self.descriptor, end)
-            self._map = mmap.mmap(self.descriptor, end)
-        if self._map is not None:
-            with memoryview(self._map) as block:
-                for (offset, size), view in zip(places, views, strict=True):
-                    block[offset : offset + size] = view
-        for buffer, view in zip(buffers, views, strict=True):
-            view.release()
-            buffer.release()
-        return places
-
-    def close(self) -> None:
-        """Gives it back; the reader keeps what it has."""
-        if self._map is not None:
-            self._map.close()
-        os.close(self.descriptor)
-
-
-class _Log:
-    """Takes what a process prints to a file, line by line, with what the process was at.
-
-    Through a pipe: a descriptor of the file itself would tell the agent where the run is.
-    """
-
-    def __init__(self, path: Path, name: str) -> None:
-        self._reader, self.descriptor = os.pipe()
-        self._path = path
-        self._label = name
-        self._left = MAX_LOG_BYTES
-        self._thread = threading.Thread(target=self._run, daemon=True)
-
-    def begin(self) -> None:
-        """After the process was started, or was not."""
-        os.close(self.descriptor)
-        self._thread.start()
-
-    def begin_part(self, label: str) -> None:
-        """From here on, lines are of this."""
-        if label != self._label:
-            self._label = label
-            self._left = MAX_LOG_BYTES
-
-    def end(self) -> None:
-        """Waits a little for the last words."""
-        self._thread.join(timeout=1.0)
-
-    def _run(self) -> None:
-        with suppress(OSError), os.fdopen(self._reader, "rb") as output:
-            first = output.readline(_MAX_LINE_BYTES)
-            if first:  # no file where nothing is said
-                with self._path.open("ab", buffering=0) as file:
-                    self._copy(first, output, file)
-
-    def _copy(self, line: bytes, output: BinaryIO, file: BinaryIO) -> None:
-        while line:
-            label, left = self._label, self._left
-            self._left = left - len(line)
-            if left > 0:
-                file.write(f"{label} | ".encode() + line.rstrip(b"\n") + b"\n")
-                if self._left <= 0:
-                    file.write(f"{label} | ... more than {MAX_LOG_BYTES} bytes: the rest is dropped\n".encode())
-            line = output.readline(_MAX_LINE_BYTES)

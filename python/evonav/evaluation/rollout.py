@@ -6,7 +6,7 @@ that remembers nothing. The records of later stages say so. A failure of anythin
 
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol, runtime_checkable
 
@@ -35,13 +35,11 @@ from evonav.evaluation.protocol import (
     as_errored,
     as_not_run,
 )
+from evonav.evaluation.record_parts import action_record, entry_record, pose_record
 from evonav.evaluation.records import (
-    ActionRecord,
     EndState,
     EntryRecord,
     ErrorKind,
-    Point3,
-    PoseRecord,
     RoundRecord,
     StageMap,
     StageRecord,
@@ -51,9 +49,6 @@ from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.simulator import SceneObject, Simulator
-
-STALE_MARGIN_M = 0.3
-"""An entry whose centre is this near the box of an object of its label is not stale."""
 
 
 class EpisodeObserver(Protocol):
@@ -335,7 +330,7 @@ class _StageRun:
             return RoundRecord(
                 round=number,
                 pose=pose_record(sensed.observation.pose),
-                action=_action_record(action),
+                action=action_record(action),
                 path_m=done.path_m,
                 is_action_success=done.is_success,
                 is_target_visible=sensed.is_target_visible,
@@ -406,41 +401,3 @@ class _StageRun:
 
     def _entry_record(self, belief: EntryBelief) -> EntryRecord:
         return entry_record(belief, self._bodies)
-
-
-def entry_record(belief: EntryBelief, bodies: Mapping[str, Sequence[SceneObject]]) -> EntryRecord:
-    """An entry for the record, judged.
-
-    Args:
-        belief: As the agent holds it.
-        bodies: Of the stage's house, by category.
-    """
-    return EntryRecord(
-        entry_id=belief.entry_id,
-        label=belief.label,
-        centre_m=belief.centre_m,
-        size_m=belief.size_m,
-        num_detections=belief.num_detections,
-        is_stale=not any(
-            distance_to_box_m(belief.centre_m, body) <= STALE_MARGIN_M for body in bodies.get(belief.label, ())
-        ),
-    )
-
-
-def pose_record(pose: Pose) -> PoseRecord:
-    """A pose for the record."""
-    return PoseRecord(x_m=pose.x_m, y_m=pose.y_m, z_m=pose.z_m, yaw_rad=pose.yaw_rad, horizon_rad=pose.horizon_rad)
-
-
-def _action_record(action: AgentAction) -> ActionRecord:
-    if isinstance(action, NavigateTo):
-        return ActionRecord(kind="navigate_to", position_m=action.position_m)
-    if isinstance(action, Move):
-        return ActionRecord(kind="move", action=action.action.value)
-    return ActionRecord(kind="stop", reason=str(action.reason))
-
-
-def distance_to_box_m(point_m: Point3, body: SceneObject) -> float:
-    """From a point to the axis-aligned box of a body; 0 inside."""
-    gaps_m = (max(0.0, abs(p - c) - s / 2) for p, c, s in zip(point_m, body.centre_m, body.size_m, strict=True))
-    return math.hypot(*gaps_m)

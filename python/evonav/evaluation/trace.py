@@ -31,8 +31,9 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.engine import agent_seed
 from evonav.evaluation.protocol import AgentFailedError, EpisodeCase, ProtocolConfig, StageOutcome
+from evonav.evaluation.record_parts import STALE_MARGIN_M, distance_to_box_m, entry_record, pose_record
 from evonav.evaluation.records import EndState, ErrorKind, RoundRecord, StageMap, StageRecord
-from evonav.evaluation.rollout import LOSSES, STALE_MARGIN_M, Episode, distance_to_box_m, entry_record, pose_record
+from evonav.evaluation.rollout import LOSSES, Episode
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.traced import (
     BLOCKED,

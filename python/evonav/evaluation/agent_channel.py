@@ -1,0 +1,105 @@
+"""What an agent's process has besides its socket: shared memory for what it is given, a log for what it prints."""
+
+import mmap
+import os
+import pickle
+import tempfile
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO
+
+MAX_LOG_BYTES = 10_000_000
+"""Of an episode; what an agent prints beyond is dropped, and the log says so."""
+_MAX_LINE_BYTES = 65536
+_ALIGN = 64
+
+
+class SharedBlock:
+    """Memory that another process can read, from the writer's side."""
+
+    def __init__(self) -> None:
+        if hasattr(os, "memfd_create"):
+            import fcntl
+
+            self.descriptor = os.memfd_create("evonav", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
+            # A reader that made the file shorter would have the writer killed by its next write.
+            fcntl.fcntl(self.descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL)
+        else:
+            with tempfile.TemporaryFile() as file:
+                self.descriptor = os.dup(file.fileno())
+        self._map: mmap.mmap | None = None
+
+    def write(self, buffers: Sequence[pickle.PickleBuffer]) -> list[tuple[int, int]]:
+        """Copies buffers into it. Returns offset and size of each."""
+        views = [buffer.raw() for buffer in buffers]
+        places, end = [], 0
+        for view in views:
+            places.append((end, view.nbytes))
+            end += -(-view.nbytes // _ALIGN) * _ALIGN
+        if end and (self._map is None or len(self._map) < end):
+            if self._map is not None:
+                self._map.close()
+            os.ftruncate(self.descriptor, end)
+            self._map = mmap.mmap(self.descriptor, end)
+        if self._map is not None:
+            with memoryview(self._map) as block:
+                for (offset, size), view in zip(places, views, strict=True):
+                    block[offset : offset + size] = view
+        for buffer, view in zip(buffers, views, strict=True):
+            view.release()
+            buffer.release()
+        return places
+
+    def close(self) -> None:
+        """Gives it back; the reader keeps what it has."""
+        if self._map is not None:
+            self._map.close()
+        os.close(self.descriptor)
+
+
+class OutputLog:
+    """Takes what a process prints to a file, line by line, with what the process was at.
+
+    Through a pipe: a descriptor of the file itself would tell the agent where the run is.
+    """
+
+    def __init__(self, path: Path, name: str) -> None:
+        self._reader, self.descriptor = os.pipe()
+        self._path = path
+        self._label = name
+        self._left = MAX_LOG_BYTES
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def begin(self) -> None:
+        """After the process was started, or was not."""
+        os.close(self.descriptor)
+        self._thread.start()
+
+    def begin_part(self, label: str) -> None:
+        """From here on, lines are of this."""
+        if label != self._label:
+            self._label = label
+            self._left = MAX_LOG_BYTES
+
+    def end(self) -> None:
+        """Waits a little for the last words."""
+        self._thread.join(timeout=1.0)
+
+    def _run(self) -> None:
+        with suppress(OSError), os.fdopen(self._reader, "rb") as output:
+            first = output.readline(_MAX_LINE_BYTES)
+            if first:  # no file where nothing is said
+                with self._path.open("ab", buffering=0) as file:
+                    self._copy(first, output, file)
+
+    def _copy(self, line: bytes, output: BinaryIO, file: BinaryIO) -> None:
+        while line:
+            label, left = self._label, self._left
+            self._left = left - len(line)
+            if left > 0:
+                file.write(f"{label} | ".encode() + line.rstrip(b"\n") + b"\n")
+                if self._left <= 0:
+                    file.write(f"{label} | ... more than {MAX_LOG_BYTES} bytes: the rest is dropped\n".encode())
+            line = output.readline(_MAX_LINE_BYTES)

@@ -1,0 +1,131 @@
+"""An agent that is watched: it does what it does, and all of it is noted."""
+
+import hashlib
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.agents import wire
+from evonav.agents.agent import Agent, AgentAction, EntryBelief, ExplainingAgent, RoundDiagnostics, Sensing
+from evonav.sensors.observation import MapFrame, Observation
+from evonav.tasks.public import StageInput, TaskInfo
+
+MAP_MARGIN_M = 0.5
+"""An entry may lie this far outside the map: walls and what hangs on them do."""
+
+
+class Probe:
+    """An agent, and what it does."""
+
+    def __init__(self, agent: Agent) -> None:
+        self.agent = agent
+        self.explains = isinstance(agent, ExplainingAgent)
+        self.calls = {"begin_task": 0, "begin_stage": 0, "act": 0, "diagnostics": 0, "entries": 0}
+        self.errors: dict[str, BaseException] = {}
+        self.seconds: list[float] = []
+        self.largest_diagnostics = 0
+        self.num_entries = 0
+        self.outside: list[str] = []
+        self._frame: MapFrame | None = None
+        self._given: list[tuple[str, NDArray[Any], str]] = []
+        self._changed = ""
+
+    @property
+    def sensing(self) -> Sensing:
+        """The agent's."""
+        return self.agent.sensing
+
+    @sensing.setter
+    def sensing(self, sensing: Sensing) -> None:
+        self.agent.sensing = sensing
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """A new house."""
+        self._frame = task.map_frame
+        self._call("begin_task", lambda: self.agent.begin_task(task))
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """A new goal."""
+        self._note("reference_image", stage.reference_image)
+        self._call("begin_stage", lambda: self.agent.begin_stage(stage))
+
+    def act(self, observation: Observation) -> AgentAction:
+        """A decision round, timed."""
+        for view in observation.views:
+            self._note("depth_m", view.depth_m)
+            self._note("detections.masks", view.detections.masks)
+            self._note("occupancy.free", view.occupancy.free)
+            self._note("occupancy.blocked", view.occupancy.blocked)
+            if view.rgb is not None:
+                self._note("rgb", view.rgb)
+        began_s = time.perf_counter()
+        action: AgentAction = self._call("act", lambda: self.agent.act(observation))
+        self.seconds.append(time.perf_counter() - began_s)
+        return action
+
+    def diagnostics(self) -> RoundDiagnostics:
+        """What it says of the round, as JSON would have it."""
+        if not isinstance(self.agent, ExplainingAgent):
+            return RoundDiagnostics()
+        agent = self.agent
+
+        def ask() -> RoundDiagnostics:
+            text = wire.diagnostics_json(agent.diagnostics())
+            self.largest_diagnostics = max(self.largest_diagnostics, len(text))
+            return wire.diagnostics_of(wire.read_json(text.encode()))
+
+        told: RoundDiagnostics = self._call("diagnostics", ask)
+        return told
+
+    def entries(self) -> Sequence[EntryBelief]:
+        """Its object memory, as JSON would have it."""
+        if not isinstance(self.agent, ExplainingAgent):
+            return ()
+        agent = self.agent
+
+        def ask() -> list[EntryBelief]:
+            return wire.entries_of(wire.read_json(wire.entries_json(agent.entries()).encode()))
+
+        found: list[EntryBelief] = self._call("entries", ask)
+        self.num_entries += len(found)
+        self.outside += [said for entry in found if (said := self._misplaced(entry)) is not None]
+        return found
+
+    def changed(self) -> str:
+        """Which of the arrays that it was given are not as they were."""
+        for name, array, digest in self._given:
+            if _digest(array) != digest:
+                self._changed = self._changed or name
+        self._given.clear()
+        return self._changed
+
+    def _note(self, name: str, array: NDArray[Any]) -> None:
+        self._given.append((name, array, _digest(array)))
+
+    def _misplaced(self, entry: EntryBelief) -> str | None:
+        frame = self._frame
+        if frame is None:
+            return None
+        low = np.array(frame.corner_m) - MAP_MARGIN_M
+        high = np.array(frame.corner_m) + np.array([frame.cols, frame.rows]) * frame.cell_m + MAP_MARGIN_M
+        place = np.array([entry.centre_m[0], entry.centre_m[2]])
+        if np.isfinite(entry.centre_m).all() and (low <= place).all() and (place <= high).all():
+            return None
+        return f"entry {entry.entry_id} ({entry.label}) is at {entry.centre_m}, outside the map"
+
+    def _call(self, name: str, function: Callable[[], Any]) -> Any:  # noqa: ANN401 - of the function
+        self.calls[name] += 1
+        try:
+            return function()
+        except BaseException as error:
+            self.errors.setdefault(name, error)
+            if isinstance(error, Exception):
+                raise
+            raise RuntimeError(f"{type(error).__name__} ends the process") from error
+
+
+def _digest(array: NDArray[Any]) -> str:
+    return hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()
