@@ -212,6 +212,26 @@ def test_a_loop_of_failed_moves_is_left():
     assert walk.bev.collisions.any()
 
 
+@pytest.mark.parametrize("kind", ["exploration", "confirmed"])
+def test_shut_in_by_its_own_bumps_it_feels_its_way_out(kind):
+    walk = Walk()
+    for yaw in np.arange(0.0, 2 * math.pi, 0.02):
+        walk.bev.core.collide(walk.here, float(yaw), start=3, length=3, width=3)
+    walk.bev.core.visit(walk.here, (3.0, 2.9))
+    goal = np.array([walk.bev.cell_of((3.6, 2.8))], np.int32)
+    start_m, real_step = walk.here, walk.simulator.step
+    # Something keeps it from going anywhere but to the east.
+    walk.simulator.step = lambda action: (
+        (action is not Action.MOVE_FORWARD or math.sin(walk.simulator.pose.yaw_rad) > 0.9) and real_step(action)
+    )
+    for _ in range(60):
+        walk.step(goal, kind)
+        if walk.here != start_m:
+            break
+    assert walk.here[0] > start_m[0] + 0.2
+    assert walk.num_bumps <= 25
+
+
 def test_without_a_way_it_goes_as_near_as_it_gets_and_from_there_to_where_it_has_been():
     bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
     planner = UniGoalPlanner(bev, 0)

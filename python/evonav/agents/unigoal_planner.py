@@ -5,7 +5,7 @@ The planner holds no goal of its own but the one to get unstuck; which goal coun
 
 import math
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -256,7 +256,8 @@ class UniGoalPlanner:
 
         A stuck agent heads for a random place where it has been, until it moves, unless its goal is confirmed. Where
         the map shows no way to the goal, the agent goes to the reachable place nearest to it, from there to one where
-        it has been, and back; an exploration target is dropped. An agent with nothing to head for turns right.
+        it has been, and back; an exploration target is dropped. An agent with nothing to head for turns right, one that
+        is shut in by what it has bumped into tries in turn to move and to turn.
 
         Args:
             pose: The agent's.
@@ -266,7 +267,8 @@ class UniGoalPlanner:
         if self.is_stuck and kind != "confirmed":
             if self._stuck.goal_m is None:
                 self._stuck.goal_m = self._visited_place(pose)
-            return self._act(self._step_to(pose, self._stuck.goal_m, "stuck"))
+            step = self._step_to(pose, self._stuck.goal_m, "stuck")
+            return self._act(step if step.distance_m is not None else self._feel(step))
         step = self._step_to(pose, goal, kind)
         if step.goal == "none" or step.action is Action.STOP:
             return self._act(step)
@@ -275,6 +277,8 @@ class UniGoalPlanner:
             return self._act(step)
         self.counters.unreachable += 1
         self._exploration.target_m = None
+        if self.is_stuck:
+            return self._act(self._feel(step))
         if self._detour_m is None and step.short_term_m is None:
             self._detour_m = self._visited_place(pose)
         if self._detour_m is None:
@@ -283,6 +287,11 @@ class UniGoalPlanner:
         if detour.distance_m is None or detour.distance_m < self.config.stop_m:
             self._detour_m = None
         return self._act(detour)
+
+    def _feel(self, step: PlannedStep) -> PlannedStep:
+        """Shut in by what it has bumped into, a stuck agent turns and tries, all around, until it moves."""
+        has_tried = self._last_action is Action.MOVE_FORWARD
+        return replace(step, action=Action.TURN_RIGHT if has_tried else Action.MOVE_FORWARD)
 
     def _act(self, step: PlannedStep) -> PlannedStep:
         self._last_action = step.action
