@@ -6,6 +6,7 @@ stage in that round without asking the agent, and goes on with a fresh one, as t
 (the evaluator's own process was lost) is shown as it was recorded. Nothing here runs in an evaluation.
 """
 
+import hashlib
 import inspect
 import json
 import math
@@ -200,6 +201,7 @@ class Tracer:
         """Objects by category, of each stage so far."""
         self._now: dict[str, SceneObject] = {}
         self._truths: dict[tuple[str, tuple[float, float, float]], Truth | None] = {}
+        self._prompt_jpegs: dict[bytes, bytes] = {}
         self._stage = 0
         self._rounds: list[TracedRound] = []
         self._pending: TracedRound | None = None
@@ -267,10 +269,28 @@ class Tracer:
                 candidate_ids=tuple(belief.candidate_ids),
                 frontiers=tuple(TracedFrontier(f.frontier_id, f.position_m, f.direction_rad) for f in belief.frontiers),
                 map=_map_of(belief),
-                asked=tuple(_question(asked) for asked in belief.asked),
+                asked=tuple(self._question(asked) for asked in belief.asked),
             )
         except Exception as error:  # a picture is not worth an episode: the page says what is missing
             return replace(seen, note=f"the agent tells no belief: {type(error).__name__}: {error}")
+
+    def _question(self, asked: Asked) -> TracedQuestion:
+        parts: list[tuple[str, str | bytes]] = []
+        for turn in asked.question.prompt().turns:
+            for part in turn.parts:
+                shown = self._shown(part.pixels) if isinstance(part, Picture) else part.text
+                parts.append((turn.role, shown))
+        answer = asked.text
+        while answer.startswith(f"{asked.outcome}: "):  # what is told of a fault begins with its name
+            answer = answer.removeprefix(f"{asked.outcome}: ")
+        return TracedQuestion(asked.question.kind, tuple(parts), answer, asked.outcome, tuple(_offered(asked.question)))
+
+    def _shown(self, pixels: NDArray[np.uint8]) -> bytes:
+        """An image of a prompt; the same ones come again round after round."""
+        key = hashlib.blake2b(pixels.tobytes(), person=f"{pixels.shape[1]}".encode()).digest()
+        if key not in self._prompt_jpegs:
+            self._prompt_jpegs[key] = jpeg_of(pixels, PROMPT_PX, QUALITY)
+        return self._prompt_jpegs[key]
 
     def _truth(self, label: str, centre_m: tuple[float, float, float]) -> Truth | None:
         """What stands where an entry is, or stood there in the latest stage in which something of its label did."""
@@ -348,18 +368,6 @@ def _map_of(belief: Belief) -> TracedMap:
         cells[(cells == FREE) & belief.explored] = EXPLORED
     frame = belief.map_frame
     return TracedMap(cells, frame.cell_m, frame.corner_m)
-
-
-def _question(asked: Asked) -> TracedQuestion:
-    parts: list[tuple[str, str | bytes]] = []
-    for turn in asked.question.prompt().turns:
-        for part in turn.parts:
-            shown = jpeg_of(part.pixels, PROMPT_PX, QUALITY) if isinstance(part, Picture) else part.text
-            parts.append((turn.role, shown))
-    answer = asked.text
-    while answer.startswith(f"{asked.outcome}: "):  # what is told of a fault begins with its name
-        answer = answer.removeprefix(f"{asked.outcome}: ")
-    return TracedQuestion(asked.question.kind, tuple(parts), answer, asked.outcome, tuple(_offered(asked.question)))
 
 
 def _offered(question: Question[Any]) -> Iterator[tuple[str, str, int]]:
