@@ -70,6 +70,7 @@
   const canvas = document.createElement("canvas");
   const drawCells = (round) => {
     const image = $("cells");
+    $("fog").setAttribute("d", "");
     if (!round.cells) { image.setAttribute("width", 0); image.setAttribute("height", 0); image.removeAttribute("href"); return; }
     const [rows, cols, cell, left, bottom] = round.grid;
     const colours = [colour("--fog", 0.4), colour("--free", 0.13), colour("--blocked", 0.62), colour("--explored", 0.3)];
@@ -84,6 +85,9 @@
     canvas.getContext("2d").putImageData(pixels, 0, 0);
     const place = { x: left, y: bottom - rows * cell, width: cols * cell, height: rows * cell, href: canvas.toDataURL() };
     for (const [key, value] of Object.entries(place)) image.setAttribute(key, value);
+    // All that the map does not reach is unknown too.
+    const [x, y, width, height] = home.split(" ").map(Number);
+    $("fog").setAttribute("d", `M${x - width} ${y - height}h${3 * width}v${3 * height}h${-3 * width}zM${left} ${place.y}h${place.width}v${place.height}h${-place.width}z`);
   };
 
   const cone = (x, y, yawDeg, fovDeg, reach, attributes, parent) => {
@@ -209,7 +213,7 @@
       ...(round.len === undefined ? [] : [["walked", `${round.len.toFixed(2)} m`]]),
       ...(round.n ? [["knows", `${count(round.n[0], "entry", "entries")}, ${count(round.n[1], "frontier", "frontiers")}`]] : []),
       ["stands at", `x ${(round.p[0] / 100).toFixed(2)} m, z ${(-round.p[1] / 100).toFixed(2)} m, looks ${Math.round(((round.p[2] % 360) + 360) % 360)}°`],
-      ...Object.entries(details).map(([name, value]) => [name.replaceAll("_", " "), words(value)]),
+      ...Object.entries(details).filter(([, value]) => value !== null).map(([name, value]) => [name.replaceAll("_", " "), words(value)]),
       ...(round.note ? [["note", round.note]] : []),
     ]);
     tellQuestions(stage, round, rounds);
@@ -357,6 +361,7 @@
       $("where").textContent = "no rounds";
       for (const id of ["entries", "tags", "frontiers", "way", "agent", "fov"]) $(id).replaceChildren();
       $("cells").removeAttribute("href");
+      $("fog").setAttribute("d", "");
       $("heading").hidden = true;
       $("sides").replaceChildren();
       for (const id of ["reason", "truth", "heading-words"]) $(id).textContent = "";
