@@ -2,8 +2,14 @@
 
 use evonav_core::{
     geometry::Vec3,
-    memory::sight_lines::{SightConfig, visible_shares},
-    sensors::unproject::Point,
+    memory::{
+        objects::{DetectedView, ObjectMap, ObjectMapConfig},
+        sight_lines::{SightConfig, visible_shares},
+    },
+    sensors::{
+        camera::Camera,
+        unproject::{MaskedDepth, Point},
+    },
 };
 use proptest::{collection::vec, prelude::*};
 
@@ -116,6 +122,43 @@ fn bad_arguments_are_named() {
     let wild = [[f32::NAN, 0.0, 0.5], [f32::INFINITY, 0.0, 0.5]];
     let seen = visible_shares([&wild[..]], &[[0.0, 0.0, 1.0]], &[[0.0; 3]], &config);
     assert_eq!(seen, Ok(vec![1.0]));
+}
+
+/// A wall of points 1.2 m wide, one metre ahead of an eye that looks along z.
+fn see_wall(map: &mut ObjectMap, eye: Vec3) {
+    let camera = Camera {
+        width_px: 100,
+        height_px: 100,
+        vertical_fov_rad: 1.2,
+        position_m: eye,
+        yaw_rad: 0.0,
+        horizon_rad: 0.0,
+    };
+    let image = MaskedDepth { camera: &camera, depth_m: &[1.0; 10_000], masks: &[0; 10_000] };
+    let labels = ["Screen".to_owned()];
+    let view = DetectedView { image, labels: &labels, confidences: &[1.0], features: &[] };
+    map.update(&view).expect("a valid view");
+}
+
+#[test]
+fn a_map_leaves_out_only_entries_that_are_in_nobodys_way() {
+    let mut map = ObjectMap::new(ObjectMapConfig::default()).expect("a valid configuration");
+    for x in [0.0, 5.0, 1.3, -40.0] {
+        see_wall(&mut map, [x, 1.0, 0.0]);
+    }
+    assert_eq!(map.entries().len(), 4);
+    let target = plate([0.2, 1.0, 1.5], 0.3);
+    let eyes: Vec<Vec3> = (0..20)
+        .map(|i| f64::from(i) * std::f64::consts::TAU / 20.0)
+        .map(|angle| [0.2 + 0.75 * angle.sin(), 1.3, 1.5 + 0.75 * angle.cos()])
+        .collect();
+    let config = SightConfig::default();
+    let mut scene: Vec<Vec<Point>> =
+        map.entries().iter().map(|entry| entry.cloud.points().to_vec()).collect();
+    scene.push(target.clone());
+    let found = map.visible_shares(&target, &eyes, &config).expect("valid places");
+    assert_eq!(found, shares(&scene, &target, &eyes, &config));
+    assert!(found[0] > 0.9 && found[10] == 0.0, "{found:?}");
 }
 
 fn points(num: usize, reach: f32) -> impl Strategy<Value = Vec<Point>> {
