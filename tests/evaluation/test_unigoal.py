@@ -251,6 +251,14 @@ def test_a_partly_found_goal_is_predicted_by_the_transform_of_two_anchors():
     assert any(isinstance(question, LayoutQuestion) for question in agent._asker.model.questions)
 
 
+def test_a_goals_noun_is_compared_as_the_word_that_it_goes_under():
+    agent = begun(scripted())  # the chair next to the dining table
+    relations = [(2, 1, "next to")]
+    graphs = knowing(agent, node(1, "table", 2.0, 1.0), node(2, "chair", 2.0, 2.0), relations=relations)
+    advice = graphs.advise(lambda _: False)
+    assert (advice.stage, advice.score, advice.target.name) == ("perfect", 1.0, "chair_2")
+
+
 def perfect(correction):
     model = scripted(
         goal_objects="[chair, table]", goal_relations="chair and table: chair is on table", correction=correction
@@ -373,10 +381,13 @@ def test_a_temporary_goal_nearby_is_confirmed_kept_or_given_up(way_m, is_in_view
     assert (watch.temporary is not None, watch.confirmed is not None, watch.num_given_up) == (held, confirmed, given_up)
 
 
-def test_a_goal_out_of_reach_is_let_go_without_being_given_up():
-    watch = watching(UniGoal(), [None, 3.0])
+def test_a_goal_without_a_way_is_held_until_another_is_seen():
+    agent = UniGoal()
+    watch = watching(agent, [None, None])
     watch.judge(replace(START, x_m=4.5))
-    assert (watch.goal, watch.num_given_up) == (None, 0)
+    assert (watch.temporary.centre_m, watch.confirmed, watch.num_given_up) == ((1.9, 3.0), None, 0)
+    other = Glimpse(np.array([agent._bev.cell_of((3.5, 3.0))], np.int32), (3.5, 3.0), "detection")
+    assert watch._gives_way(other)
 
 
 def test_of_two_goals_in_view_the_one_held_is_kept():

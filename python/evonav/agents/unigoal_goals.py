@@ -46,6 +46,7 @@ class GoalWatch:
         self.temporary: Glimpse | None = None
         self.confirmed: Glimpse | None = None
         self.num_given_up = 0
+        self._has_way = True
         self.is_in_view = False
         """Whether the last view showed what the goal is."""
         self._bev = bev
@@ -59,8 +60,8 @@ class GoalWatch:
     def look(self, view: View, category: str | None, seen_ids: frozenset[int]) -> None:
         """Takes over what a view shows of the goal: its largest detection becomes the temporary goal.
 
-        One that is held gives way to a detection of the same place only. If every largest detection took over, an
-        agent that turns towards one chair would see another, and turn back, for ever.
+        One that is held gives way to a detection of the same place, or when the map shows no way to it. If every
+        largest detection took over, an agent that turns towards one chair would see another, and turn back, for ever.
 
         Args:
             view: The present one.
@@ -76,7 +77,7 @@ class GoalWatch:
 
     def _gives_way(self, found: Glimpse) -> bool:
         held = self.temporary
-        if held is None or held.source == "graph":
+        if held is None or held.source == "graph" or not self._has_way:
             return True
         around = self._bev.grown(held.cells, round(self.config.same_place_m / self._bev.map_frame.cell_m))
         cols = self._bev.map_frame.cols
@@ -102,8 +103,7 @@ class GoalWatch:
     def judge(self, pose: Pose) -> None:
         """Confirms the temporary goal at its place; gives it up where it should be in view and is not.
 
-        One that is near, but far to walk to, is behind something and as near as it gets: confirmed. One without a way
-        to it is let go until it is seen again.
+        One that is near, but far to walk to, is behind something and as near as it gets: confirmed.
         """
         goal = self.temporary
         if goal is None or self.confirmed is not None:
@@ -115,12 +115,10 @@ class GoalWatch:
             self.temporary = None
             return
         way_m = self._planner.distance_m(pose, goal.cells)
+        self._has_way = way_m is not None
         is_long = way_m is None or way_m > self._planner.config.detour_ratio * straight_m
-        if is_long and straight_m < self._planner.config.detour_straight_m:
-            self.confirmed, self.temporary = goal, None
-        elif way_m is None:
-            self.temporary = None
-        elif way_m < self.config.confirm_m:
+        is_behind = is_long and straight_m < self._planner.config.detour_straight_m
+        if is_behind or (way_m is not None and way_m < self.config.confirm_m):
             self.confirmed, self.temporary = goal, None
 
     def _straight_m(self, pose: Pose, goal: Glimpse) -> float:

@@ -25,7 +25,7 @@ from evonav.decision.questions.unigoal_scene import (
 )
 from evonav.memory.goal_graph import GoalGraph, Match, MatchMode, match_graphs, similarity_transform
 from evonav.memory.object_graph import Group, ObjectGraph, ObjectGraphConfig, SceneNode
-from evonav.memory.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES
+from evonav.memory.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES, WORD_OF_TYPE
 from evonav.sensors.observation import View
 from evonav.tasks.public import StageInput
 
@@ -35,6 +35,15 @@ MatchStage = Literal["zero", "partial", "perfect"]
 ROOM_ZERO = "bedroom"
 """Where every node is in mode `code`: the released code provides no map of rooms."""
 ELSEWHERE = "other room"
+
+
+_WORD_OF_NOUN = {canonical(kind): canonical(word) for kind, word in WORD_OF_TYPE.items()}
+
+
+def scene_word(word: str) -> str:
+    """One spelling for what goes under one word in the scene graph: `table` for a dining table, `sofa` for a couch."""
+    noun = canonical(word)
+    return _WORD_OF_NOUN.get(noun, noun)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +155,7 @@ class GraphReasoner:
 
     def _match(self, is_given_up: Callable[[SceneNode], bool]) -> Match:
         nodes = [node for node in self.scene.nodes if not is_given_up(node)]
-        return match_graphs(self.subgraphs[0], nodes, self.scene.edges, self.config.mode, canonical)
+        return match_graphs(self.subgraphs[0], nodes, self.scene.edges, self.config.mode, scene_word)
 
     def _is_perfect(self, match: Match) -> bool:
         """Found whole, its target included; the released code also wants fewer than two common nodes."""
