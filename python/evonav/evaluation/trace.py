@@ -6,58 +6,26 @@ stage in that round without asking the agent, and goes on with a fresh one, as t
 (the evaluator's own process was lost) is shown as it was recorded. Nothing here runs in an evaluation.
 """
 
-import hashlib
 import inspect
 import json
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
-from io import BytesIO
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
-
-from evonav.agents.agent import Agent, Belief, InspectableAgent
 from evonav.agents.registry import imported
-from evonav.decision.asking import Asked
 from evonav.decision.own import own_model
-from evonav.decision.prompts import Picture
-from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
-from evonav.decision.questions.question import Question
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.engine import agent_seed
-from evonav.evaluation.protocol import AgentFailedError, EpisodeCase, ProtocolConfig, StageOutcome
-from evonav.evaluation.record_parts import STALE_MARGIN_M, distance_to_box_m, entry_record, pose_record
-from evonav.evaluation.records import EndState, ErrorKind, RoundRecord, StageMap, StageRecord
+from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
 from evonav.evaluation.rollout import LOSSES, Episode
 from evonav.evaluation.store import RunStore
-from evonav.evaluation.traced import (
-    BLOCKED,
-    EXPLORED,
-    FREE,
-    TracedEntry,
-    TracedFrontier,
-    TracedMap,
-    TracedQuestion,
-    TracedRound,
-    TracedStage,
-    TracedView,
-    Truth,
-)
-from evonav.sensors.observation import Observation
-from evonav.world.simulator import SceneObject, Simulator
+from evonav.evaluation.traced import TracedRound, TracedStage
+from evonav.evaluation.tracer import Loss, Tracer
 
-HEADING_PX, SIDE_PX, QUALITY = 300, 150, 78
-"""Longer edges of a round's heading view and of the others, and their JPEG quality ..."""
-SMALL_HEADING_PX, SMALL_SIDE_PX, SMALL_QUALITY = 192, 96, 55
-"""... and those of agents whose rounds are single actions: ten times as many."""
-PROMPT_PX = 256
-"""Longer edge of an image of a prompt, at most."""
 EXCHANGES_NAME = "exchanges.sqlite"
 """In the folder of a run that asked a model."""
 MAX_DIFFERENCES = 5
@@ -166,169 +134,6 @@ class RunReplay:
                 yield TracedStage(record, maps.get(number), _recorded_rounds(record), why_not, (), fov_rad)
 
 
-@dataclass(frozen=True, slots=True)
-class Loss:
-    """The end of an agent's process, as recorded."""
-
-    num_rounds: int
-    """Whole ones before it, in its stage."""
-    kind: ErrorKind
-    message: str
-
-
-class Tracer:
-    """Looks on as an agent runs, and keeps what it sees until `take`."""
-
-    def __init__(
-        self,
-        agent: Agent,
-        on_round: Callable[[int, int], None] = lambda _stage, _round: None,
-        losses: Mapping[int, "Loss"] | None = None,
-    ) -> None:
-        """Looks on.
-
-        Args:
-            agent: The one that runs.
-            on_round: Told the stage and the round, 0-based, as they begin.
-            losses: Where the agent's process was lost, by stage: there it is not asked.
-        """
-        self.agent = agent
-        self._on_round = on_round
-        self._losses = losses or {}
-        is_small = agent.sensing.motion == "actions"
-        self._sizes = (SMALL_HEADING_PX, SMALL_SIDE_PX, SMALL_QUALITY) if is_small else (HEADING_PX, SIDE_PX, QUALITY)
-        self._places: list[dict[str, list[SceneObject]]] = []
-        """Objects by category, of each stage so far."""
-        self._now: dict[str, SceneObject] = {}
-        self._truths: dict[tuple[str, tuple[float, float, float]], Truth | None] = {}
-        self._prompt_jpegs: dict[bytes, bytes] = {}
-        self._stage = 0
-        self._rounds: list[TracedRound] = []
-        self._pending: TracedRound | None = None
-        self._fov_rad = 0.0
-
-    def stage_begins(self, stage: int, simulator: Simulator) -> None:
-        """Takes note of where everything stands."""
-        self._stage = stage
-        self._simulator = simulator
-        by_category: dict[str, list[SceneObject]] = {}
-        for body in simulator.objects:
-            by_category.setdefault(body.category, []).append(body)
-        self._places.append(by_category)
-        self._now = {body.id: body for body in simulator.objects}
-        self._truths.clear()
-        self._rounds, self._pending = [], None
-        self._lose(0)
-
-    def round_begins(self, observation: Observation) -> None:
-        """Draws the views in colours; the agent's own stay as they are."""
-        self._on_round(self._stage, len(self._rounds))
-        heading_px, side_px, quality = self._sizes
-        views = []
-        for index, view in enumerate(observation.views):
-            is_heading = index == len(observation.views) - 1
-            rgb = view.rgb
-            if rgb is None:
-                rgb = self._simulator.render(replace(view.pose, y_m=observation.pose.y_m), instances=False).rgb
-            assert rgb is not None
-            views.append(TracedView(view.pose.yaw_rad, jpeg_of(rgb, heading_px if is_heading else side_px, quality)))
-            width_px, height_px = view.intrinsics.width_px, view.intrinsics.height_px
-            self._fov_rad = 2 * math.atan(math.tan(view.intrinsics.vertical_fov_rad / 2) * width_px / height_px)
-        self._pending = TracedRound(None, pose_record(observation.pose), tuple(views))
-        self._lose(len(self._rounds))
-
-    def _lose(self, num_rounds: int) -> None:
-        loss = self._losses.get(self._stage)
-        if loss is not None and loss.num_rounds == num_rounds:
-            raise AgentFailedError(loss.kind, loss.message)
-
-    def round_ends(self, record: RoundRecord) -> None:
-        """Asks the agent what it holds true."""
-        if self._pending is not None:
-            self._rounds.append(self._with_belief(replace(self._pending, record=record)))
-        self._pending = None
-
-    def take(self, outcome: StageOutcome) -> TracedStage:
-        """The stage that just ended; one that errored in the middle of a round has that round too."""
-        rounds = self._rounds
-        if self._pending is not None:
-            rounds = [*rounds, self._with_belief(self._pending)]
-        self._rounds, self._pending = [], None
-        return TracedStage(outcome.record, outcome.stage_map, tuple(rounds), "", (), self._fov_rad)
-
-    def _with_belief(self, seen: TracedRound) -> TracedRound:
-        if not isinstance(self.agent, InspectableAgent):
-            return seen
-        try:
-            belief = self.agent.belief()
-            bodies = self._places[-1]
-            entries = [entry_record(entry, bodies) for entry in belief.entries]
-            return replace(
-                seen,
-                entries=tuple(TracedEntry(entry, self._truth(entry.label, entry.centre_m)) for entry in entries),
-                candidate_ids=tuple(belief.candidate_ids),
-                frontiers=tuple(TracedFrontier(f.frontier_id, f.position_m, f.direction_rad) for f in belief.frontiers),
-                map=_map_of(belief),
-                asked=tuple(self._question(asked) for asked in belief.asked),
-            )
-        except Exception as error:  # a picture is not worth an episode: the page says what is missing
-            return replace(seen, note=f"the agent tells no belief: {type(error).__name__}: {error}")
-
-    def _question(self, asked: Asked) -> TracedQuestion:
-        parts: list[tuple[str, str | bytes]] = []
-        for turn in asked.question.prompt().turns:
-            for part in turn.parts:
-                shown = self._shown(part.pixels) if isinstance(part, Picture) else part.text
-                parts.append((turn.role, shown))
-        answer = asked.text
-        while answer.startswith(f"{asked.outcome}: "):  # what is told of a fault begins with its name
-            answer = answer.removeprefix(f"{asked.outcome}: ")
-        return TracedQuestion(asked.question.kind, tuple(parts), answer, asked.outcome, tuple(_offered(asked.question)))
-
-    def _shown(self, pixels: NDArray[np.uint8]) -> bytes:
-        """An image of a prompt; the same ones come again round after round."""
-        key = hashlib.blake2b(pixels.tobytes(), person=f"{pixels.shape[1]}".encode()).digest()
-        if key not in self._prompt_jpegs:
-            self._prompt_jpegs[key] = jpeg_of(pixels, PROMPT_PX, QUALITY)
-        return self._prompt_jpegs[key]
-
-    def _truth(self, label: str, centre_m: tuple[float, float, float]) -> Truth | None:
-        """What stands where an entry is, or stood there in the latest stage in which something of its label did."""
-        key = (label, centre_m)
-        if key not in self._truths:
-            self._truths[key] = self._found(label, centre_m)
-        return self._truths[key]
-
-    def _found(self, label: str, centre_m: tuple[float, float, float]) -> Truth | None:
-        for index in reversed(range(len(self._places))):
-            near = [
-                (distance_m, math.dist(body.centre_m, centre_m), body.id)
-                for body in self._places[index].get(label, ())
-                if (distance_m := distance_to_box_m(centre_m, body)) <= STALE_MARGIN_M
-            ]
-            if near:
-                object_id = min(near)[2]
-                now = self._now.get(object_id)
-                return Truth(object_id, index + 1, None if now is None else now.centre_m)
-        return None
-
-
-def jpeg_of(pixels: NDArray[np.uint8], longest_px: int, quality: int) -> bytes:
-    """A picture as JPEG, its longer edge at most `longest_px`.
-
-    Args:
-        pixels: `(H, W, 3)` RGB.
-        longest_px: Of the longer edge.
-        quality: Of JPEG, 1 to 95.
-    """
-    picture = Image.fromarray(np.ascontiguousarray(pixels))
-    if max(picture.size) > longest_px:
-        picture.thumbnail((longest_px, longest_px))
-    buffer = BytesIO()
-    picture.save(buffer, "JPEG", quality=quality, optimize=True)
-    return buffer.getvalue()
-
-
 def _answers_itself(backend: Backend) -> bool:
     """Whether the model is one of the user's own that is put the questions themselves: nothing of it is kept."""
     path = backend.decision_options.get("path")
@@ -360,30 +165,6 @@ def _why_not(record: StageRecord, is_first: bool) -> str:
 
 def _recorded_rounds(record: StageRecord) -> tuple[TracedRound, ...]:
     return tuple(TracedRound(entry, entry.pose, ()) for entry in record.trace)
-
-
-def _map_of(belief: Belief) -> TracedMap:
-    cells = np.where(belief.cells == FREE, FREE, np.where(belief.cells == BLOCKED, BLOCKED, 0)).astype(np.uint8)
-    if belief.explored is not None:
-        cells[(cells == FREE) & belief.explored] = EXPLORED
-    frame = belief.map_frame
-    return TracedMap(cells, frame.cell_m, frame.corner_m)
-
-
-def _offered(question: Question[Any]) -> Iterator[tuple[str, str, int]]:
-    """Entries and frontiers by the names that the prompt gives them, where a question has lists of them."""
-
-    def objects(candidates: Any, before: str) -> Iterator[tuple[str, str, int]]:  # noqa: ANN401
-        for index, candidate in enumerate(candidates):
-            if isinstance(candidate, ObjectCandidate):
-                yield f"{before}Object {index}", candidate.label, candidate.entry_id
-
-    yield from objects(getattr(question, "objects", ()), "")
-    for number, snapshot in enumerate(getattr(question, "snapshots", ())):
-        yield from objects(getattr(snapshot, "objects", ()), f"Snapshot {number}, ")
-    for index, candidate in enumerate(getattr(question, "frontiers", ())):
-        if isinstance(candidate, FrontierCandidate):
-            yield f"Frontier {index}", "frontier", candidate.frontier_id
 
 
 def _differences(stored: str | None, stage: TracedStage) -> tuple[str, ...]:
