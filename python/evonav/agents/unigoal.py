@@ -178,6 +178,8 @@ class UniGoal:
     def _is_given_up(self, node: SceneNode) -> bool:
         """Whether all of a node lies where the goal was sought in vain."""
         assert self._bev is not None, "there is a map whenever goals are matched"
+        if not self._planner.num_blacklisted:
+            return False
         return len(self._planner.allowed(self._cells_of(self._bev, node))) == 0
 
     def _tell(self, planner: UniGoalPlanner, watch: GoalWatch, step: PlannedStep) -> None:
