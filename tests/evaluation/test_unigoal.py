@@ -416,3 +416,18 @@ def test_of_two_goals_in_view_the_one_held_is_kept():
     watch.temporary = None
     watch.look(view, "chair", frozenset())
     assert watch.temporary.centre_m != left.centre_m
+
+
+def test_belief_shows_the_known_part_of_the_map_at_half_its_resolution():
+    agent = UniGoal()
+    run(agent, stage_case(1, "Bed|1"), protocol=ProtocolConfig(max_actions=20))
+    belief, bev = agent.belief(), agent._bev
+    frame = belief.map_frame
+    assert frame.cell_m == pytest.approx(0.1)
+    assert belief.cells.shape == (frame.rows, frame.cols)
+    assert {entry.label for entry in belief.entries} <= {category for category, _, _ in OBJECTS.values()}
+    assert (belief.cells > 0).sum() > 300
+    for row, col in np.argwhere(belief.cells == 2)[::7].tolist():
+        x_m, z_m = frame.corner_m[0] + col * 0.1, frame.corner_m[1] + row * 0.1
+        fine = [bev.cell_of((x_m + dx, z_m + dz)) for dx in (0.025, 0.075) for dz in (0.025, 0.075)]
+        assert any((bev.obstacles | bev.collisions)[cell] for cell in fine)
