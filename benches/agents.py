@@ -39,9 +39,9 @@ MAX_GROWTH_MB = 500.0
 
 NOTES = f"""One decision round of each agent in `{TASK}` (8 rooms, 155 objects), on ground-truth views of 300x300:
 mapping, memory, candidates, questions, and the text matcher's answers; rendering and all else outside of the agent is
-not counted. The agent is first led through the whole house; then it plays all stages by its own choices, and rounds
-count while it remembers at least {NUM_ENTRIES} objects. Agents without object entries count from the end of the
-tour. Limit: {MAX_ROUND_MS:g} ms.
+not counted. When stage 1 begins the agent is led through the whole house; then it plays all stages by its own choices,
+and rounds count while it remembers at least {NUM_ENTRIES} objects (`stage-reset`: in stage 1). `unigoal` remembers
+things of its own categories alone, and all its steps count. Limit: {MAX_ROUND_MS:g} ms.
 Memory: growth of a fresh process's peak RSS over all five stages with every budget spent to its end, 50 rounds a stage
 (`unigoal`: 500 actions), colours kept and candidates with images as for a VLM; the simulator's growth is in it. Limit:
 {MAX_GROWTH_MB:g} MB.
@@ -50,11 +50,10 @@ Memory: growth of a fresh process's peak RSS over all five stages with every bud
 
 @dataclass
 class Led:
-    """An agent that has seen the whole house before stage 1, and whose rounds are timed from then on."""
+    """An agent that is led through the whole house at the beginning of stage 1, and whose rounds are timed then."""
 
     agent: Agent
     tour: Callable[[Agent], None]
-    first_goal: StageInput
     never_stops: bool = False
     round_ms: list[float] = field(default_factory=list)
     num_entries: list[int] = field(default_factory=list)
@@ -63,14 +62,14 @@ class Led:
         self.sensing = self.agent.sensing
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Begins with the tour."""
+        """Of the house."""
         self.agent.begin_task(task)
-        self.agent.begin_stage(self.first_goal)
-        self.tour(self.agent)
 
     def begin_stage(self, stage: StageInput) -> None:
-        """Of the task."""
+        """The first one with the tour."""
         self.agent.begin_stage(stage)
+        if stage.stage == 1:
+            self.tour(self.agent)
 
     def act(self, observation: Observation) -> AgentAction:
         """The agent's round, timed."""
@@ -108,7 +107,8 @@ def run() -> str:
         full = [ms for ms, num in zip(led.round_ms, led.num_entries, strict=True) if num >= NUM_ENTRIES]
         counted = full or led.round_ms
         p50, p95 = statistics.median(counted), float(np.quantile(counted, 0.95))
-        entries = f"{min(led.num_entries)}-{max(led.num_entries)}" if max(led.num_entries) else "none"
+        remembered = [num for num in led.num_entries if num >= NUM_ENTRIES] or led.num_entries
+        entries = f"{min(remembered)}-{max(remembered)}"
         growth = growth_mb(name)
         lines.append(f"| {name} | {p50:.1f} ms | {p95:.1f} ms | {len(counted)} | {entries} | {growth:.0f} MB |")
     return "\n".join(lines)
@@ -120,7 +120,7 @@ def timed(name: str) -> Led:
     simulator, perception = backend.make_simulator(), backend.make_perception()
     case = _case(backend)
     agent = make_agent(name, backend.make_decision(0))
-    led = Led(agent, lambda led: _tour(led, simulator, perception), case.stages[0].public)
+    led = Led(agent, lambda led: _tour(led, simulator, perception))
     _play(case, name, led, simulator, perception)
     return led
 
@@ -142,7 +142,7 @@ def _measure_growth(name: str) -> None:
     sensors = Sensors(simulator, perception, agent.sensing, case.stages[0].target.object_id, 50)
     sensors.observe(is_first=True, is_action_success=True, has_arrived=False, num_rounds_left=1)
     before_mb = _peak_mb()
-    led = Led(agent, lambda _: None, case.stages[0].public, never_stops=agent.sensing.motion == "waypoints")
+    led = Led(agent, lambda _: None, never_stops=agent.sensing.motion == "waypoints")
     _play(case, name, led, simulator, perception)
     sys.stdout.write(json.dumps({"growth_mb": _peak_mb() - before_mb, "rounds": len(led.round_ms)}))
 

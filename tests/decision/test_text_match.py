@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evonav.decision.matching import Matcher
@@ -54,6 +54,7 @@ def test_all_are_ranked_by_what_the_instruction_speaks_of():
     assert sorted(order) == [entry.entry_id for entry in ALL]
 
 
+@settings(deadline=None)
 @given(st.permutations(ALL))
 def test_order_makes_no_difference(entries):
     model, asked = question(list(entries), [NEAR, FAR])

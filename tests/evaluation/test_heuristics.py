@@ -10,7 +10,7 @@ from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.fail_then_update import FailThenUpdate, FailThenUpdateConfig
 from evonav.agents.frontier_update import FrontierUpdate, FrontierUpdateConfig
-from evonav.agents.navigator import Navigator
+from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.agents.stage_reset import StageReset, StageResetConfig
 from evonav.agents.viewpoint import widest_direction_rad
 from evonav.decision.scripted import Scripted
@@ -256,17 +256,6 @@ def test_fail_then_update_deletes_the_moved_table_on_arrival_and_nothing_else(mo
     assert not set(removed) & {e.entry_id for e in records[2].entries}
 
 
-def test_a_commitment_ends_with_the_map_that_it_was_made_on():
-    """A conflict cancels the target, whose entry stays."""
-    model = Scripted(lambda question: "Object 0" if question.objects else "Frontier 0")
-    _, told = rounds_of(FrontierUpdate(decision=model), table_case())
-    num_conflicts = [d.counters["conflicts"] for _, _, d, _ in told]
-    fired = [i for i in range(1, len(told)) if num_conflicts[i] > num_conflicts[i - 1]]
-    assert fired
-    for i in fired:
-        assert told[i][1].asked  # asked anew, whatever it was on its way to
-
-
 def view_of(free=(), blocked=()):
     """A view that saw these cells."""
     cells = [np.array(sorted(part), np.int32).reshape(-1, 2) for part in (free, blocked)]
@@ -308,6 +297,15 @@ def test_conflicts_are_cells_that_contradict_the_map(config, contradicting, is_r
     assert (explorer.map.cells[30, 30] == 0) == is_rebuilt  # the whole map goes, not the contradicting cells alone
     row, col = contradicting[0]
     assert explorer.map.cells[row, col] == (1 if is_freed else 2)  # the last observation wins either way
+
+
+@pytest.mark.parametrize("is_contradicted", [True, False])
+def test_a_commitment_ends_with_the_map_that_it_was_made_on(is_contradicted):
+    navigator = Navigator(MapFrame(40, 40, 0.1, (0.0, 0.0)), NavigatorConfig())
+    navigator.observe(saw(view_of(BLOCK)))
+    navigator.target = Target(1, (2.0, 2.0), (2.5, 2.5))
+    navigator.observe(saw(view_of(blocked=BLOCK[:1]) if is_contradicted else view_of(BLOCK[:1])))
+    assert (navigator.target is None) == is_contradicted
 
 
 def test_without_a_valid_answer_the_stage_ends_if_so_configured():

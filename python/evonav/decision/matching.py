@@ -137,8 +137,11 @@ class Matcher:
     def room_of_signs(self, place_m: Point2, signs: Sequence[tuple[str, Point2]]) -> str | None:
         """As `room_around`, of things that were read before: for many places among the same ones."""
         votes: dict[str, list[float]] = defaultdict(list)
-        for room, other_m in signs:
-            weight = 1.0 - math.dist(other_m, place_m) / self.config.room_radius_m
+        (x_m, z_m), radius_m = place_m, self.config.room_radius_m
+        for room, (other_x_m, other_z_m) in signs:
+            if abs(other_x_m - x_m) >= radius_m or abs(other_z_m - z_m) >= radius_m:  # most are in other rooms
+                continue
+            weight = 1.0 - math.hypot(other_x_m - x_m, other_z_m - z_m) / radius_m
             if weight > 0.0:
                 votes[room].append(weight)
         return max(sorted(votes), key=lambda room: math.fsum(votes[room]), default=None)
