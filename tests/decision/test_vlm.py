@@ -174,6 +174,11 @@ def test_keys_are_in_no_file_and_no_words(stub: Stub, config: VlmConfig, path: P
         assert stub.url.encode() not in file.read_bytes()
 
 
+def test_a_key_of_one_letter_leaves_answers_whole(config: VlmConfig, stub: Stub) -> None:
+    stub.script = [{"text": "Continue Exploration"}]
+    assert VlmClient(replace(config, api_key="x")).ask(Prompt.of(Text("?"))).text == "Continue Exploration"
+
+
 def test_keys_come_from_the_environment(stub: Stub, config: VlmConfig, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OPENAI_API_KEY", "sk-from-environment")
     monkeypatch.setenv("OPENAI_BASE_URL", stub.url)

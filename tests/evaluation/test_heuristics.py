@@ -1,4 +1,4 @@
-"""Frontier-Update, Stage-Reset and Fail-then-Update on the toy house (design: agents.md 7.4-7.6)."""
+"""Frontier-Update, Stage-Reset and Fail-then-Update on the toy house."""
 
 import math
 from dataclasses import replace

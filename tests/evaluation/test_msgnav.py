@@ -1,4 +1,4 @@
-"""MSGNav on the toy house (design: agents.md 2 and 7.3)."""
+"""MSGNav on the toy house."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""3D-Mem on the toy house, in the words of its specification (design: agents.md 7.2)."""
+"""3D-Mem on the toy house, in the words of its specification."""
 
 import math
 from dataclasses import replace

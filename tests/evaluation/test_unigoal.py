@@ -1,4 +1,4 @@
-"""UniGoal on the toy house (design: agents.md 3 and 7.1)."""
+"""UniGoal on the toy house."""
 
 import math
 from dataclasses import replace

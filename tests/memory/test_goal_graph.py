@@ -1,4 +1,4 @@
-"""UniGoal's matching of goal graph and scene graph, and the scene graph itself (design: agents.md 3.4, 3.6)."""
+"""UniGoal's matching of goal graph and scene graph, and the scene graph itself."""
 
 import math
 from dataclasses import replace

@@ -1,7 +1,8 @@
 """MSGNav (arXiv 2511.10376) under the paper's protocol: a scene graph with images, and a verified stop.
 
-Specification: agents.md, sections 2 and 7.3. It shares 3D-Mem's mapping, frontiers and object entries, looks around
-with seven views in every round, and forgets nothing: neither cells that contradict it nor entries that were not there.
+docs/agents.md has its parameters and their sources. It shares 3D-Mem's mapping, frontiers and object entries, looks
+around with seven views in every round, and forgets nothing: neither cells that contradict it nor entries that were not
+there.
 """
 
 from collections import Counter

@@ -1,4 +1,4 @@
-"""UniGoal (Yin et al., CVPR 2025) on this protocol: paper, Sec. C.3; design: agents.md sections 3 and 7.1.
+"""UniGoal (Yin et al., CVPR 2025) on this protocol (paper, Sec. C.3; docs/agents.md).
 
 It explores frontiers with single actions, goes to what its detector takes for the goal, and lets the match of goal
 graph and scene graph draw exploration a little. What was once an obstacle stays one: its map takes nothing back.

@@ -1,4 +1,4 @@
-"""From a glimpse of the goal to its confirmation, or to giving the place up (UniGoal; design: agents.md 3.8)."""
+"""From a glimpse of the goal to its confirmation, or to giving the place up (UniGoal; docs/agents.md)."""
 
 from dataclasses import dataclass, field
 from typing import Literal

@@ -35,6 +35,8 @@ Mode = Literal["live", "record", "replay", "auto"]
 MODES: tuple[Mode, ...] = ("live", "record", "replay", "auto")
 MAX_ANSWER_BYTES = 2**20
 """Longest response that is read as one."""
+MIN_SECRET_CHARACTERS = 8
+"""Local servers are given keys such as `x`, which answers are full of."""
 KEY_VARIABLE, URL_VARIABLE = "OPENAI_API_KEY", "OPENAI_BASE_URL"
 
 
@@ -320,9 +322,9 @@ class VlmClient:
         return self._without_secrets(" ".join(str(error).split())[:500])
 
     def _without_secrets(self, words: str) -> str:
-        """Words without key and address, which servers quote."""
+        """Words without key and address, which servers quote; keys of a few letters are no secrets but words."""
         for secret in (self._key(), self.config.base_url or os.environ.get(URL_VARIABLE) or ""):
-            words = words.replace(secret, "***") if secret else words
+            words = words.replace(secret, "***") if len(secret) >= MIN_SECRET_CHARACTERS else words
         return words
 
 

@@ -1,4 +1,4 @@
-"""UniGoal's goal graph, and how it is matched with the scene graph (design: agents.md 3.5, 3.6)."""
+"""UniGoal's goal graph, and how it is matched with the scene graph."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,7 @@
 """UniGoal's scene graph: object nodes with captions, one relation between every two, groups of what stands together.
 
-Specification: agents.md 3.4. Nodes are the entries of an `ObjectMap` that matches by overlap alone, whatever the
-label, so that a caption is the word that most detections at a place gave.
+Nodes are the entries of an `ObjectMap` that matches by overlap alone, whatever the label, so that a caption is the word
+that most detections at a place gave.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What UniGoal asks about the goal (design: agents.md 3.5): its objects, their relations, subgraphs, its category."""
+"""What UniGoal asks about the goal: its objects, their relations, subgraphs, its category."""
 
 import json
 import re

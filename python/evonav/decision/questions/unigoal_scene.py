@@ -1,4 +1,4 @@
-"""What UniGoal asks about the scene graph (design: agents.md 3.4, 3.6): relations, groups, layout, corrections."""
+"""What UniGoal asks about the scene graph: relations, groups, layout, corrections."""
 
 import math
 import re
