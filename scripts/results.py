@@ -216,7 +216,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--sweep", type=int, default=30, help="houses of the runs with wrong decisions")
-    # UniGoal takes ten times as long as the others, and its decisions move little.
+    # UniGoal takes several times as long as the others: to be asked for.
     parser.add_argument("--sweep-agents", default=",".join(PAPER_ORDER[1:]), help="agents of those runs")
     parser.add_argument("--write-only", action="store_true", help="run nothing, write what is there")
     return parser.parse_args()
