@@ -86,10 +86,12 @@ fn integrate_naive(map: &BevMap, view: &DepthView<'_>, config: &BevConfig) -> Na
         }
         let cell = cell.map(|i| i as usize);
         *naive.explored.entry(cell).or_default() += weight;
-        let (height_m, low_m) = (height_m(level) + 1e-6, config.obstacle_min_m);
+        // The kernel's own slack: a camera may have any height, its top within a hair of a voxel's border.
+        let hair_m = 1e-6 * config.cell_m;
+        let (height_m, low_m) = (height_m(level) + hair_m, config.obstacle_min_m);
         // The last voxel is the one that the top falls into; it does not count.
         let top_m = camera.position_m[1] + config.obstacle_above_camera_m;
-        let is_under_top = height_m + config.cell_m <= top_m + 2e-6;
+        let is_under_top = height_m + config.cell_m <= top_m + 2.0 * hair_m;
         let kind = if height_m < -low_m {
             &mut naive.below
         } else if height_m < low_m {
