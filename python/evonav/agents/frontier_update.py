@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from evonav.agents.agent import AgentAction, Belief, EntryBelief, RoundDiagnostics, Sensing, Stop
 from evonav.agents.explorer import nearest_frontier
-from evonav.agents.navigator import Navigator, NavigatorConfig, Target, belief_of
+from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.asking import Asker
 from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
@@ -124,7 +124,7 @@ class FrontierUpdate:
         if choice is not None and choice.kind == "object":
             return self._go_to_object(question.objects[choice.index], frontiers, here)
         if choice is not None:
-            return self._go_to_frontier(frontiers[choice.index], self._reason())
+            return self._go_to_frontier(frontiers[choice.index], self._asker.reason)
         nearest = nearest_frontier(frontiers, here)
         if nearest is not None and self.config.on_failed_decision == "nearest_frontier":
             return self._go_to_frontier(nearest, "no valid answer")
@@ -138,11 +138,6 @@ class FrontierUpdate:
         """There is nothing to ask about: neither entries nor frontiers."""
         return self._stop("nothing to go to", None)
 
-    def _reason(self) -> str:
-        """Why the model chose as it did, in its words."""
-        lines = self._asker.asked[-1].text.splitlines() if self._asker.asked else []
-        return " ".join(lines[1:])
-
     def _go_to_object(self, chosen: ObjectCandidate, frontiers: list[Frontier], here: Point2) -> AgentAction:
         """Commits to an entry whose surroundings the map knows; else explores towards it."""
         goal_m = self._navigator.observation_point(chosen.ground_m)
@@ -153,7 +148,7 @@ class FrontierUpdate:
             if frontier is not None:
                 return self._go_to_frontier(frontier, f"towards object {chosen.entry_id}, which the map does not reach")
             goal_m = chosen.ground_m  # the planner ends at the nearest free point
-        return self._approach(Target(chosen.entry_id, goal_m, chosen.ground_m), self._reason())
+        return self._approach(Target(chosen.entry_id, goal_m, chosen.ground_m), self._asker.reason)
 
     def _approach(self, target: Target, reason: str = "") -> AgentAction:
         self._tell(f"object {target.entry_id}", reason, target.entry_id)
@@ -169,24 +164,17 @@ class FrontierUpdate:
 
     def _tell(self, choice: str, reason: str, entry_id: int | None = None) -> None:
         """Notes a round for `diagnostics`."""
-        navigator = self._navigator
-        explorer = navigator.explorer
-        entry = None if entry_id is None else navigator.objects.entry(entry_id)
-        self._diagnostics = RoundDiagnostics(
-            choice=choice,
-            chosen_entry=None if entry is None else belief_of(entry),
-            num_entries=len(navigator.objects),
-            num_frontiers=len(explorer.frontiers),
-            counters={
-                **self._asker.counters,
-                "conflicts": explorer.num_conflicts,
-                "cells_cleared": explorer.num_cells_cleared,
-                "frontiers_reset": explorer.num_frontiers_reset,
-                "unsupported_choices": 0,
-                **self._counters,
-            },
-            details={**({"reason": reason} if reason else {}), **self._details},
-        )
+        explorer = self._navigator.explorer
+        counters = {
+            **self._asker.counters,
+            "conflicts": explorer.num_conflicts,
+            "cells_cleared": explorer.num_cells_cleared,
+            "frontiers_reset": explorer.num_frontiers_reset,
+            "unsupported_choices": 0,
+            **self._counters,
+        }
+        details = {**({"reason": reason} if reason else {}), **self._details}
+        self._diagnostics = self._navigator.told(choice, entry_id, counters, details)
 
     def diagnostics(self) -> RoundDiagnostics:
         """Choice and counters of the last round."""

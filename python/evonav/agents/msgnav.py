@@ -24,7 +24,7 @@ from evonav.agents.agent import (
 )
 from evonav.agents.explorer import ExplorerConfig
 from evonav.agents.msgnav_memory import GraphMemory
-from evonav.agents.navigator import Navigator, NavigatorConfig, belief_of
+from evonav.agents.navigator import Navigator, NavigatorConfig
 from evonav.agents.visible_viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
 from evonav.decision.asking import Asker
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
@@ -220,7 +220,7 @@ class MsgNav:
         viewpoint = self._viewpoint(points_m, here)
         if viewpoint.found != "circle":
             self._counters[f"viewpoints_{viewpoint.found}"] += 1
-        return self._approach(MsgNavTarget(candidate, viewpoint, view_id, points_m), self._reason())
+        return self._approach(MsgNavTarget(candidate, viewpoint, view_id, points_m), self._asker.reason)
 
     def _graph_question(
         self, nodes: Sequence[GraphObject], subgraph: Subgraph, observation: Observation
@@ -275,7 +275,7 @@ class MsgNav:
                 surroundings=[navigator.candidate(entry) for entry in navigator.objects.entries],
             )
         )
-        return self._random_frontier() if index is None else self._go_to_frontier(frontiers[index], self._reason())
+        return self._random_frontier() if index is None else self._go_to_frontier(frontiers[index], self._asker.reason)
 
     def _random_frontier(self) -> AgentAction:
         """What follows every invalid answer; drawn from the task's seed, the stage and the round alone."""
@@ -296,24 +296,12 @@ class MsgNav:
         self._tell("none", "nothing to explore")
         return Stop("nothing to explore")
 
-    def _reason(self) -> str:
-        """Why the model answered as it did, in its words."""
-        lines = self._asker.asked[-1].text.splitlines() if self._asker.asked else []
-        return " ".join(lines[1:])
-
     def _tell(self, choice: str, reason: str, target: MsgNavTarget | None = None) -> None:
         """Notes a round for `diagnostics`."""
-        navigator = self._memory.navigator
-        is_entry = target is not None and target.view_id is None
-        entry = navigator.objects.entry(target.candidate.entry_id) if target is not None and is_entry else None
-        self._diagnostics = RoundDiagnostics(
-            choice=choice,
-            chosen_entry=None if entry is None else belief_of(entry),
-            num_entries=len(navigator.objects),
-            num_frontiers=len(navigator.explorer.frontiers),
-            counters={**self._asker.counters, **self._counters, "edges": len(self._memory.graph)},
-            details={"reason": reason} if reason else {},
-        )
+        entry_id = target.candidate.entry_id if target is not None and target.view_id is None else None
+        counters = {**self._asker.counters, **self._counters, "edges": len(self._memory.graph)}
+        details = {"reason": reason} if reason else {}
+        self._diagnostics = self._memory.navigator.told(choice, entry_id, counters, details)
 
     def diagnostics(self) -> RoundDiagnostics:
         """Choice and counters of the last round."""

@@ -4,13 +4,14 @@ Specification: the common substrate of the paper's Sec. C.3 and C.4, with 3D-Mem
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import Belief, EntryBelief, FrontierBelief, NavigateTo
+from evonav.agents.agent import Belief, EntryBelief, FrontierBelief, NavigateTo, RoundDiagnostics
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
 from evonav.decision.asking import Asked
@@ -175,6 +176,27 @@ class Navigator:
             if best is None or cost < best[0]:
                 best = (cost, view)
         return None if best is None else pixels_of(best[1], self.config.image_px)
+
+    def told(
+        self, choice: str, entry_id: int | None, counters: Mapping[str, int], details: Mapping[str, Any]
+    ) -> RoundDiagnostics:
+        """A round for `diagnostics`.
+
+        Args:
+            choice: In the agent's words.
+            entry_id: The chosen entry, if the choice was one.
+            counters: Cumulative.
+            details: JSON-ready extras.
+        """
+        entry = None if entry_id is None else self.objects.entry(entry_id)
+        return RoundDiagnostics(
+            choice=choice,
+            chosen_entry=None if entry is None else belief_of(entry),
+            num_entries=len(self.objects),
+            num_frontiers=len(self.explorer.frontiers),
+            counters=dict(counters),
+            details=dict(details),
+        )
 
     def beliefs(self) -> list[EntryBelief]:
         """The object memory."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from evonav.agents.agent import AgentAction, Belief, EntryBelief, RoundDiagnostics, Sensing, Stop
 from evonav.agents.explorer import ExplorerConfig
-from evonav.agents.navigator import Navigator, NavigatorConfig, Target, belief_of
+from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.asking import Asker
 from evonav.decision.questions.candidates import ObjectCandidate
 from evonav.decision.questions.question import DecisionModel
@@ -112,7 +112,7 @@ class ThreeDMem:
         if choice is None:
             self._counters["aborts_no_answer"] += 1
             return self._stop(NO_ANSWER)
-        reason = " ".join(self._asker.asked[-1].text.splitlines()[1:])
+        reason = self._asker.reason
         if choice.snapshot is None:
             return self._go_to_frontier(frontiers[choice.index], reason)
         self._details["snapshot"] = shown[choice.snapshot].view.id
@@ -168,25 +168,19 @@ class ThreeDMem:
 
     def _tell(self, choice: str, reason: str, entry_id: int | None = None) -> None:
         """Notes a round for `diagnostics`."""
-        navigator = self._navigator
-        entry = None if entry_id is None else navigator.objects.entry(entry_id)
-        self._diagnostics = RoundDiagnostics(
-            choice=choice,
-            chosen_entry=None if entry is None else belief_of(entry),
-            num_entries=len(navigator.objects),
-            num_frontiers=len(navigator.explorer.frontiers),
-            counters={
-                **self._asker.counters,
-                **self._counters,
-                "conflicts": navigator.explorer.num_conflicts,
-                "cells_cleared": navigator.explorer.num_cells_cleared,
-            },
-            details={
-                **self._details,
-                "num_snapshots": len(self._snapshots.snapshots),
-                **({"reason": reason} if reason else {}),
-            },
-        )
+        explorer = self._navigator.explorer
+        counters = {
+            **self._asker.counters,
+            **self._counters,
+            "conflicts": explorer.num_conflicts,
+            "cells_cleared": explorer.num_cells_cleared,
+        }
+        details = {
+            **self._details,
+            "num_snapshots": len(self._snapshots.snapshots),
+            **({"reason": reason} if reason else {}),
+        }
+        self._diagnostics = self._navigator.told(choice, entry_id, counters, details)
 
     def diagnostics(self) -> RoundDiagnostics:
         """Choice, prefilter, snapshots and counters of the last round."""

@@ -40,6 +40,11 @@ class Asker:
         """Forgets what was asked in the last round."""
         self.asked.clear()
 
+    @property
+    def reason(self) -> str:
+        """Why the model last answered as it did, in its words: what follows the first line."""
+        return " ".join(self.asked[-1].text.splitlines()[1:]) if self.asked else ""
+
     def ask(self, question: Question[A], num_tries: int | None = None) -> A | None:
         """The first valid answer; `None`, a failed decision, when there is none in all tries.
 

@@ -1,13 +1,13 @@
 """What Frontier-Update and its kin ask (paper, Sec. C.4): where to go, and whether the target is still there."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
-from evonav.decision.questions.question import AnswerError, Question, first_line
+from evonav.decision.questions.question import AnswerError, ClosedQuestion, YesNoQuestion, first_line
 from evonav.decision.questions.wording import goal_parts, merged, titled
 from evonav.tasks.public import StageInput
 
@@ -23,7 +23,7 @@ class Choice:
 
 
 @dataclass(frozen=True, slots=True)
-class ChooseQuestion(Question[Choice]):
+class ChooseQuestion(ClosedQuestion[Choice]):
     """Where to go next: to one of the objects, or to one of the frontiers?"""
 
     kind: ClassVar[str] = "choose"
@@ -69,7 +69,7 @@ class ChooseQuestion(Question[Choice]):
         if match is None:
             raise AnswerError("invalid", f"neither `Object i` nor `Frontier i`: {line[:80]!r}", text)
         choice = Choice("object" if match[1].lower() == "object" else "frontier", int(match[2]))
-        if choice not in self._choices():
+        if choice not in self.choices():
             raise AnswerError("invalid", f"there is no {line[:80]}", text)
         return choice
 
@@ -77,15 +77,8 @@ class ChooseQuestion(Question[Choice]):
         """`Object i` or `Frontier i`."""
         return f"{answer.kind.capitalize()} {answer.index}"
 
-    def answer_schema(self) -> Mapping[str, Any]:
-        """One of the candidates."""
-        return {"type": "string", "enum": [self.words(choice) for choice in self._choices()]}
-
-    def alternatives(self, answer: Choice) -> Sequence[Choice]:
-        """Every other candidate."""
-        return [choice for choice in self._choices() if choice != answer]
-
-    def _choices(self) -> list[Choice]:
+    def choices(self) -> Sequence[Choice]:
+        """Objects, then frontiers."""
         return [
             *(Choice("object", index) for index in range(len(self.objects))),
             *(Choice("frontier", index) for index in range(len(self.frontiers))),
@@ -104,7 +97,7 @@ class Sighting:
 
 
 @dataclass(frozen=True, slots=True)
-class VerifyQuestion(Question[bool]):
+class VerifyQuestion(YesNoQuestion):
     """Does the present observation support that the remembered object is still here?"""
 
     kind: ClassVar[str] = "verify"
@@ -133,31 +126,3 @@ class VerifyQuestion(Question[bool]):
             )
         )
         return Prompt.of(*merged(parts))
-
-    def parse(self, text: str) -> bool:
-        """`yes` or `no`, whatever the case."""
-        return parse_yes_no(text)
-
-    def words(self, answer: bool) -> str:
-        """`yes` or `no`."""
-        return "yes" if answer else "no"
-
-    def answer_schema(self) -> Mapping[str, Any]:
-        """`yes` or `no`."""
-        return {"type": "string", "enum": ["yes", "no"]}
-
-    def alternatives(self, answer: bool) -> Sequence[bool]:
-        """The opposite."""
-        return [not answer]
-
-
-def parse_yes_no(text: str) -> bool:
-    """Reads a first line that begins with the word `yes` or `no`.
-
-    Raises:
-        AnswerError: It begins with neither.
-    """
-    match = re.match(r"(yes|no)\b", first_line(text), re.IGNORECASE)
-    if match is None:
-        raise AnswerError("invalid", f"neither yes nor no: {first_line(text)[:80]!r}", text)
-    return match[1].lower() == "yes"

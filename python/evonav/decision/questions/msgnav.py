@@ -10,8 +10,14 @@ from typing import Any, ClassVar, Literal
 
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
-from evonav.decision.questions.frontier_update import parse_yes_no
-from evonav.decision.questions.question import AnswerError, Question, first_line, lines_of
+from evonav.decision.questions.question import (
+    AnswerError,
+    ClosedQuestion,
+    Question,
+    YesNoQuestion,
+    first_line,
+    lines_of,
+)
 from evonav.decision.questions.wording import goal_parts, merged, titled
 from evonav.tasks.public import StageInput
 
@@ -238,7 +244,7 @@ def _object_line(node: GraphObject) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class FrontierImagesQuestion(Question[int]):
+class FrontierImagesQuestion(ClosedQuestion[int]):
     """Behind which frontier may the goal be? The answer is its place in the list."""
 
     kind: ClassVar[str] = "frontier"
@@ -272,17 +278,13 @@ class FrontierImagesQuestion(Question[int]):
         """`Frontier i`."""
         return f"Frontier {answer}"
 
-    def answer_schema(self) -> Mapping[str, Any]:
-        """One of the frontiers."""
-        return {"type": "string", "enum": [self.words(index) for index in range(len(self.frontiers))]}
-
-    def alternatives(self, answer: int) -> Sequence[int]:
-        """Every other frontier."""
-        return [index for index in range(len(self.frontiers)) if index != answer]
+    def choices(self) -> Sequence[int]:
+        """Places in the list."""
+        return range(len(self.frontiers))
 
 
 @dataclass(frozen=True, slots=True)
-class ArrivalQuestion(Question[bool]):
+class ArrivalQuestion(YesNoQuestion):
     """Is the goal here? Asked at an object that was chosen, with all that was seen on the last stretch to it."""
 
     kind: ClassVar[str] = "arrival"
@@ -312,19 +314,3 @@ class ArrivalQuestion(Question[bool]):
             )
         )
         return Prompt.of(*merged(parts))
-
-    def parse(self, text: str) -> bool:
-        """A first line that begins with `yes` or `no`."""
-        return parse_yes_no(text)
-
-    def words(self, answer: bool) -> str:
-        """`yes` or `no`."""
-        return "yes" if answer else "no"
-
-    def answer_schema(self) -> Mapping[str, Any]:
-        """`yes` or `no`."""
-        return {"type": "string", "enum": ["yes", "no"]}
-
-    def alternatives(self, answer: bool) -> Sequence[bool]:
-        """The opposite."""
-        return [not answer]

@@ -4,6 +4,7 @@ A rule, a recording, a script and a VLM are interchangeable behind `DecisionMode
 data: candidates are what the agent itself remembers, images what it saw.
 """
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -75,6 +76,41 @@ class Question(ABC, Generic[A]):
     def alternatives(self, answer: A) -> Sequence[A]:
         """The other valid answers, in a fixed order: what a model that errs could have said."""
         return ()
+
+
+class ClosedQuestion(Question[A]):
+    """A question whose valid answers can be listed."""
+
+    @abstractmethod
+    def choices(self) -> Sequence[A]:
+        """All valid answers, in a fixed order."""
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """One of the choices."""
+        return {"type": "string", "enum": [self.words(choice) for choice in self.choices()]}
+
+    def alternatives(self, answer: A) -> Sequence[A]:
+        """Every other choice."""
+        return [choice for choice in self.choices() if choice != answer]
+
+
+class YesNoQuestion(ClosedQuestion[bool]):
+    """A question that is answered by `yes` or `no`."""
+
+    def choices(self) -> Sequence[bool]:
+        """Yes and no."""
+        return (True, False)
+
+    def parse(self, text: str) -> bool:
+        """A first line that begins with the word `yes` or `no`, whatever the case."""
+        match = re.match(r"(yes|no)\b", first_line(text), re.IGNORECASE)
+        if match is None:
+            raise AnswerError("invalid", f"neither yes nor no: {first_line(text)[:80]!r}", text)
+        return match[1].lower() == "yes"
+
+    def words(self, answer: bool) -> str:
+        """`yes` or `no`."""
+        return "yes" if answer else "no"
 
 
 class DecisionModel(Protocol):

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from evonav.decision.prompts import Part, Prompt, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
-from evonav.decision.questions.question import AnswerError, Question, first_line, lines_of
+from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.questions.wording import goal_parts, merged, titled
 from evonav.tasks.public import StageInput
 
@@ -89,7 +89,7 @@ class SnapshotChoice:
 
 
 @dataclass(frozen=True, slots=True)
-class SnapshotQuestion(Question[SnapshotChoice]):
+class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
     """Where to go next: to an object in one of the snapshots, or to one of the frontiers?"""
 
     kind: ClassVar[str] = "choose_snapshot"
@@ -149,16 +149,8 @@ class SnapshotQuestion(Question[SnapshotChoice]):
             return f"Frontier {answer.index}"
         return f"Snapshot {answer.snapshot}, Object {answer.index}"
 
-    def answer_schema(self) -> Mapping[str, Any]:
-        """One of the candidates."""
-        return {"type": "string", "enum": [self.words(choice) for choice in self.choices()]}
-
-    def alternatives(self, answer: SnapshotChoice) -> Sequence[SnapshotChoice]:
-        """Every other candidate."""
-        return [choice for choice in self.choices() if choice != answer]
-
-    def choices(self) -> list[SnapshotChoice]:
-        """All valid answers: objects in the order of their snapshots, then frontiers."""
+    def choices(self) -> Sequence[SnapshotChoice]:
+        """Objects in the order of their snapshots, then frontiers."""
         return [
             *(
                 SnapshotChoice(index, number)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from evonav.decision.prompts import Picture, Prompt, Text
 from evonav.decision.questions.candidates import Pixels
-from evonav.decision.questions.question import AnswerError, Question, first_line, lines_of
+from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.memory.goal_graph import GoalEdge, GoalGraph
 from evonav.tasks.public import StageInput
 
@@ -215,7 +215,7 @@ def _json_of(graph: GoalGraph) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class CategoryQuestion(Question[str]):
+class CategoryQuestion(ClosedQuestion[str]):
     """Which of its detector's categories is the goal?"""
 
     kind: ClassVar[str] = "category"
@@ -238,7 +238,7 @@ class CategoryQuestion(Question[str]):
     def parse(self, text: str) -> str:
         """One of the categories, or `none`."""
         line = first_line(text).rstrip(".").lower()
-        if line not in (*self.categories, NO_CATEGORY):
+        if line not in self.choices():
             raise AnswerError("invalid", f"no category: {line[:80]!r}", text)
         return line
 
@@ -246,10 +246,6 @@ class CategoryQuestion(Question[str]):
         """The category."""
         return answer
 
-    def answer_schema(self) -> Mapping[str, Any]:
-        """One of them."""
-        return {"type": "string", "enum": [*self.categories, NO_CATEGORY]}
-
-    def alternatives(self, answer: str) -> Sequence[str]:
-        """Every other category."""
-        return [word for word in (*self.categories, NO_CATEGORY) if word != answer]
+    def choices(self) -> Sequence[str]:
+        """The categories, and `none`."""
+        return (*self.categories, NO_CATEGORY)

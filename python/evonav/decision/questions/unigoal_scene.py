@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.candidates import Point2
-from evonav.decision.questions.question import AnswerError, Question, first_line, lines_of
+from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.questions.unigoal import parse_relation, relation_line
 from evonav.memory.goal_graph import GoalGraph
 from evonav.memory.object_graph import Group, SceneEdge, SceneNode
@@ -69,7 +69,7 @@ class RelationLinesQuestion(Question[tuple[str, ...]]):
 
 
 @dataclass(frozen=True, slots=True)
-class RoomQuestion(Question[str]):
+class RoomQuestion(ClosedQuestion[str]):
     """In which room is the goal likely?"""
 
     kind: ClassVar[str] = "room"
@@ -99,13 +99,9 @@ class RoomQuestion(Question[str]):
         """The room."""
         return answer
 
-    def answer_schema(self) -> Mapping[str, Any]:
-        """One of them."""
-        return {"type": "string", "enum": list(self.rooms)}
-
-    def alternatives(self, answer: str) -> Sequence[str]:
-        """Every other room."""
-        return [room for room in self.rooms if room != answer]
+    def choices(self) -> Sequence[str]:
+        """The rooms."""
+        return self.rooms
 
 
 @dataclass(frozen=True, slots=True)
