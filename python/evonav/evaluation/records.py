@@ -155,8 +155,24 @@ class ActionRecord(_Record):
     """Of a `move`: `MOVE_FORWARD`, `TURN_LEFT`, `TURN_RIGHT` or `STOP`."""
     position_m: Point2 | None = None
     """Of a `navigate_to`."""
+    face_m: Point2 | None = None
+    """Of a `navigate_to`: what it turns towards on arrival, if it said."""
     reason: str | None = None
     """Of a `stop`."""
+
+
+class SensingRecord(_Record):
+    """What the agent was granted of its sensors and its motion in a stage, colours apart.
+
+    With the actions, all that it takes to carry them out again (`evonav.evaluation.reenactment`).
+    """
+
+    first_round: tuple[int, float]
+    """Views, and degrees between them."""
+    later_rounds: tuple[int, float]
+    motion: Literal["waypoints", "actions"]
+    max_travel_m: float
+    occupancy_range_m: float
 
 
 class RoundRecord(_Record):
@@ -207,6 +223,7 @@ class StageRecord(_Record):
     effective_start: PoseRecord | None = None
     """After snapping to the nearest reachable position; equal to the requested one when that was free."""
     is_snapped: bool = False
+    sensing: SensingRecord | None = None
     terminal: PoseRecord | None = None
     num_rounds: int = 0
     has_stopped: bool = False

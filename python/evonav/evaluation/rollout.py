@@ -35,7 +35,7 @@ from evonav.evaluation.protocol import (
     as_errored,
     as_not_run,
 )
-from evonav.evaluation.record_parts import action_record, entry_record, pose_record
+from evonav.evaluation.record_parts import action_record, entry_record, pose_record, sensing_record
 from evonav.evaluation.records import (
     EndState,
     EntryRecord,
@@ -242,6 +242,7 @@ class _StageRun:
             self._observer.stage_begins(stage, self._simulator)
         with _blame(ErrorKind.AGENT):
             self._tell_goal()
+        self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensing)})
 
     def _tell_goal(self) -> None:
         """Tells the agent of the task, if it does not know, and of the stage. Its sensing is held for the stage."""
