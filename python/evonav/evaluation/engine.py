@@ -24,9 +24,12 @@ from evonav.evaluation.records import EndState, ErrorKind, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.workers import EpisodeJob, JobEvent, run_here, run_in_workers
 from evonav.folders import check_same_run, write_atomically, writing
+from evonav.parallel import EngineName
 from evonav.tasks.files import task_roots
 
 SUMMARY_NAME = "summary.json"
+NUM_RETRIES = 2
+"""Of a stage that lost its worker, its simulator or its agent's process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +55,16 @@ class TaskFile:
     num_stages: int
     digest: str
     """Of `task.json`, which holds the checksums of all other files."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunRequest:
+    """Agents x tasks into one folder: a run, or a cell of a sweep."""
+
+    agents: tuple[str, ...]
+    tasks: tuple[TaskFile, ...]
+    run_dir: Path
+    config: RunConfig = field(default_factory=RunConfig)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +108,10 @@ def evaluate(
     run_dir: Path,
     *,
     config: RunConfig | None = None,
+    engine: EngineName = "local",
     num_workers: int = 1,
+    ray_address: str | None = None,
+    num_retries: int = NUM_RETRIES,
     retry_errored: bool = False,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> list[AgentSummary]:
@@ -106,7 +122,10 @@ def evaluate(
         tasks: See `task_files`.
         run_dir: Holds `records.sqlite` and `summary.json`.
         config: Must be the run's own when the folder already holds one.
-        num_workers: Processes; 0 runs everything in this one.
+        engine: As for `evaluate_all`, like all that follows.
+        num_workers: 0 runs everything in this process.
+        ray_address: Of a cluster.
+        num_retries: A stage.
         retry_errored: Run errored stages again, and those that were not run because of them.
         on_progress: Called after every recorded stage.
 
@@ -118,36 +137,88 @@ def evaluate(
         StoreError: The folder holds a run of another configuration or cannot be written.
         TaskError: A task is malformed.
     """
-    config = config or RunConfig()
-    hosting = replace(
-        config.hosting,
-        is_in_process=config.hosting.is_in_process or num_workers == 0 or not IS_SUPPORTED,
-        log=config.hosting.log or str(run_dir.absolute() / LOG_NAME),
+    request = RunRequest(tuple(agents), tuple(tasks), run_dir, config or RunConfig())
+    (summaries,) = evaluate_all(
+        [request],
+        engine=engine,
+        num_workers=num_workers,
+        ray_address=ray_address,
+        num_retries=num_retries,
+        retry_errored=retry_errored,
+        on_progress=lambda _, news: on_progress(news),
     )
-    _check_request(agents, tasks, num_workers, hosting)
-    with writing(run_dir), RunStore(run_dir, create=True) as store:
-        _claim(store, run_dir, tasks, config)
-        store.set_meta("agents", sorted({*(store.meta("agents") or []), *agents}))
-        store.set_meta("tasks_dir", str(tasks[0].path.absolute().parent))  # for `evonav view`, no part of what it is
-        run = _Run(store, agents, tasks, config)
-        if retry_errored:
-            run.forget_errored()
-        jobs = run.jobs()
-        on_progress(run.progress(None))
-        if num_workers == 0:
-            events = run_here(jobs, config.backend, config.protocol)
-        else:
-            events = run_in_workers(
-                jobs,
-                config.backend,
-                config.protocol,
-                hosting,
-                num_workers=num_workers,
-                stage_timeout_s=config.stage_timeout_s,
-            )
-        for record in run.record_all(events):
-            on_progress(run.progress(record))
-    return write_summary(run_dir, only=agents)
+    return summaries
+
+
+def evaluate_all(
+    requests: Sequence[RunRequest],
+    *,
+    engine: EngineName = "local",
+    num_workers: int = 1,
+    ray_address: str | None = None,
+    num_retries: int = NUM_RETRIES,
+    retry_errored: bool = False,
+    on_progress: Callable[[int, Progress], None] = lambda _, __: None,
+) -> list[list[AgentSummary]]:
+    """Does what is left of several runs, with one set of workers for all.
+
+    Args:
+        requests: Runs, each in a folder of its own.
+        engine: Processes of this machine, or Ray actors.
+        num_workers: Processes or actors; 0 runs everything in this process.
+        ray_address: Of a cluster; default: one on this machine.
+        num_retries: How often a stage is tried again that lost its worker, its simulator or its agent's process.
+        retry_errored: Run errored stages again, and those that were not run because of them.
+        on_progress: Called with the index of a request as it begins and after each of its recorded stages.
+
+    Returns:
+        By request, one summary an agent asked for.
+
+    Raises:
+        InvalidArgumentError: An agent is unknown or asked for twice, or two requests have one folder.
+        StoreError: A folder holds a run of another configuration or cannot be written.
+        TaskError: A task is malformed.
+    """
+    folders = [request.run_dir.absolute() for request in requests]
+    if len(set(folders)) != len(folders):
+        raise InvalidArgumentError("two runs are asked for in one folder")
+    hostings = [_hosting(request, num_workers) for request in requests]
+    for request, hosting in zip(requests, hostings, strict=True):
+        _check_request(request.agents, request.tasks, num_workers, hosting)
+    for index, request in enumerate(requests):
+        agents, tasks, run_dir, config = request.agents, request.tasks, request.run_dir, request.config
+        with writing(run_dir), RunStore(run_dir, create=True) as store:
+            _claim(store, run_dir, tasks, config)
+            store.set_meta("agents", sorted({*(store.meta("agents") or []), *agents}))
+            store.set_meta("tasks_dir", str(tasks[0].path.absolute().parent))  # for `evonav view`
+            run = _Run(store, agents, tasks, config)
+            if retry_errored:
+                run.forget_errored()
+            jobs = run.jobs()
+            on_progress(index, run.progress(None))
+            if num_workers == 0:
+                events = run_here(jobs, config.backend, config.protocol)
+            else:
+                events = run_in_workers(
+                    jobs,
+                    config.backend,
+                    config.protocol,
+                    hostings[index],
+                    num_workers=num_workers,
+                    stage_timeout_s=config.stage_timeout_s,
+                )
+            for record in run.record_all(events):
+                on_progress(index, run.progress(record))
+    return [write_summary(request.run_dir, only=request.agents) for request in requests]
+
+
+def _hosting(request: RunRequest, num_workers: int) -> AgentHosting:
+    hosting = request.config.hosting
+    return replace(
+        hosting,
+        is_in_process=hosting.is_in_process or num_workers == 0 or not IS_SUPPORTED,
+        log=hosting.log or str(request.run_dir.absolute() / LOG_NAME),
+    )
 
 
 def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[AgentSummary]:
