@@ -70,7 +70,7 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--decision", "vlm"), "needs --model"),
+        (("--decision", "vlm"), "--model is needed"),
         (("--decision", "gpt"), "expected text, vlm or module:name"),
         (("--temperature", 0.5), "--temperature is of no use"),
         (("--decision", "own_vlm:OwnVlm", "--max-tokens", 5), "--max-tokens is of no use"),
@@ -83,7 +83,7 @@ def test_a_run_with_a_model_is_recorded_paid_for_and_replayed(
         (("--noise", "wrong=2"), "noise wrong"),
         (("--noise", "wrnog=0.1"), "wrnog"),
         (("--noise", "wrong=many"), "expected a number"),
-        (("--dry-run",), "--dry-run is of no use"),
+        (("--dry-run",), "--dry-run is for --decision vlm"),
         (("--dry-run", "--decision", "own_vlm:OwnVlm"), "--dry-run is for --decision vlm"),
     ],
 )

@@ -94,7 +94,7 @@ def test_evaluates_through_the_client_of_ai2thor(tmp_path, monkeypatch):
     [
         (("--simulator", "ai2thor", "--thor-executable", "OUT/none"), 1, "no such executable"),
         (("--simulator", "ai2thor", "--thor-executable", "evonav", "--thor-gpu", "0"), 1, "gpu_device = 0"),
-        (("--thor-executable", "evonav"), 2, "--simulator ai2thor"),
+        (("--thor-executable", "evonav"), 2, "--thor-executable is for simulator ai2thor"),
     ],
 )
 def test_a_simulator_that_does_not_start_is_told_before_the_run(

@@ -2,7 +2,8 @@
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
 from enum import Enum
 from functools import wraps
 from pathlib import Path
@@ -11,17 +12,20 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 if TYPE_CHECKING:  # the command must start fast
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
-    from evonav.decision.account import Price
     from evonav.evaluation.backend import Backend
     from evonav.evaluation.engine import RunConfig, TaskFile
+    from evonav.evaluation.settings import DecisionSettings
 
 MODEL_VARIABLE = "EVONAV_VLM_MODEL"
-EXCHANGES_NAME = "exchanges.sqlite"
-"""In the folder of a run."""
-VLM_STAGE_TIMEOUT_S = 4 * 3600.0
-"""50 rounds of three questions, each answered in a minute and asked again once or twice."""
+_SETTINGS = {"decision": "kind", "vlm_mode": "mode", "request_timeout": "request_timeout_s"}
+"""Options whose setting has another name."""
+_THOR = ("executable", "commit_id", "platform", "gpu_device", "x_display")
+_PATHS = ("exchanges",)
+_OF_MODELS = ("prices", "max_cost", "dry_run")
+"""Options of `--decision vlm` alone that are no settings of it."""
+_NO_SETTINGS = (*_OF_MODELS, "noise")
 
 
 class VlmMode(str, Enum):
@@ -65,7 +69,7 @@ class DecisionOptions:
         ),
     ] = None
     exchanges: Annotated[
-        Path | None, _option(f"SQLite file of questions and answers. Default: {EXCHANGES_NAME} in OUT.")
+        Path | None, _option("SQLite file of questions and answers. Default: exchanges.sqlite in OUT.")
     ] = None
     exchange_images: Annotated[bool, _option("Keep the images of exchanges too.")] = True
     prices: Annotated[
@@ -123,6 +127,33 @@ def with_decision_options(command: Callable[..., None]) -> Callable[..., None]:
     return spread_out
 
 
+def decision_settings(options: DecisionOptions) -> "DecisionSettings":
+    """The options as settings, checked.
+
+    Raises:
+        InvalidArgumentError: Rates of mistakes make no sense.
+    """
+    from evonav.decision.noisy import NoiseRates
+    from evonav.decision.rates import read_rates
+    from evonav.evaluation.settings import DecisionSettings
+
+    default = DecisionOptions()
+    given: dict[str, Any] = {
+        _SETTINGS.get(name, name): value.value if isinstance(value, Enum) else str(value) if name in _PATHS else value
+        for name in (field.name for field in fields(DecisionOptions) if field.name not in _NO_SETTINGS)
+        if (value := getattr(options, name)) != getattr(default, name)
+    }
+    noise = read_rates(options.noise, [field.name for field in fields(NoiseRates)])
+    settings = DecisionSettings.model_validate({**given, "noise": noise})
+    with spelled_as_options():
+        settings.check()
+    if options.decision != "vlm":
+        for name in _OF_MODELS:
+            if getattr(options, name) != getattr(default, name):
+                raise typer.BadParameter(f"--{name.replace('_', '-')} is for --decision vlm")
+    return settings
+
+
 def with_decisions(
     backend: "Backend", options: DecisionOptions, *, out: Path, seed: int, num_workers: int
 ) -> "Backend":
@@ -133,150 +164,30 @@ def with_decisions(
         DecisionError: The model cannot be asked from here: no key, no package.
         StoreError: The exchanges cannot be opened.
     """
-    noise = _noise(options.noise)
-    if options.decision == "text":
-        _refuse_model_options(options)
-        return replace(backend, decision_options=noise)
-    if options.decision != "vlm" and ":" not in options.decision:
-        raise typer.BadParameter(f"--decision {options.decision}: expected text, vlm or module:name")
-    if options.dry_run:
-        if options.decision != "vlm":
-            raise typer.BadParameter("--dry-run is for --decision vlm")
-        return replace(backend, decision_options={**_vlm_identity(options, seed), **noise})
-    asked = _vlm(options, out, seed, num_workers) if options.decision == "vlm" else _own(options, out)
-    path, identity, host = asked
-    asking = replace(backend, decision=path, decision_options={**identity, **noise}, decision_host_options=host)
-    check = getattr(asking.make_decision(seed), "check", None)
-    if check is not None:
-        check()
+    from evonav.evaluation.settings import Books, SpendingSettings, try_decisions
+
+    settings = decision_settings(options)
+    spending = SpendingSettings(options.prices, options.max_cost)
+    books = None if options.dry_run else Books.of_run(out, spending, num_workers)
+    with spelled_as_options():
+        asking = settings.backend(backend, seed, books)
+    if books is not None and settings.kind != "text":
+        try_decisions(asking, seed)
     return asking
 
 
-def stage_timeout_s(options: DecisionOptions, default_s: float) -> float:
-    """How long a stage may take: models take their time."""
-    return default_s if options.decision == "text" else VLM_STAGE_TIMEOUT_S
+@contextmanager
+def spelled_as_options() -> "Iterator[None]":
+    """Names the option where a setting makes no sense."""
+    from evonav.evaluation.settings import SettingError
 
-
-def answer_timeout_s(options: DecisionOptions) -> float:
-    """How long an agent may take for a round: a model that is asked several times in it takes its time."""
-    return 600.0 if options.decision == "text" else 3600.0
-
-
-def _noise(text: str) -> dict[str, Any]:
-    """The option, read and checked; nothing where nothing is to go wrong."""
-    if not text:
-        return {}
-    from evonav.decision.noisy import NoiseRates
-    from evonav.decision.rates import read_rates
-
-    rates = read_rates(text, [field.name for field in fields(NoiseRates)])
-    NoiseRates.read(rates)
-    return {"noise": rates}
-
-
-def _refuse_model_options(options: DecisionOptions, *allowed: str) -> None:
-    """Says of options that would be overlooked that they are; the model may come from the environment."""
-    default = DecisionOptions()
-    for field in fields(DecisionOptions):
-        is_given = getattr(options, field.name) != getattr(default, field.name)
-        if is_given and field.name not in ("decision", "model", "noise", *allowed):
-            raise typer.BadParameter(
-                f"--{field.name.replace('_', '-')} is of no use with --decision {options.decision}"
-            )
-
-
-def _vlm(
-    options: DecisionOptions, out: Path, seed: int, num_workers: int
-) -> tuple[str, dict[str, Any], dict[str, Any]]:
-    """A model behind an endpoint: what makes it, what it is, and how it is reached."""
-    server = _given(
-        base_url=options.base_url,
-        timeout_s=options.request_timeout,
-        max_retries=options.max_retries,
-        # Each process keeps to its share of what the run may ask.
-        requests_per_minute=_share(options.requests_per_minute, num_workers),
-        tokens_per_minute=_share(options.tokens_per_minute, num_workers),
-    )
-    identity = _vlm_identity(options, seed)
-    host = {"server": server, **_keeping(options, out), **_spending(options, identity["model"], out)}
-    return "evonav.decision.backends:vlm", identity, host
-
-
-def _vlm_identity(options: DecisionOptions, seed: int) -> dict[str, Any]:
-    """What decides the answers of a model behind an endpoint."""
-    from evonav.decision.backends import SAMPLING
-
-    if not options.model:
-        raise typer.BadParameter(f"--decision vlm needs --model (or {MODEL_VARIABLE})")
-    sampling: dict[str, Any] = {**SAMPLING, "seed": seed}
-    if options.reasoning:
-        sampling |= {"temperature": None, "top_p": None, "max_tokens_field": "max_completion_tokens"}
-    given = _given(temperature=options.temperature, top_p=options.top_p, max_tokens=options.max_tokens)
-    return {
-        "model": options.model,
-        "structured": options.structured.value,
-        "images": options.images,
-        "request": {**sampling, **given},
-    }
-
-
-def _own(options: DecisionOptions, out: Path) -> tuple[str, dict[str, Any], dict[str, Any]]:
-    """A model of the user's own."""
-    from evonav.decision.ledger import LEDGER_NAME
-
-    _refuse_model_options(options, "vlm_mode", "exchanges", "exchange_images")
-    host = {**_keeping(options, out), "ledger": str((out / LEDGER_NAME).absolute())}
-    return "evonav.decision.backends:own", {"path": options.decision}, host
-
-
-def _keeping(options: DecisionOptions, out: Path) -> dict[str, Any]:
-    """Where exchanges are kept, and what is had from there."""
-    from evonav.decision.exchanges import ExchangeStore
-    from evonav.errors import StoreError
-    from evonav.evaluation.store import FILE_NAME
-
-    mode = options.vlm_mode or VlmMode.AUTO
-    if mode is VlmMode.LIVE:
-        if options.exchanges is not None:
-            raise typer.BadParameter("--vlm-mode live keeps nothing: leave --exchanges out")
-        return {}
-    path = options.exchanges or out / EXCHANGES_NAME
-    if mode is VlmMode.REPLAY and not path.is_file():
-        raise StoreError(f"{path}: no exchanges here to replay")
-    store = ExchangeStore(path)
-    is_new = len(store) == 0 and store.num_failures == 0
-    store.close()
-    if mode is VlmMode.RECORD and not is_new and not (out / FILE_NAME).exists():
-        raise StoreError(f"{path}: holds exchanges already: record to a new file, or use --vlm-mode auto")
-    # Agents of one run ask the same questions: the first answer has to stay, or its replay would be another run.
-    kept = VlmMode.AUTO if mode is VlmMode.RECORD else mode
-    return {"exchanges": str(path.absolute()), "mode": kept.value, "keeps_images": options.exchange_images}
-
-
-def _spending(options: DecisionOptions, model: str, out: Path) -> dict[str, Any]:
-    """Prices, limit, and where all processes of the run book."""
-    from evonav.decision.ledger import LEDGER_NAME
-
-    spending: dict[str, Any] = {"ledger": str((out / LEDGER_NAME).absolute())}
-    price = _price(options, model)
-    if price is not None:
-        spending["price"] = [price.input_usd, price.output_usd]
-    if options.max_cost is not None:
-        spending["max_cost_usd"] = options.max_cost
-    return spending
-
-
-def _price(options: DecisionOptions, model: str) -> "Price | None":
-    """Of the model, from the table given."""
-    from evonav.decision.account import read_prices
-    from evonav.errors import InvalidArgumentError
-
-    if options.prices is None:
-        return None
-    table = read_prices(options.prices)
-    if model not in table:
-        raise InvalidArgumentError(f"{options.prices}: has no prices of {model!r}")
-    return table[model]
+    options = {name: option for option, name in _SETTINGS.items()}
+    options |= {name: f"thor_{name.partition('_')[0 if name != 'x_display' else 2]}" for name in _THOR}
+    try:
+        yield
+    except SettingError as error:
+        option = options.get(error.key, error.key).replace("_", "-")
+        raise typer.BadParameter(f"--{option} {error.said}") from None
 
 
 def print_estimate(
@@ -294,8 +205,9 @@ def print_estimate(
     from evonav.decision.account import Usage
     from evonav.decision.counting import OUTPUT_TOKENS
     from evonav.evaluation.estimate import estimate_run
+    from evonav.evaluation.settings import SpendingSettings
 
-    price = _price(options, options.model or "")
+    price = SpendingSettings(options.prices).price(options.model or "")
     with progress() as show:
         estimates = estimate_run(
             agents, tasks, config, dict(config.backend.decision_options), num_workers=num_workers, on_progress=show
@@ -333,11 +245,3 @@ def print_spending(out: Path) -> None:
             f"{spent.model}: {spent.num_asked} questions asked{lost}, {spent.num_replayed} answered from exchanges; "
             f"{spent.input_tokens} tokens in, {spent.output_tokens} out{cost}{aside}"
         )
-
-
-def _share(limit: float | None, num_workers: int) -> float | None:
-    return None if limit is None else limit / max(1, num_workers)
-
-
-def _given(**options: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
-    return {name: value for name, value in options.items() if value is not None}

@@ -3,16 +3,16 @@
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from evonav.cli.decision_options import (
     DecisionOptions,
-    answer_timeout_s,
+    decision_settings,
     print_estimate,
     print_spending,
-    stage_timeout_s,
+    spelled_as_options,
     with_decision_options,
     with_decisions,
 )
@@ -46,7 +46,7 @@ from evonav.cli.options import (
 from evonav.cli.view import make_pages
 
 if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from evonav.evaluation.agent_process import AgentHosting
     from evonav.evaluation.backend import Backend
@@ -87,15 +87,18 @@ def evaluate(
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")
     num_workers = count_of(workers)
-    build = {
-        "executable": thor_executable,
-        "commit_id": thor_commit,
-        "platform": None if thor_platform is None else thor_platform.value,
-    }
-    host = {"gpu_device": thor_gpu, "x_display": thor_display, "timeout_s": thor_timeout}
-    backend = _backend(simulator, allow_unknown_assets, build, host)
+    backend = _backend(
+        simulator,
+        allow_unknown_assets=allow_unknown_assets,
+        executable=thor_executable,
+        commit_id=thor_commit,
+        platform=None if thor_platform is None else thor_platform.value,
+        gpu_device=thor_gpu,
+        x_display=thor_display,
+        timeout_s=thor_timeout if simulator is SimulatorName.AI2THOR else None,
+    )
     config = _config(seed, backend, decisions, out, num_workers)
-    hosting = _hosting(in_process, agent_timeout or answer_timeout_s(decisions), agent_memory)
+    hosting = _hosting(in_process, agent_timeout or decision_settings(decisions).answer_timeout_s, agent_memory)
     config = replace(config, hosting=hosting)
     names = agents if agents is not None else "" if agent else HEURISTICS
     with _tasks(out, houses, tasks, limit, subset, seed, allow_unknown_assets, num_workers) as task_files:
@@ -120,7 +123,7 @@ def demo(
     """Evaluates the paper's three heuristics on the bundled tasks and writes a report and pages of one task."""
     num_workers = count_of(workers)
     with _tasks(out, None, None, limit, None, seed, False, num_workers) as task_files:
-        config = _config(seed, _backend(SimulatorName.EMBEDDED, False, {}, {}), decisions, out, num_workers)
+        config = _config(seed, _backend(SimulatorName.EMBEDDED), decisions, out, num_workers)
         if decisions.dry_run:
             print_estimate(decisions, _names(agents, ()), task_files, config, num_workers)
             return
@@ -231,7 +234,7 @@ def _config(seed: int, backend: "Backend", decisions: DecisionOptions, out: Path
 
     backend = with_decisions(backend, decisions, out=out, seed=seed, num_workers=num_workers)
     config = RunConfig(seed=seed, backend=backend)
-    return replace(config, stage_timeout_s=stage_timeout_s(decisions, config.stage_timeout_s))
+    return replace(config, stage_timeout_s=decision_settings(decisions).stage_timeout_s)
 
 
 def _hosting(in_process: bool, timeout_s: float, memory_mb: int | None) -> "AgentHosting":
@@ -240,20 +243,12 @@ def _hosting(in_process: bool, timeout_s: float, memory_mb: int | None) -> "Agen
     return AgentHosting(is_in_process=in_process, timeout_s=timeout_s, memory_mb=memory_mb)
 
 
-def _backend(
-    simulator: SimulatorName, allow_unknown_assets: bool, build: "Mapping[str, object]", host: "Mapping[str, object]"
-) -> "Backend":
+def _backend(simulator: SimulatorName, **options: Any) -> "Backend":  # noqa: ANN401 - of `SimulatorSettings`
     """The simulator of the options; those that were not given are left to it."""
-    from evonav.evaluation.backend import Backend
+    from evonav.evaluation.settings import SimulatorSettings
 
-    module = "evonav.evaluation.backend"
-    given = {key: value for key, value in build.items() if value is not None}
-    if simulator is SimulatorName.AI2THOR:
-        means = {key: value for key, value in host.items() if value is not None}
-        return Backend(simulator=f"{module}:ai2thor_simulator", simulator_options=given, host_options=means)
-    if given or any(host.get(key) is not None for key in ("gpu_device", "x_display")):
-        raise typer.BadParameter("--thor-... options are for --simulator ai2thor")
-    return Backend(simulator=f"{module}:lenient_simulator") if allow_unknown_assets else Backend()
+    with spelled_as_options():
+        return SimulatorSettings(kind=simulator.value, **options).backend()
 
 
 def _exit(summaries: "list[AgentSummary]") -> None:

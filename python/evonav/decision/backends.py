@@ -47,6 +47,7 @@ def vlm(
     mode: Any = None,  # noqa: ANN401 - JSON, checked
     keeps_images: bool = True,
     ledger: str | None = None,
+    account: str | None = None,
     price: Sequence[float] | None = None,
     max_cost_usd: float | None = None,
     noise: Mapping[str, float] | None = None,
@@ -64,6 +65,7 @@ def vlm(
         mode: Default `auto` with a file, else `live`.
         keeps_images: Whether that file gets the images too.
         ledger: File that books what all processes of the run spend.
+        account: Name in that file; default: the model's.
         price: Of the model: dollars a million tokens, in and out.
         max_cost_usd: Most that the run may spend; needs `price`.
         noise: Rates of mistakes.
@@ -80,13 +82,13 @@ def vlm(
 
     store = None if exchanges is None else ExchangeStore(Path(exchanges))
     config = vlm_config(model, request, server)
-    account = Account(
+    booked = Account(
         None if price is None else Price(*price),
         max_cost_usd,
         ledger=None if ledger is None else Ledger(ledger),
-        model=model,
+        model=account or model,
     )
-    client = VlmClient(config, store=store, mode=mode, account=account, keeps_failures=True, keeps_images=keeps_images)
+    client = VlmClient(config, store=store, mode=mode, account=booked, keeps_failures=True, keeps_images=keeps_images)
     return _with_noise(VlmDecision(client, structured=structured, needs_images=images), noise, seed)
 
 
@@ -98,6 +100,7 @@ def own(
     mode: str | None = None,
     keeps_images: bool = True,
     ledger: str | None = None,
+    account: str | None = None,
     noise: Mapping[str, float] | None = None,
 ) -> DecisionModel:
     """A model of your own: an object with `answer(question, attempt)`, or just with `ask(prompt) -> str`.
@@ -109,6 +112,7 @@ def own(
         mode: Default `auto` with a file, else `live`.
         keeps_images: Whether that file gets the images too.
         ledger: File that counts the run's questions.
+        account: Name in that file; default: the model's path.
         noise: Rates of mistakes.
 
     Raises:
@@ -124,9 +128,9 @@ def own(
     model = own_model(path, seed)
     if hasattr(model, "answer"):
         return _with_noise(cast("DecisionModel", model), noise, seed)
-    account = Account(ledger=None if ledger is None else Ledger(ledger), model=path)
+    booked = Account(ledger=None if ledger is None else Ledger(ledger), model=account or path)
     store = None if exchanges is None else ExchangeStore(Path(exchanges))
-    client = OwnClient(path, model, store=store, mode=mode, account=account, keeps_images=keeps_images)
+    client = OwnClient(path, model, store=store, mode=mode, account=booked, keeps_images=keeps_images)
     needs_images = bool(getattr(model, "needs_images", True))
     return _with_noise(VlmDecision(client, structured="off", needs_images=needs_images), noise, seed)
 

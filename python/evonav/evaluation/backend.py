@@ -16,6 +16,9 @@ from evonav.evaluation.protocol import EpisodeCase
 from evonav.evaluation.sensing import Perception
 from evonav.world.simulator import Simulator
 
+PERCEPTIONS: Mapping[str, str] = {"ground-truth": "evonav.evaluation.backend:ground_truth"}
+"""Import path by name."""
+
 
 @runtime_checkable
 class Startable(Protocol):
@@ -36,6 +39,8 @@ class Backend:
     """Makes a `Simulator`."""
     perception: str = "evonav.evaluation.backend:ground_truth"
     """Makes a `Perception`."""
+    perception_options: Mapping[str, Any] = field(default_factory=dict)
+    """Keywords for `perception`, as JSON."""
     simulator_options: Mapping[str, Any] = field(default_factory=dict)
     """Keywords for `simulator`, as JSON."""
     host_options: Mapping[str, Any] = field(default_factory=dict)
@@ -89,7 +94,7 @@ class Backend:
 
     def make_perception(self) -> Perception:
         """A perception of the worker's own."""
-        perception: Perception = _imported(self.perception)()
+        perception: Perception = _imported(self.perception)(**self.perception_options)
         return perception
 
 

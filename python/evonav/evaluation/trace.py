@@ -22,12 +22,11 @@ from evonav.evaluation.engine import agent_seed
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
 from evonav.evaluation.rollout import LOSSES, Episode
+from evonav.evaluation.settings import EXCHANGES_NAME
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.traced import TracedRound, TracedStage
 from evonav.evaluation.tracer import Loss, Tracer
 
-EXCHANGES_NAME = "exchanges.sqlite"
-"""In the folder of a run that asked a model."""
 MAX_DIFFERENCES = 5
 
 
