@@ -352,9 +352,9 @@ def _check_request(agents: Sequence[str], tasks: Sequence[TaskFile], num_workers
         check_agent_name(agent, is_in_process=hosting.is_in_process)
 
 
-def _claim(store: RunStore, run_dir: Path, tasks: Sequence[TaskFile], config: RunConfig) -> None:
-    """Makes the folder this run's, or checks that it is."""
-    asked: dict[str, Any] = {
+def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]:
+    """What makes runs the same: a folder holds one run, of any number of agents."""
+    return {
         "evonav": __version__,
         "seed": config.seed,
         "protocol": asdict(config.protocol),
@@ -362,6 +362,11 @@ def _claim(store: RunStore, run_dir: Path, tasks: Sequence[TaskFile], config: Ru
         "tasks": hashlib.sha256("".join(f"{t.task_id} {t.digest}\n" for t in tasks).encode()).hexdigest(),
         "num_tasks": len(tasks),
     }
+
+
+def _claim(store: RunStore, run_dir: Path, tasks: Sequence[TaskFile], config: RunConfig) -> None:
+    """Makes the folder this run's, or checks that it is."""
+    asked = run_identity(tasks, config)
     there = store.meta("config")
     if there is None:
         store.set_meta("config", asked)
