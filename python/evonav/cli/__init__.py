@@ -10,6 +10,7 @@ from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
 from evonav.cli.mock_vlm import mock_vlm
 from evonav.cli.paper import paper
+from evonav.cli.submission import pack, verify
 from evonav.cli.tasks import tasks_app
 from evonav.cli.view import view
 
@@ -22,7 +23,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (evaluate, demo, report, paper, strip, view, generate, check_agent):
+for command in (evaluate, demo, report, paper, strip, view, generate, check_agent, pack, verify):
     app.command()(command)
 app.command(name="mock-vlm")(mock_vlm)
 app.add_typer(houses_app, name="houses")

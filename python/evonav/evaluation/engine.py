@@ -373,3 +373,4 @@ def _claim(store: RunStore, run_dir: Path, tasks: Sequence[TaskFile], config: Ru
         store.set_meta("num_stages", {task.task_id: task.num_stages for task in tasks})
     else:
         check_same_run(there, asked, run_dir)
+    store.set_meta("task_digests", {task.task_id: task.digest for task in tasks})  # for `evonav pack`

@@ -7,17 +7,16 @@ stage in that round without asking the agent, and goes on with a fresh one, as t
 """
 
 import inspect
-import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from evonav.agents.registry import imported
 from evonav.decision.own import own_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend, make_agent
+from evonav.evaluation.differences import record_differences
 from evonav.evaluation.engine import agent_seed
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
@@ -26,8 +25,6 @@ from evonav.evaluation.settings import EXCHANGES_NAME
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.traced import TracedRound, TracedStage
 from evonav.evaluation.tracer import Loss, Tracer
-
-MAX_DIFFERENCES = 5
 
 
 class RunReplay:
@@ -170,26 +167,4 @@ def _differences(stored: str | None, stage: TracedStage) -> tuple[str, ...]:
     """Where a replayed record departs from the stored one."""
     if stored is None or not stage.is_replayed:
         return ()
-    text = stage.record.model_dump_json()
-    if text == stored:
-        return ()
-    found = list(_departures(json.loads(stored), json.loads(text), ""))
-    return tuple(found[:MAX_DIFFERENCES]) or ("the same values in other bytes",)
-
-
-def _departures(was: Any, is_now: Any, where: str) -> Iterator[str]:  # noqa: ANN401 - JSON
-    if isinstance(was, dict) and isinstance(is_now, dict):
-        for key in dict.fromkeys([*was, *is_now]):
-            yield from _departures(was.get(key), is_now.get(key), f"{where}.{key}" if where else key)
-    elif isinstance(was, list) and isinstance(is_now, list) and len(was) == len(is_now):
-        for index, (a, b) in enumerate(zip(was, is_now, strict=True)):
-            yield from _departures(a, b, f"{where}[{index}]")
-    elif was != is_now:
-        yield f"{where}: {_short(was)} stored, {_short(is_now)} replayed"
-
-
-def _short(value: Any) -> str:  # noqa: ANN401 - JSON
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return f"{len(value)} items"
-    text = json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:59]}…"
+    return record_differences(stored, stage.record.model_dump_json(), "replayed")

@@ -1,0 +1,270 @@
+"""Is a submission what it claims? Whole, of the benchmark's protocol and tasks, and each score what its actions give.
+
+What no file can show is that an agent chose its actions by itself: for that, it has to be run again.
+"""
+
+import json
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.engine import TaskFile
+from evonav.evaluation.metrics import stage_soft_spl, stage_spl
+from evonav.evaluation.privileged import YARDSTICKS
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.submission import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
+from evonav.parallel import Job, open_pool
+
+MAX_WORDS = 5
+"""Findings told of one check; the others are counted."""
+TOLERANCE = 1e-9
+"""Of claimed scores: sums may be rounded otherwise on other machines."""
+EPISODE_TIMEOUT_S = 1800.0
+_OUR_SIMULATORS = ("embedded_simulator", "lenient_simulator")
+"""That actions can be carried out in again; only these names are taken from a file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing that was looked at."""
+
+    name: str
+    is_passed: bool
+    said: str
+    """What was found, or how much was looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Of a file."""
+
+    checks: tuple[Check, ...]
+    submission: Submission | None
+    """The header, if it could be read."""
+    is_reenacted: bool
+    """Whether actions were carried out again; without that, scores only agree with the traces."""
+
+    @property
+    def is_accepted(self) -> bool:
+        """Whether every check was passed."""
+        return all(check.is_passed for check in self.checks)
+
+
+def verify(
+    path: Path,
+    tasks: Sequence[TaskFile],
+    *,
+    scores_only: bool = False,
+    num_workers: int = 0,
+    on_progress: Callable[[int, int], None] = lambda _done, _all: None,
+) -> Verdict:
+    """Looks at everything in a submission.
+
+    Args:
+        path: The file.
+        tasks: That it should be of, all of them.
+        scores_only: Do not carry the actions out again; scores are computed from the recorded paths.
+        num_workers: Processes; 0 for this one.
+        on_progress: Told how many episodes were carried out again, of how many.
+    """
+    checks: list[Check] = []
+    try:
+        with SubmissionFile(path) as file:
+            header = file.header
+            records = {part.agent: _records(file, part) for part in header.records}
+    except SubmissionError as error:
+        return Verdict((Check("file", False, str(error)),), None, False)
+    checks.append(Check("file", True, f"{len(header.records)} agents, {sum(map(len, records.values()))} records"))
+    known = {task.task_id: task for task in tasks}
+    checks.append(_check("protocol", _protocol_findings(header), "the benchmark's"))
+    checks.append(_check("tasks", _task_findings(header, known), f"{len(header.tasks)}, all known"))
+    checks.append(_check("complete", _gaps(header, records), "every stage once, and scored"))
+    if all(check.is_passed for check in checks):
+        scored = (finding for mine in records.values() for record in mine for finding in score_findings(record, header))
+        checks.append(_check("paths", scored, "lengths, distances, success and SPL follow from the recorded paths"))
+        checks.append(_check("scores", _claims(header, records), "the claimed summary is that of the records"))
+        if not scores_only:
+            found = _reenact(header, records, known, num_workers, on_progress)
+            checks.append(_check("actions", found, "carried out again, they give the same records, byte for byte"))
+    return Verdict(tuple(checks), header, checks[-1].name == "actions")
+
+
+def verdict_json(verdict: Verdict) -> dict[str, Any]:
+    """A verdict for other programs."""
+    header = verdict.submission
+    return {
+        "is_accepted": verdict.is_accepted,
+        "is_reenacted": verdict.is_reenacted,
+        "checks": [asdict(check) for check in verdict.checks],
+        "about": None if header is None else header.about.model_dump(),
+        "summary": None if header is None else header.summary,
+    }
+
+
+def score_findings(record: StageRecord, header: Submission) -> Iterator[str]:
+    """What in a scored record contradicts its own path.
+
+    The formulas are those of the protocol (paper, Sec. C.2), from rounds, target and reference length.
+    """
+    where = f"{record.agent} {record.task_id} stage {record.stage}"
+    start, end, trace = record.effective_start, record.terminal, record.trace
+    if start is None or end is None or record.reference_length_m is None or record.path_length_m is None or not trace:
+        yield f"{where}: a scored stage without start, end, rounds or lengths"
+        return
+    points = [(start.x_m, start.z_m), *(point for entry in trace for point in entry.path_m), (end.x_m, end.z_m)]
+    if any(
+        before.path_m[-1] != after.path_m[0] or (after.pose.x_m, after.pose.z_m) != after.path_m[0]
+        for before, after in pairwise(trace)
+    ):
+        yield f"{where}: the path jumps between rounds"
+    if points[0] != points[1] or points[-1] != points[-2]:
+        yield f"{where}: the path does not lead from start to end"
+    length_m = sum(math.fsum(math.dist(a, b) for a, b in pairwise(entry.path_m)) for entry in trace)
+    target = (record.target.position_m[0], record.target.position_m[2])
+    start_distance_m, distance_m = math.dist(points[0], target), math.dist(points[-1], target)
+    is_success = distance_m < header.config["protocol"]["success_radius_m"]
+    reference_m = record.reference_length_m
+    made: dict[str, object] = {
+        "num_rounds": len(trace),
+        "num_target_visible_rounds": sum(entry.is_target_visible for entry in trace),
+        "has_stopped": trace[-1].action.kind == "stop",
+        "state": EndState.SUCCESS if is_success else EndState.FAILURE,
+        "path_length_m": length_m,
+        "start_distance_m": start_distance_m,
+        "terminal_distance_m": distance_m,
+        "spl": stage_spl(is_success, length_m, reference_m),
+        "soft_spl": stage_soft_spl(start_distance_m, distance_m, length_m, reference_m),
+    }
+    for field, value in made.items():
+        told = getattr(record, field)
+        same = math.isclose(told, value, abs_tol=TOLERANCE) if isinstance(value, float) and told is not None else None
+        if not (told == value if same is None else same):
+            yield f"{where}: {field} is {told}, its path gives {value}"
+
+
+def _records(file: SubmissionFile, part: PackedRecords) -> list[StageRecord]:
+    records = []
+    for number, text in enumerate(file.texts(part), start=1):
+        try:
+            record = StageRecord.model_validate_json(text)
+        except ValidationError as error:
+            first = error.errors()[0]
+            field = ".".join(str(step) for step in first["loc"])
+            raise SubmissionError(f"{file.path}: {part.member}, line {number}: {field}: {first['msg']}") from error
+        if record.model_dump_json() != text:
+            raise SubmissionError(f"{file.path}: {part.member}, line {number}: not as evonav writes records")
+        records.append(record)
+    return records
+
+
+def _protocol_findings(header: Submission) -> Iterator[str]:
+    expected, told = asdict(ProtocolConfig()), header.config.get("protocol")
+    if not isinstance(told, dict):
+        yield "not told"
+        return
+    for name in expected.keys() | told.keys():
+        if told.get(name) != expected.get(name):
+            yield f"{name} is {told.get(name)}, the benchmark's is {expected.get(name)}"
+
+
+def _task_findings(header: Submission, known: Mapping[str, TaskFile]) -> Iterator[str]:
+    if not header.tasks:
+        yield "there is none"
+    for task in header.tasks:
+        there = known.get(task.task_id)
+        if there is None:
+            yield f"{task.task_id} is not among the tasks to verify with"
+        elif (there.digest, there.num_stages) != (task.digest, task.num_stages):
+            yield f"{task.task_id} is another task than the one of this name"
+    for name in sorted(known.keys() - {task.task_id for task in header.tasks}):
+        yield f"{name} is missing"
+
+
+def _gaps(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> Iterator[str]:
+    if len(records) != len(header.records) or not records:
+        yield "an agent is there twice, or none is"
+    expected = sorted((task.task_id, stage) for task in header.tasks for stage in range(1, task.num_stages + 1))
+    for part in header.records:
+        mine = records[part.agent]
+        if part.agent in YARDSTICKS:
+            yield f"{part.agent} is a yardstick"
+        if [(record.task_id, record.stage) for record in mine] != expected:
+            yield f"{part.agent}: not every stage of every task, once and in order"
+        for record in mine:
+            if record.agent != part.agent:
+                yield f"{part.agent}: a record of {record.agent}"
+            if not record.is_scored:
+                yield f"{part.agent} {record.task_id} stage {record.stage} is {record.state.value}"
+
+
+def _claims(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> Iterator[str]:
+    num_stages = sum(task.num_stages for task in header.tasks)
+    yield from _unequal(header.summary, packed_summary({a: list(r) for a, r in records.items()}, num_stages), "")
+
+
+def _unequal(told: Any, made: Any, where: str) -> Iterator[str]:  # noqa: ANN401 - JSON
+    if isinstance(told, dict) and isinstance(made, dict):
+        for key in told.keys() | made.keys():
+            yield from _unequal(told.get(key), made.get(key), f"{where}.{key}" if where else key)
+    elif isinstance(told, list) and isinstance(made, list) and len(told) == len(made):
+        for index, (a, b) in enumerate(zip(told, made, strict=True)):
+            yield from _unequal(a, b, f"{where}[{index}]")
+    elif isinstance(told, float) and isinstance(made, float):
+        if not math.isclose(told, made, abs_tol=TOLERANCE):
+            yield f"{where} is {told}, the records give {made}"
+    elif told != made or type(told) is not type(made):
+        yield f"{where} is {told}, the records give {made}"
+
+
+def _reenact(
+    header: Submission,
+    records: Mapping[str, Sequence[StageRecord]],
+    known: Mapping[str, TaskFile],
+    num_workers: int,
+    on_progress: Callable[[int, int], None],
+) -> Iterator[str]:
+    backend = header.config.get("backend")
+    simulator = str(backend.get("simulator")) if isinstance(backend, dict) else ""
+    module, _, name = simulator.partition(":")
+    if module != Backend.__module__ or name not in _OUR_SIMULATORS:
+        yield f"simulator {simulator!r}: actions can be carried out again in evonav's own alone (see --scores-only)"
+        return
+    settings = {"protocol": header.config["protocol"], "simulator": simulator, "simulator_options": {}}
+    episodes: dict[tuple[str, str], list[StageRecord]] = {}
+    for agent, mine in records.items():
+        for record in mine:
+            episodes.setdefault((agent, record.task_id), []).append(record)
+    waiting = list(episodes)
+    work = "evonav.evaluation.reenactment:work"
+    with open_pool(work, json.dumps(settings), num_workers=num_workers, timeout_s=EPISODE_TIMEOUT_S) as pool:
+        num_sent = num_done = 0
+        while num_done < len(waiting):
+            while num_sent < len(waiting) and num_sent - num_done < pool.capacity:
+                _, task_id = waiting[num_sent]
+                texts = [record.model_dump_json() for record in episodes[waiting[num_sent]]]
+                pool.submit(Job(num_sent, json.dumps({"path": str(known[task_id].path), "records": texts})))
+                num_sent += 1
+            answer = pool.next_answer()
+            num_done += 1
+            on_progress(num_done, len(waiting))
+            agent, task_id = waiting[answer.key]
+            if answer.failure is not None:
+                yield f"{agent} {task_id}: {answer.detail.strip().splitlines()[-1]}"
+                continue
+            for stage, differences in json.loads(answer.text):
+                yield f"{agent} {task_id} stage {stage}: {'; '.join(differences)}"
+
+
+def _check(name: str, findings: Iterator[str], if_none: str) -> Check:
+    found = list(findings)
+    if not found:
+        return Check(name, True, if_none)
+    more = f"; and {len(found) - MAX_WORDS} more" if len(found) > MAX_WORDS else ""
+    return Check(name, False, "; ".join(found[:MAX_WORDS]) + more)

@@ -1,0 +1,357 @@
+"""Packed runs: true ones are accepted, and whatever is altered in one is found."""
+
+import hashlib
+import json
+import re
+import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.engine import RunConfig, TaskFile, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records import StageRecord
+from evonav.evaluation.reenactment import reenact
+from evonav.evaluation.store import RunStore
+from evonav.evaluation.submission import MAX_RATIO, About, SubmissionError, SubmissionFile, pack
+from evonav.evaluation.verification import verify
+
+SELF_REPORTED = (
+    r"agent",
+    r"trace\.\d+\.(choice|num_entries|num_frontiers)",
+    r"trace\.\d+\.(counters|details)\..*",
+    r"(trace\.\d+\.chosen_entry|entries\.\d+)\.(entry_id|label|centre_m\.\d|size_m\.\d|num_detections)",
+)
+"""What an agent says of itself: no part of a score, and nothing can tell whether it is true."""
+
+
+@pytest.fixture(scope="module")
+def tasks() -> list[TaskFile]:
+    from evonav.evaluation.datasets import bundled_tasks
+
+    with bundled_tasks() as folder:
+        return task_files(folder, 1)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory, tasks: list[TaskFile]) -> Path:
+    folder = tmp_path_factory.mktemp("packed") / "run"
+    evaluate(["ftu"], tasks, folder, num_workers=0)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def packed(run: Path) -> Path:
+    target = run.with_name("run.evonav.zip")
+    pack(run, target, about=About(title="A title", authors="Us"))
+    return target
+
+
+def rejected(path: Path, tasks: list[TaskFile], *, scores_only: bool = True) -> str:
+    """The name of the first check that a file fails."""
+    verdict = verify(path, tasks, scores_only=scores_only)
+    assert not verdict.is_accepted
+    return next(check.name for check in verdict.checks if not check.is_passed)
+
+
+def test_true_submission_is_accepted_and_has_the_runs_scores(packed: Path, run: Path, tasks: list[TaskFile]) -> None:
+    verdict = verify(packed, tasks)
+    assert verdict.is_accepted, verdict.checks
+    assert verdict.is_reenacted
+    assert verdict.submission is not None
+    assert verdict.submission.about.title == "A title"
+    summary = json.loads((run / "summary.json").read_text())
+    assert verdict.submission.summary["agents"]["ftu"] == summary["agents"]["ftu"]
+
+
+def test_equal_runs_give_equal_files(packed: Path, run: Path, tmp_path: Path) -> None:
+    pack(run, tmp_path / "again.zip", about=About(title="A title", authors="Us"))
+    assert (tmp_path / "again.zip").read_bytes() == packed.read_bytes()
+
+
+def leaves(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    if isinstance(value, dict) and value:
+        for key, part in value.items():
+            yield from leaves(part, (*path, key))
+    elif isinstance(value, list) and value:
+        for index, part in enumerate(value):
+            yield from leaves(part, (*path, index))
+    else:
+        yield path
+
+
+def altered(document: Any, path: tuple[str | int, ...]) -> Any:
+    document = json.loads(json.dumps(document))
+    at = document
+    for step in path[:-1]:
+        at = at[step]
+    old = at[path[-1]]
+    new: Any
+    if isinstance(old, bool):
+        new = not old
+    elif isinstance(old, int):
+        new = old + 1
+    elif isinstance(old, float):
+        new = old + 1e-6
+    elif isinstance(old, str):
+        new = old + "x"
+    else:  # null, or an empty list or object
+        new = [1] if isinstance(old, list) else {"x": 1} if isinstance(old, dict) else 1.5
+    at[path[-1]] = new
+    return document
+
+
+def test_any_altered_field_of_a_record_is_found_by_carrying_the_actions_out(run: Path, tasks: list[TaskFile]) -> None:
+    backend = Backend()
+    case, simulator = backend.load_case(tasks[0].path), backend.make_simulator()
+    with RunStore(run) as store:
+        records = {record.stage: record for record in store.records("ftu")}
+    document = json.loads(records[1].model_dump_json())
+    assert document["entries"], "an agent without memory would leave the list of entries untried"
+    seen: dict[str, str] = {}
+    for path in leaves(document):
+        name = ".".join(map(str, path))
+        kind = re.sub(r"\d+", "N", name)
+        if path[0] == "trace" and path[1] != len(document["trace"]) // 2:
+            continue
+        if kind in seen and "position_m" not in kind:
+            continue
+        seen[kind] = name
+        try:
+            forged = StageRecord.model_validate(altered(document, path), strict=False)
+        except ValueError:
+            continue  # not a record at all: the file is refused
+        if forged == records[1]:
+            continue
+        _, differences = next(iter(reenact(case, {**records, 1: forged}, simulator, ProtocolConfig())))
+        if path[0] == "sensing" or "face_m" in path:  # counts by what came of it, which may be nothing
+            continue
+        is_own_words = any(re.fullmatch(pattern, name) for pattern in SELF_REPORTED)
+        assert bool(differences) != is_own_words, f"{name}: {differences}"
+    assert len(seen) > 60
+    simulator.close()
+
+
+def test_record_in_another_place_is_found(run: Path, tasks: list[TaskFile]) -> None:
+    """Rounds left out, and a stage's record in place of another's."""
+    backend = Backend()
+    case, simulator = backend.load_case(tasks[0].path), backend.make_simulator()
+    with RunStore(run) as store:
+        records = {record.stage: record for record in store.records("ftu")}
+    first = records[1]
+    short = first.model_copy(update={"trace": first.trace[:-1], "num_rounds": first.num_rounds - 1})
+    _, differences = next(iter(reenact(case, {**records, 1: short}, simulator, ProtocolConfig())))
+    assert any("state" in text for text in differences)
+    swapped = {**records, 1: records[2].model_copy(update={"stage": 1})}
+    _, differences = next(iter(reenact(case, swapped, simulator, ProtocolConfig())))
+    assert differences
+    simulator.close()
+
+
+def rewritten(
+    packed: Path,
+    target: Path,
+    *,
+    header: Callable[[dict[str, Any]], Any] | None = None,
+    records: Callable[[list[dict[str, Any]]], list[dict[str, Any]]] | None = None,
+    more: dict[str, bytes] | None = None,
+) -> Path:
+    """A forged file whose checksums are right."""
+    with zipfile.ZipFile(packed) as archive:
+        told = json.loads(archive.read("submission.json"))
+        rows = [json.loads(line) for line in archive.read("records/1.jsonl").splitlines()]
+    if records is not None:
+        rows = records(rows)
+    lines = "".join(f"{json.dumps(row, separators=(',', ':'), ensure_ascii=False)}\n" for row in rows).encode()
+    told["records"][0] |= {"num_bytes": len(lines), "sha256": hashlib.sha256(lines).hexdigest()}
+    if header is not None:
+        told = header(told) or told
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("submission.json", json.dumps(told))
+        archive.writestr("records/1.jsonl", lines)
+        for name, data in (more or {}).items():
+            archive.writestr(name, data)
+    return target
+
+
+def test_rewriting_alone_changes_nothing(packed: Path, tasks: list[TaskFile], tmp_path: Path) -> None:
+    """The forger of the tests below forges nothing by itself."""
+    assert verify(rewritten(packed, tmp_path / "same.zip"), tasks, scores_only=True).is_accepted
+
+
+def test_forged_success_is_found_from_the_path_alone(packed: Path, tasks: list[TaskFile], tmp_path: Path) -> None:
+    def forge(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        rows[0] |= {"state": "success" if rows[0]["state"] == "failure" else "failure"}
+        return rows
+
+    assert rejected(rewritten(packed, tmp_path / "f.zip", records=forge), tasks) == "paths"
+
+
+def test_teleport_within_a_round_is_found_when_carried_out(packed: Path, tasks: list[TaskFile], tmp_path: Path) -> None:
+    """A path that was made longer in step with all that follows from it passes for true until it is walked."""
+
+    def forge(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        row = rows[0]
+        entry = next(entry for entry in row["trace"] if len(entry["path_m"]) > 2)
+        entry["path_m"][1][0] += 0.01
+        record = StageRecord.model_validate(row)
+        from evonav.evaluation.metrics import stage_soft_spl, stage_spl
+        from evonav.evaluation.motion import polyline_length_m
+
+        length_m = sum(polyline_length_m(part.path_m) for part in record.trace)
+        assert record.reference_length_m is not None
+        assert record.start_distance_m is not None
+        assert record.terminal_distance_m is not None
+        row["path_length_m"] = length_m
+        row["spl"] = stage_spl(record.state.value == "success", length_m, record.reference_length_m)
+        row["soft_spl"] = stage_soft_spl(
+            record.start_distance_m, record.terminal_distance_m, length_m, record.reference_length_m
+        )
+        return rows
+
+    forged = rewritten(packed, tmp_path / "t.zip", records=forge)
+    verdict = verify(forged, tasks, scores_only=True)
+    assert {check.name for check in verdict.checks if not check.is_passed} <= {"scores"}
+    assert "actions" in {check.name for check in verify(forged, tasks).checks if not check.is_passed}
+
+
+@pytest.mark.parametrize(
+    ("forge", "check"),
+    [
+        (lambda rows: rows[:-1], "complete"),
+        (lambda rows: [*rows, rows[-1]], "complete"),
+        (lambda rows: rows[::-1], "complete"),
+        (lambda rows: [{**rows[0], "agent": "other"}, *rows[1:]], "complete"),
+        (lambda rows: [{**rows[0], "state": "not_run"}, *rows[1:]], "complete"),
+        (lambda rows: [{**rows[0], "surprise": 1}, *rows[1:]], "file"),
+        (lambda rows: [{**rows[0], "spl": "1"}, *rows[1:]], "file"),
+        (lambda rows: [{**rows[0], "stage": 0}, *rows[1:]], "file"),
+    ],
+)
+def test_altered_set_of_records_is_found(
+    packed: Path, tasks: list[TaskFile], tmp_path: Path, forge: Callable[..., Any], check: str
+) -> None:
+    assert rejected(rewritten(packed, tmp_path / "f.zip", records=forge), tasks) == check
+
+
+def with_value(*path: str | int, value: Any) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    def change(told: dict[str, Any]) -> dict[str, Any]:
+        at: Any = told
+        for step in path[:-1]:
+            at = at[step]
+        at[path[-1]] = value
+        return told
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("header", "check"),
+    [
+        (with_value("summary", "agents", "ftu", "sr", value=0.999), "scores"),
+        (with_value("summary", "agents", "ftu", "counts", "success", value=77), "scores"),
+        (with_value("config", "protocol", "max_rounds", value=80), "protocol"),
+        (with_value("config", "protocol", "success_radius_m", value=3.0), "protocol"),
+        (with_value("config", "protocol", value=None), "protocol"),
+        (with_value("config", "protocol", "surprise", value=1), "protocol"),
+        (with_value("tasks", 0, "digest", value="0" * 64), "tasks"),
+        (with_value("tasks", 0, "task_id", value="nowhere"), "tasks"),
+        (with_value("tasks", value=[]), "tasks"),
+        (with_value("records", 0, "sha256", value="0" * 64), "file"),
+        (with_value("records", 0, "num_bytes", value=12), "file"),
+        (with_value("records", 0, "member", value="../../evil"), "file"),
+        (with_value("records", 0, "agent", value="shortest-path"), "complete"),
+        (with_value("format_version", value=2), "file"),
+        (with_value("surprise", value=1), "file"),
+        (with_value("config", "backend", "simulator", value="os:system"), "actions"),
+    ],
+)
+def test_altered_header_is_found(
+    packed: Path, tasks: list[TaskFile], tmp_path: Path, header: Callable[..., Any], check: str
+) -> None:
+    forged = rewritten(packed, tmp_path / "h.zip", header=header)
+    assert rejected(forged, tasks, scores_only=check != "actions") == check
+
+
+def test_other_tasks_than_asked_for_are_found(packed: Path, tmp_path: Path) -> None:
+    from evonav.evaluation.datasets import bundled_tasks
+
+    with bundled_tasks() as folder:
+        assert rejected(packed, task_files(folder, 2)) == "tasks"
+
+
+def read_all(path: Path) -> None:
+    with SubmissionFile(path) as file:
+        for part in file.header.records:
+            list(file.texts(part))
+
+
+def test_hostile_archives_are_refused(packed: Path, tmp_path: Path) -> None:
+    data = packed.read_bytes()
+    hostile = {
+        "text": b"not a zip",
+        "empty": b"",
+        "cut": data[: len(data) // 2],
+        "extra": rewritten(packed, tmp_path / "e.zip", more={"../x": b"1"}).read_bytes(),
+        "absolute": rewritten(packed, tmp_path / "a.zip", more={"/etc/x": b"1"}).read_bytes(),
+    }
+    with pytest.warns(UserWarning, match="Duplicate name"):
+        hostile["twice"] = rewritten(packed, tmp_path / "d.zip", more={"records/1.jsonl": b"1"}).read_bytes()
+    bomb = tmp_path / "bomb.zip"
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("submission.json", b" " * (MAX_RATIO * 40_000))
+    hostile["bomb"] = bomb.read_bytes()
+    for name, content in hostile.items():
+        path = tmp_path / f"{name}.bin"
+        path.write_bytes(content)
+        with pytest.raises(SubmissionError, match=re.escape(str(path))):
+            read_all(path)
+
+
+def test_flipped_bytes_never_pass_as_another_file(packed: Path, tasks: list[TaskFile], tmp_path: Path) -> None:
+    """A byte that decides nothing (of a member's date) may differ; what was recorded may not."""
+    data = packed.read_bytes()
+    true = verify(packed, tasks, scores_only=True)
+    for number in range(120):
+        place = number * len(data) // 120
+        flipped = tmp_path / "flipped.zip"
+        flipped.write_bytes(data[:place] + bytes([data[place] ^ (1 << number % 8)]) + data[place + 1 :])
+        verdict = verify(flipped, tasks, scores_only=True)
+        assert not verdict.is_accepted or verdict == true
+
+
+def test_incomplete_runs_and_yardsticks_are_refused(run: Path, tasks: list[TaskFile], tmp_path: Path) -> None:
+    import shutil
+
+    with pytest.raises(InvalidArgumentError, match="no agent 'fu'; it has ftu"):
+        pack(run, tmp_path / "x.zip", agents=["fu"])
+    copy = tmp_path / "copy"
+    shutil.copytree(run, copy)
+    with RunStore(copy) as store:
+        store.forget_episode("ftu", tasks[0].task_id, 2)
+    with pytest.raises(InvalidArgumentError, match="ftu is incomplete: 1 of"):
+        pack(copy, tmp_path / "x.zip")
+    evaluate(["shortest-path"], tasks, tmp_path / "still", num_workers=0)
+    with pytest.raises(InvalidArgumentError, match="no agent to pack"):
+        pack(tmp_path / "still", tmp_path / "x.zip")
+    with pytest.raises(InvalidArgumentError, match="shortest-path is a yardstick"):
+        pack(tmp_path / "still", tmp_path / "x.zip", agents=["shortest-path"])
+    with pytest.raises(StoreError, match="no run here"):
+        pack(tmp_path / "nowhere", tmp_path / "x.zip")
+    assert not (tmp_path / "x.zip").exists()
+
+
+def test_run_of_another_protocol_packs_but_is_rejected(tasks: list[TaskFile], tmp_path: Path) -> None:
+    config = RunConfig(protocol=ProtocolConfig(max_rounds=3))
+    evaluate(["fu"], tasks, tmp_path / "short", config=config, num_workers=0)
+    pack(tmp_path / "short", tmp_path / "short.zip")
+    verdict = verify(tmp_path / "short.zip", tasks)
+    failed = [check for check in verdict.checks if not check.is_passed]
+    assert [check.name for check in failed] == ["protocol"]
+    assert failed[0].said == "max_rounds is 3, the benchmark's is 50"
+    assert asdict(ProtocolConfig())["max_rounds"] == 50
