@@ -30,7 +30,7 @@ def test_a_stop_is_judged_by_what_it_stopped_at(chosen: EntryRecord | None, expe
         (0, [], Cause.NEVER_IN_VIEW),
         (2, [], Cause.NOT_REMEMBERED),
         (2, [entry("Plate", ELSEWHERE_M, is_stale=False)], Cause.NOT_REMEMBERED),
-        (2, [entry("Plate", AT_TARGET_M, is_stale=False)], Cause.NOT_REACHED),
+        (2, [entry("Plate", AT_TARGET_M, is_stale=False)], Cause.NOT_APPROACHED),
     ],
 )
 def test_a_spent_budget_is_judged_by_what_was_seen(
@@ -42,7 +42,7 @@ def test_a_spent_budget_is_judged_by_what_was_seen(
 
 def test_success_has_no_cause_and_errors_speak_for_themselves() -> None:
     assert cause_of(stage_record("fu", "t", 1, EndState.SUCCESS)) is None
-    assert cause_of(stage_record("fu", "t", 1, EndState.ERRORED)) is Cause.ERRORED
+    assert cause_of(stage_record("fu", "t", 1, EndState.ERRORED)) is Cause.HARNESS_ERROR
     assert sentence(stage_record("fu", "t", 1, EndState.ERRORED)) == "Errored (simulation): the floor <gave> way"
     assert cause_of(stage_record("fu", "t", 1, EndState.NOT_RUN)) is Cause.NOT_RUN
 

@@ -147,6 +147,43 @@ class EntryRecord(_Record):
     """No object of this label is near the entry in the stage's house."""
 
 
+class MemoryRecord(_Record):
+    """The agent's entries held against the stage's house."""
+
+    num_entries: int
+    num_right: int
+    """Entries with an object of their label in their place: the others are stale."""
+    num_held: int
+    """Objects that right entries stand for, each with the nearest one of its label."""
+    num_seen: int
+    """Objects of the house that were in view so far in the episode."""
+    num_seen_held: int
+    """Of them, those that a right entry stands for."""
+    position_error_m: float | None
+    """Mean distance of right entries' centres from those of their objects' boxes; `None` without any."""
+
+
+class StaleEntryRecord(_Record):
+    """An entry that was stale when the stage began, and when its agent could have known, and did."""
+
+    label: str
+    centre_m: Point3
+    evident_round: int | None = None
+    """The first round whose views show that its place is empty."""
+    cleared_round: int | None = None
+    """The round, from the evident one on, after which the entry is gone or corrected."""
+
+
+class MovedObjectRecord(_Record):
+    """An object moved in the transition before the stage, far enough that an entry of it would be stale."""
+
+    object_id: str
+    seen_round: int | None = None
+    """The first round in which it is in view at its new place."""
+    found_round: int | None = None
+    """The round, from that one on, after which an entry stands for it."""
+
+
 class ActionRecord(_Record):
     """What the agent answered."""
 
@@ -241,6 +278,22 @@ class StageRecord(_Record):
     soft_spl: float | None = None
     """SPL with success replaced by the share of the start distance that was covered."""
     num_target_visible_rounds: int = 0
+
+    reference_ring_m: float | None = None
+    """The part of the reference path that lies outside of the success radius; 0 for a start within it."""
+    terminal_box_distance_m: float | None = None
+    """Ground-plane distance to the target's box at the end."""
+    terminal_geodesic_m: float | None = None
+    """Length of the shortest path to the target at the end; `None` where there is none."""
+    is_geodesic_success: bool | None = None
+    """Whether that is shorter than the success radius."""
+    memory_at_start: MemoryRecord | None = None
+    """After the agent was told the goal; `None`, as all that follows, for an agent that tells no entries."""
+    memory_at_end: MemoryRecord | None = None
+    num_forgotten: int | None = None
+    """Objects that an entry stood for at the start and none at the end, though they stand where they stood."""
+    stale_entries: tuple[StaleEntryRecord, ...] = ()
+    moved_objects: tuple[MovedObjectRecord, ...] = ()
 
     trace: tuple[RoundRecord, ...] = ()
     entries: tuple[EntryRecord, ...] = ()

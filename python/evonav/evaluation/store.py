@@ -9,6 +9,7 @@ so that records of equal runs are equal to the byte: wall-clock figures in `timi
 import json
 import sqlite3
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -16,6 +17,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
+from evonav.evaluation.costs import StageCosts
+from evonav.evaluation.measures import MEASURES_VERSION, kept_measures
 from evonav.evaluation.records import SCHEMA_VERSION, EndState, StageMap, StageRecord
 
 FILE_NAME = "records.sqlite"
@@ -40,13 +43,24 @@ CREATE TABLE IF NOT EXISTS timings (
 """
 
 # Later than the first runs of this schema version: made where it is missing. Stages without a restart have no row.
-_RESTARTS_SCHEMA = """
-CREATE TABLE IF NOT EXISTS simulator_restarts (
+# Measures are derived from the record (`evonav.evaluation.measures`), so that tables need no traces.
+_LATER_SCHEMA = (
+    """CREATE TABLE IF NOT EXISTS measures (
+    agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
+    version INTEGER NOT NULL, measures TEXT NOT NULL,
+    PRIMARY KEY (agent, task_id, stage)
+) WITHOUT ROWID""",
+    """CREATE TABLE IF NOT EXISTS costs (
+    agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
+    costs TEXT NOT NULL,
+    PRIMARY KEY (agent, task_id, stage)
+) WITHOUT ROWID""",
+    """CREATE TABLE IF NOT EXISTS simulator_restarts (
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
     num_restarts INTEGER NOT NULL,
     PRIMARY KEY (agent, task_id, stage)
-) WITHOUT ROWID;
-"""
+) WITHOUT ROWID""",
+)
 
 
 class RunStore:
@@ -77,7 +91,8 @@ class RunStore:
             self.set_meta("schema_version", SCHEMA_VERSION)
         elif version != SCHEMA_VERSION:
             raise StoreError(f"{self.path}: schema version {version}, this evonav reads {SCHEMA_VERSION}")
-        self._execute(_RESTARTS_SCHEMA, ())
+        for statement in _LATER_SCHEMA:
+            self._execute(statement, ())
 
     def __enter__(self) -> "RunStore":
         return self
@@ -105,8 +120,16 @@ class RunStore:
         rows = self._db.execute("SELECT agent, task_id, stage, state FROM stages")
         return {(agent, task_id, stage): EndState(state) for agent, task_id, stage, state in rows}
 
-    def add_stage(self, record: StageRecord, *, wall_s: float, cpu_s: float, num_simulator_restarts: int = 0) -> None:
-        """Commits a finished stage.
+    def add_stage(
+        self,
+        record: StageRecord,
+        *,
+        wall_s: float,
+        cpu_s: float,
+        num_simulator_restarts: int = 0,
+        costs: StageCosts | None = None,
+    ) -> None:
+        """Commits a finished stage, with the measures that are derived from it.
 
         Raises:
             StoreError: The stage is already recorded, or the file cannot be written.
@@ -116,7 +139,12 @@ class RunStore:
             self._db.execute("BEGIN IMMEDIATE")
             text = record.model_dump_json()
             self._db.execute("INSERT INTO stages VALUES (?, ?, ?, ?, ?)", (*key, record.state.value, text))
+            measures = kept_measures(record)
+            self._db.execute("INSERT INTO measures VALUES (?, ?, ?, ?, ?)", (*key, MEASURES_VERSION, measures))
             self._db.execute("INSERT INTO timings VALUES (?, ?, ?, ?, ?)", (*key, wall_s, cpu_s))
+            if costs is not None:
+                told = {name: value for name, value in asdict(costs).items() if value is not None}
+                self._db.execute("INSERT INTO costs VALUES (?, ?, ?, ?)", (*key, _json(told)))
             if num_simulator_restarts:
                 self._db.execute("INSERT INTO simulator_restarts VALUES (?, ?, ?, ?)", (*key, num_simulator_restarts))
             self._db.execute("COMMIT")
@@ -135,7 +163,7 @@ class RunStore:
         key = (agent, task_id, from_stage)
         try:
             self._db.execute("BEGIN IMMEDIATE")
-            for table in ("stages", "timings", "simulator_restarts"):
+            for table in ("stages", "measures", "timings", "costs", "simulator_restarts"):
                 self._db.execute(f"DELETE FROM {table} WHERE agent = ? AND task_id = ? AND stage >= ?", key)  # noqa: S608
             self._db.execute("COMMIT")
         except sqlite3.Error as error:
@@ -174,6 +202,29 @@ class RunStore:
         for (text,) in self._db.execute(query, (agent, task_id)):
             yield text
 
+    def record(self, agent: str, task_id: str, stage: int) -> StageRecord:
+        """One record, whole.
+
+        Raises:
+            StoreError: There is none, or it is not valid.
+        """
+        text = self.record_text(agent, task_id, stage)
+        if text is None:
+            raise StoreError(f"{self.path}: no record of {agent}, {task_id}, stage {stage}")
+        try:
+            return StageRecord.model_validate_json(text)
+        except ValidationError as error:
+            raise StoreError(f"{self.path}: {error}") from error
+
+    def kept_measures(self) -> Iterator[tuple[tuple[str, str, int], int | None, str | None]]:
+        """By agent, task and stage: the version of the measures kept beside a record, and these; `None` without."""
+        query = (
+            "SELECT agent, task_id, stage, version, measures FROM stages LEFT JOIN measures "
+            "USING (agent, task_id, stage) ORDER BY agent, task_id, stage"
+        )
+        for agent, task_id, stage, version, measures in self._db.execute(query):
+            yield (agent, task_id, stage), version, measures
+
     def record_text(self, agent: str, task_id: str, stage: int) -> str | None:
         """One record as stored, or `None`."""
         query = "SELECT record FROM stages WHERE agent = ? AND task_id = ? AND stage = ?"
@@ -193,6 +244,11 @@ class RunStore:
         """Wall and CPU seconds of every recorded stage; not deterministic, hence not in the records."""
         rows = self._db.execute("SELECT agent, task_id, stage, wall_s, cpu_s FROM timings")
         return {(agent, task_id, stage): (wall_s, cpu_s) for agent, task_id, stage, wall_s, cpu_s in rows}
+
+    def costs(self) -> dict[tuple[str, str, int], dict[str, Any]]:
+        """What else the stages cost, by field of `StageCosts`; like `timings`, not in the records."""
+        rows = self._db.execute("SELECT agent, task_id, stage, costs FROM costs")
+        return {(agent, task_id, stage): json.loads(costs) for agent, task_id, stage, costs in rows}
 
     def simulator_restarts(self) -> dict[tuple[str, str, int], int]:
         """How often the simulator's process was lost and the stage tried again, of stages where it was."""

@@ -1,43 +1,28 @@
-"""Why a stage failed: one cause a stage, the first that fits, judged from its record."""
+"""How a stage ended, in words. What is what is decided in `evonav.evaluation.taxonomy`."""
 
-import math
-from enum import Enum
-
-from evonav.evaluation.records import EndState, EntryRecord, StageRecord
+from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.taxonomy import Cause, cause_of
 from evonav.tasks.language import noun_of
 
-NEAR_TARGET_M = 1.0
-"""Ground-plane distance within which an entry of the goal's category is taken for the target's."""
+__all__ = ["WORDS", "Cause", "cause_of", "sentence"]
 
-
-class Cause(str, Enum):
-    """What to fix. Values are the words a report uses."""
-
-    STALE_ENTRY = "stopped at a stale entry"
-    STOPPED_SHORT = "stopped short of the target"
-    WRONG_INSTANCE = "stopped at another instance"
-    WRONG_CATEGORY = "stopped at another kind of object"
-    NO_OBJECT = "stopped without an object"
-    NEVER_IN_VIEW = "target never in view"
-    NOT_REMEMBERED = "target in view, not recognised"
-    NOT_REACHED = "target known, not reached in time"
-    ERRORED = "errored"
-    NOT_RUN = "not run"
-
-
-def cause_of(record: StageRecord) -> Cause | None:
-    """The cause of a stage that did not succeed; `None` for a success."""
-    if record.state is EndState.SUCCESS:
-        return None
-    if record.state is EndState.ERRORED:
-        return Cause.ERRORED
-    if record.state is EndState.NOT_RUN:
-        return Cause.NOT_RUN
-    if record.has_stopped:
-        return _cause_of_stop(record)
-    if record.num_target_visible_rounds == 0:
-        return Cause.NEVER_IN_VIEW
-    return Cause.NOT_REACHED if any(_is_target(record, entry) for entry in record.entries) else Cause.NOT_REMEMBERED
+WORDS: dict[Cause, str] = {
+    Cause.NO_OBJECT: "stopped without an object",
+    Cause.STALE_ENTRY: "stopped at a stale entry",
+    Cause.WRONG_CATEGORY: "stopped at another kind of object",
+    Cause.STOPPED_SHORT: "stopped short of the target",
+    Cause.WRONG_INSTANCE: "stopped at another instance",
+    Cause.NEVER_IN_VIEW: "target never in view",
+    Cause.NOT_REMEMBERED: "target in view, not recognised",
+    Cause.NOT_APPROACHED: "target known, never chosen",
+    Cause.NOT_REACHED: "target known, not reached in time",
+    Cause.NO_PATH: "errored: no path to the target",
+    Cause.DECISION_FAILURE: "errored: no valid decision",
+    Cause.AGENT_ERROR: "errored: the agent failed",
+    Cause.HARNESS_ERROR: "errored: the simulator or evonav failed",
+    Cause.NOT_RUN: "not run",
+}
+"""What reports call the causes."""
 
 
 def sentence(record: StageRecord) -> str:
@@ -58,21 +43,4 @@ def sentence(record: StageRecord) -> str:
     if record.has_stopped:
         named = f" ({record.stop_reason})" if entry is None and record.stop_reason else ""
         named = f" ({noun_of(entry.label)})" if entry is not None else named
-    return f"{cause.value.capitalize()}{named}{distance}."
-
-
-def _cause_of_stop(record: StageRecord) -> Cause:
-    entry = record.trace[-1].chosen_entry if record.trace else None
-    if entry is None:
-        return Cause.NO_OBJECT
-    if entry.is_stale:
-        return Cause.STALE_ENTRY
-    if entry.label != record.target.category:
-        return Cause.WRONG_CATEGORY
-    return Cause.STOPPED_SHORT if _is_target(record, entry) else Cause.WRONG_INSTANCE
-
-
-def _is_target(record: StageRecord, entry: EntryRecord) -> bool:
-    x_m, _, z_m = record.target.position_m
-    distance_m = math.dist((entry.centre_m[0], entry.centre_m[2]), (x_m, z_m))
-    return not entry.is_stale and entry.label == record.target.category and distance_m <= NEAR_TARGET_M
+    return f"{WORDS[cause].capitalize()}{named}{distance}."

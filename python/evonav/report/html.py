@@ -13,7 +13,7 @@ from evonav.errors import StoreError
 from evonav.evaluation.metrics import AgentSummary
 from evonav.report import tables
 from evonav.report.cards import TaskView, filter_data, task_view
-from evonav.report.causes import Cause
+from evonav.report.causes import WORDS, Cause
 from evonav.report.findings import latex_tables, markdown_tables, run_tables, statements
 from evonav.report.legend import legend
 from evonav.report.maps import map_css, map_name, outcome_words, stage_svg
@@ -108,7 +108,7 @@ def _page_context(run: Run) -> dict[str, Any]:
         "tables": [table for table in others if table.rows],
         "statements": statements(run),
         "overview": overview,
-        "causes": [cause for cause in Cause if cause in used],
+        "causes": [(cause.name, WORDS[cause]) for cause in Cause if cause in used],
         "facts": _run_facts(run),
         "css": text_of("report.css") + map_css(),
         "js": text_of("report.js"),
@@ -122,7 +122,7 @@ def _mark(outcome: StageOutcome | None) -> tuple[str, str]:
     if outcome is None:
         return ("none", "no record yet")
     record = outcome.record
-    why = "" if outcome.cause is None or outcome.cause.value == record.state.value else f": {outcome.cause.value}"
+    why = f": {WORDS[outcome.cause]}" if outcome.cause is not None and record.is_scored else ""
     return (record.state.value, f"{record.goal.category}, {outcome_words(record)}{why}")
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from evonav.evaluation.records import EndState, StageRecord
-from evonav.report.causes import Cause
+from evonav.report.causes import WORDS, Cause
 from evonav.report.run import Run
 from evonav.report.tables import NONE, Table, percent
 
@@ -91,7 +91,7 @@ def cause_share_table(run: Run, stratum: str) -> Table:
     rows = [("n", *(str(total) for total in totals.values()))]
     for cause in (None, *causes):
         shares = [part[cause] / totals[agent] if totals[agent] else None for agent, part in counts.items()]
-        rows.append(("success" if cause is None else cause.value, *(percent(share, None) for share in shares)))
+        rows.append(("success" if cause is None else WORDS[cause], *(percent(share, None) for share in shares)))
     title = f"Why stages failed: {STRATA[stratum]}"
     return Table(title, ("% of stages", *run.agents), tuple(rows), ("One cause a stage, the first that fits.",))
 

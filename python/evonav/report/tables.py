@@ -16,7 +16,7 @@ from rich.text import Text
 
 from evonav.evaluation.metrics import AgentSummary, PairedDifference, Rates, rates
 from evonav.evaluation.records import StageRecord
-from evonav.report.causes import Cause, cause_of
+from evonav.report.causes import WORDS, Cause, cause_of
 from evonav.significance import Interval
 
 NONE = "–"
@@ -150,7 +150,7 @@ def cause_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:
 def cause_count_table(counts: Mapping[str, Mapping[Cause | None, int]]) -> Table:
     """`cause_table` from counts."""
     causes = [cause for cause in Cause if any(part.get(cause) for part in counts.values())]
-    rows = tuple((cause.value, *(str(part.get(cause, 0)) for part in counts.values())) for cause in causes)
+    rows = tuple((WORDS[cause], *(str(part.get(cause, 0)) for part in counts.values())) for cause in causes)
     note = "One cause a stage, the first that fits."
     return Table("Why stages failed", ("Cause", *counts), rows, (note,))
 

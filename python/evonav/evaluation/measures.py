@@ -1,0 +1,376 @@
+"""One flat row a stage: everything that tables, exports and comparisons are made of (docs/measures.md defines it).
+
+`stage_rows` reads what the store keeps beside each record, so no trace is parsed; of runs that an older evonav wrote,
+it derives the same from the records. What old records do not hold is `None`.
+"""
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, fields
+from itertools import groupby, pairwise
+from typing import TYPE_CHECKING, Any
+
+from evonav.evaluation.costs import StageCosts
+from evonav.evaluation.records import EndState, MemoryRecord, RoundRecord, StageRecord
+from evonav.evaluation.taxonomy import cause_of
+
+if TYPE_CHECKING:
+    from evonav.evaluation.store import RunStore
+
+MEASURES_VERSION = 1
+"""Raised whenever a measure changes: measures kept under another version are derived again from their records."""
+STRICT_RADIUS_M = 1.0
+"""Of `is_strict_success`."""
+COUNTERS = {
+    "decisions": "num_decisions",
+    "failed_decisions": "num_failed_decisions",
+    "conflicts": "num_conflicts",
+    "verifications": "num_verifications",
+    "rejected_entries": "num_rejected_entries",
+}
+"""Agents' own counters, cumulative over a task, and the fields that hold what a stage added."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordMeasures:
+    """What one record tells by itself. Without a score (errored, not run), scores and distances are `None`."""
+
+    agent: str
+    task_id: str
+    house: str
+    stage: int
+    """1-based: `stage - 1` earlier stages share its memory."""
+    num_stages: int
+    """Of its task."""
+    state: str
+    """`success`, `failure`, `errored` or `not_run`."""
+    cause: str | None
+    """Why it is no success: a value of `Cause`."""
+    error_kind: str | None
+    category: str
+    """Of the target."""
+    mode: str
+    """Of the transition before the stage: `TransitionRecord.kind`; `first` in stage 1."""
+    stratum: str
+    """`stage_1`, `relocated` or `not_relocated` (the paper's)."""
+    is_relocated_now: bool
+    """The target moved in the transition just before the stage."""
+    is_agent_in_changed_room: bool
+    num_relocations: int
+    """Objects that moved in the transition before the stage."""
+    num_failed_before: int
+    """Earlier stages of the episode in which the agent failed to answer."""
+    has_lost_memory: bool
+    """Its process was lost earlier in the episode, and its memory with it."""
+
+    success: bool | None
+    """The paper's: within the success radius at the end, on the ground plane."""
+    is_strict_success: bool | None
+    """It called stop, at most 1 m from the target's box, with the target in view."""
+    is_geodesic_success: bool | None
+    """The shortest path from its end to the target is shorter than the success radius."""
+    spl: float | None
+    soft_spl: float | None
+    ring_spl: float | None
+    """SPL to the success radius instead of the target's centre; `None` for a start within the radius."""
+    start_distance_m: float | None
+    terminal_distance_m: float | None
+    """Ground plane, to the centre of the target: success at another radius is `terminal_distance_m < radius`."""
+    terminal_box_distance_m: float | None
+    terminal_geodesic_m: float | None
+    path_length_m: float | None
+    reference_length_m: float | None
+    reference_ring_m: float | None
+
+    num_rounds: int
+    has_stopped: bool
+    stop_reason: str
+    is_snapped: bool
+    num_target_visible_rounds: int
+    first_target_visible_round: int | None
+    num_failed_actions: int
+    """Rounds whose action could not be carried out."""
+
+    num_stale_visits: int
+    """Runs of rounds with one and the same stale entry chosen."""
+    num_stale_rounds: int
+    stale_path_m: float
+    """Walked in rounds that had chosen a stale entry."""
+    num_stale_at_start: int | None
+    """Entries that are stale as the stage begins."""
+    num_stale_evident: int | None
+    """Of them, those whose empty place came into view."""
+    num_stale_cleared: int | None
+    """Of those, the ones that the agent dropped or corrected before the stage ended."""
+    rounds_to_clear: float | None
+    """Mean over the cleared ones, from the first view of the empty place."""
+    metres_to_clear: float | None
+    num_moved: int | None
+    """Objects that the transition moved out of their old places."""
+    num_moved_seen: int | None
+    num_moved_found: int | None
+    """Of those seen at their new place, the ones that an entry came to stand for."""
+    rounds_to_find: float | None
+    """Mean over the found ones, from the first view of the object at its new place."""
+    metres_to_find: float | None
+    num_forgotten: int | None
+    """Objects known at the start and not at the end though they stand where they stood."""
+
+    num_entries: int | None
+    """In memory at the end."""
+    num_stale_entries: int | None
+    """Of them, stale."""
+    precision: float | None
+    """Entries at the end with an object of their label in their place, by all; `None` without entries."""
+    recall: float | None
+    """Objects seen so far that a right entry stands for at the end, by all seen so far."""
+    num_seen_objects: int | None
+    num_duplicates: int | None
+    """Right entries at the end beyond the first for an object."""
+    position_error_m: float | None
+    num_entries_at_start: int | None
+    precision_at_start: float | None
+    """The same when the agent had been told the goal: stages from 2 on tell what the change has cost."""
+    recall_at_start: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageRow(StageCosts, RecordMeasures):
+    """A stage in a row: what its record tells, what those before it add, and what it cost."""
+
+    precision_before: float | None
+    """At the end of the stage before, in that stage's house: less `precision_at_start`, what the change made stale."""
+    num_decisions: int | None
+    """Questions that the agent's model answered in this stage, or rounds in which it decided; its own counter."""
+    num_failed_decisions: int | None
+    num_conflicts: int | None
+    num_verifications: int | None
+    num_rejected_entries: int | None
+
+    @property
+    def is_scored(self) -> bool:
+        """Whether the stage counts in rates."""
+        return self.success is not None
+
+    def is_success_at(self, radius_m: float) -> bool | None:
+        """Success had the radius been another; `None` where the stage has no score."""
+        return None if self.terminal_distance_m is None or not self.is_scored else self.terminal_distance_m < radius_m
+
+
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """What the store keeps of a record beside it."""
+
+    measures: RecordMeasures
+    counters: dict[str, int]
+    """Cumulative, at the end of the stage."""
+    is_fresh: bool
+    """The agent began anew in this stage, and its counters with it."""
+
+
+def kept_measures(record: StageRecord) -> str:
+    """What `stage_rows` needs of a record, as JSON; derived from it alone.
+
+    Args:
+        record: Whole, with its trace.
+    """
+    last = record.trace[-1].counters if record.trace else {}
+    kept = {
+        "measures": asdict(measures_of(record)),
+        "counters": {name: last[name] for name in COUNTERS if name in last}
+        # Agents count failures from the first one on.
+        | ({"failed_decisions": last.get("failed_decisions", 0)} if "decisions" in last else {}),
+        "is_fresh": record.stage == 1 or record.memory_lost_at == record.stage,
+    }
+    return json.dumps(kept, separators=(",", ":"), allow_nan=False)
+
+
+def stage_rows(store: "RunStore", agents: Sequence[str] | None = None) -> list[StageRow]:
+    """A row for every recorded stage, by agent, task and stage.
+
+    Args:
+        store: Of a run, finished or not.
+        agents: Only these.
+
+    Raises:
+        StoreError: The run cannot be read.
+    """
+    kept = _kept(store, agents)
+    costs, timings, restarts = store.costs(), store.timings(), store.simulator_restarts()
+    rows: list[StageRow] = []
+    for _, episode in groupby(kept, key=lambda one: (one.measures.agent, one.measures.task_id)):
+        before: _Kept | None = None
+        counted: dict[str, int] = {}
+        for one in episode:
+            key = (one.measures.agent, one.measures.task_id, one.measures.stage)
+            counted = {} if one.is_fresh else counted
+            follows = before is not None and before.measures.stage == one.measures.stage - 1
+            wall_s, cpu_s = timings.get(key, (None, None))
+            values: dict[str, Any] = {
+                **_values(one.measures),
+                "wall_s": wall_s,
+                "cpu_s": cpu_s,
+                **costs.get(key, {}),
+                "num_simulator_restarts": restarts.get(key, 0),
+                **{
+                    field: one.counters[name] - counted.get(name, 0) if name in one.counters else None
+                    for name, field in COUNTERS.items()
+                },
+                "precision_before": before.measures.precision if before is not None and follows else None,
+            }
+            rows.append(StageRow(**values))
+            before, counted = one, {**counted, **one.counters}
+    return rows
+
+
+def measures_of(record: StageRecord) -> RecordMeasures:
+    """What one record tells.
+
+    Args:
+        record: Whole, with its trace.
+    """
+    is_success = record.state is EndState.SUCCESS if record.is_scored else None
+    cause = cause_of(record)
+    walked_m = _walked_m(record.trace)
+    visits = [list(group) for (_, is_stale), group in groupby(record.trace, key=_chosen) if is_stale]
+    start, end = record.memory_at_start, record.memory_at_end
+    is_told = end is not None
+    cleared = [(e.evident_round, e.cleared_round) for e in record.stale_entries]
+    found = [(m.seen_round, m.found_round) for m in record.moved_objects]
+    # Records of the first runs have no `memory_at_end`, but entries: stale or not is in them.
+    has_entries = is_told or bool(record.entries)
+    num_stale = sum(entry.is_stale for entry in record.entries)
+    return RecordMeasures(
+        agent=record.agent,
+        task_id=record.task_id,
+        house=record.house,
+        stage=record.stage,
+        num_stages=record.num_stages,
+        state=record.state.value,
+        cause=None if cause is None else cause.value,
+        error_kind=None if record.error is None else record.error.kind.value,
+        category=record.target.category,
+        mode="first" if record.stage == 1 else record.transition.kind,
+        stratum=stratum_of(record),
+        is_relocated_now=record.target.is_relocated_now,
+        is_agent_in_changed_room=record.transition.is_agent_in_room,
+        num_relocations=len(record.transition.relocations),
+        num_failed_before=len(record.failed_before),
+        has_lost_memory=record.memory_lost_at is not None,
+        success=is_success,
+        is_strict_success=_is_strict_success(record),
+        is_geodesic_success=record.is_geodesic_success,
+        spl=record.spl,
+        soft_spl=record.soft_spl,
+        ring_spl=_ring_spl(record),
+        start_distance_m=record.start_distance_m,
+        terminal_distance_m=record.terminal_distance_m,
+        terminal_box_distance_m=record.terminal_box_distance_m,
+        terminal_geodesic_m=record.terminal_geodesic_m,
+        path_length_m=record.path_length_m,
+        reference_length_m=record.reference_length_m,
+        reference_ring_m=record.reference_ring_m,
+        num_rounds=record.num_rounds,
+        has_stopped=record.has_stopped,
+        stop_reason=record.stop_reason,
+        is_snapped=record.is_snapped,
+        num_target_visible_rounds=record.num_target_visible_rounds,
+        first_target_visible_round=next((r.round for r in record.trace if r.is_target_visible), None),
+        num_failed_actions=sum(not taken.is_action_success for taken in record.trace),
+        num_stale_visits=len(visits),
+        num_stale_rounds=sum(map(len, visits)),
+        stale_path_m=math.fsum(_length_m(taken) for visit in visits for taken in visit),
+        num_stale_at_start=len(record.stale_entries) if is_told else None,
+        num_stale_evident=sum(evident is not None for evident, _ in cleared) if is_told else None,
+        num_stale_cleared=sum(gone is not None for _, gone in cleared) if is_told else None,
+        rounds_to_clear=_mean(b - a for a, b in _whole(cleared)),
+        metres_to_clear=_mean(walked_m[b] - walked_m[a] for a, b in _whole(cleared)),
+        num_moved=len(record.moved_objects) if is_told else None,
+        num_moved_seen=sum(seen is not None for seen, _ in found) if is_told else None,
+        num_moved_found=sum(there is not None for _, there in found) if is_told else None,
+        rounds_to_find=_mean(b - a for a, b in _whole(found)),
+        metres_to_find=_mean(walked_m[b] - walked_m[a] for a, b in _whole(found)),
+        num_forgotten=record.num_forgotten,
+        num_entries=len(record.entries) if has_entries else None,
+        num_stale_entries=num_stale if has_entries else None,
+        precision=1.0 - num_stale / len(record.entries) if record.entries else None,
+        recall=_recall(end),
+        num_seen_objects=None if end is None else end.num_seen,
+        num_duplicates=None if end is None else end.num_right - end.num_held,
+        position_error_m=None if end is None else end.position_error_m,
+        num_entries_at_start=None if start is None else start.num_entries,
+        precision_at_start=start.num_right / start.num_entries if start is not None and start.num_entries else None,
+        recall_at_start=_recall(start),
+    )
+
+
+def stratum_of(record: StageRecord) -> str:
+    """The paper's strata: `relocated` if the target ever moved since stage 1; `stage_1` is in neither."""
+    if record.stage == 1:
+        return "stage_1"
+    return "relocated" if record.target.is_relocated else "not_relocated"
+
+
+_MEASURE_FIELDS = tuple(field.name for field in fields(RecordMeasures))
+
+
+def _values(measures: RecordMeasures) -> dict[str, Any]:
+    return {name: getattr(measures, name) for name in _MEASURE_FIELDS}
+
+
+def _kept(store: "RunStore", agents: Sequence[str] | None) -> Iterator[_Kept]:
+    """By agent, task and stage; derived anew where the store has none of this version."""
+    wanted = None if agents is None else set(agents)
+    for (agent, task_id, stage), version, text in store.kept_measures():
+        if wanted is not None and agent not in wanted:
+            continue
+        if version != MEASURES_VERSION or text is None:
+            text = kept_measures(store.record(agent, task_id, stage))
+        kept = json.loads(text)
+        yield _Kept(RecordMeasures(**kept["measures"]), kept["counters"], kept["is_fresh"])
+
+
+def _chosen(taken: RoundRecord) -> tuple[int | None, bool]:
+    entry = taken.chosen_entry
+    return (None, False) if entry is None else (entry.entry_id, entry.is_stale)
+
+
+def _length_m(taken: RoundRecord) -> float:
+    return math.fsum(math.dist(a, b) for a, b in pairwise(taken.path_m))
+
+
+def _walked_m(trace: Sequence[RoundRecord]) -> list[float]:
+    """Path length walked before each round."""
+    walked = [0.0]
+    for taken in trace:
+        walked.append(walked[-1] + _length_m(taken))
+    return walked
+
+
+def _whole(spans: Iterable[tuple[int | None, int | None]]) -> Iterator[tuple[int, int]]:
+    return ((a, b) for a, b in spans if a is not None and b is not None)
+
+
+def _mean(values: Iterable[float]) -> float | None:
+    found = list(values)
+    return math.fsum(found) / len(found) if found else None
+
+
+def _recall(memory: MemoryRecord | None) -> float | None:
+    return memory.num_seen_held / memory.num_seen if memory is not None and memory.num_seen else None
+
+
+def _is_strict_success(record: StageRecord) -> bool | None:
+    if not record.is_scored or record.terminal_box_distance_m is None:
+        return None
+    # An agent stops where it looked: the views of its last round are those of the terminal pose.
+    is_in_view = bool(record.trace) and record.trace[-1].is_target_visible
+    return record.has_stopped and is_in_view and record.terminal_box_distance_m <= STRICT_RADIUS_M
+
+
+def _ring_spl(record: StageRecord) -> float | None:
+    if not record.is_scored or not record.reference_ring_m or record.path_length_m is None:
+        return None
+    is_success = record.state is EndState.SUCCESS
+    return record.reference_ring_m / max(record.path_length_m, record.reference_ring_m) if is_success else 0.0

@@ -1,0 +1,98 @@
+"""Why a stage failed: one cause a stage, the first that fits, judged from its record alone.
+
+Definitions, in the order in which they are tried, are in docs/measures.md.
+"""
+
+import math
+from enum import Enum
+
+from evonav.evaluation.records import EndState, EntryRecord, ErrorKind, StageRecord
+
+NEAR_TARGET_M = 1.0
+"""Ground-plane distance within which an entry of the goal's category is taken for the target's."""
+
+
+class Cause(str, Enum):
+    """What to fix. The first nine are failures, the others stages without a score."""
+
+    STALE_ENTRY = "stale_entry"
+    """It stopped at an entry with no object of its label there."""
+    WRONG_CATEGORY = "wrong_category"
+    """It stopped at an entry of another category than the target's."""
+    STOPPED_SHORT = "stopped_short"
+    """It stopped at the target's entry, outside of the success radius."""
+    WRONG_INSTANCE = "wrong_instance"
+    """It stopped at another object of the target's category."""
+    NO_OBJECT = "no_object"
+    """It stopped with no entry chosen: it gave up, or has no entries."""
+    NEVER_IN_VIEW = "never_in_view"
+    """The budget ended, and the target was in no view."""
+    NOT_REMEMBERED = "not_remembered"
+    """The budget ended; the target was in view, and no entry at the end is the target's."""
+    NOT_APPROACHED = "not_approached"
+    """The budget ended; an entry is the target's, and the agent never chose it."""
+    NOT_REACHED = "not_reached"
+    """The budget ended; an entry is the target's, and the agent had chosen it."""
+    NO_PATH = "no_path"
+    """Errored: there is no path from the effective start to the target, so SPL is undefined."""
+    DECISION_FAILURE = "decision_failure"
+    """Errored: the decision model gave no valid answer."""
+    AGENT_ERROR = "agent_error"
+    """Errored: the agent raised, died or hung."""
+    HARNESS_ERROR = "harness_error"
+    """Errored: the simulator, the task or evonav itself failed."""
+    NOT_RUN = "not_run"
+    """An earlier stage of the episode is errored, or the run has not come to it."""
+
+
+_OF_ERRORS = {
+    ErrorKind.REFERENCE: Cause.NO_PATH,
+    ErrorKind.DECISION: Cause.DECISION_FAILURE,
+    ErrorKind.AGENT: Cause.AGENT_ERROR,
+    ErrorKind.CRASH: Cause.AGENT_ERROR,
+    ErrorKind.TIMEOUT: Cause.AGENT_ERROR,
+    ErrorKind.SIMULATION: Cause.HARNESS_ERROR,
+    ErrorKind.SIMULATOR_LOST: Cause.HARNESS_ERROR,
+    ErrorKind.HARNESS: Cause.HARNESS_ERROR,
+}
+
+
+def cause_of(record: StageRecord) -> Cause | None:
+    """The cause of a stage that did not succeed; `None` for a success.
+
+    Args:
+        record: Whole: trace and entries are looked at.
+    """
+    if record.state is EndState.SUCCESS:
+        return None
+    if record.state is EndState.NOT_RUN:
+        return Cause.NOT_RUN
+    if record.state is EndState.ERRORED:
+        return _OF_ERRORS[record.error.kind] if record.error is not None else Cause.HARNESS_ERROR
+    if record.has_stopped:
+        return _cause_of_stop(record)
+    if record.num_target_visible_rounds == 0:
+        return Cause.NEVER_IN_VIEW
+    if not any(_is_target(record, entry) for entry in record.entries):
+        return Cause.NOT_REMEMBERED
+    was_chosen = any(
+        taken.chosen_entry is not None and _is_target(record, taken.chosen_entry) for taken in record.trace
+    )
+    return Cause.NOT_REACHED if was_chosen else Cause.NOT_APPROACHED
+
+
+def _cause_of_stop(record: StageRecord) -> Cause:
+    entry = record.trace[-1].chosen_entry if record.trace else None
+    if entry is None:
+        return Cause.NO_OBJECT
+    if entry.is_stale:
+        return Cause.STALE_ENTRY
+    if entry.label != record.target.category:
+        return Cause.WRONG_CATEGORY
+    return Cause.STOPPED_SHORT if _is_target(record, entry) else Cause.WRONG_INSTANCE
+
+
+def _is_target(record: StageRecord, entry: EntryRecord) -> bool:
+    x_m, _, z_m = record.target.position_m
+    distance_m = math.dist((entry.centre_m[0], entry.centre_m[2]), (x_m, z_m))
+    return not entry.is_stale and entry.label == record.target.category and distance_m <= NEAR_TARGET_M
