@@ -27,7 +27,7 @@ SELF_REPORTED = (
     r"trace\.\d+\.(counters|details)\..*",
     r"(trace\.\d+\.chosen_entry|entries\.\d+)\.(entry_id|label|centre_m\.\d|size_m\.\d|num_detections)",
 )
-"""What an agent says of itself: no part of a score, and nothing can tell whether it is true."""
+"""What an agent says of itself: no part of a score, and mostly nothing can tell whether it is true."""
 
 
 @pytest.fixture(scope="module")
@@ -132,7 +132,7 @@ def test_any_altered_field_of_a_record_is_found_by_carrying_the_actions_out(run:
         if path[0] == "sensing" or "face_m" in path:  # counts by what came of it, which may be nothing
             continue
         is_own_words = any(re.fullmatch(pattern, name) for pattern in SELF_REPORTED)
-        assert bool(differences) != is_own_words, f"{name}: {differences}"
+        assert differences or is_own_words, name
     assert len(seen) > 60
     simulator.close()
 
