@@ -574,7 +574,13 @@ def map_spec(house_json: str, *, name: str, cell_m: float) -> tuple[tuple[int, i
 # evolution
 
 def generate_task(
-    house: House, *, seed: int, label: str, parameters_json: str, allow_unknown_assets: bool
+    house: House,
+    *,
+    seed: int,
+    label: str,
+    parameters_json: str,
+    allow_unknown_assets: bool,
+    given_json: str = "{}",
 ) -> tuple[str, list[str], list[bytes]]: ...
 
 # validation

@@ -4,10 +4,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 from evonav.evaluation.plans import house_map, image_uri, target_record, transition_record
-from evonav.evaluation.protocol import EpisodeCase, StageCase
+from evonav.evaluation.protocol import EpisodeCase, ForcedWalk, StageCase
 from evonav.evaluation.records import ObjectFootprint, Point2, StageMap
 from evonav.house import House
 from evonav.tasks import Task
+from evonav.tasks.oracle import OracleStage
 from evonav.world.simulator import SceneObject
 
 THUMBNAIL_PX = 160
@@ -30,10 +31,15 @@ def episode_case(task: Task) -> EpisodeCase:
                 house_json=task.house_json(k),
                 target=target_record(task, k),
                 transition=transition_record(task.oracle(k)),
+                forced=_forced_walk(task.oracle(k)) if k in task.forced_stages else None,
             )
             for k in numbers
         ),
     )
+
+
+def _forced_walk(oracle: OracleStage) -> ForcedWalk:
+    return ForcedWalk(path_m=oracle.reference_path_m, end=oracle.reference_pose.pose())
 
 
 def stage_map(case: EpisodeCase, stage: int, objects: Sequence[SceneObject]) -> StageMap:

@@ -156,7 +156,7 @@ def summarise(agent: str, records: Sequence[StageRecord], num_stages: int) -> Ag
         sr_wilson95=overall.sr_wilson95,
         soft_spl=_mean(record.soft_spl for record in scored),
         counts={state.value: counts[state] for state in EndState},
-        is_incomplete=overall.n != num_stages,
+        is_incomplete=overall.n + counts[EndState.FORCED] != num_stages,
         num_stages=num_stages,
         num_tasks=len({record.task_id for record in records}),
         num_stopped=sum(record.has_stopped for record in scored),

@@ -11,6 +11,7 @@ from evonav.evaluation.records import (
     EndState,
     ErrorKind,
     GoalRecord,
+    Point2,
     StageError,
     StageMap,
     StageRecord,
@@ -75,6 +76,16 @@ class ProtocolConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class ForcedWalk:
+    """A reference trajectory that the evaluator walks while the agent looks on."""
+
+    path_m: tuple[Point2, ...]
+    """Corners, the start first."""
+    end: Pose
+    """Where it ends; of its horizon nothing is taken: an agent's camera is as its house has it."""
+
+
+@dataclass(frozen=True, slots=True)
 class StageCase:
     """A stage as the evaluator knows it; only `public` ever reaches an agent."""
 
@@ -82,6 +93,8 @@ class StageCase:
     house_json: str
     target: TargetRecord
     transition: TransitionRecord
+    forced: ForcedWalk | None = None
+    """The stage is not the agent's to walk, and not scored."""
 
     @property
     def goal(self) -> GoalRecord:

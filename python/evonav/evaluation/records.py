@@ -32,6 +32,8 @@ class EndState(str, Enum):
     FAILURE = "failure"
     ERRORED = "errored"
     NOT_RUN = "not_run"
+    FORCED = "forced"
+    """The evaluator walked and the agent looked on: nothing to score (docs/controlled.md)."""
 
 
 class ErrorKind(str, Enum):

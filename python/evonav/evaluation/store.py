@@ -27,7 +27,7 @@ _SCHEMA = """
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS stages (
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
-    state TEXT NOT NULL CHECK (state IN ('success', 'failure', 'errored', 'not_run')),
+    state TEXT NOT NULL CHECK (state IN ('success', 'failure', 'errored', 'not_run', 'forced')),
     record TEXT NOT NULL,
     PRIMARY KEY (agent, task_id, stage)
 ) WITHOUT ROWID;

@@ -1,11 +1,19 @@
 """A task: header, public stages, oracle stages, stage houses. `evonav.tasks.files` reads and writes them."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+)
 
 from evonav.tasks.extensions import Extensions
 from evonav.tasks.oracle import OracleStage
@@ -64,6 +72,20 @@ class HouseSource(Record):
     num_objects: PositiveInt
 
 
+class Control(Record):
+    """How a task is one of several that differ in one thing alone (paper, Sec. 4.3; docs/controlled.md)."""
+
+    arm: Id
+    """Which of them: `fixed` or `evolved`, or a probability of evolution such as `p0.25`."""
+    attempt: NonNegativeInt
+    """Draws of goals and changes that were dropped before, because a goal could not be one in every arm."""
+    forced_stages: tuple[PositiveInt, ...]
+    """Stages in which the evaluator walks the reference trajectory and the agent looks on. They are not scored."""
+    shown_goals: tuple[PositiveInt, ...]
+    """For each stage, the stage whose words and image the agent is given: its own, or the earlier one with the same
+    target, so that it is told the same whatever has changed since."""
+
+
 class TaskHeader(Record):
     """`task.json` (paper, Sec. A.3)."""
 
@@ -80,6 +102,13 @@ class TaskHeader(Record):
     parameters: GenerationParameters
     checksums: dict[str, Sha256]
     """Per file of the task, of its contents: JSON as it is, `.gz` uncompressed, `.png` its RGB values row by row."""
+    control: Control | None = None
+    """Left out of the files of tasks that belong to no controlled analysis."""
+
+    @model_serializer(mode="wrap")
+    def _without_control(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        fields: dict[str, Any] = serialize(self)
+        return {key: value for key, value in fields.items() if key != "control" or value is not None}
 
 
 class PublicStage(Record):
@@ -116,6 +145,11 @@ class Task:
     def num_stages(self) -> int:
         """K."""
         return self.header.num_stages
+
+    @property
+    def forced_stages(self) -> tuple[int, ...]:
+        """Stages in which the evaluator walks and the agent looks on."""
+        return () if self.header.control is None else self.header.control.forced_stages
 
     @property
     def start_pose(self) -> Pose:

@@ -2,7 +2,7 @@
 
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::{self, Generation, Parameters},
+    evolution::{self, Generation, Given, Parameters},
 };
 use pyo3::{prelude::*, types::PyBytes};
 
@@ -11,9 +11,9 @@ use crate::{error, house::House};
 /// JSON of the record, stage houses, and reference images (RGB, row by row).
 type Generated<'py> = (String, Vec<String>, Vec<Bound<'py, PyBytes>>);
 
-/// Units and errors: `_core.pyi` and `evonav_core::evolution::generate_task`.
+/// Units and errors: `_core.pyi` and `evonav_core::evolution::generate_given`.
 #[pyfunction]
-#[pyo3(signature = (house, *, seed, label, parameters_json, allow_unknown_assets))]
+#[pyo3(signature = (house, *, seed, label, parameters_json, allow_unknown_assets, given_json="{}"))]
 fn generate_task<'py>(
     py: Python<'py>,
     house: &House,
@@ -21,14 +21,16 @@ fn generate_task<'py>(
     label: &str,
     parameters_json: &str,
     allow_unknown_assets: bool,
+    given_json: &str,
 ) -> PyResult<Generated<'py>> {
     let unknown =
         if allow_unknown_assets { UnknownAssets::CategoryDefault } else { UnknownAssets::Error };
     let (json, generated) = py
         .detach(|| {
             let parameters = Parameters::from_json(parameters_json)?;
-            let catalogue = Catalogue::bundled();
-            evolution::generate_task(&house.inner, catalogue, unknown, seed, label, &parameters)
+            let given = Given::from_json(given_json)?;
+            let (house, catalogue) = (&house.inner, Catalogue::bundled());
+            evolution::generate_given(house, catalogue, unknown, seed, label, &parameters, &given)
                 .map(|generated| (generated.to_json(), generated))
         })
         .map_err(error::to_py)?;

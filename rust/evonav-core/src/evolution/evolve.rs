@@ -27,7 +27,9 @@ impl Generator<'_> {
         stage: usize,
     ) -> Result<(EvolutionRecord, HouseDelta), Error> {
         let parameters = self.parameters;
-        if self.stream(stage, "trigger").uniform() >= parameters.evolve_probability {
+        let is_drawn =
+            || self.stream(stage, "trigger").uniform() < parameters.evolve_probability;
+        if !self.given.is_evolved(stage).unwrap_or_else(is_drawn) {
             return Ok((no_evolution(EvolutionOutcome::NotTriggered), HouseDelta::default()));
         }
         let house = &world.house;

@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use serde::Serialize;
 
 use super::{
-    Extensions, Parameters,
+    Extensions, Given, Parameters,
     beyond::Transition,
     evolve::no_evolution,
     record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason, Rejected},
@@ -62,17 +62,46 @@ pub fn generate_task(
     label: &str,
     parameters: &Parameters,
 ) -> Result<Generation, Error> {
+    generate_given(house, catalogue, unknown, seed, label, parameters, &Given::default())
+}
+
+/// Makes a task of a house, some of whose draws are given.
+///
+/// # Arguments
+/// As for [`generate_task`], and:
+/// * `given` - what is not drawn. All else is drawn from the same streams, so that tasks that
+///   differ in `given` or in `evolve_probability` alone share what they can.
+///
+/// # Returns
+/// A goal that is not in the house, or has no reference pose there, is
+/// [`RejectReason::NoValidGoal`].
+///
+/// # Errors
+/// Those of [`generate_task`]; [`Error::InvalidArgument`] for more stages than a task may have.
+pub fn generate_given(
+    house: &House,
+    catalogue: &Catalogue,
+    unknown: UnknownAssets,
+    seed: u64,
+    label: &str,
+    parameters: &Parameters,
+    given: &Given,
+) -> Result<Generation, Error> {
     parameters.check()?;
+    given.check()?;
     let num_rooms = house.rooms.len();
     if num_rooms < 2 {
         let detail = format!("{num_rooms} room(s)");
         return Ok(reject(RejectReason::TooFewRooms, 0, detail));
     }
     let frame = RefCell::default();
-    let generator = Generator { catalogue, seed, label, parameters, frame };
+    let generator = Generator { catalogue, seed, label, parameters, given, frame };
     let choices = &parameters.num_stages;
     let drawn = generator.stream(0, "num_stages").below(choices.len());
-    let num_stages = choices.get(drawn).copied().unwrap_or(1);
+    let num_stages = match given.stages.len() {
+        0 => choices.get(drawn).copied().unwrap_or(1),
+        num_given => num_given,
+    };
     let mut world = StageWorld::build(house.clone(), catalogue, unknown)?;
     let mut state = match State::at_start(&world) {
         Ok(state) => state,
@@ -133,6 +162,8 @@ pub(super) struct Generator<'a> {
     seed: u64,
     label: &'a str,
     pub(super) parameters: &'a Parameters,
+    /// What is not drawn.
+    pub(super) given: &'a Given,
     /// Working memory of the renderer.
     pub(super) frame: RefCell<FrameBuffer>,
 }

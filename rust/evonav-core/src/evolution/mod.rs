@@ -7,6 +7,7 @@ mod beyond;
 mod evolve;
 mod extensions;
 mod generate;
+mod given;
 mod goals;
 mod groups;
 mod layout;
@@ -30,7 +31,8 @@ mod target;
 mod unit;
 
 pub use extensions::{Extensions, Occurrence, Schedule};
-pub use generate::{Generation, generate_task};
+pub use generate::{Generation, generate_given, generate_task};
+pub use given::{Given, GivenStage};
 pub use goals::{Candidate, GoalBias, goal_room_weights, sample_goal, target_scores};
 pub use groups::{Group, asset_groups};
 pub use parameters::Parameters;

@@ -82,20 +82,28 @@ impl Generator<'_> {
             }
             None
         };
-        let num_rooms = house.rooms.len();
-        let drawn = sample_goal(
-            &candidates,
-            num_rooms,
-            bias,
-            self.parameters,
-            &mut stream,
-            &mut draw_reference,
-        );
+        let drawn = match self.given.goal(stage) {
+            Some(id) => indices
+                .iter()
+                .position(|&index| house.objects[index].id == id)
+                .and_then(|candidate| draw_reference(candidate).map(|made| (candidate, made))),
+            None => sample_goal(
+                &candidates,
+                house.rooms.len(),
+                bias,
+                self.parameters,
+                &mut stream,
+                &mut draw_reference,
+            ),
+        };
         if let Some(error) = failure {
             return Err(error);
         }
         let Some((candidate, reference)) = drawn else {
-            let detail = format!("{} objects drawn and refused", rejections.len());
+            let detail = match self.given.goal(stage) {
+                Some(id) => format!("the given goal {id} is no goal: {rejections:?}"),
+                None => format!("{} objects drawn and refused", rejections.len()),
+            };
             return rejected(RejectReason::NoValidGoal, detail);
         };
         let (index, room) = (indices[candidate], candidates[candidate].room);

@@ -1,0 +1,146 @@
+//! Given draws against drawn ones: what is given as it was drawn changes nothing, what is given
+//! otherwise changes that alone.
+
+#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
+
+use evonav_core::{
+    assets::{Catalogue, UnknownAssets},
+    evolution::{
+        Generation, Given, GivenStage, Parameters, generate_given, generate_task,
+        record::{EvolutionOutcome, GeneratedTask, RejectReason},
+    },
+    house::House,
+};
+use proptest::prelude::*;
+
+fn houses() -> Vec<House> {
+    let texts =
+        [include_str!("data/house_39_objects.json"), include_str!("data/house_100_objects.json")];
+    texts.iter().map(|text| House::from_json("test house", text).unwrap()).collect()
+}
+
+fn small(evolve_probability: f64) -> Parameters {
+    Parameters { evolve_probability, reference_image_px: 64, ..Parameters::default() }
+}
+
+fn made(house: &House, seed: u64, parameters: &Parameters, given: &Given) -> Generation {
+    let unknown = UnknownAssets::Error;
+    generate_given(house, Catalogue::bundled(), unknown, seed, "test", parameters, given).unwrap()
+}
+
+fn task(generation: Generation) -> GeneratedTask {
+    match generation {
+        Generation::Task(task) => task,
+        Generation::Rejected(rejected) => panic!("{rejected:?}"),
+    }
+}
+
+fn drawn(house: &House, seed: u64, parameters: &Parameters) -> GeneratedTask {
+    let catalogue = Catalogue::bundled();
+    let made = generate_task(house, catalogue, UnknownAssets::Error, seed, "test", parameters);
+    task(made.unwrap())
+}
+
+fn goals_of(task: &GeneratedTask) -> Vec<GivenStage> {
+    let goals = task.stages.iter().map(|stage| stage.target.id.clone());
+    goals.map(|id| GivenStage { goal_id: Some(id), is_evolved: None }).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn what_is_given_as_it_was_drawn_changes_nothing(which in 0..2_usize, seed in 0..1000_u64) {
+        let house = &houses()[which];
+        let parameters = small(0.5);
+        let free = drawn(house, seed, &parameters);
+        let mut stages = goals_of(&free);
+        for (given, stage) in stages.iter_mut().zip(&free.stages).skip(1) {
+            given.is_evolved = Some(stage.evolution.outcome != EvolutionOutcome::NotTriggered);
+        }
+        // The probability no longer matters either: every trigger is given.
+        let again = task(made(house, seed, &small(0.0), &Given { stages }));
+        let strip = |task: &GeneratedTask| {
+            let mut task = task.clone();
+            // Goals that were drawn and refused are not drawn.
+            task.stages.iter_mut().for_each(|stage| stage.rejections.clear());
+            task
+        };
+        prop_assert_eq!(strip(&free), strip(&again));
+    }
+
+    #[test]
+    fn a_larger_probability_evolves_wherever_a_smaller_one_does(
+        which in 0..2_usize, seed in 0..1000_u64, low in 0.0..1.0, high in 0.0..1.0,
+    ) {
+        let house = &houses()[which];
+        let stages = goals_of(&drawn(house, seed, &small(0.0)));
+        let triggers = |p: f64| -> Option<Vec<bool>> {
+            let given = Given { stages: stages.clone() };
+            let Generation::Task(task) = made(house, seed, &small(p), &given) else { return None };
+            for (given, stage) in stages.iter().zip(&task.stages) {
+                assert_eq!(given.goal_id.as_ref(), Some(&stage.target.id));
+            }
+            let is_triggered = |stage: &evonav_core::evolution::record::GeneratedStage| {
+                !matches!(
+                    stage.evolution.outcome,
+                    EvolutionOutcome::NotTriggered | EvolutionOutcome::FirstStage
+                )
+            };
+            Some(task.stages.iter().map(is_triggered).collect())
+        };
+        if let (Some(few), Some(many)) = (triggers(low.min(high)), triggers(low.max(high))) {
+            prop_assert!(few.iter().zip(&many).all(|(few, many)| few <= many));
+        }
+    }
+}
+
+#[test]
+fn a_change_is_made_where_it_is_given_and_nowhere_else() {
+    let mut num_evolved = 0;
+    for (house, seed) in houses().iter().flat_map(|house| (0..4).map(move |seed| (house, seed))) {
+        let fixed = drawn(house, seed, &small(0.0));
+        let mut stages = goals_of(&fixed);
+        stages.truncate(3);
+        stages[2].goal_id.clone_from(&stages[0].goal_id);
+        stages[2].is_evolved = Some(true);
+        let Generation::Task(evolved) = made(house, seed, &small(0.0), &Given { stages }) else {
+            continue;
+        };
+        assert_eq!(evolved.stages.len(), 3);
+        assert_eq!(evolved.stages[..2], fixed.stages[..2]);
+        assert_eq!(evolved.images[..2], fixed.images[..2]);
+        assert_eq!(evolved.houses[..2], fixed.houses[..2]);
+        assert_eq!(evolved.stages[2].target.id, evolved.stages[0].target.id);
+        let outcome = evolved.stages[2].evolution.outcome;
+        assert!(outcome != EvolutionOutcome::NotTriggered);
+        if outcome == EvolutionOutcome::Evolved {
+            num_evolved += 1;
+            assert_ne!(evolved.houses[2], evolved.houses[1]);
+        }
+    }
+    assert!(num_evolved >= 3, "{num_evolved}");
+}
+
+#[test]
+fn a_goal_that_is_not_there_is_refused() {
+    let goal_id = Some("no such object".to_owned());
+    let given = Given { stages: vec![GivenStage { goal_id, is_evolved: None }] };
+    match made(&houses()[0], 0, &small(0.5), &given) {
+        Generation::Rejected(rejected) => {
+            assert_eq!((rejected.reason, rejected.stage), (RejectReason::NoValidGoal, 1));
+            assert!(rejected.detail.contains("no such object"), "{}", rejected.detail);
+        }
+        Generation::Task(_) => panic!("a task"),
+    }
+}
+
+#[test]
+fn what_cannot_be_given_is_told() {
+    assert_eq!(Given::from_json("{}").unwrap(), Given::default());
+    for json in ["", "[1]", r#"{"stages": [{"goal": "a"}]}"#, r#"{"stages": [{"goal_id": 3}]}"#] {
+        assert!(Given::from_json(json).unwrap_err().to_string().contains("given"), "{json}");
+    }
+    let many = format!(r#"{{"stages": [{}]}}"#, vec!["{}"; 65].join(","));
+    assert!(Given::from_json(&many).unwrap_err().to_string().contains("64"));
+}
