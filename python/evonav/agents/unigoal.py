@@ -93,7 +93,7 @@ class UniGoal:
         self._asker.begin_round()
         view, pose = observation.views[-1], observation.pose
         bev, planner, watch = self._ready(pose)
-        planner.observe(pose)
+        planner.observe(pose, is_own_move=not observation.is_guided)
         bev.integrate(view, category_image(view.detections))
         if self._graphs.goal_graph is None:
             self._graphs.understand()

@@ -137,8 +137,13 @@ class UniGoalPlanner:
         self._exploration = _Exploration()
         self._blacklist = set()
 
-    def observe(self, pose: Pose) -> None:
-        """Where the last action has brought the agent; to be called once before each `step`."""
+    def observe(self, pose: Pose, *, is_own_move: bool = True) -> None:
+        """Where the last action has brought the agent; to be called once before each `step`.
+
+        Args:
+            pose: The agent's.
+            is_own_move: It came there by the last `step`; a move of another's tells nothing of obstacles.
+        """
         here = (pose.x_m, pose.z_m)
         last = self._last or pose
         there = (last.x_m, last.z_m)
@@ -146,7 +151,7 @@ class UniGoalPlanner:
         is_still = abs(here[0] - there[0]) < self.config.still_m and abs(here[1] - there[1]) < self.config.still_m
         if not is_still:
             self._stuck.is_stuck, self._stuck.goal_m = False, None
-        if self._last is not None and self._last_action is Action.MOVE_FORWARD:
+        if is_own_move and self._last is not None and self._last_action is Action.MOVE_FORWARD:
             self._learn_from_move(last, math.dist(here, there), is_still)
         self._last = pose
         self._exploration.num_steps += 1

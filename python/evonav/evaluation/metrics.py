@@ -155,7 +155,7 @@ def summarise(agent: str, records: Sequence[StageRecord], num_stages: int) -> Ag
         spl_ci95=overall.spl_ci95,
         sr_wilson95=overall.sr_wilson95,
         soft_spl=_mean(record.soft_spl for record in scored),
-        counts={state.value: counts[state] for state in EndState},
+        counts={state.value: counts[state] for state in EndState if state is not EndState.FORCED or counts[state]},
         is_incomplete=overall.n + counts[EndState.FORCED] != num_stages,
         num_stages=num_stages,
         num_tasks=len({record.task_id for record in records}),

@@ -69,6 +69,27 @@ def waypoints(corners_m: Sequence[Point2], spacing_m: float, max_travel_m: float
     return points, True
 
 
+def legs(corners_m: Sequence[Point2], travel_m: float) -> list[tuple[Point2, ...]]:
+    """A path in pieces of `travel_m`, the last one shorter; each begins where the one before ends.
+
+    Args:
+        corners_m: The path.
+        travel_m: Length of a piece along the path.
+
+    Returns:
+        Points of each piece, corners included; none for a path without length.
+    """
+    pieces: list[tuple[Point2, ...]] = []
+    left = [corners_m[0], *(b for a, b in pairwise(corners_m) if a != b)]
+    while len(left) > 1:
+        ahead, _ = waypoints(left, math.inf, travel_m)
+        pieces.append((left[0], *ahead))
+        # Where it ended within a segment, the rest of that segment is left.
+        num_corners = len(ahead) - (ahead[-1] != left[len(ahead)])
+        left = [ahead[-1], *left[1 + num_corners :]]
+    return pieces
+
+
 class Planner:
     """The simulator's shortest paths, to the nearest reachable place where a point itself is cut off.
 
@@ -116,6 +137,20 @@ def navigate(
     if is_end and action.face_m is not None:
         face(simulator, action.face_m)
     return Motion(tuple(passed), is_success=True, has_arrived=is_end)
+
+
+def walk(simulator: Simulator, leg_m: Sequence[Point2], yaw_rad: float | None = None) -> Motion:
+    """Takes the agent along a piece of a path that is known to be free.
+
+    Args:
+        simulator: It is moved.
+        leg_m: Points, the agent's own first.
+        yaw_rad: Heading at the end; default: that of travel.
+    """
+    (x0, z0), (x1, z1) = leg_m[-2], leg_m[-1]
+    heading_rad = math.atan2(x1 - x0, z1 - z0) if yaw_rad is None else yaw_rad
+    is_success = simulator.teleport(replace(simulator.pose, x_m=x1, z_m=z1, yaw_rad=heading_rad))
+    return Motion(tuple(leg_m), is_success=is_success)
 
 
 def face(simulator: Simulator, point_m: Point2) -> None:

@@ -8,6 +8,7 @@ import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 from evonav.agents import wire
@@ -30,6 +31,7 @@ from evonav.evaluation.privileged import Sighting, privileges_of
 from evonav.evaluation.protocol import (
     AgentFailedError,
     EpisodeCase,
+    ForcedWalk,
     ProtocolConfig,
     StageOutcome,
     as_errored,
@@ -163,14 +165,19 @@ class Episode:
             record = run.run()
             yield StageOutcome(record, run.plan, time.perf_counter() - wall_s, self._cpu_s() - cpu_s)
             if run.failure is None:
-                pose = self._simulator.pose
+                pose = self._end_pose(stage)
             elif run.failure.is_agents:
                 failed = (*failed, stage)
-                pose = self._simulator.pose
+                pose = self._end_pose(stage)
                 is_lost = run.failure in LOSSES
                 self._has_begun = self._has_begun and not is_lost
             else:
                 failure = record
+
+    def _end_pose(self, stage: int) -> Pose:
+        """Where a stage ends: where the agent stands, or where it would have been taken had it not failed."""
+        pose, forced = self._simulator.pose, self._case.stages[stage - 1].forced
+        return pose if forced is None else replace(forced.end, y_m=pose.y_m, horizon_rad=pose.horizon_rad)
 
     def replace_agent(self, agent: Agent) -> None:
         """Another agent from the next stage on, as after the loss of a process; for replays in one process."""
@@ -209,6 +216,8 @@ class _StageRun:
         try:
             with _blame(ErrorKind.HARNESS):
                 self._start()
+                if self._stage.forced is not None:
+                    return self._forced(self._stage.forced)
                 with _blame(ErrorKind.SIMULATION):
                     reference_length_m = self._reference_length_m()
                 stop_reason = self._rounds()
@@ -277,14 +286,7 @@ class _StageRun:
 
     def _rounds(self) -> str | None:
         """Decision rounds until the agent stops (returns why) or the budget ends (returns `None`)."""
-        with _blame(ErrorKind.SIMULATION):
-            sensors = Sensors(
-                self._simulator,
-                self._perception,
-                self._sensing,
-                self._stage.target.object_id,
-                self._protocol.min_visible_px,
-            )
+        sensors = self._sensors()
         last = motion.Motion((), is_success=True)
         budget = self._protocol.budget(self._sensing)
         for number in range(budget):
@@ -295,21 +297,67 @@ class _StageRun:
                     has_arrived=last.has_arrived,
                     num_rounds_left=budget - number,
                 )
-            if self._observer is not None:
-                self._observer.round_begins(sensed.observation)
-            with _blame(ErrorKind.AGENT):
-                if (privileged := privileges_of(self._agent)) is not None:
-                    privileged.reveal_sighting(Sighting(sensed.is_target_visible))
-                action = wire.checked_action(self._agent.act(sensed.observation), self._sensing)
+            action = self._answer(sensed)
             with _blame(ErrorKind.SIMULATION):
                 last = self._carry_out(action)
-            self._length_m += last.length_m
-            self._trace.append(self._round_record(number, sensed, action, last))
-            if self._observer is not None:
-                self._observer.round_ends(self._trace[-1])
+            self._end_round(number, sensed, action, last)
             if isinstance(action, Stop):
                 return action.reason
         return None
+
+    def _forced(self, forced: ForcedWalk) -> StageRecord:
+        """Walks the reference trajectory; the agent is asked in every round as in any stage, and not heeded."""
+        sensors = self._sensors()
+        is_stepwise = self._sensing.motion == "actions"
+        travel_m = self._protocol.waypoint_m if is_stepwise else self._protocol.max_travel_m
+        legs = motion.legs(forced.path_m, travel_m)
+        for number in range(len(legs) + 1):
+            with _blame(ErrorKind.SIMULATION):
+                sensed = sensors.observe(is_first=number == 0, num_rounds_left=len(legs) + 1 - number, is_guided=True)
+            action = self._answer(sensed)
+            pose = self._simulator.pose
+            done = motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
+            if number < len(legs):
+                is_last = number + 1 == len(legs)
+                with _blame(ErrorKind.SIMULATION):
+                    done = motion.walk(self._simulator, legs[number], forced.end.yaw_rad if is_last else None)
+            self._end_round(number, sensed, action, done)
+            if not done.is_success:
+                raise _StageError(ErrorKind.SIMULATION, f"the reference trajectory is blocked at {legs[number][-1]}")
+        end = self._simulator.pose
+        return self._with_trace(self._record).model_copy(
+            update={
+                "state": EndState.FORCED,
+                "terminal": pose_record(end),
+                "path_length_m": self._length_m,
+                "entries": self._entries(),
+            }
+        )
+
+    def _sensors(self) -> Sensors:
+        with _blame(ErrorKind.SIMULATION):
+            return Sensors(
+                self._simulator,
+                self._perception,
+                self._sensing,
+                self._stage.target.object_id,
+                self._protocol.min_visible_px,
+            )
+
+    def _answer(self, sensed: Sensed) -> AgentAction:
+        """What the agent answers to what it is given."""
+        if self._observer is not None:
+            self._observer.round_begins(sensed.observation)
+        with _blame(ErrorKind.AGENT):
+            if (privileged := privileges_of(self._agent)) is not None:
+                privileged.reveal_sighting(Sighting(sensed.is_target_visible))
+            return wire.checked_action(self._agent.act(sensed.observation), self._sensing)
+
+    def _end_round(self, number: int, sensed: Sensed, action: AgentAction, done: motion.Motion) -> None:
+        self._length_m += done.length_m
+        self._trace.append(self._round_record(number, sensed, action, done))
+        if self._observer is not None:
+            self._observer.round_ends(self._trace[-1])
 
     def _carry_out(self, action: AgentAction) -> motion.Motion:
         if isinstance(action, NavigateTo):

@@ -63,7 +63,15 @@ class Sensors:
         self._target_instance = ids.index(target_id) + 1 if target_id in ids else None
         self._min_visible_px = min_visible_px
 
-    def observe(self, *, is_first: bool, is_action_success: bool, has_arrived: bool, num_rounds_left: int) -> Sensed:
+    def observe(
+        self,
+        *,
+        is_first: bool,
+        num_rounds_left: int,
+        is_action_success: bool = True,
+        has_arrived: bool = False,
+        is_guided: bool = False,
+    ) -> Sensed:
         """Looks around from the agent's pose."""
         pose = self._simulator.pose
         schedule = self._sensing.first_round if is_first else self._sensing.later_rounds
@@ -78,6 +86,7 @@ class Sensors:
             is_action_success=is_action_success,
             num_rounds_left=num_rounds_left,
             has_arrived=has_arrived,
+            is_guided=is_guided,
         )
         return Sensed(observation, is_target_visible)
 

@@ -58,12 +58,12 @@ _OF_ERRORS = {
 
 
 def cause_of(record: StageRecord) -> Cause | None:
-    """The cause of a stage that did not succeed; `None` for a success.
+    """The cause of a stage that did not succeed; `None` for a success, and for a walk of the evaluator's.
 
     Args:
         record: Whole: trace and entries are looked at.
     """
-    if record.state is EndState.SUCCESS:
+    if record.state in (EndState.SUCCESS, EndState.FORCED):
         return None
     if record.state is EndState.NOT_RUN:
         return Cause.NOT_RUN

@@ -32,6 +32,8 @@ def sentence(record: StageRecord) -> str:
             f"{record.state.value.replace('_', ' ').capitalize()} ({record.error.kind.value}): {record.error.message}"
         )
     cause = cause_of(record)
+    if record.state is EndState.FORCED:
+        return "The evaluator walked the reference trajectory; the agent looked on."
     if record.state is EndState.NOT_RUN:
         return "Not run."
     distance = "" if record.terminal_distance_m is None else f", {record.terminal_distance_m:.1f} m away"

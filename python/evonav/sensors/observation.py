@@ -74,3 +74,6 @@ class Observation:
     """Decision rounds left in this stage, this one included."""
     has_arrived: bool = False
     """Whether the last action was a `NavigateTo` that reached its (snapped) point."""
+    is_guided: bool = False
+    """The evaluator walks in this stage and carries out no answer: look, remember, and draw no conclusion from where
+    the last action should have led."""
