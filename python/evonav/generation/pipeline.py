@@ -4,7 +4,7 @@ import dataclasses
 import json
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -31,6 +31,16 @@ from evonav.tasks.records import sha256_of
 _ORACLE_KEYS = frozenset(OracleStage.model_fields) - {"schema_version", "stage", "house_sha256"}
 
 
+@dataclass(frozen=True, slots=True)
+class GivenStage:
+    """What of a stage is given instead of drawn."""
+
+    goal_id: str | None = None
+    """Object that is the goal."""
+    is_evolved: bool | None = None
+    """Whether the transition before the stage evolves the house."""
+
+
 class TaskRejectedError(TaskError):
     """No task can be made of a house."""
 
@@ -48,10 +58,13 @@ def generate_task(
     dataset: str = "evonav",
     split: str = "none",
     allow_unknown_assets: bool = False,
+    given: Sequence[GivenStage] = (),
+    attempt: int = 0,
 ) -> Task:
     """Makes a task of a house (paper, Algorithm 1).
 
-    What is drawn depends on the seed and on the house's contents only.
+    What is drawn depends on the seed, the attempt and the house's contents only, each draw by itself: tasks that differ
+    in what is given, or in the probability of evolution, share what they can.
 
     Args:
         house: Two rooms or more.
@@ -60,6 +73,8 @@ def generate_task(
         dataset: Recorded in the header.
         split: Recorded in the header.
         allow_unknown_assets: Give assets that the catalogue lacks the size and shape of their category.
+        given: What is not drawn, of each stage from the first; as many stages as the task then has.
+        attempt: Another one draws anew.
 
     Raises:
         TaskRejectedError: The house does not allow a task; it says why.
@@ -71,9 +86,10 @@ def generate_task(
     text, houses, images = _core.generate_task(
         house,
         seed=seed,
-        label=house_sha256,
+        label=house_sha256 if attempt == 0 else f"{house_sha256} attempt {attempt}",
         parameters_json=config.model_dump_json(),
         allow_unknown_assets=allow_unknown_assets,
+        given_json=json.dumps({"stages": [dataclasses.asdict(stage) for stage in given]}),
     )
     made = json.loads(text)
     if "rejected" in made:

@@ -20,14 +20,16 @@ RejectReason = Literal[
     "start_outside",
     "disconnected",
     "no_valid_goal",
+    "not_evolved",
     "malformed_house",
     "unusable_house",
     "crash",
     "timeout",
     "error",
 ]
-"""Why a house gives no task; `unusable_house` when the world cannot be built, such as for an unknown asset. At a
-`crash`, `timeout` or `error` it is the generator that failed."""
+"""Why a house gives no task; `not_evolved` when a controlled analysis needs a change and none could be made,
+`unusable_house` when the world cannot be built, such as for an unknown asset. At a `crash`, `timeout` or `error` it is
+the generator that failed."""
 
 
 class SourceFile(Record):

@@ -186,12 +186,35 @@ def inconsistencies(task: Task, root: Path) -> Iterator[Inconsistency]:
         message = "does not match houses/stage_1.json.gz"
         error = field_error(header_path, "house.sha256", task.header.house.sha256, message)
         yield Inconsistency("checksum", 0, error)
+    for problem in _control_problems(task):
+        yield Inconsistency("contradiction", 0, field_error(header_path, "control", task.header.control, problem))
     expected_sums = checksums_of(task)
     for name in sorted(expected_sums.keys() | task.header.checksums.keys()):
         found_sum = task.header.checksums.get(name)
         if expected_sums.get(name) != found_sum:
             error = field_error(header_path, f"checksums.{name}", found_sum, "does not match the file's contents")
             yield Inconsistency("checksum", 0, error)
+
+
+def _control_problems(task: Task) -> Iterator[str]:
+    """What a header's `control` says that the stages do not."""
+    control = task.header.control
+    if control is None:
+        return
+    numbers = range(1, task.num_stages + 1)
+    if not set(control.forced_stages) < set(numbers):
+        yield f"expected forced_stages of 1 to {task.num_stages}, and not all of them"
+    is_earlier = all(1 <= shown <= stage for stage, shown in zip(numbers, control.shown_goals, strict=False))
+    if len(control.shown_goals) != task.num_stages or not is_earlier:
+        yield f"expected shown_goals of {task.num_stages} stages, each its own or an earlier one"
+        return
+    for stage, shown in zip(numbers, control.shown_goals, strict=True):
+        same = task.public_stages[shown - 1].model_copy(update={"stage": stage})
+        is_same_image = np.array_equal(task.reference_images[stage - 1], task.reference_images[shown - 1])
+        if task.public_stages[stage - 1] != same or not is_same_image:
+            yield f"expected stage {stage} to have the words and image of stage {shown}"
+        if task.oracle_stages[stage - 1].target.id != task.oracle_stages[shown - 1].target.id:
+            yield f"expected stage {stage} to have the target of stage {shown}"
 
 
 def load_tasks(directory: Path | str, limit: int | None = None) -> Iterator[Task]:

@@ -1,0 +1,159 @@
+"""Tasks in several arms that differ in one thing alone (paper, Sec. 4.3; docs/controlled.md).
+
+`pairs`: two goals are drawn in the house as it is. The reference trajectory goes to the second stage's goal, then to
+the first stage's; there the house stays as it was (`fixed`) or evolves for certain (`evolved`), and the second stage's
+goal is to be found. As a task that is three stages: two in which the agent looks on, and the one that counts, whose
+goal is that of stage 1 in the same words and image.
+
+`rates`: a task as any other, its goals drawn in the house as it is, once for each probability of evolution. The draws
+of whether a transition evolves are nested: what evolves at 0.25 does so at 0.5, too.
+"""
+
+import dataclasses
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from evonav.errors import InvalidArgumentError
+from evonav.generation.pipeline import GivenStage, TaskRejectedError, generate_task
+from evonav.house import House
+from evonav.tasks.controlled import Arm, Kind
+from evonav.tasks.dataset import RejectReason
+from evonav.tasks.files import checksums_of
+from evonav.tasks.manifest import Control, GenerationParameters, Task
+
+NUM_ATTEMPTS = 8
+"""Draws of goals and changes before a house is given up."""
+RATES = (0.0, 0.25, 0.5, 0.75, 1.0)
+_ANEW: tuple[RejectReason, ...] = ("no_valid_goal", "not_evolved")
+"""Reasons of an arm that another draw may do without."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlledOptions:
+    """What decides the tasks of a house."""
+
+    kind: Kind = "pairs"
+    seed: int = 0
+    per_house: int = 1
+    """Tasks a house: the seeds that follow `seed`."""
+    rates: tuple[float, ...] = RATES
+    """Of `rates`: the probabilities."""
+    parameters: GenerationParameters = field(default_factory=GenerationParameters)
+    allow_unknown_assets: bool = False
+
+    def __post_init__(self) -> None:
+        """Checks the values that no record checks.
+
+        Raises:
+            InvalidArgumentError: Of a value outside its domain.
+        """
+        if self.per_house < 1:
+            raise InvalidArgumentError(f"per_house = {self.per_house}: must be at least 1")
+        are_probabilities = all(0.0 <= rate <= 1.0 for rate in self.rates)
+        if len(set(self.rates)) < 2 or sorted(set(self.rates)) != list(self.rates) or not are_probabilities:
+            raise InvalidArgumentError(f"rates = {self.rates}: must be at least two of [0, 1], ascending")
+
+    @property
+    def arms(self) -> tuple[Arm, ...]:
+        """The ways in which every task is made."""
+        if self.kind == "pairs":
+            return (Arm(name="fixed", evolve_probability=0.0), Arm(name="evolved", evolve_probability=1.0))
+        return tuple(Arm(name=f"p{rate:.2f}", evolve_probability=rate) for rate in self.rates)
+
+    def as_json(self) -> dict[str, Any]:
+        """As JSON, to be read by `from_json`."""
+        return {**dataclasses.asdict(self), "parameters": self.parameters.model_dump(mode="json")}
+
+    @classmethod
+    def from_json(cls, values: dict[str, Any]) -> "ControlledOptions":
+        """What `as_json` gave."""
+        parameters = GenerationParameters.model_validate_json(json.dumps(values["parameters"]))
+        return cls(**{**values, "parameters": parameters, "rates": tuple(values["rates"])})
+
+
+def generate_arms(house: House, options: ControlledOptions, *, seed: int) -> dict[str, Task]:
+    """A task in every arm, by the arm's name.
+
+    Where a goal cannot be one in some arm, or the house does not evolve where it must, goals and changes are drawn
+    anew for all arms: no arm is chosen for what became of another.
+
+    Raises:
+        TaskRejectedError: The house does not allow it; it says why.
+        HouseError: An asset is unknown, unless allowed.
+    """
+    failed: list[TaskRejectedError] = []
+    for attempt in range(NUM_ATTEMPTS):
+        goals = _draw_goals(house, options, seed, attempt)
+        try:
+            return {arm.name: _arm(house, options, seed, attempt, arm, goals) for arm in options.arms}
+        except TaskRejectedError as error:
+            if error.reason not in _ANEW:
+                raise
+            failed.append(error)
+    counts = Counter(error.reason for error in failed)
+    told = ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items()))
+    last = failed[-1]
+    raise TaskRejectedError(house.name, last.reason, last.stage, f"{NUM_ATTEMPTS} draws: {told}; the last: {last}")
+
+
+def _draw_goals(house: House, options: ControlledOptions, seed: int, attempt: int) -> tuple[str, ...]:
+    """Goals of a house that does not evolve."""
+    parameters = options.parameters.model_copy(update={"evolve_probability": 0.0})
+    given: tuple[GivenStage, ...] = ()
+    if options.kind == "pairs":
+        # What evolves is outside of the room where the trajectory ends, so the other goal must be, too.
+        parameters = parameters.model_copy(update={"previous_goal_room_multiplier": 0.0})
+        given = (GivenStage(), GivenStage())
+    task = _task(house, options, seed, attempt, parameters, given)
+    return tuple(stage.target.id for stage in task.oracle_stages)
+
+
+def _arm(house: House, options: ControlledOptions, seed: int, attempt: int, arm: Arm, goals: Sequence[str]) -> Task:
+    is_pair = options.kind == "pairs"
+    parameters = options.parameters.model_copy(update={"evolve_probability": arm.evolve_probability})
+    given = [GivenStage(goal) for goal in goals]
+    shown = tuple(range(1, len(goals) + 1))
+    forced: tuple[int, ...] = ()
+    if is_pair:
+        given = [
+            GivenStage(goals[0]),
+            GivenStage(goals[1], is_evolved=False),
+            GivenStage(goals[0], is_evolved=arm.evolve_probability == 1.0),
+        ]
+        shown, forced = (1, 2, 1), (1, 2)
+    task = _task(house, options, seed, attempt, parameters, given)
+    if is_pair and arm.evolve_probability == 1.0 and task.oracle(3).evolution.outcome != "evolved":
+        detail = f"{task.oracle(3).evolution.outcome} ({task.oracle(3).evolution.failure})"
+        raise TaskRejectedError(house.name, "not_evolved", 3, detail)
+    control = Control(arm=arm.name, attempt=attempt, forced_stages=forced, shown_goals=shown)
+    task = dataclasses.replace(
+        task,
+        header=task.header.model_copy(update={"control": control}),
+        public_stages=tuple(
+            task.public_stages[other - 1].model_copy(update={"stage": k}) for k, other in enumerate(shown, start=1)
+        ),
+        reference_images=tuple(task.reference_images[other - 1] for other in shown),
+    )
+    return dataclasses.replace(task, header=task.header.model_copy(update={"checksums": checksums_of(task)}))
+
+
+def _task(
+    house: House,
+    options: ControlledOptions,
+    seed: int,
+    attempt: int,
+    parameters: GenerationParameters,
+    given: Sequence[GivenStage],
+) -> Task:
+    return generate_task(
+        house,
+        seed=seed,
+        config=parameters,
+        dataset=f"controlled-{options.kind}",
+        allow_unknown_assets=options.allow_unknown_assets,
+        given=given,
+        attempt=attempt,
+    )

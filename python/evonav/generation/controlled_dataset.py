@@ -1,0 +1,288 @@
+"""Controlled analyses from houses into a folder: parallel, resumable, the same bytes for any number of workers."""
+
+import json
+import os
+import shutil
+import socket
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import islice, pairwise
+from pathlib import Path
+
+from evonav._core import __version__
+from evonav.errors import EvonavError, HouseError, InvalidArgumentError, SimulationError, StoreError, TaskError
+from evonav.folders import sha256_of_file, writing
+from evonav.generation.controlled import ControlledOptions, generate_arms
+from evonav.generation.engine import Workforce
+from evonav.generation.journal import Journal, Outcome
+from evonav.generation.pipeline import TaskRejectedError, short_name
+from evonav.generation.worker import MAX_DETAIL, PARTIAL_NAME, put
+from evonav.house import House
+from evonav.house.files import HouseText, HouseTexts
+from evonav.parallel import Answer, Job, open_pool
+from evonav.tasks.controlled import ControlledRecord, tasks_of, write_controlled
+from evonav.tasks.dataset import (
+    DatasetRecord,
+    HouseRejection,
+    RejectReason,
+    SourceFile,
+    TaskEntry,
+    write_dataset,
+)
+from evonav.tasks.files import read_house, task_roots
+from evonav.tasks.manifest import TaskHeader
+from evonav.tasks.records import parse_record, read_file
+
+WORK = "evonav.generation.controlled_dataset:make_worker"
+
+
+@dataclass(frozen=True, slots=True)
+class ControlledSummary:
+    """What a call left."""
+
+    record: ControlledRecord
+    num_new: int
+    """Tasks made by this call, one counted for all arms."""
+
+
+def generate_controlled(
+    source: Path | str,
+    out: Path,
+    *,
+    options: ControlledOptions | None = None,
+    limit: int | None = None,
+    workforce: Workforce | None = None,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+) -> ControlledSummary:
+    """Makes the arms of a controlled analysis; called again on the same folder, does what is left.
+
+    Args:
+        source: Houses as for `evonav.house.load_houses`, or a folder of tasks, whose first houses are taken.
+        out: Gets `tasks/<arm>`, `journal.jsonl` and, when all is done, `controlled.json`.
+        options: Must be the folder's own when it already holds tasks.
+        limit: Only the first houses; must be the folder's own, too.
+        workforce: Default: this process.
+        on_progress: Called with tasks done and all tasks, when it begins and after every one.
+
+    Raises:
+        HouseError: The houses cannot be read.
+        InvalidArgumentError: Of the arguments.
+        StoreError: `out` holds something else, is being written to, or cannot be written.
+        TaskError: No house allows it; it says why.
+        EngineError: Workers cannot be had.
+    """
+    options, workforce = options or ControlledOptions(), workforce or Workforce()
+    if limit is not None and limit < 1:
+        raise InvalidArgumentError(f"argument `limit` is {limit}, expected None or at least 1")
+    sources = _sources(source)
+    houses = list(islice(_houses(source), limit))
+    run = {
+        "evonav": __version__,
+        "houses": {one.name: one.sha256 for one in sources},
+        "limit": limit,
+        "options": options.as_json(),
+    }
+    out = out.resolve()
+    with writing(out), Journal(out, run) as journal:
+        lost = [index for index, done in journal.outcomes.items() if not _is_whole(done, out, options)]
+        journal.drop(lost)
+        num_before, num_all = len(journal.outcomes), len(houses) * options.per_house
+        on_progress(num_before, num_all)
+        if num_before < num_all:
+            settings = json.dumps({"out": str(out), "options": options.as_json()})
+            with open_pool(
+                WORK,
+                settings,
+                engine=workforce.engine,
+                num_workers=workforce.num_workers,
+                timeout_s=workforce.house_timeout_s,
+                ray_address=workforce.ray_address,
+            ) as pool:
+                left = (index for index in range(num_all) if index not in journal.outcomes)
+                num_open = 0
+                while len(journal.outcomes) < num_all:
+                    while num_open < pool.capacity and (index := next(left, None)) is not None:
+                        house = houses[index // options.per_house]
+                        head = json.dumps([index, house.name, options.seed + index % options.per_house])
+                        pool.submit(Job(index, f"{head}\n{house.text}"))
+                        num_open += 1
+                    answer = pool.next_answer()
+                    num_open -= 1
+                    journal.add(_outcome(answer, houses[answer.key // options.per_house].name))
+                    on_progress(len(journal.outcomes), num_all)
+            shutil.rmtree(out / PARTIAL_NAME, ignore_errors=True)
+        journal.rewrite()
+        outcomes = [journal.outcomes[index] for index in sorted(journal.outcomes)]
+        record = _write(out, options, sources, limit, outcomes)
+        return ControlledSummary(record, len(outcomes) - num_before)
+
+
+def make_worker(settings: str) -> Callable[[str], str]:
+    """The function from a house to its `Outcome`, as `evonav.parallel` calls it.
+
+    Args:
+        settings: `{"out": ..., "options": ...}`.
+
+    Returns:
+        It takes `[index, name, seed]` and, after a line feed, the house; and gives an `Outcome`, or `{"refused": ...}`
+        for bad options, or `{"stop": ...}` where nothing can be written.
+    """
+    values = json.loads(settings)
+    options, out = ControlledOptions.from_json(values["options"]), Path(values["out"])
+
+    def work(text: str) -> str:
+        head, _, house = text.partition("\n")
+        index, name, seed = json.loads(head)
+        try:
+            return _do_house(index, name, seed, house, options, out).model_dump_json()
+        except InvalidArgumentError as error:
+            return json.dumps({"refused": str(error)})
+        except (TaskError, OSError) as error:
+            return json.dumps({"stop": str(error)})
+
+    return work
+
+
+def _do_house(index: int, name: str, seed: int, text: str, options: ControlledOptions, out: Path) -> Outcome:
+    def without_task(reason: RejectReason, error: EvonavError, stage: int = 0) -> Outcome:
+        detail = str(error)[:MAX_DETAIL]
+        return Outcome(index=index, house=short_name(name), reason=reason, stage=stage, detail=detail)
+
+    try:
+        house = House(text, name=name)
+    except HouseError as error:
+        return without_task("malformed_house", error)
+    try:
+        arms = generate_arms(house, options, seed=seed)
+    except TaskRejectedError as error:
+        return without_task(error.reason, error, error.stage)
+    except (HouseError, SimulationError) as error:
+        return without_task("unusable_house", error)
+    label = f"{socket.gethostname()}-{os.getpid()}"
+    roots = [put(task, tasks_of(out, arm), label) for arm, task in arms.items()]
+    task = next(iter(arms.values()))
+    return Outcome(
+        index=index,
+        house=short_name(name),
+        task_id=task.task_id,
+        house_sha256=task.header.house.sha256,
+        # The last arm is written last: if it is there, all are.
+        task_sha256=sha256_of_file(roots[-1] / "task.json"),
+    )
+
+
+def _outcome(answer: Answer, name: str) -> Outcome:
+    if answer.failure is not None:
+        detail = answer.detail[-MAX_DETAIL:]
+        return Outcome(index=answer.key, house=short_name(name), reason=answer.failure, detail=detail)
+    values = json.loads(answer.text)
+    if "refused" in values:
+        raise InvalidArgumentError(values["refused"])
+    if "stop" in values:
+        raise StoreError(values["stop"])
+    return Outcome.model_validate(values)
+
+
+def _is_whole(outcome: Outcome, out: Path, options: ControlledOptions) -> bool:
+    """Whether what the journal says is still there."""
+    if outcome.task_id is None:
+        return True
+    try:
+        last = tasks_of(out, options.arms[-1].name) / outcome.task_id / "task.json"
+        return sha256_of_file(last) == outcome.task_sha256
+    except OSError:
+        return False
+
+
+def _write(
+    out: Path,
+    options: ControlledOptions,
+    sources: tuple[SourceFile, ...],
+    limit: int | None,
+    outcomes: list[Outcome],
+) -> ControlledRecord:
+    """Writes each arm's `dataset.json`, and `controlled.json` last.
+
+    Raises:
+        TaskError: There is no task, or two have the same id.
+    """
+    made = sorted((done.task_id, done.house_sha256) for done in outcomes if done.task_id and done.house_sha256)
+    rejections = tuple(
+        HouseRejection(house=done.house, reason=done.reason, stage=done.stage, detail=done.detail)
+        for done in outcomes
+        if done.reason is not None
+    )
+    task_ids = tuple(task_id for task_id, _ in made)
+    if not made:
+        first = f"; the first: {rejections[0].detail}" if rejections else ""
+        raise TaskError(f"{sources[0].name}: no house allows it{first}")
+    if len(set(task_ids)) < len(task_ids):
+        twice = next(one for one, other in pairwise(task_ids) if one == other)
+        raise TaskError(f"two houses give a task named {twice}")
+    num_attempts = 0
+    for arm in options.arms:
+        folder = tasks_of(out, arm.name)
+        entries = []
+        for task_id, house_sha256 in made:
+            path = folder / task_id / "task.json"
+            entries.append(TaskEntry(task_id=task_id, sha256=sha256_of_file(path), house_sha256=house_sha256))
+            if arm == options.arms[0]:
+                control = parse_record(TaskHeader, read_file(path), path).control
+                num_attempts += 1 if control is None else control.attempt + 1
+        parameters = options.parameters.model_copy(update={"evolve_probability": arm.evolve_probability})
+        write_dataset(
+            DatasetRecord(
+                name=f"controlled-{options.kind}",
+                split="none",
+                generator=f"evonav {__version__}",
+                sources=sources,
+                seed=options.seed,
+                limit=limit,
+                subset=None,
+                allow_unknown_assets=options.allow_unknown_assets,
+                parameters=parameters,
+                num_houses=len(outcomes),
+                num_tasks=len(entries),
+                tasks=tuple(entries),
+                rejections=rejections,
+            ),
+            folder,
+        )
+    record = ControlledRecord(
+        kind=options.kind,
+        arms=options.arms,
+        generator=f"evonav {__version__}",
+        sources=sources,
+        seed=options.seed,
+        limit=limit,
+        per_house=options.per_house,
+        allow_unknown_assets=options.allow_unknown_assets,
+        parameters=options.parameters,
+        task_ids=task_ids,
+        num_attempts=num_attempts,
+        rejections=rejections,
+    )
+    write_controlled(record, out)
+    return record
+
+
+def _is_tasks(source: Path | str) -> bool:
+    return Path(source).is_dir() and any(Path(source).glob("*/task.json"))
+
+
+def _houses(source: Path | str) -> Iterator[HouseText]:
+    """Houses of files, or the first ones of a folder's tasks."""
+    if not _is_tasks(source):
+        yield from HouseTexts(source)
+        return
+    for root in task_roots(Path(source)):
+        header = parse_record(TaskHeader, read_file(root / "task.json"), root / "task.json")
+        yield HouseText(header.house.name, read_house(root / "houses/stage_1.json.gz"))
+
+
+def _sources(source: Path | str) -> tuple[SourceFile, ...]:
+    if _is_tasks(source):
+        return tuple(
+            SourceFile(name=root.name, sha256=sha256_of_file(root / "task.json")) for root in task_roots(Path(source))
+        )
+    return tuple(SourceFile(name=file.name, sha256=sha256_of_file(file)) for file in HouseTexts(source).files)
