@@ -5,6 +5,7 @@ import sys
 import typer
 
 from evonav.cli.check_agent import check_agent
+from evonav.cli.controlled import controlled_app
 from evonav.cli.evaluate import demo, evaluate, report, strip
 from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
@@ -28,6 +29,7 @@ for command in (evaluate, demo, report, paper, strip, view, generate, check_agen
 app.command(name="mock-vlm")(mock_vlm)
 app.add_typer(houses_app, name="houses")
 app.add_typer(tasks_app, name="tasks")
+app.add_typer(controlled_app, name="controlled")
 
 
 @app.command(name="agents")

@@ -1,0 +1,137 @@
+"""Controlled analyses: `controlled generate`, `controlled evaluate`, `controlled report` (docs/controlled.md)."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evonav.cli.decision_options import DecisionOptions, decision_settings, with_decision_options, with_decisions
+from evonav.cli.display import interruptible, print_table, status
+from evonav.cli.options import (
+    HEURISTICS,
+    HOUSES,
+    Agents,
+    AgentTimeout,
+    AnyAsset,
+    InProcess,
+    Limit,
+    OneAgent,
+    Seed,
+    Workers,
+    count_of,
+)
+
+if TYPE_CHECKING:  # the command must start fast
+    from evonav.evaluation.engine import Progress
+
+EXIT_INCOMPLETE = 3
+
+controlled_app = typer.Typer(
+    name="controlled",
+    help="What a change does, all else being equal: Fixed / Not Fixed, and sweeps of the evolution rate.",
+    no_args_is_help=True,
+)
+
+Directory = Annotated[Path, typer.Argument(help="Folder of the analysis, which `controlled generate` made.")]
+
+
+@controlled_app.command()
+def generate(
+    source: Annotated[Path, typer.Argument(help=f"{HOUSES}; or a folder of tasks, whose houses are taken.")],
+    out: Annotated[Path, typer.Option(help="Folder of the analysis; an unfinished one is gone on with.")],
+    rates: Annotated[
+        str | None,
+        typer.Option(help="Probabilities of evolution to compare, such as 0,0.5,1. Default: Fixed / Not Fixed pairs."),
+    ] = None,
+    limit: Limit = None,
+    per_house: Annotated[int, typer.Option(min=1, help="Tasks a house, of the seeds from SEED on.")] = 1,
+    seed: Seed = 0,
+    config: Annotated[
+        Path | None, typer.Option(help="JSON or TOML with any of the generator's parameters (docs/extensions.md).")
+    ] = None,
+    workers: Workers = None,
+    allow_unknown_assets: AnyAsset = False,
+) -> None:
+    """Makes the same tasks in several arms that differ in one thing alone; run again to resume."""
+    from evonav.generation.config import read_parameters
+    from evonav.generation.controlled import ControlledOptions
+    from evonav.generation.controlled_dataset import generate_controlled
+    from evonav.generation.engine import Workforce
+
+    options = ControlledOptions(
+        seed=seed,
+        per_house=per_house,
+        parameters=read_parameters(config, evolve_probability=None, num_stages=None),
+        allow_unknown_assets=allow_unknown_assets,
+    )
+    if rates is not None:
+        try:
+            probabilities = tuple(float(rate) for rate in rates.split(","))
+        except ValueError:
+            raise typer.BadParameter(f"--rates {rates}: numbers, comma-separated") from None
+        options = replace(options, kind="rates", rates=probabilities)
+    with interruptible(out), status("Making tasks") as show:
+        made = generate_controlled(
+            source,
+            out,
+            options=options,
+            limit=limit,
+            workforce=Workforce(count_of(workers)),
+            on_progress=lambda done, total: show(f"{done} of {total}"),
+        )
+    record = made.record
+    arms = ", ".join(arm.name for arm in record.arms)
+    typer.echo(f"{len(record.task_ids)} tasks in each arm ({arms}) in {out}; {made.num_new} made now")
+    for rejection in record.rejections:
+        typer.echo(f"  without: {rejection.house}: {rejection.reason}")
+
+
+@controlled_app.command()
+@with_decision_options
+def evaluate(
+    directory: Directory,
+    decisions: DecisionOptions,
+    agents: Agents = HEURISTICS,
+    agent: OneAgent = None,
+    seed: Seed = 0,
+    workers: Workers = None,
+    retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
+    in_process: InProcess = False,
+    agent_timeout: AgentTimeout = None,
+) -> None:
+    """Runs agents in every arm, into DIRECTORY/runs/ARM; run again to resume, or to add agents."""
+    from evonav.evaluation.agent_process import AgentHosting
+    from evonav.evaluation.backend import Backend
+    from evonav.evaluation.controlled import evaluate_controlled
+    from evonav.evaluation.engine import RunConfig
+    from evonav.tasks.controlled import read_controlled
+
+    record = read_controlled(directory)
+    num_workers = count_of(workers)
+    module = "evonav.evaluation.backend"
+    backend = Backend(simulator=f"{module}:lenient_simulator") if record.allow_unknown_assets else Backend()
+    backend = with_decisions(backend, decisions, out=directory, seed=seed, num_workers=num_workers)
+    settings = decision_settings(decisions)
+    hosting = AgentHosting(is_in_process=in_process, timeout_s=agent_timeout or settings.answer_timeout_s)
+    config = RunConfig(seed=seed, backend=backend, stage_timeout_s=settings.stage_timeout_s, hosting=hosting)
+    names = [*(name.strip() for name in agents.split(",") if name.strip()), *(agent or ())]
+
+    def tell(arm: str, news: "Progress") -> None:
+        latest = "" if news.latest is None else f" {news.latest.agent} {news.latest.task_id}/{news.latest.stage}"
+        show(f"{arm} {news.num_done} of {news.num_stages}{latest}")
+
+    with interruptible(directory), status("Running") as show:
+        summaries = evaluate_controlled(
+            directory,
+            names,
+            config=config,
+            num_workers=num_workers,
+            retry_errored=retry_errored,
+            on_progress=tell,
+        )
+    for arm, of_arm in summaries.items():
+        typer.echo(f"{arm}:")
+        print_table(of_arm)
+    if any(summary.is_incomplete for of_arm in summaries.values() for summary in of_arm):
+        raise typer.Exit(EXIT_INCOMPLETE)

@@ -1,0 +1,57 @@
+"""Runs every arm of a controlled analysis (`evonav.tasks.controlled`), each into an ordinary run folder."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from evonav.evaluation.engine import Progress, RunConfig, RunRequest, evaluate_all, task_files
+from evonav.evaluation.metrics import AgentSummary
+from evonav.tasks.controlled import read_controlled, run_of, tasks_of
+
+
+def evaluate_controlled(
+    directory: Path,
+    agents: Sequence[str],
+    *,
+    config: RunConfig | None = None,
+    num_workers: int = 1,
+    retry_errored: bool = False,
+    on_progress: Callable[[str, Progress], None] = lambda _arm, _progress: None,
+) -> dict[str, list[AgentSummary]]:
+    """Evaluates agents on every arm; called again, does what is left.
+
+    An agent has the same seed in every arm, since its seed is a function of the run's seed and the names of agent and
+    task.
+
+    Args:
+        directory: Holds `controlled.json`.
+        agents: Names, see `evonav agents`.
+        config: Of the runs.
+        num_workers: Processes; 0 runs everything in this one.
+        retry_errored: Run errored stages again.
+        on_progress: Called with an arm's name after each of its recorded stages.
+
+    Returns:
+        By arm, one summary an agent.
+
+    Raises:
+        TaskError: There is no controlled analysis, or a task is malformed.
+        InvalidArgumentError: An agent is unknown, or asked for twice.
+        StoreError: A run's folder holds another run, or cannot be written.
+    """
+    arms = [arm.name for arm in read_controlled(directory).arms]
+    requests = [
+        RunRequest(
+            tuple(agents),
+            tuple(task_files(tasks_of(directory, arm))),
+            run_of(directory, arm),
+            config or RunConfig(),
+        )
+        for arm in arms
+    ]
+    summaries = evaluate_all(
+        requests,
+        num_workers=num_workers,
+        retry_errored=retry_errored,
+        on_progress=lambda index, news: on_progress(arms[index], news),
+    )
+    return dict(zip(arms, summaries, strict=True))
