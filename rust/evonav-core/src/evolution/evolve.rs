@@ -27,8 +27,7 @@ impl Generator<'_> {
         stage: usize,
     ) -> Result<(EvolutionRecord, HouseDelta), Error> {
         let parameters = self.parameters;
-        let is_drawn =
-            || self.stream(stage, "trigger").uniform() < parameters.evolve_probability;
+        let is_drawn = || self.stream(stage, "trigger").uniform() < parameters.evolve_probability;
         if !self.given.is_evolved(stage).unwrap_or_else(is_drawn) {
             return Ok((no_evolution(EvolutionOutcome::NotTriggered), HouseDelta::default()));
         }
