@@ -12,6 +12,7 @@ from evonav.cli.houses import houses_app
 from evonav.cli.mock_vlm import mock_vlm
 from evonav.cli.paper import paper
 from evonav.cli.submission import pack, verify
+from evonav.cli.sweep import sweep
 from evonav.cli.tasks import tasks_app
 from evonav.cli.view import view
 
@@ -24,9 +25,22 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-for command in (evaluate, demo, report, paper, strip, view, generate, check_agent, pack, verify):
+COMMANDS = (
+    evaluate,
+    sweep,
+    demo,
+    report,
+    paper,
+    strip,
+    view,
+    generate,
+    check_agent,
+    pack,
+    verify,
+    mock_vlm,
+)
+for command in COMMANDS:
     app.command()(command)
-app.command(name="mock-vlm")(mock_vlm)
 app.add_typer(houses_app, name="houses")
 app.add_typer(tasks_app, name="tasks")
 app.add_typer(controlled_app, name="controlled")

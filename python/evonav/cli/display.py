@@ -15,14 +15,30 @@ LINE_EVERY_S = 60.0
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+    from rich.table import Table
+
     from evonav.evaluation.engine import Progress
     from evonav.evaluation.metrics import AgentSummary
     from evonav.generation.engine import GenerationProgress
 
 
+MAX_WIDTH = 200
+"""Of tables where there is no terminal, in characters."""
+
+
+def show(table: "Table") -> None:
+    """Prints a table of which nothing is cut off, however narrow the terminal; without one, as wide as it likes."""
+    from rich.console import Console
+    from rich.measure import Measurement
+
+    console = Console()
+    needed = Measurement.get(console, console.options.update(max_width=MAX_WIDTH), table)
+    width = needed.minimum if console.is_terminal else min(needed.maximum, MAX_WIDTH)
+    Console(width=max(console.width, width)).print(table)
+
+
 def print_table(summaries: "list[AgentSummary]") -> None:
     """Agents with their rates, and what is missing of a run."""
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(title="SR and SPL in % with 95% intervals; SR by whether the target was moved")
@@ -40,12 +56,11 @@ def print_table(summaries: "list[AgentSummary]") -> None:
             _percent_interval(summary.spl_ci95),
             *("-" if rates is None else f"{_percent(rates.sr)} ({rates.n})" for rates in splits),
         )
-    console = Console()
-    console.print(table)
+    show(table)
     for summary in summaries:
         if summary.is_incomplete:
             states = ", ".join(f"{count} {state}" for state, count in summary.counts.items() if count)
-            console.print(f"incomplete: {summary.agent} has {summary.n} of {summary.num_stages} stages ({states})")
+            typer.echo(f"incomplete: {summary.agent} has {summary.n} of {summary.num_stages} stages ({states})")
 
 
 def _percent(value: float | None) -> str:

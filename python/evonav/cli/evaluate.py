@@ -18,6 +18,7 @@ from evonav.cli.decision_options import (
 )
 from evonav.cli.display import generation_progress, interruptible, print_table, progress, status
 from evonav.cli.options import (
+    EXIT_INCOMPLETE,
     HEURISTICS,
     AgentMemory,
     AgentNames,
@@ -52,8 +53,6 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from evonav.evaluation.backend import Backend
     from evonav.evaluation.engine import RunConfig, TaskFile
     from evonav.evaluation.metrics import AgentSummary
-
-EXIT_INCOMPLETE = 3
 
 
 @with_decision_options

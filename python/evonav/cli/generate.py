@@ -1,23 +1,15 @@
 """Making tasks: `generate`."""
 
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from evonav.cli.display import generation_progress, interruptible
-from evonav.cli.options import HOUSES, AnyAsset, Limit, Seed, Subset, Workers, count_of
+from evonav.cli.options import HOUSES, AnyAsset, EngineOption, Limit, Seed, Subset, Workers, count_of
 
 if TYPE_CHECKING:
     from evonav.generation.engine import GenerationSummary
-
-
-class EngineOption(str, Enum):
-    """What the workers are."""
-
-    LOCAL = "local"
-    RAY = "ray"
 
 
 def generate(

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+EXIT_INCOMPLETE = 3
 HEURISTICS = "fu,stage-reset,ftu"
 
 Agents = Annotated[str, typer.Option(help="Names, comma-separated; see `evonav agents`.")]
@@ -37,6 +38,13 @@ AnyAsset = Annotated[
     bool,
     typer.Option("--allow-unknown-assets", help="Objaverse houses: unknown assets get their category's usual size."),
 ]
+
+
+class EngineOption(str, Enum):
+    """What the workers are."""
+
+    LOCAL = "local"
+    RAY = "ray"
 
 
 class SimulatorName(str, Enum):

@@ -16,7 +16,7 @@ from evonav.evaluation.protocol import EpisodeCase
 from evonav.evaluation.sensing import Perception
 from evonav.world.simulator import Simulator
 
-PERCEPTIONS: Mapping[str, str] = {"ground-truth": "evonav.evaluation.backend:ground_truth"}
+PERCEPTIONS: Mapping[str, str] = {"gt": "evonav.evaluation.backend:ground_truth"}
 """Import path by name."""
 
 

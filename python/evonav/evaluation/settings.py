@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from evonav.decision.ledger import LEDGER_NAME
 from evonav.decision.vlm import Mode
@@ -48,7 +48,13 @@ class SettingError(InvalidArgumentError):
         self.said = said
 
 
-class SimulatorSettings(Record):
+class Settings(Record):
+    """Part of a file that people write: the words below a field tell what it is, in its JSON Schema too."""
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
+
+
+class SimulatorSettings(Settings):
     """Which simulator runs the episodes."""
 
     kind: Literal["embedded", "ai2thor"] = "embedded"
@@ -84,7 +90,7 @@ class SimulatorSettings(Record):
         return Backend(simulator=f"{_BACKENDS}:lenient_simulator") if self.allow_unknown_assets else Backend()
 
 
-class DecisionSettings(Record):
+class DecisionSettings(Settings):
     """Who answers the agents' questions (docs/decision.md)."""
 
     kind: str = "text"

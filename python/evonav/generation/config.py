@@ -44,14 +44,14 @@ def _json_of(path: Path) -> bytes:
     data = read_file(path)
     if path.suffix.lower() != ".toml":
         return data
-    toml = _toml()
+    toml = toml_reader()
     try:
         return json.dumps(toml.loads(data.decode())).encode()
     except ValueError as error:
         raise TaskError(f"{path}: no TOML: {error}") from None
 
 
-def _toml() -> Any:  # noqa: ANN401
+def toml_reader() -> Any:  # noqa: ANN401
     """Python's own `tomllib` from 3.11 on, or the package `tomli`."""
     import importlib
 

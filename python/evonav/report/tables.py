@@ -70,7 +70,7 @@ class Table:
         """For `rich.print`."""
         table = RichTable(title=self.title, title_justify="left", caption="\n".join(self.notes), caption_justify="left")
         for j, column in enumerate(self.columns):
-            table.add_column(Text(column), justify="left" if j == 0 else "right")
+            table.add_column(Text(column), justify="left" if j == 0 else "right", overflow="fold")
         for i, row in enumerate(self.rows):
             table.add_row(*(Text(cell, style="bold" if (i, j) in self.best else "") for j, cell in enumerate(row)))
         return table

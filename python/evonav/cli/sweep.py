@@ -1,0 +1,192 @@
+"""`evonav sweep`: many runs from one file."""
+
+import shlex
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evonav.cli.display import EXIT_INTERRUPTED, show
+from evonav.cli.options import EXIT_INCOMPLETE, EngineOption, count_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from evonav.evaluation.engine import TaskFile
+    from evonav.evaluation.sweep import Cell, CellRun
+    from evonav.evaluation.sweep_file import SweepFile
+
+
+def sweep(
+    file: Annotated[
+        Path | None, typer.Argument(help="TOML, YAML or JSON (docs/sweeps.md).", show_default=False)
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the sweep; default: the file's `out`, else out/NAME of the file.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Over the file: seeds=[0,1], protocol.max_rounds=20; repeat."),
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="GLOB", help="Run cells of these names alone; repeat it for more.")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(min=0, help="Processes; default: the file's, else one a core.")] = None,
+    engine: Annotated[EngineOption | None, typer.Option(help="Processes here, or Ray. Default: the file's.")] = None,
+    ray_address: Annotated[str | None, typer.Option(help="Of a Ray cluster that shares this file system.")] = None,
+    retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="List cells, stages and what models would cost; run nothing.")
+    ] = False,
+    schema: Annotated[bool, typer.Option("--schema", help="Print the file's JSON Schema, for editors.")] = False,
+) -> None:
+    """Runs agents x perceptions x decisions x tasks x seeds from one file; run again to resume.
+
+    Leaves a run for every cell in OUT/runs, and OUT/summary.json, .csv and .md.
+    """
+    if schema:
+        _print_schema()
+        return
+    if file is None:
+        raise typer.BadParameter("name a sweep file, such as examples/sweep.toml")
+    from evonav.evaluation.sweep import cell_runs, cells_of, chosen, task_sets
+    from evonav.evaluation.sweep_file import read_sweep
+
+    flags = {"workers": workers, "engine": None if engine is None else engine.value, "ray_address": ray_address}
+    changes = [*(set_ or ()), *(f"{key}={value}" for key, value in flags.items() if value is not None)]
+    asked = read_sweep(file, changes)
+    folder = out or Path(asked.out or f"out/{file.stem}")
+    cells = cells_of(asked)
+    selected = chosen(cells, only or ())
+    num_workers = count_of(asked.workers)
+    with task_sets(asked) as tasks:
+        if dry_run:
+            _print_plan(asked, selected, tasks, folder, num_workers)
+            return
+        runs = cell_runs(asked, cells, tasks, folder)
+        again = _command(file, out, set_ or (), only or (), flags)
+        _run(asked, folder, runs, selected, num_workers, retry_errored, again)
+    is_incomplete = _print_summary(folder, {cell.name for cell in selected}, again)
+    if is_incomplete:
+        raise typer.Exit(EXIT_INCOMPLETE)
+
+
+def _run(
+    asked: "SweepFile",
+    out: Path,
+    runs: "Sequence[CellRun]",
+    selected: "Sequence[Cell]",
+    num_workers: int,
+    retry_errored: bool,
+    again: str,
+) -> None:
+    """Runs what is missing; an interrupt leaves a summary of what there is."""
+    from evonav.cli.sweep_display import SweepProgress, Teller, showing
+    from evonav.evaluation.sweep import run_sweep
+    from evonav.report.sweep import write_sweep_summary
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+    names = {cell.name for cell in selected}
+    progress = SweepProgress.of(out, [run for run in runs if run.cell.name in names])
+    teller = Teller(progress)
+    try:
+        with showing(progress):
+            run_sweep(
+                asked,
+                out,
+                runs,
+                num_workers=num_workers,
+                only=sorted(names),
+                retry_errored=retry_errored,
+                on_progress=teller.take,
+            )
+    except KeyboardInterrupt:
+        typer.echo(f"interrupted: {progress.line()}; what is finished is in {out}", err=True)
+        typer.echo(f"to go on: {again}", err=True)
+        if (out / "sweep.json").exists():
+            write_sweep_summary(out)
+        raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
+    """Tables, files, and what to do about what is missing.
+
+    Returns:
+        Whether a stage of the selected cells is.
+    """
+    from evonav.cli.decision_options import print_spending
+    from evonav.report.sweep import sweep_tables, write_sweep_summary
+
+    rows = write_sweep_summary(out)
+    for table in sweep_tables(rows):
+        show(table.rich())
+    print_spending(out)
+    typer.echo(f"summary: {out / 'summary.md'}, .csv, .json; runs: {out / 'runs'}")
+    missing = [row for row in rows if row.is_incomplete and row.cell in selected]
+    if any(row.counts["errored"] for row in missing):
+        typer.echo(
+            f"some stages errored (`evonav report` of their run says why); to run them again: {again} --retry-errored"
+        )
+    return bool(missing)
+
+
+def _print_plan(
+    asked: "SweepFile", cells: "Sequence[Cell]", tasks: "Mapping[str, list[TaskFile]]", out: Path, num_workers: int
+) -> None:
+    """What would be run, and what it would cost."""
+    from rich.table import Table
+
+    from evonav.cli.display import status
+    from evonav.evaluation.sweep import cell_runs
+    from evonav.evaluation.sweep_cost import cell_estimate
+
+    has_models = any(asked.decisions[cell.decision].kind == "vlm" for cell in cells)
+    table = Table(title=f"{len(cells)} cells into {out}", title_justify="left")
+    table.add_column("cell", overflow="fold", min_width=20)
+    table.add_column("agents", overflow="fold")
+    for heading in ("tasks", "stages", *(["requests", "tokens in", "dollars"] if has_models else [])):
+        table.add_column(heading, justify="right", no_wrap=True)
+    total, total_usd = 0, 0.0
+    with status("Estimating") as tell:
+        for run in cell_runs(asked, cells, tasks, out):
+            cell = run.cell
+            cost = [""] * 3 if has_models else []
+            if asked.decisions[cell.decision].kind == "vlm":
+                tell(cell.name)
+                found = cell_estimate(asked, run, num_workers)
+                total_usd += found.dollars or 0.0
+                dollars = "?" if found.dollars is None else f"{found.dollars:.2f}"
+                cost = [f"{found.num_requests:.0f}", f"{found.input_tokens:.0f}", dollars]
+            total += run.num_stages
+            table.add_row(cell.name, ", ".join(cell.agents), str(len(run.request.tasks)), str(run.num_stages), *cost)
+    show(table)
+    typer.echo(f"{total} stages" + (f", about ${total_usd:.2f}" if total_usd else ""))
+    if has_models and asked.prices is None:
+        typer.echo("dollars: name a table of prices, `prices = ...` (docs/decision.md)")
+    if asked.max_cost is not None and total_usd > asked.max_cost:
+        typer.echo(f"more than max_cost = {asked.max_cost:g}: stages beyond it would end as errored")
+
+
+def _print_schema() -> None:
+    import json
+
+    from evonav.evaluation.sweep_file import sweep_schema
+
+    typer.echo(json.dumps(sweep_schema(), indent=2))
+
+
+def _command(
+    file: Path, out: Path | None, changes: "Sequence[str]", only: "Sequence[str]", flags: "Mapping[str, object]"
+) -> str:
+    """The command that goes on."""
+    words = ["evonav", "sweep", str(file)]
+    words += [] if out is None else ["--out", str(out)]
+    words += [word for change in changes for word in ("--set", change)]
+    words += [word for pattern in only for word in ("--only", pattern)]
+    for key, value in flags.items():
+        words += [] if value is None else [f"--{key.replace('_', '-')}", str(value)]
+    return shlex.join(words)

@@ -1,0 +1,373 @@
+"""A sweep: agents x simulators x perceptions x decisions x tasks x seeds, as one ordinary run a cell in one folder.
+
+    OUT/sweep.json      what the folder is for: settings, cells, and what makes their runs the same
+    OUT/runs/CELL/      a run like any other: `evonav report`, `view`, `compare` work on it
+    OUT/spending.sqlite what models cost, over all cells
+    OUT/summary.*       every cell and agent, see `evonav.evaluation.sweep_summary`
+
+A cell's name depends on the cell alone, so that a file may gain agents and values, and the folder goes on.
+"""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass, replace
+from fnmatch import fnmatchcase
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from evonav._core import __version__
+from evonav.decision.ledger import LEDGER_NAME
+from evonav.errors import EvonavError, InvalidArgumentError, StoreError
+from evonav.evaluation.agent_process import AgentHosting
+from evonav.evaluation.backend import PERCEPTIONS, Backend
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import (
+    NUM_RETRIES,
+    Progress,
+    RunConfig,
+    RunRequest,
+    TaskFile,
+    evaluate_all,
+    run_identity,
+    task_file,
+    task_files,
+)
+from evonav.evaluation.settings import Books, SpendingSettings, try_decisions
+from evonav.evaluation.store import FILE_NAME, RunStore
+from evonav.evaluation.sweep_file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
+from evonav.folders import write_atomically, writing
+from evonav.tasks.subsets import subset_roots
+
+SWEEP_NAME, RUNS_NAME = "sweep.json", "runs"
+SCHEMA_VERSION = 1
+_HOW = {"out", "workers", "engine", "ray_address", "num_retries", "stage_timeout_s", "agent_timeout_s"}
+"""Of a file: how it is run, no part of what."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One combination of settings, by their names in the file, with the agents that run in it."""
+
+    name: str
+    simulator: str
+    perception: str
+    decision: str
+    tasks: str
+    seed: int
+    agents: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CellRun:
+    """A cell and the run that it is."""
+
+    cell: Cell
+    request: RunRequest
+
+    @property
+    def num_stages(self) -> int:
+        """Over all agents."""
+        return len(self.cell.agents) * sum(task.num_stages for task in self.request.tasks)
+
+
+def cells_of(sweep: SweepFile) -> list[Cell]:
+    """The cells of a sweep, in the order of the file.
+
+    Raises:
+        InvalidArgumentError: A pattern fits nothing, or nothing is left.
+    """
+    cells = []
+    used = {("include", i): False for i in range(len(sweep.include))}
+    used |= {("exclude", i): False for i in range(len(sweep.exclude))}
+    axes = (sweep.simulators, sweep.perceptions, sweep.decisions, sweep.tasks, sweep.seeds)
+    for simulator, perception, decision, tasks, seed in product(*axes):
+        parts = (*((simulator,) if simulator != "embedded" else ()), perception, decision, tasks, f"s{seed}")
+        cell = Cell(SEPARATOR.join(parts), simulator, perception, decision, tasks, seed, ())
+        agents = []
+        for agent in sweep.agents:
+            fits = {
+                (which, i): _fits(pattern, agent, cell)
+                for which, patterns in (("include", sweep.include), ("exclude", sweep.exclude))
+                for i, pattern in enumerate(patterns)
+            }
+            used = {key: used[key] or fits[key] for key in used}
+            is_in = not sweep.include or any(fits[key] for key in fits if key[0] == "include")
+            if is_in and not any(fits[key] for key in fits if key[0] == "exclude"):
+                agents.append(agent)
+        if agents:
+            cells.append(Cell(cell.name, simulator, perception, decision, tasks, seed, tuple(agents)))
+    for (which, i), is_used in used.items():
+        if not is_used:
+            said = getattr(sweep, which)[i].model_dump(exclude_defaults=True)
+            told = ", ".join(f"{axis} {' or '.join(map(str, values))}" for axis, values in said.items())
+            raise InvalidArgumentError(f"{which}.{i} fits no combination: there is none of {told}")
+    if not cells:
+        raise InvalidArgumentError("the sweep has no cell: `exclude` leaves nothing")
+    return cells
+
+
+def chosen(cells: Sequence[Cell], patterns: Sequence[str]) -> list[Cell]:
+    """The cells whose name fits one of the patterns; all without any.
+
+    Raises:
+        InvalidArgumentError: A pattern fits none.
+    """
+    for pattern in patterns:
+        if not any(fnmatchcase(cell.name, pattern) for cell in cells):
+            names = ", ".join(cell.name for cell in cells[:4]) + (", ..." if len(cells) > 4 else "")
+            raise InvalidArgumentError(f"--only {pattern}: fits no cell; there are {names}")
+    return [cell for cell in cells if not patterns or any(fnmatchcase(cell.name, each) for each in patterns)]
+
+
+@contextmanager
+def task_sets(sweep: SweepFile) -> Iterator[dict[str, list[TaskFile]]]:
+    """The tasks of every set, while in use.
+
+    Raises:
+        TaskError: A folder holds none, too few, or malformed ones.
+    """
+    with ExitStack() as stack:
+        yield {name: tasks_of(tasks, stack) for name, tasks in sweep.tasks.items()}
+
+
+def tasks_of(tasks: TaskSet, stack: ExitStack) -> list[TaskFile]:
+    """The tasks of a set; `stack` holds bundled ones.
+
+    Raises:
+        TaskError: There are none, too few, or malformed ones.
+    """
+    folder = stack.enter_context(bundled_tasks()) if tasks.folder == BUNDLED else Path(tasks.folder)
+    if tasks.subset is None:
+        return task_files(folder, tasks.limit)
+    return [task_file(root) for root in subset_roots(folder, tasks.subset)]
+
+
+def config_of(sweep: SweepFile, cell: Cell, books: Books | None) -> RunConfig:
+    """What decides a cell's records; without books, for estimates alone.
+
+    Raises:
+        EvonavError: A model's settings make no sense, or its exchanges cannot be opened.
+    """
+    decision = sweep.decisions[cell.decision]
+    perception = sweep.perceptions[cell.perception]
+    simulated = sweep.simulators[cell.simulator].backend()
+    backend = Backend(
+        simulator=simulated.simulator,
+        simulator_options=simulated.simulator_options,
+        host_options=simulated.host_options,
+        perception=PERCEPTIONS.get(perception.make, perception.make),
+        perception_options=perception.options,
+    )
+    return RunConfig(
+        seed=cell.seed,
+        protocol=sweep.protocol.config(),
+        backend=decision.backend(backend, cell.seed, books),
+        stage_timeout_s=sweep.stage_timeout_s or decision.stage_timeout_s,
+        hosting=AgentHosting(
+            is_in_process=sweep.in_process,
+            timeout_s=sweep.agent_timeout_s or decision.answer_timeout_s,
+            memory_mb=sweep.agent_memory_mb,
+        ),
+    )
+
+
+def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[TaskFile]], out: Path) -> list[CellRun]:
+    """The runs of cells, before their models can be asked."""
+    return [
+        CellRun(
+            cell,
+            RunRequest(
+                cell.agents, tuple(tasks[cell.tasks]), out / RUNS_NAME / cell.name, config_of(sweep, cell, None)
+            ),
+        )
+        for cell in cells
+    ]
+
+
+def asking(sweep: SweepFile, out: Path, run: CellRun, num_workers: int) -> CellRun:
+    """A run whose agents can ask their model; that is tried, nothing is asked.
+
+    Raises:
+        EvonavError: The model cannot be asked from here.
+    """
+    if sweep.decisions[run.cell.decision].kind == "text":
+        return run
+    spending = SpendingSettings(None if sweep.prices is None else Path(sweep.prices), sweep.max_cost)
+    books = Books(
+        run.request.run_dir, out / LEDGER_NAME, spending, account=run.cell.name, num_workers=max(1, num_workers)
+    )
+    try:
+        config = config_of(sweep, run.cell, books)
+        try_decisions(config.backend, run.cell.seed)
+    except EvonavError as error:
+        raise type(error)(f"decisions.{run.cell.decision}: {error}") from error
+    return replace(run, request=replace(run.request, config=config))
+
+
+def claim(out: Path, sweep: SweepFile, runs: Sequence[CellRun]) -> None:
+    """Makes the folder this sweep's, or checks that it is.
+
+    Cells and agents may be added; of what has begun, none may be changed or left out.
+
+    Args:
+        out: Of the sweep.
+        sweep: The file.
+        runs: Of all its cells.
+
+    Raises:
+        StoreError: The folder holds another sweep, or cannot be written; it says what differs.
+    """
+    asked = {run.cell.name: _content(run) for run in runs}
+    path = out / SWEEP_NAME
+    if path.exists():
+        cells = read_claim(out)["cells"]
+        there = {name: cell for name, cell in cells.items() if (out / RUNS_NAME / name / FILE_NAME).exists()}
+        differing = [*_differences(there, asked)]
+        if differing:
+            shown = "; ".join(differing[:3]) + (f"; and {len(differing) - 3} more" if len(differing) > 3 else "")
+            raise StoreError(f"{out} holds another sweep ({shown}); use another folder")
+    settings = sweep.model_dump(mode="json", exclude=_HOW)
+    for decision in settings["decisions"].values():
+        decision.pop("base_url")  # an address may hold a password
+    content = {"schema_version": SCHEMA_VERSION, "evonav": __version__, "settings": settings, "cells": asked}
+    write_atomically(path, json.dumps(content, indent=2) + "\n")
+
+
+def read_claim(out: Path) -> dict[str, Any]:
+    """The content of `sweep.json`.
+
+    Raises:
+        StoreError: There is none, or it is no such file.
+    """
+    path = out / SWEEP_NAME
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise StoreError(f"{out}: no sweep here ({SWEEP_NAME}: {error.strerror or error})") from None
+    except ValueError as error:
+        raise StoreError(f"{path}: no JSON: {error}") from None
+    if not isinstance(content, dict) or not isinstance(content.get("cells"), dict):
+        raise StoreError(f"{path}: not a sweep's: it names no cells")
+    if content.get("schema_version") != SCHEMA_VERSION:
+        found = content.get("schema_version")
+        raise StoreError(f"{path}: schema version {found}, this evonav reads {SCHEMA_VERSION}")
+    return content
+
+
+def run_sweep(
+    sweep: SweepFile,
+    out: Path,
+    runs: Sequence[CellRun],
+    *,
+    num_workers: int,
+    only: Sequence[str] = (),
+    retry_errored: bool = False,
+    on_progress: Callable[[Cell, Progress], None] = lambda _, __: None,
+) -> None:
+    """Runs what is missing of a sweep, with one set of workers; what was finished stays.
+
+    Args:
+        sweep: The file.
+        out: Folder of the sweep.
+        runs: Of all cells.
+        num_workers: Processes or actors; 0 runs everything in this process.
+        only: Patterns of cells' names; others are left as they are.
+        retry_errored: Run errored stages again, and those that were not run because of them.
+        on_progress: Called as a cell begins and after each of its recorded stages.
+
+    Raises:
+        StoreError: The folder holds another sweep, is being written, or cannot be.
+        EvonavError: An agent is unknown, a simulator does not start, a task is malformed.
+    """
+    names = {cell.name for cell in chosen([run.cell for run in runs], only)}
+    todo = [run for run in runs if run.cell.name in names]
+    with writing(out):
+        claim(out, sweep, runs)
+        todo = [run for run in todo if retry_errored or not _is_recorded(run)]
+        todo = [asking(sweep, out, run, num_workers) for run in todo]
+        for name in dict.fromkeys(run.cell.simulator for run in todo):
+            _check_simulator(next(run for run in todo if run.cell.simulator == name))
+        evaluate_all(
+            [run.request for run in todo],
+            engine=sweep.engine,
+            num_workers=num_workers,
+            ray_address=sweep.ray_address,
+            num_retries=NUM_RETRIES if sweep.num_retries is None else sweep.num_retries,
+            retry_errored=retry_errored,
+            on_progress=lambda index, news: on_progress(todo[index].cell, news),
+        )
+
+
+def _fits(pattern: Pattern, agent: str, cell: Cell) -> bool:
+    return (
+        _is_one(agent, pattern.agent)
+        and _is_one(cell.simulator, pattern.simulator)
+        and _is_one(cell.perception, pattern.perception)
+        and _is_one(cell.decision, pattern.decision)
+        and _is_one(cell.tasks, pattern.tasks)
+        and (not pattern.seed or cell.seed in pattern.seed)
+    )
+
+
+def _is_one(name: str, globs: Sequence[str]) -> bool:
+    return not globs or any(fnmatchcase(name, glob) for glob in globs)
+
+
+def _content(run: CellRun) -> dict[str, Any]:
+    """Of a cell, for `sweep.json`."""
+    axes = {key: value for key, value in asdict(run.cell).items() if key not in ("name", "agents")}
+    return {
+        "agents": list(run.cell.agents),
+        "axes": axes,
+        "num_stages": run.num_stages,
+        "run": json.loads(json.dumps(run_identity(run.request.tasks, run.request.config))),
+    }
+
+
+def _differences(there: Mapping[str, Any], asked: Mapping[str, Any]) -> Iterator[str]:
+    """What was promised and is not asked for any more."""
+    for name, cell in there.items():
+        if name not in asked:
+            yield f"cell {name} is not in the file: put it back, `--only` runs a part"
+            continue
+        gone = [agent for agent in cell["agents"] if agent not in asked[name]["agents"]]
+        if gone:
+            yield f"cell {name} is without agent {', '.join(gone)}: put it back"
+        old, new = _flat(cell["run"]), _flat(asked[name]["run"])
+        for key in sorted(old.keys() | new.keys()):
+            if old.get(key) != new.get(key):
+                yield f"cell {name}: {key}: there {old.get(key)!r}, asked {new.get(key)!r}"
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in values.items():
+        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {prefix + key: value}
+    return flat
+
+
+def _is_recorded(run: CellRun) -> bool:
+    """Whether every stage of a cell has a record, in a run that is the cell's."""
+    try:
+        with RunStore(run.request.run_dir) as store:
+            if store.meta("config") != _content(run)["run"]:
+                return False  # the engine says what differs
+            states = store.states()
+    except StoreError:
+        return False
+    return all(
+        (agent, task.task_id, stage) in states
+        for agent in run.cell.agents
+        for task in run.request.tasks
+        for stage in range(1, task.num_stages + 1)
+    )
+
+
+def _check_simulator(run: CellRun) -> None:
+    """Starts the simulator once, before anything is written for a cell."""
+    try:
+        run.request.config.backend.check()
+    except EvonavError as error:
+        raise type(error)(f"simulators.{run.cell.simulator}: {error}") from error

@@ -1,0 +1,48 @@
+"""What the cells of a sweep would ask a model and pay for it, before anything is asked."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from evonav.decision.account import Usage
+from evonav.evaluation.estimate import estimate_run
+from evonav.evaluation.settings import SpendingSettings
+from evonav.evaluation.sweep import CellRun
+from evonav.evaluation.sweep_file import SweepFile
+
+
+@dataclass(frozen=True, slots=True)
+class CellEstimate:
+    """Of all agents of a cell, see `evonav.evaluation.estimate`."""
+
+    num_requests: float
+    input_tokens: float
+    output_tokens: float
+    dollars: float | None
+    """`None` without prices."""
+
+
+def cell_estimate(sweep: SweepFile, run: CellRun, num_workers: int) -> CellEstimate:
+    """Runs a few tasks of a cell with the text matcher and counts what its model would be asked.
+
+    Args:
+        sweep: The file.
+        run: Of a cell whose decisions are a model's.
+        num_workers: Processes.
+
+    Raises:
+        InvalidArgumentError: An agent is unknown, or the prices lack the model.
+        TaskError: A task is malformed.
+    """
+    config = run.request.config
+    options = dict(config.backend.decision_options)
+    prices = SpendingSettings(None if sweep.prices is None else Path(sweep.prices))
+    price = prices.price(options["model"])
+    found = estimate_run(run.cell.agents, run.request.tasks, config, options, num_workers=num_workers)
+    tokens_in = sum(estimate.input_tokens for estimate in found)
+    tokens_out = sum(estimate.output_tokens for estimate in found)
+    return CellEstimate(
+        num_requests=sum(estimate.num_requests for estimate in found),
+        input_tokens=tokens_in,
+        output_tokens=tokens_out,
+        dollars=None if price is None else price.of(Usage(int(tokens_in), int(tokens_out))),
+    )

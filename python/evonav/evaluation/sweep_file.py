@@ -1,0 +1,256 @@
+"""Sweep files: TOML, YAML or JSON that names what is to be run (docs/sweeps.md).
+
+Short forms (`tasks = ["bundled:2"]`) are spelled out first, so that there is one record and one way to read it.
+Whatever is wrong is one sentence with the file, the key and the value.
+"""
+
+import difflib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, ValidationError
+
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.backend import PERCEPTIONS
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.settings import DecisionSettings, SettingError, Settings, SimulatorSettings
+from evonav.evaluation.sweep_words import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed, loaded
+from evonav.parallel import EngineName
+from evonav.tasks.subsets import SubsetError, parse_subset
+
+BUNDLED = "bundled"
+"""Stands for the folder of the tasks that come with evonav."""
+SEPARATOR = "__"
+"""Between the parts of a cell's name, and in none of them."""
+
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9](_?[A-Za-z0-9.-])*$", max_length=MAX_NAME_CHARACTERS)]
+Seed = Annotated[int, Field(ge=0)]
+
+
+class TaskSet(Settings):
+    """Tasks of a folder."""
+
+    folder: str = Field(min_length=1)
+    """Holds one folder a task; `bundled`: the tasks that come with evonav."""
+    limit: int | None = Field(default=None, ge=1)
+    """Take the first N."""
+    subset: str | None = None
+    """Named subset, SPLIT-N, such as test-90 (docs/tasks.md)."""
+
+
+class PerceptionSettings(Settings):
+    """What agents are given to see with."""
+
+    make: str = "gt"
+    """gt (the simulator's masks and labels), or module:function that makes a `Perception`."""
+    options: dict[str, Any] = Field(default_factory=dict)
+    """Keywords for it."""
+
+
+class ProtocolSettings(Settings):
+    """What every agent is held to; what is left out is the paper's (docs/parity.md)."""
+
+    max_rounds: int | None = Field(default=None, ge=1)
+    max_actions: int | None = Field(default=None, ge=1)
+    success_radius_m: float | None = Field(default=None, gt=0.0)
+    waypoint_m: float | None = Field(default=None, gt=0.0)
+    max_travel_m: float | None = Field(default=None, gt=0.0)
+    max_views: int | None = Field(default=None, ge=1)
+    max_occupancy_range_m: float | None = Field(default=None, gt=0.0)
+    min_visible_px: int | None = Field(default=None, ge=0)
+
+    def config(self) -> ProtocolConfig:
+        """The paper's, with what was given in its place."""
+        return ProtocolConfig(**self.model_dump(exclude_none=True))
+
+
+class Pattern(Settings):
+    """Combinations of agent and cell: a name, a glob such as `noisy-*`, or a list of them, for any of the axes."""
+
+    agent: tuple[str, ...] = ()
+    simulator: tuple[str, ...] = ()
+    perception: tuple[str, ...] = ()
+    decision: tuple[str, ...] = ()
+    tasks: tuple[str, ...] = ()
+    seed: tuple[Seed, ...] = ()
+
+
+class SweepFile(Settings):
+    """A sweep: agents x simulators x perceptions x decisions x tasks x seeds."""
+
+    model_config = ConfigDict(title="evonav sweep")
+
+    name: str = ""
+    """Told in the summary."""
+    out: str | None = None
+    """Folder for runs and summary; `--out` goes before it."""
+    agents: tuple[str, ...] = Field(min_length=1)
+    """Names as `evonav agents` lists them, `./file.py:Class` or `module:Class`."""
+    tasks: dict[Name, TaskSet] = Field(min_length=1)
+    """Short: a list of `FOLDER`, `FOLDER:LIMIT` or `FOLDER:SUBSET`, with `bundled` for a folder."""
+    simulators: dict[Name, SimulatorSettings] = Field(default={"embedded": SimulatorSettings()}, min_length=1)
+    """Short: a list of embedded, ai2thor."""
+    perceptions: dict[Name, PerceptionSettings] = Field(default={"gt": PerceptionSettings()}, min_length=1)
+    """Short: a list of gt, module:function."""
+    decisions: dict[Name, DecisionSettings] = Field(default={"text": DecisionSettings()}, min_length=1)
+    """Short: a list of text, text:wrong=0.1 (with mistakes), vlm:MODEL, module:name."""
+    seeds: tuple[Seed, ...] = Field(default=(0,), min_length=1)
+    """Each decides everything random of its runs."""
+    protocol: ProtocolSettings = ProtocolSettings()
+    include: tuple[Pattern, ...] = ()
+    """Given any, only combinations that fit one of them are run."""
+    exclude: tuple[Pattern, ...] = ()
+    """Combinations that fit one of them are not run."""
+    prices: str | None = None
+    """JSON of models' prices, as for `evonav evaluate --prices`."""
+    max_cost: float | None = Field(default=None, gt=0.0)
+    """Dollars that the whole sweep may spend; needs prices."""
+    workers: int | None = Field(default=None, ge=0)
+    """Processes or actors; default: one a core. 0: all in one process."""
+    engine: EngineName = "local"
+    """Processes of this machine, or Ray."""
+    ray_address: str | None = None
+    """Of a cluster that shares this file system; default: one on this machine."""
+    num_retries: int | None = Field(default=None, ge=0)
+    """Of a stage that lost its worker, its simulator or its agent's process."""
+    stage_timeout_s: float | None = Field(default=None, gt=0.0)
+    """Default: 900, four hours where a model decides."""
+    agent_timeout_s: float | None = Field(default=None, ge=0.1)
+    """For an agent's answer; default: 600, an hour where a model decides."""
+    agent_memory_mb: int | None = Field(default=None, ge=256)
+    """Address space of an agent's process."""
+    in_process: bool = False
+    """Agents in the workers' own processes: faster for many short stages, but only exceptions are held."""
+
+
+def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
+    """Reads a sweep file.
+
+    Args:
+        path: `.toml`, `.yaml`, `.yml` or `.json`.
+        changes: `KEY=VALUE` over what the file says; keys with dots reach into tables, values are JSON or plain words.
+
+    Raises:
+        InvalidArgumentError: With file, key and value.
+    """
+    raw = loaded(path)
+    for change in changes:
+        apply(raw, change, path)
+    for axis, spell in SHORT_FORMS.items():
+        if axis in raw:
+            raw[axis] = spell(raw[axis], f"{path}: {axis}")
+    for axis in ("include", "exclude"):
+        if isinstance(raw.get(axis), list):
+            raw[axis] = [listed(pattern) for pattern in raw[axis]]
+    try:
+        text = json.dumps(raw, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgumentError(f"{path}: holds a value that is no text, number, list or table: {error}") from None
+    try:
+        sweep = SweepFile.model_validate_json(text)
+    except ValidationError as error:
+        raise InvalidArgumentError(_told(path, error)) from None
+    _check(sweep, path)
+    return sweep
+
+
+def sweep_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of sweep files, short forms included, for editors."""
+    schema = SweepFile.model_json_schema()
+    words: dict[str, Any] = {"type": "string"}
+    short: dict[str, Any] = {"anyOf": [words, {"type": "array", "items": words}]}
+    for axis in SHORT_FORMS:
+        field = schema["properties"][axis]
+        long = {key: field.pop(key) for key in tuple(field) if key not in ("title", "description", "default")}
+        for pattern, entry in long.get("patternProperties", {}).items():
+            long |= {"patternProperties": {pattern: {"anyOf": [entry, words]}}, "additionalProperties": False}
+        field["anyOf"] = [long, *([words, {"type": "integer"}] if axis == "seeds" else short["anyOf"])]
+        field.pop("default", None)
+    for name, field in schema["$defs"]["Pattern"]["properties"].items():
+        one = {"type": "integer" if name == "seed" else "string"}
+        field["anyOf"] = [{key: field.pop(key) for key in tuple(field) if key not in ("title", "default")}, one]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _told(path: Path, error: ValidationError) -> str:
+    """The first thing wrong, in a sentence."""
+    found = error.errors(include_url=False, include_context=True)
+    # A key that nobody knows explains what is missing.
+    first = next((one for one in found if one["type"] == "extra_forbidden"), found[0])
+    place = ".".join(str(part) for part in first["loc"] if part != "[key]")
+    more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
+    if first["type"] == "extra_forbidden":
+        known = _keys_at(first["loc"][:-1])
+        near = difflib.get_close_matches(str(first["loc"][-1]), known, 1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+        return f"{path}: {place}: no such key; {hint}{more}"
+    if first["type"] == "missing":
+        return f"{path}: {place} is missing{more}"
+    if first["type"] == "string_pattern_mismatch" and "[key]" in first["loc"]:
+        said = "a name is letters, digits, '.', '-' and single '_', and begins with one of the first two"
+        return f"{path}: {place}: {said}{more}"
+    shown = repr(first.get("input"))
+    shown = shown if len(shown) <= 80 else shown[:77] + "..."
+    return f"{path}: {place} = {shown}: {first['msg']}{more}"
+
+
+def _keys_at(place: Sequence[int | str]) -> list[str]:
+    """Keys that a table of the file may have."""
+    model: type[Settings] = SweepFile
+    tables: Mapping[str, type[Settings]] = {
+        "tasks": TaskSet,
+        "simulators": SimulatorSettings,
+        "perceptions": PerceptionSettings,
+        "decisions": DecisionSettings,
+        "protocol": ProtocolSettings,
+        "include": Pattern,
+        "exclude": Pattern,
+    }
+    if place:
+        model = tables.get(str(place[0]), SweepFile)
+    return list(model.model_fields)
+
+
+def _check(sweep: SweepFile, path: Path) -> None:
+    """What no single field can tell."""
+    settings: Sequence[tuple[Literal["simulators", "decisions"], Mapping[str, Any]]] = (
+        ("simulators", sweep.simulators),
+        ("decisions", sweep.decisions),
+    )
+    for axis, table in settings:
+        for name, entry in table.items():
+            place = f"{path}: {axis}.{name}"
+            try:
+                entry.backend() if axis == "simulators" else entry.check()
+            except SettingError as error:
+                raise InvalidArgumentError(f"{place}.{error.key} {error.said}") from None
+            except InvalidArgumentError as error:
+                raise InvalidArgumentError(f"{place}: {error}") from None
+            if axis == "decisions" and entry.mode == "record":
+                raise InvalidArgumentError(
+                    f"{place}.mode = 'record': is for one run; auto keeps answers too, and a sweep goes on with them"
+                )
+    for name, perception in sweep.perceptions.items():
+        if perception.make not in PERCEPTIONS and ":" not in perception.make:
+            known = ", ".join(PERCEPTIONS)
+            raise InvalidArgumentError(
+                f"{path}: perceptions.{name}.make = {perception.make!r}: expected {known} or module:function"
+            )
+    for name, tasks in sweep.tasks.items():
+        if tasks.limit is not None and tasks.subset is not None:
+            raise InvalidArgumentError(f"{path}: tasks.{name}: give limit or subset, not both")
+        if tasks.subset is not None:
+            try:
+                parse_subset(tasks.subset)
+            except SubsetError as error:
+                raise InvalidArgumentError(f"{path}: tasks.{name}.{error}") from None
+    if sweep.ray_address is not None and sweep.engine != "ray":
+        raise InvalidArgumentError(f"{path}: ray_address is for engine = 'ray'")
+    if sweep.max_cost is not None and sweep.prices is None:
+        raise InvalidArgumentError(f"{path}: max_cost = {sweep.max_cost:g} needs prices, a table of what models cost")
+    for which in ("include", "exclude"):
+        for index, pattern in enumerate(getattr(sweep, which)):
+            if not pattern.model_fields_set:
+                raise InvalidArgumentError(f"{path}: {which}.{index} is empty: name an agent, decision, ...")

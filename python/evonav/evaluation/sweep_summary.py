@@ -1,0 +1,157 @@
+"""What came of a sweep: a row a cell and agent, and one over the seeds of cells that differ in nothing else.
+
+Rates and intervals are the runs' own; over seeds, stages of one task under several seeds are resampled together.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from evonav.evaluation.engine import SUMMARY_NAME, write_summary
+from evonav.evaluation.metrics import Rates, rates
+from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.store import FILE_NAME, RunStore
+from evonav.evaluation.sweep import RUNS_NAME, read_claim
+from evonav.significance import Interval
+
+AXES = ("simulator", "perception", "decision", "tasks", "seed")
+
+
+@dataclass(frozen=True, slots=True)
+class SweepRow:
+    """An agent in a cell, or over the seeds of cells."""
+
+    cell: str
+    """Empty over seeds."""
+    simulator: str
+    perception: str
+    decision: str
+    tasks: str
+    seed: int | None
+    """`None`: over all of them."""
+    agent: str
+    n: int
+    """Scored stages."""
+    num_stages: int
+    sr: float | None
+    sr_ci95: Interval | None
+    spl: float | None
+    spl_ci95: Interval | None
+    counts: Mapping[str, int]
+    """Stages by end state; one that was not begun is not run."""
+
+    @property
+    def is_incomplete(self) -> bool:
+        """Some stage is errored or not run: no rate may be quoted as final."""
+        return self.n != self.num_stages
+
+
+def sweep_rows(out: Path) -> list[SweepRow]:
+    """The rows of a sweep as it stands, cell by cell, then those over seeds.
+
+    Raises:
+        StoreError: There is no sweep, or it cannot be read.
+    """
+    cells: dict[str, dict[str, Any]] = read_claim(out)["cells"]
+    rows: list[SweepRow] = []
+    groups: dict[tuple[str, ...], list[str]] = {}
+    for name, cell in cells.items():
+        rows += _cell_rows(out / RUNS_NAME / name, name, cell)
+        axes = cell["axes"]
+        groups.setdefault(tuple(str(axes[axis]) for axis in AXES[:-1]), []).append(name)
+    for names in groups.values():
+        if len(names) > 1:
+            rows += _over_seeds(out, {name: cells[name] for name in names}, rows)
+    return rows
+
+
+def sweep_json(out: Path, rows: list[SweepRow]) -> dict[str, Any]:
+    """The content of the sweep's `summary.json`."""
+    return {
+        "schema_version": 1,
+        "name": read_claim(out)["settings"]["name"],
+        "is_incomplete": any(row.is_incomplete for row in rows),
+        "rows": [{**asdict(row), "is_incomplete": row.is_incomplete} for row in rows],
+    }
+
+
+def _cell_rows(run_dir: Path, name: str, cell: Mapping[str, Any]) -> list[SweepRow]:
+    found = _run_summary(run_dir)
+    num_stages = cell["num_stages"] // len(cell["agents"])
+    blank = {**{state.value: 0 for state in EndState}, EndState.NOT_RUN.value: num_stages}
+    rows = []
+    for agent in cell["agents"]:
+        summary = found.get(agent, {})
+        rows.append(
+            SweepRow(
+                cell=name,
+                **cell["axes"],
+                agent=agent,
+                n=summary.get("n", 0),
+                num_stages=num_stages,
+                sr=summary.get("sr"),
+                sr_ci95=_interval(summary.get("sr_ci95")),
+                spl=summary.get("spl"),
+                spl_ci95=_interval(summary.get("spl_ci95")),
+                counts=summary.get("counts", blank),
+            )
+        )
+    return rows
+
+
+def _run_summary(run_dir: Path) -> dict[str, dict[str, Any]]:
+    """A run's summary by agent, computed anew where its records are newer; nothing for a run not begun."""
+    records, written = run_dir / FILE_NAME, run_dir / SUMMARY_NAME
+    if not records.exists():
+        return {}
+    changed_ns = max(path.stat().st_mtime_ns for path in (records, Path(f"{records}-wal")) if path.exists())
+    try:
+        if written.stat().st_mtime_ns >= changed_ns:
+            agents: dict[str, dict[str, Any]] = json.loads(written.read_text(encoding="utf-8"))["agents"]
+            return agents
+    except (OSError, ValueError, KeyError):
+        pass
+    return {summary.agent: asdict(summary) for summary in write_summary(run_dir)}
+
+
+def _over_seeds(out: Path, cells: Mapping[str, Mapping[str, Any]], rows: list[SweepRow]) -> list[SweepRow]:
+    """One row an agent that runs under more than one seed."""
+    axes = {key: value for key, value in next(iter(cells.values()))["axes"].items() if key != "seed"}
+    found = []
+    for agent in dict.fromkeys(agent for cell in cells.values() for agent in cell["agents"]):
+        parts = [row for row in rows if row.cell in cells and row.agent == agent]
+        if len(parts) < 2:
+            continue
+        pooled = _pooled([out / RUNS_NAME / row.cell for row in parts], agent)
+        counts = {state.value: sum(row.counts[state.value] for row in parts) for state in EndState}
+        found.append(
+            SweepRow(
+                cell="",
+                **axes,
+                seed=None,
+                agent=agent,
+                n=pooled.n,
+                num_stages=sum(row.num_stages for row in parts),
+                sr=pooled.sr,
+                sr_ci95=pooled.sr_ci95,
+                spl=pooled.spl,
+                spl_ci95=pooled.spl_ci95,
+                counts=counts,
+            )
+        )
+    return found
+
+
+def _pooled(run_dirs: list[Path], agent: str) -> Rates:
+    records: list[StageRecord] = []
+    for run_dir in run_dirs:
+        if (run_dir / FILE_NAME).exists():
+            with RunStore(run_dir) as store:
+                records += store.records(agent, is_brief=True)
+    return rates(records)
+
+
+def _interval(ends: Any) -> Interval | None:  # noqa: ANN401 - JSON
+    return None if ends is None else (float(ends[0]), float(ends[1]))

@@ -1,0 +1,214 @@
+"""What a sweep file and `--set` say, as plain values: short forms (`tasks = ["bundled:2"]`) are spelled out here."""
+
+import json
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from evonav.errors import InvalidArgumentError
+from evonav.tasks.subsets import SubsetError, parse_subset
+
+MAX_NAME_CHARACTERS = 64
+
+
+def loaded(path: Path) -> dict[str, Any]:
+    """A file as plain values.
+
+    Args:
+        path: `.toml`, `.yaml`, `.yml` or `.json`.
+
+    Raises:
+        InvalidArgumentError: It cannot be read; it says where.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise InvalidArgumentError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
+        raise InvalidArgumentError(f"{path}: not UTF-8: {error}") from None
+    kind = path.suffix.lower()
+    try:
+        if kind == ".toml":
+            from evonav.generation.config import toml_reader
+
+            raw = toml_reader().loads(text)
+        elif kind in (".yaml", ".yml"):
+            raw = _yaml(text)
+        elif kind == ".json":
+            raw = json.loads(text)
+        else:
+            raise InvalidArgumentError(f"{path}: expected a name that ends in .toml, .yaml, .yml or .json")
+    except ValueError as error:
+        said = " ".join(str(error).split())
+        raise InvalidArgumentError(f"{path}: no {kind[1:].upper()}: {said}") from None
+    if not isinstance(raw, dict):
+        raise InvalidArgumentError(f"{path}: expected keys and values, got {type(raw).__name__}: see docs/sweeps.md")
+    return raw
+
+
+def _yaml(text: str) -> Any:  # noqa: ANN401 - YAML
+    """Plain YAML, in which a key said twice is an error.
+
+    Raises:
+        ValueError: It is none.
+    """
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:  # noqa: ANN401
+            keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+            twice = next((key for i, key in enumerate(keys) if key in keys[:i]), None)
+            if twice is not None:
+                raise ValueError(f"key {twice!r} is there twice (line {node.start_mark.line + 1})")
+            return super().construct_mapping(node, deep=deep)
+
+    try:
+        return yaml.load(text, Loader)  # noqa: S506 - a safe loader
+    except yaml.YAMLError as error:
+        raise ValueError(str(error)) from None
+
+
+def apply(raw: dict[str, Any], change: str, path: Path) -> None:
+    """Sets a value as `--set KEY=VALUE` says it.
+
+    Args:
+        raw: Changed.
+        change: A key with dots reaches into tables; a value is JSON, or plain words.
+        path: Named in errors.
+
+    Raises:
+        InvalidArgumentError: It is no such change, or the key reaches into what is no table.
+    """
+    place, equals, text = change.partition("=")
+    keys = place.strip().split(".")
+    if not equals or not all(keys):
+        raise InvalidArgumentError(f"--set {change}: expected KEY=VALUE, such as seeds=[0,1] or protocol.max_rounds=20")
+    try:
+        value = json.loads(text)
+    except ValueError:
+        value = text.strip()
+    table = raw
+    for depth, key in enumerate(keys[:-1]):
+        inner = table.setdefault(key, {})
+        if not isinstance(inner, dict):
+            raise InvalidArgumentError(
+                f"--set {change}: {'.'.join(keys[: depth + 1])} is no table in {path}: give the whole of it"
+            )
+        table = inner
+    table[keys[-1]] = value
+
+
+def _words(value: Any) -> Any:  # noqa: ANN401 - as read
+    """One string, with commas or not, as a list."""
+    if isinstance(value, str):
+        return [word.strip() for word in value.split(",") if word.strip()]
+    return value
+
+
+def _agents(value: Any, place: str) -> Any:  # noqa: ANN401 - as read
+    agents = _words(value)
+    if isinstance(agents, list):
+        twice = next((agent for i, agent in enumerate(agents) if agent in agents[:i]), None)
+        if twice is not None:
+            raise InvalidArgumentError(f"{place}: {twice!r} is named twice")
+    return agents
+
+
+def _seeds(value: Any, place: str) -> Any:  # noqa: ANN401 - as read
+    if isinstance(value, int) and not isinstance(value, bool):
+        return [value]
+    if isinstance(value, str):
+        try:
+            value = [int(word) for word in _words(value)]
+        except ValueError:
+            raise InvalidArgumentError(f"{place} = {value!r}: expected whole numbers, such as [0, 1, 2]") from None
+    if isinstance(value, list) and len({str(seed) for seed in value}) < len(value):
+        raise InvalidArgumentError(f"{place} = {value}: a seed is named twice")
+    return value
+
+
+def _tasks(word: str, place: str) -> tuple[str, dict[str, Any]]:
+    folder, colon, part = word.rpartition(":")
+    table: dict[str, Any] = {"folder": word}
+    name = Path(word).name
+    if colon and part.isdigit():
+        table, name = {"folder": folder, "limit": int(part)}, f"{Path(folder).name}-{part}"
+    elif colon and folder:
+        try:
+            parse_subset(part)
+        except SubsetError:
+            raise InvalidArgumentError(
+                f"{place}: {word!r}: expected FOLDER, FOLDER:LIMIT or FOLDER:SUBSET, such as tasks:20 or tasks:test-90"
+            ) from None
+        table, name = {"folder": folder, "subset": part}, f"{Path(folder).name}-{part}"
+    return name, table
+
+
+def _decision(word: str, place: str) -> tuple[str, dict[str, Any]]:
+    from evonav.decision.noisy import NoiseRates
+    from evonav.decision.rates import read_rates
+
+    kind, colon, rest = word.partition(":")
+    if kind == "vlm" and colon:
+        return rest, {"kind": "vlm", "model": rest}
+    if kind == "text" and colon:
+        try:
+            return word, {"kind": "text", "noise": read_rates(rest, list(NoiseRates.__dataclass_fields__))}
+        except InvalidArgumentError as error:
+            raise InvalidArgumentError(f"{place}: {word!r}: {error}") from None
+    return word, {"kind": word}
+
+
+def _perception(word: str, place: str) -> tuple[str, dict[str, Any]]:
+    return word, {"make": word}
+
+
+def _simulator(word: str, place: str) -> tuple[str, dict[str, Any]]:
+    return word, {"kind": word}
+
+
+def _axis(read: Any) -> Any:  # noqa: ANN401 - a function of (word, place)
+    """Spells out a list of short forms, each under a name made from it; tables stay as they are."""
+
+    def spell(value: Any, place: str) -> Any:  # noqa: ANN401 - as read
+        words = _words(value) if read is not _decision else [value] if isinstance(value, str) else value
+        if isinstance(words, dict):
+            return {
+                name: read(entry, f"{place}.{name}")[1] if isinstance(entry, str) else entry
+                for name, entry in words.items()
+            }
+        if not isinstance(words, list):
+            return words
+        table: dict[str, Any] = {}
+        for word in words:
+            if not isinstance(word, str):
+                raise InvalidArgumentError(f"{place}: {word!r}: expected a word; give tables names of their own")
+            name, entry = read(word, place)
+            name = re.sub(r"__+", "_", re.sub(r"[^A-Za-z0-9._-]+", "-", name)).strip("-._")[:MAX_NAME_CHARACTERS]
+            if name in table:
+                raise InvalidArgumentError(
+                    f"{place}: {word!r} and another are both called {name!r}: give them names, {name} = ..., "
+                    "in a table instead of a list"
+                )
+            table[name] = entry
+        return table
+
+    return spell
+
+
+SHORT_FORMS: Mapping[str, Callable[[Any, str], Any]] = {
+    "agents": _agents,
+    "seeds": _seeds,
+    "tasks": _axis(_tasks),
+    "decisions": _axis(_decision),
+    "perceptions": _axis(_perception),
+    "simulators": _axis(_simulator),
+}
+
+
+def listed(pattern: Any) -> Any:  # noqa: ANN401 - as read
+    """A pattern with a list of one for each value that stands alone."""
+    if not isinstance(pattern, dict):
+        return pattern
+    return {key: value if isinstance(value, list) else [value] for key, value in pattern.items()}

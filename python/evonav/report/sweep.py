@@ -1,0 +1,100 @@
+"""The summary of a sweep as tables and files, from its records alone."""
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from evonav.evaluation.records import EndState
+from evonav.evaluation.sweep_summary import AXES, SweepRow, sweep_json, sweep_rows
+from evonav.folders import write_atomically
+from evonav.report.tables import Table, percent
+
+
+def write_sweep_summary(out: Path) -> list[SweepRow]:
+    """Writes `summary.json`, `summary.csv` and `summary.md` of a sweep as it stands.
+
+    Returns:
+        Its rows.
+
+    Raises:
+        StoreError: There is no sweep, or it cannot be read or written.
+    """
+    rows = sweep_rows(out)
+    content = sweep_json(out, rows)
+    write_atomically(out / "summary.json", json.dumps(content, indent=2, sort_keys=True) + "\n")
+    write_atomically(out / "summary.csv", sweep_csv(rows))
+    title = content["name"] or out.resolve().name
+    parts = [f"# {title}\n"]
+    parts += [f"## {table.title}\n\n{table.markdown()}" for table in sweep_tables(rows)]
+    write_atomically(out / "summary.md", "\n".join(parts))
+    return rows
+
+
+def sweep_tables(rows: Sequence[SweepRow]) -> list[Table]:
+    """A table of cells, and where there are several seeds one over them; axes with one value are left out."""
+    axes = [axis for axis in AXES if len({getattr(row, axis) for row in rows if row.cell}) > 1]
+    cells = [row for row in rows if row.cell]
+    seeds = [row for row in rows if not row.cell]
+    tables = [_table("Cells", cells, axes)]
+    if seeds:
+        tables.append(_table("Over seeds", seeds, [axis for axis in axes if axis != "seed"]))
+    return tables
+
+
+def sweep_csv(rows: Sequence[SweepRow]) -> str:
+    """A line a row, rates as shares."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    ends = [f"{measure}_{end}" for measure in ("sr", "spl") for end in ("mean", "low95", "high95")]
+    writer.writerow(
+        ["cell", *AXES, "agent", "n", "num_stages", *ends, *(state.value for state in EndState), "is_incomplete"]
+    )
+    for row in rows:
+        axes = ["all" if axis == "seed" and row.seed is None else getattr(row, axis) for axis in AXES]
+        rates = [row.sr, *(row.sr_ci95 or (None, None)), row.spl, *(row.spl_ci95 or (None, None))]
+        writer.writerow(
+            [
+                row.cell,
+                *axes,
+                _csv_text(row.agent),
+                row.n,
+                row.num_stages,
+                *("" if value is None else repr(value) for value in rates),
+                *(row.counts[state.value] for state in EndState),
+                str(row.is_incomplete).lower(),
+            ]
+        )
+    return text.getvalue()
+
+
+def _table(title: str, rows: Sequence[SweepRow], axes: Sequence[str]) -> Table:
+    columns = ("Agent", *axes, "SR % [95% CI]", "SPL % [95% CI]", "n", "stages")
+    told = tuple(
+        (
+            row.agent,
+            *(str(getattr(row, axis)) for axis in axes),
+            percent(row.sr, row.sr_ci95),
+            percent(row.spl, row.spl_ci95),
+            str(row.n),
+            f"all {row.num_stages}" if not row.is_incomplete else f"{_missing(row)}, incomplete",
+        )
+        for row in rows
+    )
+    notes = ["Intervals: bootstrap over tasks (stages of a task share a memory), 10,000 resamples."]
+    if any(row.is_incomplete for row in rows):
+        notes.append("Incomplete: some stages errored or were not run; their rates are not final.")
+    return Table(title, columns, told, tuple(notes))
+
+
+def _missing(row: SweepRow) -> str:
+    errored = row.counts["errored"]
+    not_run = row.num_stages - row.n - errored
+    parts = [f"{count} {state}" for count, state in ((errored, "errored"), (not_run, "not run")) if count]
+    return f"{row.n} of {row.num_stages} ({', '.join(parts)})"
+
+
+def _csv_text(text: str) -> str:
+    """Text that no spreadsheet takes for a formula."""
+    return f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
