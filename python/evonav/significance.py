@@ -130,14 +130,51 @@ def bootstrap_ratios(
     return percentile_interval(np.concatenate(ratios))
 
 
-def percentile_interval(resampled: NDArray[np.float64]) -> NDArray[np.float64]:
-    """`(M, 2)` 95% ends of `(R, M)` resampled values, leaving NaN out; NaN where nothing else is."""
+def percentile_interval(resampled: NDArray[np.float64], num_units: int | None = None) -> NDArray[np.float64]:
+    """95% ends of resampled values, leaving NaN out.
+
+    Args:
+        resampled: `(R, M)`, M values in each of R resamples.
+        num_units: What was resampled; widens the ends as `widened_tail` tells. `None`: the plain percentiles.
+
+    Returns:
+        `(M, 2)`; NaN where nothing else is.
+    """
+    tail = 0.025 if num_units is None else widened_tail(num_units)
     ends = np.full((resampled.shape[1], 2), np.nan)
     for column, values in enumerate(resampled.T):
         there = values[~np.isnan(values)]
         if there.size:
-            ends[column] = np.quantile(there, [0.025, 0.975])
+            ends[column] = np.quantile(there, [tail, 1 - tail])
     return ends
+
+
+def widened_tail(num_units: int) -> float:
+    """Share of resamples to leave out at either end, so that few units do not make an interval too narrow.
+
+    Resamples of N units vary by (N - 1) / N of what the mean of N units does, and their quantiles are a normal's where
+    Student's are due: of 10 units the plain percentiles cover the truth 89 times in 100 instead of 95. For 100 units
+    the two are 2% apart. Hesterberg, "What Teachers Should Know About the Bootstrap", The American Statistician 2015.
+    """
+    if num_units < 2:
+        return 0.025
+    return 0.5 * math.erfc(math.sqrt(num_units / (num_units - 1)) * student_quantile(num_units - 1) / math.sqrt(2))
+
+
+def student_quantile(num_degrees: int) -> float:
+    """Student's t that is exceeded one time in forty; by Cornish and Fisher's expansion, exact for 1 and 2 degrees."""
+    if num_degrees == 1:
+        return 12.706204736432095
+    if num_degrees == 2:
+        return 4.302652729911275
+    z = 1.959963984540054
+    terms = (
+        (z**3 + z) / 4,
+        (5 * z**5 + 16 * z**3 + 3 * z) / 96,
+        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
+        (79 * z**9 + 776 * z**7 + 1482 * z**5 - 1920 * z**3 - 945 * z) / 92160,
+    )
+    return z + math.fsum(term / num_degrees ** (i + 1) for i, term in enumerate(terms))
 
 
 def weighted_quantiles(

@@ -5,6 +5,7 @@ import sys
 import typer
 
 from evonav.cli.check_agent import check_agent
+from evonav.cli.compare import compare
 from evonav.cli.controlled import controlled_app
 from evonav.cli.evaluate import demo, evaluate, report, strip
 from evonav.cli.generate import generate
@@ -30,6 +31,7 @@ COMMANDS = (
     sweep,
     demo,
     report,
+    compare,
     paper,
     strip,
     view,

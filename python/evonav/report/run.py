@@ -125,7 +125,7 @@ def load_run(run_dir: Path) -> Run:
     with RunStore(run_dir) as store:
         outcomes: dict[tuple[str, str, int], StageOutcome] = {}
         states = store.states()
-        agents = _agents(store.meta("agents"), [agent for agent, _, _ in states])
+        agents = agents_in_order(store.meta("agents"), [agent for agent, _, _ in states])
         digests = {}
         for agent in agents:
             digest = hashlib.sha256()
@@ -183,7 +183,7 @@ def _outcome(text: str, run_dir: Path, failed_before: dict[str, int]) -> StageOu
     )
 
 
-def _agents(asked: Sequence[str] | None, recorded: Sequence[str]) -> tuple[str, ...]:
+def agents_in_order(asked: Sequence[str] | None, recorded: Sequence[str]) -> tuple[str, ...]:
     """The agents of a run: the paper's in the order of its tables, then the others by name."""
     rank = {agent: i for i, agent in enumerate(PAPER_ORDER)}
     return tuple(sorted({*(asked or ()), *recorded}, key=lambda agent: (rank.get(agent, len(rank)), agent)))

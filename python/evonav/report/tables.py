@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 from rich.text import Text
 
@@ -68,7 +69,15 @@ class Table:
 
     def rich(self) -> RichTable:
         """For `rich.print`."""
-        table = RichTable(title=self.title, title_justify="left", caption="\n".join(self.notes), caption_justify="left")
+        notes = "\n".join(self.notes)
+        table = RichTable(
+            title=self.title,
+            title_justify="left",
+            caption=notes,
+            caption_justify="left",
+            box=SIMPLE_HEAD,
+            pad_edge=False,
+        )
         for j, column in enumerate(self.columns):
             table.add_column(Text(column), justify="left" if j == 0 else "right", overflow="fold")
         for i, row in enumerate(self.rows):

@@ -1,0 +1,288 @@
+"""Agents against each other on the same stages: differences with interval and p, in parts, and the stages that flipped.
+
+The statistics are those of `evonav.paired`; what they mean and how they were calibrated is in docs/statistics.md.
+"""
+
+import shlex
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evonav.errors import InvalidArgumentError
+from evonav.paired import PairedEffect, holm, mcnemar, paired_effects
+from evonav.report.maps import VIEW_DIR, page_name
+from evonav.report.rows import StageRow
+from evonav.report.sides import Side, config_differences
+
+MEASURES = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_success": "strict SR"}
+"""Fields of a row that are compared unless others are asked for."""
+SAME_PROTOCOL = ("protocol.", "tasks", "num_tasks")
+"""Settings that two runs have to share."""
+STRATA = {"stage_1": "first", "relocated": "relocated", "not_relocated": "not relocated"}
+MODES = {
+    "static": "static",
+    "salient_object": "SALIENT_OBJECT",
+    "retain_group": "RETAIN_GROUP",
+    "full_shuffle": "FULL_SHUFFLE",
+    "activities": "daily activities",
+    "extensions": "other extensions",
+}
+ALL = "all"
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A comparison on some of the stages."""
+
+    key: str
+    """`all`, a stratum or a mode."""
+    words: str
+    n: int
+    num_only_a: int
+    """Stages where only `a` succeeded."""
+    num_only_b: int
+    mcnemar_p: float
+    """As if stages were independent; `effects["success"].p` takes houses whole."""
+    effects: Mapping[str, PairedEffect]
+    """By measure; one that no pair has is left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flip:
+    """A stage where exactly one of the two succeeded."""
+
+    task_id: str
+    stage: int
+    category: str
+    stratum: str
+    mode: str
+    winner: str
+    loser: str
+    cause: str
+    """Why the other failed."""
+    pages: tuple[str | None, str | None]
+    """Where `evonav view` has shown the winner and the loser, as paths with a fragment."""
+    command: str
+    """That makes both pages."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Of `b` less `a`."""
+
+    a: str
+    b: str
+    parts: tuple[Part, ...]
+    """`all` first."""
+    dropped: Mapping[str, int]
+    """Stages of either that are not compared, by reason."""
+    flips: tuple[Flip, ...]
+    settings: Mapping[str, tuple[str, str]]
+    """What the two runs were told differently."""
+    adjusted: Mapping[str, float]
+    """By measure, p on all stages after Holm's adjustment over all pairs of the report."""
+
+    @property
+    def all(self) -> Part:
+        """The comparison on all pairs of stages."""
+        return self.parts[0]
+
+
+def compare(
+    sides: Sequence[Side],
+    *,
+    measures: Sequence[str] = (),
+    baseline: str | None = None,
+    allow_differences: bool = False,
+) -> list[Comparison]:
+    """Every pair of sides, or each against the baseline.
+
+    Of several runs with the same agents, an agent is compared with itself in the other runs.
+
+    Args:
+        sides: From `read_sides`.
+        measures: Numeric fields of a row, besides success and SPL.
+        baseline: Name of a side.
+        allow_differences: Compare what runs of different tasks or protocol have in common.
+
+    Raises:
+        InvalidArgumentError: There are not two sides, their runs differ, or a name is unknown.
+    """
+    pairs = _pairs(sides, baseline)
+    fields = _fields(sides, measures)
+    found = [_compare(a, b, fields, allow_differences) for a, b in pairs]
+    adjusted: list[dict[str, float]] = [{} for _ in found]
+    for field in fields:
+        of_field = [(i, one.all.effects[field].p) for i, one in enumerate(found) if field in one.all.effects]
+        for (i, _), p in zip(of_field, holm([p for _, p in of_field]), strict=True):
+            adjusted[i][field] = p
+    return [replace(one, adjusted=ps) for one, ps in zip(found, adjusted, strict=True)]
+
+
+def comparison_json(comparisons: Sequence[Comparison]) -> dict[str, Any]:
+    """All figures, unrounded."""
+    return {
+        "schema_version": 1,
+        "comparisons": [
+            {
+                "a": one.a,
+                "b": one.b,
+                "parts": [
+                    {
+                        **{key: getattr(part, key) for key in ("key", "n", "num_only_a", "num_only_b", "mcnemar_p")},
+                        "effects": {
+                            name: {**asdict(effect), "detectable": effect.detectable, "verdict": effect.verdict}
+                            for name, effect in part.effects.items()
+                        },
+                    }
+                    for part in one.parts
+                ],
+                "holm_p": dict(one.adjusted),
+                "dropped": dict(one.dropped),
+                "settings": {key: list(values) for key, values in one.settings.items()},
+                "flips": [asdict(flip) for flip in one.flips],
+            }
+            for one in comparisons
+        ],
+    }
+
+
+def _pairs(sides: Sequence[Side], baseline: str | None) -> list[tuple[Side, Side]]:
+    if baseline is not None:
+        first = [side for side in sides if baseline in (side.name, side.agent)]
+        if len(first) != 1:
+            raise InvalidArgumentError(f"baseline {baseline!r} is none of {', '.join(side.name for side in sides)}")
+        return [(first[0], side) for side in sides if side is not first[0]]
+    pairs = list(combinations(sides, 2))
+    num_runs = len({side.run_dir.resolve() for side in sides})
+    # Two runs of the same six agents: the question is what the settings changed, agent by agent.
+    if 1 < num_runs < len(sides):
+        same = [(a, b) for a, b in pairs if a.agent == b.agent]
+        pairs = same or pairs
+    if not pairs:
+        names = ", ".join(side.name for side in sides) or "nothing"
+        raise InvalidArgumentError(f"two agents are needed to compare; these are {names}")
+    return pairs
+
+
+def _fields(sides: Sequence[Side], measures: Sequence[str]) -> list[str]:
+    row = next((row for side in sides for row in side.rows.values()), None)
+    if row is None:
+        raise InvalidArgumentError(f"no recorded stage in {', '.join(str(side.run_dir) for side in sides)}")
+    for name in measures:
+        if not hasattr(row, name) or isinstance(getattr(row, name), str):
+            numeric = sorted(key for key, value in asdict(row).items() if not isinstance(value, str))
+            raise InvalidArgumentError(f"measure {name!r} is none of {', '.join(numeric)}")
+    return list(dict.fromkeys([*(name for name in MEASURES if hasattr(row, name)), *measures]))
+
+
+def _compare(a: Side, b: Side, fields: Sequence[str], allow_differences: bool) -> Comparison:
+    settings = config_differences(a, b)
+    different = [key for key in settings if key.startswith(SAME_PROTOCOL)]
+    if different and not allow_differences:
+        told = "; ".join(f"{key} {settings[key][0]} and {settings[key][1]}" for key in different)
+        raise InvalidArgumentError(
+            f"{a.name} and {b.name} were not run alike ({told}); "
+            "--allow-differences compares the stages that they have in common"
+        )
+    dropped: Counter[str] = Counter()
+    pairs: list[tuple[StageRow, StageRow]] = []
+    for key in sorted(_stages(a) | _stages(b)):
+        reason = _reason(a, b, key)
+        if reason is None:
+            pairs.append((a.rows[key], b.rows[key]))
+        else:
+            dropped[reason] += 1
+    if not pairs:
+        told = ", ".join(f"{count} {reason}" for reason, count in dropped.items())
+        raise InvalidArgumentError(f"{a.name} and {b.name} have no scored stage in common ({told or 'no stages'})")
+    groups = {ALL: pairs}
+    for field in ("stratum", "mode"):
+        for pair in pairs:
+            groups.setdefault(getattr(pair[0], field), []).append(pair)
+    order = {ALL: "all", **STRATA, **MODES}
+    parts = tuple(_part(key, order[key], groups[key], fields) for key in order if key in groups)
+    flips = tuple(_flip(a, b, pair) for pair in pairs if pair[0].success is not pair[1].success)
+    return Comparison(a.name, b.name, parts, dict(dropped.most_common()), flips, settings, {})
+
+
+def _stages(side: Side) -> set[tuple[str, int]]:
+    """All that the run consists of, recorded or not."""
+    asked = {(task_id, stage) for task_id, num in side.num_stages.items() for stage in range(1, num + 1)}
+    return asked | side.rows.keys()
+
+
+def _reason(a: Side, b: Side, key: tuple[str, int]) -> str | None:
+    """Why a stage is not compared."""
+    for side in (a, b):
+        if key not in side.rows:
+            is_foreign = key[0] not in side.num_stages
+            return f"{'no such task' if is_foreign else 'not run yet'} in {side.name}"
+        if side.rows[key].success is None:
+            return f"{side.rows[key].state.replace('_', ' ')} in {side.name}"
+    first, second = a.rows[key], b.rows[key]
+    same = ("house", "category", "stratum", "mode", "num_stages")
+    if any(getattr(first, name) != getattr(second, name) for name in same):
+        return "another stage under the same name"
+    return None
+
+
+def _part(key: str, words: str, pairs: Sequence[tuple[StageRow, StageRow]], fields: Sequence[str]) -> Part:
+    # Houses are told apart by their first task, so that resamples are those of the run's own tables.
+    first_task: dict[str, str] = {}
+    for row, _ in pairs:
+        first_task.setdefault(row.house, row.task_id)
+    by_missing: dict[tuple[int, ...], list[str]] = {}
+    for field in fields:
+        there = tuple(i for i, pair in enumerate(pairs) if all(getattr(row, field) is not None for row in pair))
+        if there:
+            by_missing.setdefault(there, []).append(field)
+    effects: dict[str, PairedEffect] = {}
+    for there, names in by_missing.items():
+        values = np.array([[[float(getattr(row, name)) for name in names] for row in pairs[i]] for i in there])
+        houses = [first_task[pairs[i][0].house] for i in there]
+        effects.update(zip(names, paired_effects(values[:, 0], values[:, 1], houses), strict=True))
+    only_a = sum(bool(x.success) and not y.success for x, y in pairs)
+    only_b = sum(bool(y.success) and not x.success for x, y in pairs)
+    ordered = {name: effects[name] for name in fields if name in effects}
+    return Part(key, words, len(pairs), only_a, only_b, mcnemar(only_a, only_b), ordered)
+
+
+def _flip(a: Side, b: Side, pair: tuple[StageRow, StageRow]) -> Flip:
+    winner, loser, row = (a, b, pair[1]) if pair[0].success else (b, a, pair[0])
+    return Flip(
+        task_id=row.task_id,
+        stage=row.stage,
+        category=row.category,
+        stratum=row.stratum,
+        mode=row.mode,
+        winner=winner.name,
+        loser=loser.name,
+        cause=row.cause or "",
+        pages=(_page(winner, row), _page(loser, row)),
+        command=_view_command(winner, loser, row),
+    )
+
+
+def _page(side: Side, row: StageRow) -> str | None:
+    for stage in (None, row.stage):
+        path = side.run_dir / VIEW_DIR / page_name(row.task_id, side.agent, stage)
+        if path.is_file():
+            return f"{path.as_posix()}#stage={row.stage}&round=1"
+    return None
+
+
+def _view_command(a: Side, b: Side, row: StageRow) -> str:
+    agents: dict[Path, list[str]] = {}
+    for side in (a, b):
+        agents.setdefault(side.run_dir, []).append(side.agent)
+    commands = (
+        ["evonav", "view", str(run_dir), "--task", row.task_id, "--agent", ",".join(names), "--stage", str(row.stage)]
+        for run_dir, names in agents.items()
+    )
+    return " && ".join(shlex.join(command) for command in commands)

@@ -1,0 +1,84 @@
+"""A comparison as one self-contained page: sentences, tables, plots, and the stages that flipped."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from markupsafe import Markup
+
+from evonav.report import compare_words as words
+from evonav.report.compare import Comparison, Flip
+from evonav.report.html import page_environment, text_of
+from evonav.report.plots import Gap, GapPlot, plot_svg
+
+
+def comparison_plot(comparisons: Sequence[Comparison]) -> GapPlot:
+    """SR differences: of one pair by parts, of several pairs on all stages."""
+    if len(comparisons) == 1:
+        (one,) = comparisons
+        gaps = tuple(
+            _gap(one, i, part.words, f"n = {part.n}, p = {words.p_words(part.effects['success'].p)}")
+            for i, part in enumerate(one.parts)
+        )
+        return GapPlot(f"SR of {one.b} less {one.a}, points", gaps, f"{one.a} is better", f"{one.b} is better")
+    gaps = tuple(
+        _gap(one, 0, f"{one.b} less {one.a}", f"n = {one.all.n}, p (Holm) = {words.p_words(one.adjusted['success'])}")
+        for one in comparisons
+    )
+    return GapPlot("SR differences, points", gaps, "the second is better", "the first is better")
+
+
+def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = None) -> str:
+    """The page.
+
+    Args:
+        comparisons: At least one.
+        out_dir: Folder of the page, to which links to replays are relative.
+    """
+    sections = [
+        {
+            "title": f"{one.b} less {one.a}",
+            "plot": Markup(plot_svg(comparison_plot([one]))),  # noqa: S704 - our own SVG
+            "table": words.part_table(one),
+            "winners": [
+                (winner, [_shown(flip, out_dir) for flip in one.flips if flip.winner == winner])
+                for winner in (one.b, one.a)
+            ],
+        }
+        for one in comparisons
+    ]
+    return (
+        page_environment()
+        .get_template("compare.html.j2")
+        .render(
+            title=f"{comparisons[0].b} and {comparisons[0].a}" if len(comparisons) == 1 else "agents",
+            css=text_of("report.css"),
+            statements=words.findings(comparisons),
+            warnings=words.warnings(comparisons),
+            pairs=words.pair_table(comparisons),
+            overview=Markup(plot_svg(comparison_plot(comparisons))) if len(comparisons) > 1 else "",  # noqa: S704
+            sections=sections,
+        )
+    )
+
+
+def _gap(one: Comparison, index: int, name: str, detail: str) -> Gap:
+    effect = one.parts[index].effects["success"]
+    ends = None if effect.ci95 is None else (100 * effect.ci95[0], 100 * effect.ci95[1])
+    # Parts by their own p, the whole after adjustment.
+    is_head = words.says(one).endswith("ahead") if index == 0 else effect.verdict in ("a", "b")
+    return Gap(name, detail.replace("= <", "< "), 100 * effect.difference, ends, is_head)
+
+
+def _shown(flip: Flip, out_dir: Path | None) -> dict[str, object]:
+    links = [
+        (name, _relative(page, out_dir))
+        for name, page in zip((flip.winner, flip.loser), flip.pages, strict=True)
+        if page is not None
+    ]
+    return {"flip": flip, "where": words.where(flip), "cause": words.cause(flip), "links": links}
+
+
+def _relative(page: str, out_dir: Path | None) -> str:
+    path, _, fragment = page.partition("#")
+    return f"{Path(os.path.relpath(path, out_dir or Path())).as_posix()}#{fragment}"

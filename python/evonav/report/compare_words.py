@@ -1,0 +1,325 @@
+"""A comparison as tables and sentences."""
+
+from collections.abc import Sequence
+
+from evonav.paired import LEAST_CLUSTERS, LEVEL, PairedEffect
+from evonav.report.compare import MEASURES, STRATA, Comparison, Flip
+from evonav.report.export import csv_text
+from evonav.report.tables import NONE, Table
+from evonav.significance import Interval
+
+RATES = frozenset({*MEASURES, "ring_spl", "is_geodesic_success"})
+"""Measures of 0 to 1, shown in percent; others are shown in their own unit."""
+MAX_FLIPS = 5
+"""Stages that flipped, each way, in a terminal."""
+
+METHOD = (
+    "Differences are of the same stages. Intervals: 95%, houses resampled (10,000 times). p: two-sided, the agents' "
+    "names exchanged in whole houses. Holm: p adjusted for the number of pairs."
+)
+EXPLORING = "Parts are for reading on, not for claims: their p is not adjusted for the number of parts."
+
+
+def measure_name(field: str) -> str:
+    """As tables head it."""
+    return MEASURES.get(field, field.replace("_", " "))
+
+
+def pair_table(comparisons: Sequence[Comparison]) -> Table:
+    """One row a pair, on all stages that both scored."""
+    rows = []
+    is_family = len(comparisons) > 1
+    for one in comparisons:
+        sr, spl = one.all.effects["success"], one.all.effects.get("spl")
+        p = one.adjusted["success"] if is_family else sr.p
+        rows.append(
+            (
+                f"{one.b} less {one.a}",
+                f"{100 * sr.mean_a:.1f} to {100 * sr.mean_b:.1f}",
+                difference(sr, "success"),
+                p_words(p),
+                NONE if spl is None else difference(spl, "spl"),
+                NONE if spl is None else p_words(one.adjusted["spl"] if is_family else spl.p),
+                str(one.all.n),
+                f"{one.all.num_only_b} / {one.all.num_only_a}",
+                NONE if sr.detectable is None else f"{100 * sr.detectable:.1f}",
+                says(one),
+            )
+        )
+    p_name = "p (Holm)" if is_family else "p"
+    columns = (
+        "Agents",
+        "SR %",
+        "SR difference [95% CI]",
+        p_name,
+        "SPL difference [95% CI]",
+        p_name,
+        "n",
+        "only first / second",
+        "detectable",
+        "SR says",
+    )
+    notes = (
+        f"Percentage points. {METHOD}",
+        "Only: stages where only the first-named, or the second, succeeded. Detectable: the least true difference in "
+        "SR that so many such houses find at 5% four times in five.",
+    )
+    return Table("Paired differences", columns, tuple(rows), notes)
+
+
+def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
+    """One measure on all stages, for a terminal: one row a pair."""
+    is_family = len(comparisons) > 1
+    rows = []
+    for one in comparisons:
+        effect = one.all.effects.get(field)
+        if effect is not None:
+            p = one.adjusted[field] if is_family else effect.p
+            shown = [f"{_scale(field) * mean:.1f}" for mean in (effect.mean_a, effect.mean_b)]
+            rows.append((f"{one.b} less {one.a}", *shown, difference(effect, field), p_words(p), says(one, field)))
+    columns = ("", "second", "first", "difference [95% CI]", "p (Holm)" if is_family else "p", "")
+    sizes = sorted({one.all.n for one in comparisons})
+    return Table(f"{measure_name(field)}, n = {'-'.join(map(str, sizes))}", columns, tuple(rows))
+
+
+def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
+    """What fits eighty columns: the rest is in the files."""
+    fields = list(dict.fromkeys(field for one in comparisons for field in one.all.effects))
+    tables = [measure_table(comparisons, field) for field in fields]
+    if len(comparisons) == 1:
+        (one,) = comparisons
+        effects = [(part, part.effects["success"]) for part in one.parts]
+        rows = tuple(
+            (
+                part.words,
+                str(part.n),
+                *(f"{100 * mean:.1f}" for mean in (sr.mean_a, sr.mean_b)),
+                difference(sr, "success"),
+                p_words(sr.p),
+            )
+            for part, sr in effects
+        )
+        columns = ("SR %", "n", one.a, one.b, "difference [95% CI]", "p")
+        tables += [Table(f"SR of {one.b} less {one.a} by kind of stage", columns, rows, (EXPLORING,))]
+        tables += [_short_flips(one)]
+    return [table for table in tables if table.rows]
+
+
+def _short_flips(one: Comparison) -> Table:
+    shown = []
+    for winner in (one.b, one.a):
+        shown += [flip for flip in one.flips if flip.winner == winner][:MAX_FLIPS]
+    rows = tuple((f"{flip.task_id} {flip.stage}", flip.category, _stratum(flip), flip.winner) for flip in shown)
+    columns = ("Task and stage", "", "", "succeeded")
+    num_more = len(one.flips) - len(rows)
+    notes = [f"{num_more} more flipped."] if num_more else []
+    notes.append("--md, --html and --json have them all, with the command that replays each.")
+    return Table(f"Stages that flipped between {one.a} and {one.b}", columns, rows, tuple(notes))
+
+
+def part_table(one: Comparison) -> Table:
+    """One pair, on all stages, by stratum and by mode."""
+    fields = list(one.all.effects)
+    columns = ["Stages", "n", "only first / second", f"SR % {one.a}", f"SR % {one.b}"]
+    for field in fields:
+        columns += [f"{measure_name(field)} difference [95% CI]", "p"]
+    rows = []
+    for part in one.parts:
+        sr = part.effects["success"]
+        cells = [part.words, str(part.n), f"{part.num_only_b} / {part.num_only_a}"]
+        cells += [f"{100 * sr.mean_a:.1f}", f"{100 * sr.mean_b:.1f}"]
+        for field in fields:
+            effect = part.effects.get(field)
+            cells += [NONE, NONE] if effect is None else [difference(effect, field), p_words(effect.p)]
+        rows.append(tuple(cells))
+    return Table(f"{one.b} less {one.a}", tuple(columns), tuple(rows), (METHOD, EXPLORING))
+
+
+def flip_table(one: Comparison) -> Table:
+    """Stages where exactly one of the two succeeded, those of `b` first."""
+    rows = [
+        (f"{flip.task_id} {flip.stage}", flip.category, where(flip), winner, f"{flip.loser}: {cause(flip)}")
+        for winner in (one.b, one.a)
+        for flip in one.flips
+        if flip.winner == winner
+    ]
+    columns = ("Task and stage", "category", "stage is", "succeeded", "failed")
+    return Table(f"Stages that flipped between {one.a} and {one.b}", columns, tuple(rows))
+
+
+def statements(comparisons: Sequence[Comparison]) -> list[str]:
+    """What the comparison allows to say, no more, and what to mind."""
+    return findings(comparisons) + warnings(comparisons)
+
+
+def findings(comparisons: Sequence[Comparison]) -> list[str]:
+    """SR and SPL of every pair, in words."""
+    lines = []
+    for one in comparisons:
+        for field in ("success", "spl"):
+            effect = one.all.effects.get(field)
+            if effect is not None:
+                p = one.adjusted[field] if len(comparisons) > 1 else effect.p
+                lines.append(f"{measure_name(field)}: {sentence(one.a, one.b, effect, field, p, len(comparisons))}")
+    return lines
+
+
+def warnings(comparisons: Sequence[Comparison]) -> list[str]:
+    """Stages that were left out, and what the runs were told differently."""
+    lines = []
+    for one in comparisons:
+        if one.dropped:
+            told = ", ".join(f"{count} {reason}" for reason, count in one.dropped.items())
+            lines.append(f"{one.b} and {one.a}: {sum(one.dropped.values())} stages are not compared: {told}.")
+        if one.settings:
+            told = "; ".join(f"{key}: {a} / {b}" for key, (a, b) in one.settings.items())
+            lines.append(f"{one.a} and {one.b} were told differently: {told}.")
+    return lines
+
+
+def sentence(a: str, b: str, effect: PairedEffect, field: str, p: float, num_pairs: int = 1) -> str:
+    """One difference in words."""
+    measured = f"{difference(effect, field)}{' points' if field in RATES else ''}, p = {p_words(p)}".replace(
+        "= <", "< "
+    )
+    measured += f" (Holm, {num_pairs} pairs)" if num_pairs > 1 else ""
+    on = f"on {effect.n} stages of {effect.num_clusters} houses"
+    verdict = effect.verdict if p <= LEVEL or effect.verdict not in ("a", "b") else "tie"
+    if verdict == "equal":
+        return f"{a} and {b} are equal on every one of {effect.n} stages."
+    if verdict == "few":
+        return f"{b} less {a}: {measured} {on}: fewer than {LEAST_CLUSTERS} houses, or all alike, are too few to tell."
+    if verdict == "tie":
+        least = "" if effect.detectable is None else f"{amount(effect.detectable, field)} "
+        found = f" (a true difference of {least}would be found four times in five)" if least else ""
+        return f"{b} less {a}: {measured} {on}: a tie at this n{found}."
+    ahead, behind = (b, a) if verdict == "b" else (a, b)
+    if field not in RATES:
+        return f"{b} less {a}: {measured} {on}: they differ."
+    relative = "" if effect.relative is None else f", {100 * effect.relative:+.0f}% of {a}'s"
+    return f"{ahead} is ahead of {behind}: {b} less {a} is {measured}{relative} {on}."
+
+
+def says(one: Comparison, field: str = "success") -> str:
+    """What a measure on all stages allows to say, after adjustment, in a few words."""
+    effect = one.all.effects[field]
+    verdict = effect.verdict
+    if verdict in ("a", "b") and one.adjusted.get(field, effect.p) > LEVEL:
+        verdict = "tie"
+    if verdict in ("a", "b") and field not in RATES:
+        return "they differ"
+    return {
+        "equal": "equal on every stage",
+        "few": f"too few houses to tell ({effect.num_clusters})",
+        "tie": "a tie at this n",
+        "a": f"{one.a} is ahead",
+        "b": f"{one.b} is ahead",
+    }[verdict]
+
+
+def comparison_csv(comparisons: Sequence[Comparison]) -> str:
+    """Every figure, unrounded: one row a pair, part and measure."""
+    columns = (
+        "a",
+        "b",
+        "part",
+        "measure",
+        "n",
+        "num_houses",
+        "mean_a",
+        "mean_b",
+        "difference",
+        "low",
+        "high",
+        "relative",
+        "relative_low",
+        "relative_high",
+        "p",
+        "p_holm",
+        "standard_error",
+        "detectable",
+        "num_only_a",
+        "num_only_b",
+        "mcnemar_p",
+        "verdict",
+    )
+    rows: list[list[object]] = []
+    for one in comparisons:
+        for part in one.parts:
+            for name, effect in part.effects.items():
+                rows.append(
+                    [
+                        *(one.a, one.b, part.key, name, effect.n, effect.num_clusters, effect.mean_a, effect.mean_b),
+                        *(effect.difference, *_two(effect.ci95), effect.relative, *_two(effect.relative_ci95)),
+                        *(effect.p, one.adjusted.get(name) if part is one.all else None),
+                        *(effect.standard_error, effect.detectable, part.num_only_a, part.num_only_b),
+                        *(part.mcnemar_p, effect.verdict),
+                    ]
+                )
+    return csv_text(columns, rows)
+
+
+def all_tables(comparisons: Sequence[Comparison]) -> list[Table]:
+    """Of a report: the pairs, then each pair's parts and flips."""
+    tables = [pair_table(comparisons)]
+    for one in comparisons:
+        tables += [part_table(one), flip_table(one)]
+    return [table for table in tables if table.rows]
+
+
+def comparison_markdown(comparisons: Sequence[Comparison]) -> str:
+    """Sentences, tables, and the command that replays each stage that flipped."""
+    parts = ["# Comparison\n", "".join(f"- {line}\n" for line in statements(comparisons))]
+    parts += [f"## {table.title}\n\n{table.markdown()}" for table in all_tables(comparisons)]
+    for one in comparisons:
+        if one.flips:
+            commands = "\n".join(flip.command for flip in one.flips)
+            parts.append(f"## Replays: {one.b} and {one.a}\n\n```bash\n{commands}\n```\n")
+    return "\n".join(parts)
+
+
+def comparison_latex(comparisons: Sequence[Comparison]) -> str:
+    """The pairs and every pair's parts, for `booktabs`; sentences as comments."""
+    lines = "".join(f"% {line}\n" for line in statements(comparisons))
+    tables = [pair_table(comparisons), *(part_table(one) for one in comparisons)]
+    return lines + "\n".join(table.latex() for table in tables)
+
+
+def difference(effect: PairedEffect, field: str) -> str:
+    """`+6.3 [-1.2, +13.9]`."""
+    scale = _scale(field)
+    ends = "" if effect.ci95 is None else f" [{scale * effect.ci95[0]:+.1f}, {scale * effect.ci95[1]:+.1f}]"
+    return f"{scale * effect.difference:+.1f}{ends}"
+
+
+def amount(value: float, field: str) -> str:
+    """A size without a sign, with its unit where it is points."""
+    return f"{100 * value:.1f} points" if field in RATES else f"{value:.2g}"
+
+
+def p_words(p: float) -> str:
+    """`0.012`; `<0.0001` where it is less."""
+    return "<0.0001" if p < 0.0001 else f"{p:.4f}" if p < 0.01 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"
+
+
+def where(flip: Flip) -> str:
+    """Stratum and mode in words."""
+    stratum = _stratum(flip)
+    return stratum if flip.mode == "first" else f"{stratum}, {flip.mode.upper() if '_' in flip.mode else flip.mode}"
+
+
+def cause(flip: Flip) -> str:
+    """Why the loser failed, in words."""
+    return flip.cause.replace("_", " ")
+
+
+def _stratum(flip: Flip) -> str:
+    return STRATA.get(flip.stratum, flip.stratum)
+
+
+def _scale(field: str) -> int:
+    return 100 if field in RATES else 1
+
+
+def _two(interval: Interval | None) -> tuple[float | None, float | None]:
+    return (None, None) if interval is None else interval
