@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
-.PHONY: setup demo test test-procthor lint bench wheel data readme clean
+.PHONY: setup demo test test-procthor lint bench wheel data readme docs clean
 
 $(VENV)/.dependencies: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -66,6 +66,10 @@ readme: setup
 	$(BIN)/evonav demo --out out/demo
 	$(BIN)/python scripts/update_readme.py out/demo
 	$(BIN)/evonav strip out/demo --agents ftu --out docs/images/episode.svg
+
+# The site, from the repository's own pages, into out/docs.
+docs: setup
+	$(BIN)/python scripts/build_docs.py
 
 clean:
 	rm -rf $(VENV) target dist out

@@ -1,0 +1,230 @@
+"""Every block of code in the documentation: Python is run, commands are run where they can be and parsed where not."""
+
+import gzip
+import json
+import re
+import shlex
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from build_docs import ROOT, links, pages
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.evaluation.backend import check_agent_name
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import evaluate, task_files
+from evonav.house import bundled_houses
+
+BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
+PARSED_ONLY = {
+    "evonav demo": "what `make demo` does; tests/e2e",
+    "evonav doctor": "depends on the machine; tests of its own",
+    "evonav houses fetch": "network",
+    "--houses procthor-10k": "needs what the network brings",
+    "test-90": "needs a whole dataset",
+    "--simulator ai2thor": "AI2-THOR: tests/world, tests/thor",
+    "--decision vlm": "a model: tests/decision, with a stand-in",
+    "--vlm-model": "a model: tests/decision, with a stand-in",
+    "evonav mock-vlm": "serves until it is stopped: tests/decision",
+    "my_package": "a package that is not there",
+    "--open": "opens a browser",
+    "delay=": "waits",
+}
+"""Commands with these words are not run here, only parsed."""
+LIMITED = ("evaluate", "generate")
+"""Commands that get one task and this process: the words are tested, not the machine."""
+
+
+def blocks(page: Path) -> Iterator[tuple[str, str]]:
+    yield from BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
+
+
+def command_lines(page: Path) -> list[str]:
+    found = []
+    for language, text in blocks(page):
+        if language not in ("", "bash", "console", "sh"):
+            continue
+        has_prompt = any(line.startswith("$ ") for line in text.splitlines())
+        for raw in text.splitlines():
+            if has_prompt and not raw.startswith("$ "):
+                continue  # what a command prints
+            line = re.split(r"\s+#\s", raw.removeprefix("$ "))[0].strip()
+            if re.match(r"(evonav|make|pip|python|export|PYTHONPATH|\.venv)", line):
+                found.append(line)
+    return found
+
+
+def python_texts(page: Path) -> list[str]:
+    return [text for language, text in blocks(page) if language == "python"]
+
+
+@pytest.fixture(scope="session")
+def template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with what commands of the documentation take: houses, tasks, a run."""
+    folder = tmp_path_factory.mktemp("docs")
+    houses = [house.to_json() for house in sorted(bundled_houses(), key=lambda house: len(house.rooms))[:2]]
+    for name in ("houses.jsonl.gz", "uniform-hard-val-75.jsonl.gz"):
+        (folder / name).write_bytes(gzip.compress("\n".join(houses).encode()))
+    tasks = folder / "tasks"
+    with bundled_tasks() as bundled:
+        task = min(task_files(bundled), key=lambda task: task.num_stages)
+        shutil.copytree(task.path, tasks / task.task_id)
+    evaluate(["fu", "ftu"], task_files(tasks), folder / "out" / "run", num_workers=0)
+    return folder
+
+
+@pytest.fixture
+def place(template: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the template to work in."""
+    shutil.copytree(template, tmp_path / "here")
+    here = tmp_path / "here"
+    for name in ("demo", "first", "six", "paper"):
+        shutil.copytree(template / "out" / "run", here / "out" / name)
+    shutil.copytree(here / "tasks", here / "tasks" / "test")
+    for name in ("FOLDER",):
+        (here / name).symlink_to("tasks")
+    (here / "RUN").symlink_to("out/run")
+    for name in ("examples", "scripts"):
+        (here / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(here)
+    monkeypatch.setenv("COLUMNS", "200")
+    return here
+
+
+def filled(line: str, task_id: str) -> str:
+    """A command with its placeholders replaced."""
+    line = re.sub(r"\bTASK_ID\b|(?<=--task )ID\b", task_id, line)
+    return re.sub(r"\s(\.\.\.|…)(?=\s|$)", "", line)
+
+
+def parse(arguments: list[str]) -> None:
+    """Has the command's parser read arguments, without running anything."""
+    command: Any = typer.main.get_command(app)
+    context, rest = typer.Context(command), arguments
+    while hasattr(command, "commands"):
+        name, rest = rest[0], rest[1:]
+        assert name in command.commands, f"no command {name}"
+        command = command.commands[name]
+    command.make_context(command.name, list(rest), parent=context)
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if command_lines(page)], ids=str)
+def test_commands_of_a_page_do_what_they_say(page: Path, place: Path) -> None:
+    task_id = next(path.name for path in sorted((place / "tasks").iterdir()) if (path / "task.json").exists())
+    write_files_of(page, place)
+    for line in command_lines(page):
+        run_line(filled(line, task_id), place)
+
+
+def write_files_of(page: Path, place: Path) -> None:
+    """Blocks that the page says to save."""
+    texts: dict[str, str] = {}
+    for language, text in blocks(page):
+        if language == "python" and (found := re.match(r"# (\w+\.py)\b", text)):
+            texts[found[1]] = texts.get(found[1], "") + text
+        if language == "json":
+            texts["theta.json"] = text
+    for name, text in texts.items():
+        (place / name).write_text(text)
+
+
+def run_line(line: str, place: Path) -> None:
+    words = shlex.split(line.removesuffix("&").strip())
+    if words[0] == "make":
+        targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+        assert words[1] in targets, f"{line}: no such target"
+    elif words[0] == "pip":
+        extras = re.findall(r"evonav\[(\w+)\]", line)
+        told = (ROOT / "pyproject.toml").read_text()
+        assert all(re.search(rf"^{extra} = \[", told, re.MULTILINE) for extra in extras), f"{line}: no such extra"
+    elif words[0].startswith(("python", ".venv")):
+        script = next((word for word in words if word.endswith(".py")), None)
+        assert script is None or (ROOT / script).is_file(), f"{line}: no such file"
+    elif words[0] != "export":
+        environment = {}
+        while "=" in words[0]:
+            name, _, value = words.pop(0).partition("=")
+            environment[name] = value
+        assert words.pop(0) == "evonav", line
+        run_evonav(line, words, environment, place)
+
+
+def run_evonav(line: str, words: list[str], environment: dict[str, str], place: Path) -> None:
+    if environment or any(part in line for part in PARSED_ONLY):
+        parse(words)
+        return
+    parse(words)
+    if words[0] in LIMITED:
+        words = made_small(words, place)
+    result = CliRunner().invoke(app, words)
+    error = result.exception if not isinstance(result.exception, SystemExit) else None
+    assert result.exit_code == 0, f"{line}: exit code {result.exit_code}: {error}\n{result.output[-2000:]}"
+
+
+def made_small(words: list[str], place: Path) -> list[str]:
+    options = {"--limit": "1", "--workers": "0"}
+    if "--subset" in words:
+        del options["--limit"]
+    if "--agents" in words:
+        at = words.index("--agents") + 1
+        names = words[at].split(",")
+        for name in names:
+            check_agent_name(name)
+        options["--agents"] = ",".join(names[-2:])
+    for option, value in options.items():
+        if option in words:
+            words[words.index(option) + 1] = value
+        else:
+            words = [*words, option, value]
+    if "--out" in words:  # a page may use a folder's name for several examples
+        shutil.rmtree(place / words[words.index("--out") + 1], ignore_errors=True)
+    return words
+
+
+@pytest.mark.parametrize("page", [page for page in pages() if python_texts(page)], ids=str)
+def test_python_of_a_page_runs(page: Path, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    texts = python_texts(page)
+    if any("ai2thor" in text for text in texts):
+        pytest.importorskip("ai2thor")
+    namespace: dict[str, Any] = {"__name__": "__main__"}
+    try:
+        for text in texts:
+            exec(compile(text, str(page), "exec", dont_inherit=True), namespace)
+    finally:
+        for value in namespace.values():
+            if type(value).__name__ == "Controller":
+                value.stop()
+
+
+@pytest.mark.parametrize("page", pages(), ids=str)
+def test_links_of_a_page_lead_somewhere(page: Path) -> None:
+    for words, target in links(page):
+        assert (ROOT / target).exists(), f"{page}: {words}"
+
+
+def test_every_page_is_in_the_site() -> None:
+    navigation = (ROOT / "mkdocs.yml").read_text()
+    for page in pages():
+        if page.name not in ("README.md",) or page.parent != Path():
+            assert f": {page}\n" in navigation, f"{page} is not in mkdocs.yml"
+
+
+def test_api_pages_name_modules_that_exist() -> None:
+    import importlib
+
+    named = [name for page in pages() for name in re.findall(r"^::: (\S+)", (ROOT / page).read_text(), re.MULTILINE)]
+    assert len(named) > 20
+    for name in named:
+        importlib.import_module(name)
+
+
+def test_bundled_json_of_pages_is_json() -> None:
+    for page in pages():
+        for language, text in blocks(page):
+            if language == "json":
+                json.loads(text)
