@@ -1,5 +1,6 @@
 """EvoNav-Bench: lifelong navigation in homes that change."""
 
+import sys
 from importlib import import_module
 from typing import Any
 
@@ -25,6 +26,9 @@ __all__ = [
     "__version__",
     "check_agent",
 ]
+
+if "gymnasium" in sys.modules:  # which imports this package to look for `evonav:evonav/LifelongNav-v0`
+    import_module("evonav.gym.registration").register()
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - of a module

@@ -568,6 +568,70 @@ class EmbeddedSimulator:
     def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
         """Corners `(N, 3, 3)`, body indices `(N,)` and colours `(N, 3)` of all surfaces."""
 
+@final
+class GeodesicField:
+    """Shortest distances to one point of a house."""
+
+    def __new__(cls, simulator: EmbeddedSimulator, source_m: tuple[float, float]) -> GeodesicField: ...
+    def distance_m(self, point_m: tuple[float, float]) -> float:
+        """`inf` where there is no way."""
+
+@final
+class BatchSimulator:
+    """B agents in houses of their own or shared; `evonav_core::simulator::batch` has shapes and units."""
+
+    def __new__(
+        cls,
+        num_slots: int,
+        *,
+        image_px: tuple[int, int],
+        empty_depth_m: float,
+        move_m: float,
+        turn_rad: float,
+        grid_m: float,
+        min_area_px: int,
+        num_threads: int,
+    ) -> BatchSimulator: ...
+    def place(
+        self,
+        slot: int,
+        simulator: EmbeddedSimulator,
+        *,
+        position_m: tuple[float, float, float],
+        yaw_rad: float,
+        horizon_rad: float,
+        labels: NDArray[np.uint8],
+    ) -> None:
+        """`labels` `(bodies,)`: what the pixels of each body get, 0 for nothing."""
+
+    def aim(self, slot: int, field: GeodesicField | None) -> None:
+        """What distances of an agent are to; of one just placed, nothing: they are `inf`."""
+
+    def step(self, actions: NDArray[np.uint8]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+        """0 ahead, 1 left, 2 right, 3 stop, `(B,)`: whether each was carried out, and distances after it."""
+
+    def plan(self, targets_m: list[tuple[float, float] | None]) -> list[list[tuple[float, float]]]:
+        """Corners of a path for each agent, none where there is no way or no target."""
+
+    def plan_one(self, slot: int, target_m: tuple[float, float]) -> list[tuple[float, float]]:
+        """`plan` of one agent."""
+
+    def follow(self, slot: int, stops: list[tuple[tuple[float, float], float]]) -> int:
+        """How many of the points, with a yaw each, the agent came to."""
+
+    def distance_m(self, slot: int) -> float: ...
+    def poses(self) -> NDArray[np.float64]:
+        """`(B, 5)`: x, y, z, yaw and horizon."""
+
+    def render(
+        self,
+        *,
+        depth_m: NDArray[np.float32] | None,
+        rgb: NDArray[np.uint8] | None,
+        labels: NDArray[np.uint8] | None,
+    ) -> None:
+        """Writes `(B, H, W)` depths, `(B, H, W, 3)` colours and `(B, H, W)` labels."""
+
 def map_spec(house_json: str, *, name: str, cell_m: float) -> tuple[tuple[int, int], tuple[float, float]]:
     """Shape `(R, C)` and `(x, z)` of the corner of `EmbeddedSimulator.occupancy`'s grid, without its objects."""
 

@@ -116,6 +116,15 @@ class EmbeddedSimulator:
         """The `HouseDelta` (JSON) that brings down what hangs in the air; empty moves where nothing does."""
         return self._world.settled()
 
+    def enter(self, pose: Pose | None = None) -> Pose:
+        """Stands at `pose` as after `reset`, in the house at hand."""
+        return self._enter(self._world, pose)
+
+    @property
+    def core(self) -> _core.EmbeddedSimulator:
+        """The house at hand, as the core has it; it never changes, so many may share it."""
+        return self._world
+
     @property
     def house_json(self) -> str:
         """The house at hand."""

@@ -1,5 +1,9 @@
 //! One house, instantiated: what an agent can see and where it can go.
 
+pub mod batch;
+pub mod field;
+pub mod motion;
+
 use std::sync::OnceLock;
 
 use crate::{

@@ -2,8 +2,9 @@
 
 use evonav_core::Error;
 use numpy::{
-    Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods,
-    ndarray::IntoDimension,
+    Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadwriteArray,
+    PyUntypedArrayMethods,
+    ndarray::{Dimension, IntoDimension},
 };
 use pyo3::prelude::*;
 
@@ -20,6 +21,17 @@ pub fn row_major<'a, T: Element>(
     }
     let shape = array.shape();
     Ok((array.as_slice()?, [shape[0], shape[1]]))
+}
+
+/// Elements of a C-contiguous array to be written, of any shape.
+pub fn whole_mut<'a, T: Element, D: Dimension>(
+    name: &str,
+    array: &'a mut PyReadwriteArray<'_, T, D>,
+) -> PyResult<&'a mut [T]> {
+    if !array.is_c_contiguous() {
+        return Err(error::to_py(Error::invalid(name, "not C-contiguous", "a C-contiguous array")));
+    }
+    Ok(array.as_slice_mut()?)
 }
 
 /// The `(N, 2)` `[row, col]` rows of an array.

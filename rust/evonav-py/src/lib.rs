@@ -1,6 +1,7 @@
 //! Python bindings of `evonav-core`: they convert, release the GIL and map errors, nothing else.
 
 mod arrays;
+mod batch;
 mod camera;
 mod error;
 mod evolution;
@@ -26,6 +27,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     planning::register(module)?;
     camera::register(module)?;
     simulator::register(module)?;
+    batch::register(module)?;
     snapshots::register(module)?;
     evolution::register(module)?;
     // PyO3 lists every name in `__all__`, which the stub would have to repeat.

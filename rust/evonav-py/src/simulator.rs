@@ -1,6 +1,6 @@
 //! `EmbeddedSimulator`. Shapes, units and errors: `_core.pyi`.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use evonav_core::{
     assets::catalogue::{Catalogue, UnknownAssets},
@@ -41,15 +41,15 @@ type MapSpec = ((usize, usize), Vec2);
 type BodyRecord = (String, String, &'static str, Vec3, Vec3);
 
 #[pyclass(name = "EmbeddedSimulator", module = "evonav._core", frozen)]
-struct PyEmbeddedSimulator {
-    core: EmbeddedSimulator,
+pub struct PyEmbeddedSimulator {
+    pub core: Arc<EmbeddedSimulator>,
     /// Working memory of the renderer; a second thread that finds it taken makes its own.
     buffer: Mutex<FrameBuffer>,
 }
 
 impl From<EmbeddedSimulator> for PyEmbeddedSimulator {
     fn from(core: EmbeddedSimulator) -> Self {
-        Self { core, buffer: Mutex::default() }
+        Self { core: Arc::new(core), buffer: Mutex::default() }
     }
 }
 

@@ -9,7 +9,7 @@ use crate::{
     world::{
         collision::{AgentBody, Obstacle, Obstacles},
         footprint::footprint,
-        paths::VisibilityGraph,
+        paths::{DistanceField, VisibilityGraph},
         scene::{BodyKind, Scene},
     },
 };
@@ -233,6 +233,20 @@ impl Navigation {
         let mut lengths = self.graph().distances_m(&self.obstacles, start_m, &free).into_iter();
         let length_of = |target: Option<Vec2>| target.and_then(|_| lengths.next());
         snapped.into_iter().map(length_of).map(|l| l.unwrap_or(f64::INFINITY)).collect()
+    }
+
+    /// Shortest distances from a point (snapped) to everywhere, for [`Self::field_distance_m`];
+    /// `None` if the point is too far off the free space.
+    pub fn field(&self, source_m: Vec2) -> Option<DistanceField> {
+        let source_m = self.snap(source_m)?;
+        Some(self.graph().field(&self.obstacles, source_m))
+    }
+
+    /// Length of the shortest path between a field's source and a point (snapped), as
+    /// [`Self::distances_m`]; infinite where there is none.
+    pub fn field_distance_m(&self, field: &DistanceField, point_m: Vec2) -> f64 {
+        let to = |point_m| self.graph().distance_m(&self.obstacles, field, point_m);
+        self.snap(point_m).map_or(f64::INFINITY, to)
     }
 
     /// [`map_spec`] of the scene.

@@ -41,6 +41,15 @@ pub struct VisibilityGraph {
     edges: Vec<OnceLock<Box<[Edge]>>>,
 }
 
+/// What one search has found of a graph: shortest distances from one point ([`VisibilityGraph::field`]).
+///
+/// It means something with the graph that made it alone.
+#[derive(Debug)]
+pub struct DistanceField {
+    start_m: Vec2,
+    search: Search,
+}
+
 /// A way to a node that a search may take: least bound first, then least node, so that ties have
 /// one outcome.
 #[derive(Debug, Clone, Copy)]
@@ -139,6 +148,15 @@ impl VisibilityGraph {
         start_m: Vec2,
         targets_m: &[Vec2],
     ) -> Vec<f64> {
+        let field = self.field(obstacles, start_m);
+        targets_m.iter().map(|&target_m| self.distance_m(obstacles, &field, target_m)).collect()
+    }
+
+    /// Shortest distances from a free point to all places where paths may bend.
+    ///
+    /// # Complexity
+    /// Dijkstra over the whole graph: O(n log n + edges), and what edges are not known yet.
+    pub fn field(&self, obstacles: &Obstacles, start_m: Vec2) -> DistanceField {
         let mut search = Search::new(self.nodes.len());
         search.leave(self, obstacles, start_m, |_| 0.0);
         while let Some(node) = search.pop(self, obstacles, start_m) {
@@ -147,15 +165,19 @@ impl VisibilityGraph {
                 search.reach(edge.to, node, cost_m + edge.length_m, |_| 0.0);
             }
         }
-        targets_m
-            .iter()
-            .map(|&target_m| {
-                if obstacles.is_clear_between(start_m, target_m) {
-                    return distance_2d_m(start_m, target_m);
-                }
-                self.last_leg(obstacles, &search, start_m, target_m)
-            })
-            .collect()
+        DistanceField { start_m, search }
+    }
+
+    /// Shortest distance from a field's start to a free point; infinite where there is no way.
+    ///
+    /// # Complexity
+    /// O(n), and one test of sight for each node that may be the last before the point.
+    pub fn distance_m(&self, obstacles: &Obstacles, field: &DistanceField, target_m: Vec2) -> f64 {
+        let DistanceField { start_m, search } = field;
+        if obstacles.is_clear_between(*start_m, target_m) {
+            return distance_2d_m(*start_m, target_m);
+        }
+        self.last_leg(obstacles, search, *start_m, target_m)
     }
 
     /// Least cost to a target over the nodes that see it, given the costs to all nodes.
@@ -243,6 +265,7 @@ impl VisibilityGraph {
 }
 
 /// Costs so far, and the open list.
+#[derive(Debug)]
 struct Search {
     cost_m: Vec<f64>,
     parents: Vec<u32>,

@@ -1,0 +1,102 @@
+"""Which tasks an environment draws from, and what it needs to know of a task."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import as_file, files
+from pathlib import Path
+
+import numpy as np
+
+from evonav.errors import InvalidArgumentError
+from evonav.gym.spaces import MAX_STAGES
+from evonav.tasks.files import load_task, task_roots
+from evonav.tasks.public import StageInput
+from evonav.tasks.subsets import subset_roots
+from evonav.world.pose import Pose
+
+
+@dataclass(frozen=True, slots=True)
+class StageTask:
+    """One stage of a task. But for the goal, oracle data."""
+
+    goal: StageInput
+    house_json: str
+    house_sha256: str
+    target_m: tuple[float, float]
+    """`(x, z)`."""
+
+
+@dataclass(frozen=True, slots=True)
+class NavTask:
+    """A task."""
+
+    task_id: str
+    start: Pose
+    stages: tuple[StageTask, ...]
+
+
+class TaskSource:
+    """The tasks of a folder, each read when it is first drawn."""
+
+    def __init__(self, tasks: Path | str | None = None, *, subset: str | None = None) -> None:
+        """Lists the tasks.
+
+        Args:
+            tasks: A folder of tasks as `evonav generate` makes them; by default the bundled ones, which are of the
+                test split.
+            subset: Of the folder, such as `train-90`; by default all.
+
+        Raises:
+            TaskError: The folder holds no task, or not the subset.
+        """
+        folder = _bundled() if tasks is None else Path(tasks)
+        self.roots = tuple(task_roots(folder) if subset is None else subset_roots(folder, subset))
+        self._load = lru_cache(maxsize=256)(read_task)
+
+    def __len__(self) -> int:
+        return len(self.roots)
+
+    def draw(self, random: np.random.Generator) -> int:
+        """Number of a task, each as likely as any other."""
+        return int(random.integers(len(self.roots)))
+
+    def find(self, task_id: str) -> int:
+        """Number of a task.
+
+        Raises:
+            InvalidArgumentError: There is none of that name.
+        """
+        for number, root in enumerate(self.roots):
+            if root.name == task_id:
+                return number
+        raise InvalidArgumentError(f"option `task` is {task_id!r}: {self.roots[0].parent} holds no such task")
+
+    def task(self, number: int) -> NavTask:
+        """Reads a task.
+
+        Raises:
+            TaskError: It is malformed.
+        """
+        return self._load(self.roots[number])
+
+
+def read_task(root: Path) -> NavTask:
+    """A task, of which evolution, rooms and categories are left behind.
+
+    Raises:
+        TaskError: It is malformed.
+    """
+    task = load_task(root)
+    if task.num_stages > MAX_STAGES:
+        raise InvalidArgumentError(f"{root}: has {task.num_stages} stages, expected at most {MAX_STAGES}")
+    stages = []
+    for number in range(1, task.num_stages + 1):
+        oracle = task.oracle(number)
+        x_m, _, z_m = oracle.target.position_m
+        stages.append(StageTask(task.public(number), task.house_json(number), oracle.house_sha256, (x_m, z_m)))
+    return NavTask(task.task_id, task.start_pose, tuple(stages))
+
+
+def _bundled() -> Path:
+    with as_file(files("evonav") / "data" / "tasks") as folder:
+        return folder

@@ -1,0 +1,336 @@
+"""Many environments at once: all agents are stepped and drawn inside Rust, in parallel and without Python's lock."""
+
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from evonav import _core
+from evonav.agents.agent import Sensing
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation import motion
+from evonav.gym import spaces
+from evonav.gym.config import STOP, NavConfig
+from evonav.gym.env import as_row, oracle_info
+from evonav.gym.source import TaskSource
+from evonav.gym.stage import StageRun, task_result
+from evonav.gym.worlds import StageWorld, WorldLoader
+from evonav.world.pose import Pose
+
+Observations = dict[str, Any]
+Infos = dict[str, Any]
+
+
+@dataclass(slots=True)
+class _Episode:
+    """One agent's task."""
+
+    random: np.random.Generator
+    number: int
+    """Of the task in the source."""
+    next_number: int
+    at: StageWorld
+    run: StageRun
+    results: list[Infos]
+    is_over: bool = False
+
+
+class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
+    """B environments that are to the bit `LifelongNavEnv`, each with a seed of its own.
+
+    What ends is begun anew by the next step (`AutoresetMode.NEXT_STEP`), whose action for it is not carried out and
+    whose reward is 0. The next houses are built meanwhile on a background thread.
+
+    Example:
+        >>> import evonav.gym, gymnasium
+        >>> envs = gymnasium.make_vec("evonav/LifelongNav-v0", num_envs=4, observations=("depth", "category"))
+        >>> observations, infos = envs.reset(seed=0)
+        >>> observations["depth"].shape
+        (4, 128, 128)
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": ["rgb_array"],
+        "render_fps": 10,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        tasks: Path | str | None = None,
+        *,
+        num_envs: int = 1,
+        subset: str | None = None,
+        config: NavConfig | None = None,
+        render_mode: str | None = None,
+        num_threads: int | None = None,
+        copy: bool = True,
+        cache_mb: int = 512,
+        **settings: Any,  # noqa: ANN401 - fields of NavConfig
+    ) -> None:
+        """Environments over some tasks.
+
+        Args:
+            tasks: A folder of tasks; by default the bundled ones.
+            num_envs: B.
+            subset: Of the folder, such as `train-90`.
+            config: All settings at once.
+            render_mode: `rgb_array`, or none.
+            num_threads: That step and draw; by default one a core. Results do not depend on it.
+            copy: Whether every step returns arrays of its own. If not, the images of a step are written over by the
+                next one's, which saves their memory from being mapped anew.
+            cache_mb: Memory for houses that no agent is in.
+            **settings: Fields of `NavConfig`, over those of `config`.
+
+        Raises:
+            InvalidArgumentError: A setting is outside its domain.
+            TaskError: The folder holds no task, or not the subset.
+        """
+        self.config = replace(config or NavConfig(), **settings)
+        self.num_envs, self.render_mode, self._copies = num_envs, render_mode, copy
+        self.single_observation_space = spaces.observation_space(self.config)
+        self.single_action_space = spaces.action_space(self.config)
+        camera = self.config.simulator
+        self._batch = _core.BatchSimulator(
+            num_envs,
+            image_px=(camera.width_px, camera.height_px),
+            empty_depth_m=camera.far_m,
+            move_m=camera.move_m,
+            turn_rad=math.radians(camera.turn_deg),
+            grid_m=camera.grid_m,
+            min_area_px=self.config.min_mask_px,
+            num_threads=num_threads or _num_cores(),
+        )
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.loader = WorldLoader(TaskSource(tasks, subset=subset), self.config, cache_mb * 2**20)
+        self._images: dict[str, NDArray[Any]] = {}
+        self._episodes: list[_Episode] = []
+        self._randoms: list[np.random.Generator] = [seeding.np_random()[0] for _ in range(num_envs)]
+        self._poses = np.zeros((num_envs, 5))
+        self._origins = np.zeros((num_envs, 5))
+        self._has_succeeded = np.ones(num_envs, np.int64)
+        self._has_arrived = np.zeros(num_envs, np.int64)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, Infos]:
+        """Begins a task in every environment.
+
+        Args:
+            seed: Environment `i`'s is `seed + i`, or one is given for each.
+            options: `{"task": TASK_ID}` for one task in all of them.
+        """
+        seeds = [seed] * self.num_envs if seed is None else seed
+        if isinstance(seeds, int):
+            seeds = [seeds + index for index in range(self.num_envs)]
+        if len(seeds) != self.num_envs:
+            raise InvalidArgumentError(f"argument `seed` has {len(seeds)} seeds, expected {self.num_envs}")
+        for index, one in enumerate(seeds):
+            if one is not None:
+                self._randoms[index] = seeding.np_random(one)[0]
+        source = self.loader.source
+        numbers = [source.draw(random) for random in self._randoms]
+        if options and "task" in options:
+            numbers = [source.find(options["task"])] * self.num_envs
+        for number in numbers:
+            self.loader.prefetch(number, 1)
+        self._episodes = []
+        self._has_succeeded[:], self._has_arrived[:] = 1, 0
+        for index, (number, random) in enumerate(zip(numbers, self._randoms, strict=True)):
+            self._episodes.append(self._begin_task(index, number, random))
+        self._poses = self._batch.poses()
+        return self._observations(), self._infos({})
+
+    def step(
+        self,
+        actions: Any,  # noqa: ANN401 - of either mode
+    ) -> tuple[Observations, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]:
+        """Acts in every environment.
+
+        Raises:
+            InvalidArgumentError: There is not one action an environment, or one is none.
+            ResetNeeded: No task was begun.
+        """
+        if not self._episodes:
+            raise ResetNeeded("no task was begun: call reset first")
+        actions = np.asarray(actions)
+        if len(actions) != self.num_envs:
+            raise InvalidArgumentError(f"argument `actions` has {len(actions)} elements, expected {self.num_envs}")
+        is_reset = [episode.is_over for episode in self._episodes]
+        move = self._move if self.config.action_mode == "actions" else self._navigate
+        lengths_m, distances_m, is_stop = move(actions, is_reset)
+        rewards = np.zeros(self.num_envs)
+        terminations = np.zeros(self.num_envs, np.bool_)
+        ended: dict[int, Infos] = {}
+        for index, episode in enumerate(self._episodes):
+            if is_reset[index]:
+                self._episodes[index] = self._begin_task(index, episode.next_number, episode.random)
+                self._has_succeeded[index], self._has_arrived[index] = 1, 0
+                continue
+            end = self._pose(index)
+            rewards[index] = episode.run.advance(end, lengths_m[index], distances_m[index], is_stop=is_stop[index])
+            if episode.run.is_over(is_stop=is_stop[index]):
+                ended[index] = self._end_stage(index, episode, end, is_stop=is_stop[index])
+                terminations[index] = episode.is_over
+        if ended or any(is_reset):
+            self._poses = self._batch.poses()
+        return self._observations(), rewards, terminations, np.zeros(self.num_envs, np.bool_), self._infos(ended)
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """What the agents see, `(H, W, 3)` each, in mode `rgb_array`."""
+        if self.render_mode != "rgb_array":
+            return None
+        rgb = np.empty((self.num_envs, self.config.height_px, self.config.width_px, 3), np.uint8)
+        self._batch.render(depth_m=None, rgb=rgb, labels=None)
+        return tuple(rgb)
+
+    def close_extras(self, **_: Any) -> None:  # noqa: ANN401 - Gymnasium's signature
+        """Ends the background thread."""
+        self.loader.close()
+
+    def _begin_task(self, index: int, number: int, random: np.random.Generator) -> _Episode:
+        at = self.loader.get(number, 1)
+        # One draw a task, made a task ahead: the next house can be built meanwhile.
+        next_number = self.loader.source.draw(random)
+        self.loader.prefetch(next_number, 1)
+        run, start = self._begin_stage(index, number, at, at.task.start)
+        self._origins[index] = as_row(start)
+        return _Episode(random, number, next_number, at, run, [])
+
+    def _begin_stage(self, index: int, number: int, at: StageWorld, pose: Pose) -> tuple[StageRun, Pose]:
+        simulator = at.world.entered()
+        start = simulator.enter(pose)
+        self._batch.place(
+            index,
+            simulator.core,
+            position_m=start.position_m,
+            yaw_rad=start.yaw_rad,
+            horizon_rad=start.horizon_rad,
+            labels=at.world.labels,
+        )
+        path_m = self._batch.plan_one(index, at.data.target_m)
+        if path_m:
+            self._batch.aim(index, _core.GeodesicField(simulator.core, path_m[-1]))
+        if at.stage < len(at.task.stages):
+            self.loader.prefetch(number, at.stage + 1)
+        length_m = motion.polyline_length_m(path_m) if path_m else None
+        run = StageRun(self.config, at.data.target_m, start, length_m, self._batch.distance_m(index))
+        return run, start
+
+    def _end_stage(self, index: int, episode: _Episode, end: Pose, *, is_stop: bool) -> Infos:
+        """Measures a stage and begins the next, if there is one."""
+        at = episode.at
+        episode.results.append(episode.run.result(at.stage, end, is_stop=is_stop))
+        ended: Infos = {"stage_result": dict(episode.results[-1])}
+        if at.stage == len(at.task.stages):
+            episode.is_over = True
+            return ended | {"task_result": task_result(episode.results)}
+        episode.at = self.loader.get(episode.number, at.stage + 1)
+        episode.run, _ = self._begin_stage(index, episode.number, episode.at, end)
+        self._has_succeeded[index], self._has_arrived[index] = 1, 0
+        return ended
+
+    def _move(self, actions: NDArray[Any], is_reset: list[bool]) -> tuple[list[float], list[float], list[bool]]:
+        """Discrete actions: lengths of the ways, distances left, and who stopped."""
+        numbers = np.where(is_reset, STOP, actions)
+        if not ((numbers >= 0) & (numbers <= STOP)).all():
+            raise InvalidArgumentError(f"argument `actions` holds {numbers.tolist()}, expected 0 to {STOP}")
+        before = self._poses[:, [0, 2]].tolist()
+        is_success, distances_m = self._batch.step(numbers.astype(np.uint8))
+        self._poses = self._batch.poses()
+        self._has_succeeded[:] = is_success
+        after = self._poses[:, [0, 2]].tolist()
+        lengths_m = [0.0 if a == b else math.dist(a, b) for a, b in zip(before, after, strict=True)]
+        return lengths_m, distances_m.tolist(), (numbers == STOP).tolist()
+
+    def _navigate(self, actions: NDArray[Any], is_reset: list[bool]) -> tuple[list[float], list[float], list[bool]]:
+        """Waypoint actions: paths are found in Rust, and followed as the evaluator follows them."""
+        targets_m = [
+            None if skips else spaces.waypoint_m(self.config, action, pose, origin)
+            for action, pose, origin, skips in zip(actions, self._poses, self._origins, is_reset, strict=True)
+        ]
+        lengths_m = [0.0] * self.num_envs
+        self._has_succeeded[:], self._has_arrived[:] = 1, 0
+        for index, corners in enumerate(self._batch.plan(targets_m)):
+            if targets_m[index] is not None:
+                lengths_m[index] = self._follow(index, corners)
+        self._poses = self._batch.poses()
+        _, distances_m = self._batch.step(np.full(self.num_envs, STOP, np.uint8))
+        return lengths_m, distances_m.tolist(), [target is None for target in targets_m]
+
+    def _follow(self, index: int, corners: list[tuple[float, float]]) -> float:
+        here: tuple[float, float] = (float(self._poses[index, 0]), float(self._poses[index, 2]))
+        if not corners:
+            self._has_succeeded[index] = 0
+            return 0.0
+        spacing_m = self.config.protocol.waypoint_m
+        points, is_end = motion.waypoints([here, *corners], spacing_m, Sensing().max_travel_m)
+        way = [here, *points]
+        stops = [
+            (there, math.atan2(there[0] - from_m[0], there[1] - from_m[1]))
+            for from_m, there in zip(way, points, strict=False)
+        ]
+        num_passed = self._batch.follow(index, stops)
+        self._has_succeeded[index] = num_passed == len(points)
+        self._has_arrived[index] = is_end and num_passed == len(points)
+        return motion.polyline_length_m(way[: num_passed + 1])
+
+    def _pose(self, index: int) -> Pose:
+        return Pose(*self._poses[index].tolist())
+
+    def _observations(self) -> Observations:
+        config, seen = self.config, self._drawn()
+        seen["pose"] = spaces.relative_poses(self._poses, self._origins)
+        goals = [episode.at.data.goal for episode in self._episodes]
+        seen["category"] = np.array([spaces.category_index(goal.category) for goal in goals], np.int64)
+        seen["stage"] = np.array([episode.at.stage for episode in self._episodes], np.int64)
+        steps = [config.budget - episode.run.num_steps for episode in self._episodes]
+        seen["steps_left"] = np.array(steps, np.int64)
+        seen["is_action_success"] = self._has_succeeded.copy()
+        seen["has_arrived"] = self._has_arrived.copy()
+        if config.has("instruction"):
+            seen["instruction"] = tuple(spaces.instruction_text(goal) for goal in goals)
+        if config.has("reference_image"):
+            side_px = config.reference_image_px
+            seen["reference_image"] = np.stack([spaces.reference_image(goal, side_px) for goal in goals])
+        return {name: seen[name] for name in config.observations}
+
+    def _drawn(self) -> Observations:
+        """Images of all agents, drawn straight into the arrays that are returned."""
+        shape = (self.num_envs, self.config.height_px, self.config.width_px)
+        kinds = {"depth": (shape, np.float32), "rgb": ((*shape, 3), np.uint8), "semantic": (shape, np.uint8)}
+        wanted = {name: kind for name, kind in kinds.items() if self.config.has(name)}
+        if not wanted:
+            return {}
+        if self._copies or not self._images:
+            self._images = {name: np.empty(*kind) for name, kind in wanted.items()}
+        images = self._images
+        self._batch.render(depth_m=images.get("depth"), rgb=images.get("rgb"), labels=images.get("semantic"))
+        return dict(images)
+
+    def _infos(self, ended: dict[int, Infos]) -> Infos:
+        infos: Infos = {}
+        for index, episode in enumerate(self._episodes):
+            at = episode.at
+            info: Infos = {"task_id": at.task.task_id, "stage": at.stage, "num_stages": len(at.task.stages)}
+            if self.config.oracle_info:
+                info["oracle"] = oracle_info(episode.run)
+            infos = self._add_info(infos, info | ended.get(index, {}), index)
+        return infos
+
+
+def _num_cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

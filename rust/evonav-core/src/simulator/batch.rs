@@ -1,0 +1,385 @@
+//! Many agents, each in a house of its own or in one shared with others, stepped and drawn at once.
+//!
+//! What an agent of a batch does and sees is what it would do and see alone, to the bit, however
+//! many threads there are: agents share houses, which do not change, and nothing else.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
+
+use crate::{
+    Error,
+    geometry::{Pose, Vec2, distance_2d_m},
+    sensors::{
+        ground_truth::{MaskFilter, number_instances},
+        raster::{FrameBuffer, Want},
+    },
+    simulator::{
+        EmbeddedSimulator,
+        field::GeodesicField,
+        motion::{Action, Strides, act, set_down},
+    },
+};
+
+/// Most agents of a batch, and most threads.
+const MAX_SLOTS: usize = 1 << 16;
+
+/// What all agents of a batch have in common.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BatchConfig {
+    /// Columns and rows of images: those of every house's camera.
+    pub image_px: [usize; 2],
+    /// What pixels without a surface get for a depth.
+    pub empty_depth_m: f32,
+    /// Size of discrete actions.
+    pub strides: Strides,
+    /// Spacing of the positions among which the nearest reachable one is taken where a target is cut off.
+    pub grid_m: f64,
+    /// Which masks count in images of labels.
+    pub mask_filter: MaskFilter,
+    /// Threads that step and draw, 1 for the caller's own.
+    pub num_threads: usize,
+}
+
+/// An agent, and where it is.
+#[derive(Debug, Clone)]
+pub struct Slot {
+    /// Its house.
+    pub world: Arc<EmbeddedSimulator>,
+    /// Where it stands and looks.
+    pub pose: Pose,
+    /// By body of the house, what its pixels get in images of labels; 0: nothing.
+    pub labels: Arc<[u8]>,
+    /// Distances to its goal; see [`Batch::aim`].
+    field: Option<Arc<GeodesicField>>,
+    /// Positions that could be reached when a target was first cut off; see [`Batch::plan`].
+    reachable_m: Option<Vec<Vec2>>,
+}
+
+impl Slot {
+    /// An agent in a house, without a goal.
+    pub fn new(world: Arc<EmbeddedSimulator>, pose: Pose, labels: Arc<[u8]>) -> Self {
+        Self { world, pose, labels, field: None, reachable_m: None }
+    }
+
+    fn point_m(&self) -> Vec2 {
+        let [x_m, _, z_m] = self.pose.position_m;
+        [x_m, z_m]
+    }
+
+    /// Length of the shortest path to the goal, infinite if there is none or no field.
+    pub fn distance_m(&self) -> f64 {
+        self.field.as_ref().map_or(f64::INFINITY, |field| field.distance_m(self.point_m()))
+    }
+
+    /// Corners of the shortest path to a point, or to the reachable position nearest to it where it
+    /// is cut off; empty if there is none.
+    fn plan(&mut self, target_m: Vec2, grid_m: f64) -> Result<Vec<Vec2>, Error> {
+        let (navigation, here_m) = (self.world.navigation(), self.point_m());
+        if let Some(path_m) = navigation.shortest_path(here_m, target_m) {
+            return Ok(path_m);
+        }
+        let reachable_m = match self.reachable_m.take() {
+            Some(known) => known,
+            None => navigation.reachable_positions(here_m, grid_m)?,
+        };
+        let reachable_m = self.reachable_m.insert(reachable_m);
+        let nearest = reachable_m
+            .iter()
+            .copied()
+            .min_by(|&a, &b| distance_2d_m(a, target_m).total_cmp(&distance_2d_m(b, target_m)));
+        let path_m = nearest.and_then(|nearest_m| navigation.shortest_path(here_m, nearest_m));
+        Ok(path_m.unwrap_or_default())
+    }
+}
+
+/// What came of a step, by agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stepped {
+    /// Whether the action was carried out; its pose is the old one if not.
+    pub is_success: bool,
+    /// [`Slot::distance_m`] after it.
+    pub distance_m: f64,
+}
+
+/// Where a batch's images go: each is one after the other by agent, row-major, or not wanted.
+#[derive(Debug, Default)]
+pub struct Images<'a> {
+    /// `(B, H, W)` planar z in metres.
+    pub depth_m: Option<&'a mut [f32]>,
+    /// `(B, H, W, 3)` sRGB.
+    pub rgb: Option<&'a mut [u8]>,
+    /// `(B, H, W)` labels of the bodies.
+    pub labels: Option<&'a mut [u8]>,
+}
+
+/// Many agents.
+#[derive(Debug)]
+pub struct Batch {
+    config: BatchConfig,
+    slots: Vec<Option<Slot>>,
+    /// `None` for one thread: the caller's.
+    pool: Option<ThreadPool>,
+    /// Working memory, one a thread.
+    frames: Vec<Mutex<FrameBuffer>>,
+}
+
+impl Batch {
+    /// A batch of `num_slots` agents that are nowhere yet: [`Self::place`] is next.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there are no agents or no threads, or too many;
+    /// [`Error::Simulation`] if threads cannot be started.
+    pub fn new(num_slots: usize, config: BatchConfig) -> Result<Self, Error> {
+        let is_number = |n: usize| (1..=MAX_SLOTS).contains(&n);
+        Error::require("num_slots", num_slots, "1 to 65536", is_number)?;
+        Error::require("num_threads", config.num_threads, "1 to 65536", is_number)?;
+        let Strides { move_m, turn_rad } = config.strides;
+        Error::require("move_m", move_m, "finite", f64::is_finite)?;
+        Error::require("turn_rad", turn_rad, "finite", f64::is_finite)?;
+        let started = |_| Error::Simulation {
+            message: format!("cannot start {} threads", config.num_threads),
+        };
+        let pool = (config.num_threads > 1)
+            .then(|| ThreadPoolBuilder::new().num_threads(config.num_threads).build())
+            .transpose()
+            .map_err(started)?;
+        let frames = (0..config.num_threads).map(|_| Mutex::default()).collect();
+        Ok(Self { config, slots: vec![None; num_slots], pool, frames })
+    }
+
+    /// Number of agents.
+    pub fn num_slots(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// What all agents have in common.
+    pub fn config(&self) -> &BatchConfig {
+        &self.config
+    }
+
+    /// Puts an agent into a house; its pose is taken as it is.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such agent, or the house has another image size or
+    /// another number of bodies than there are labels.
+    pub fn place(&mut self, index: usize, slot: Slot) -> Result<(), Error> {
+        let (image_px, num_labels) = (slot.world.image_px(), slot.labels.len());
+        if image_px != self.config.image_px {
+            let expected = format!("{:?}, the batch's", self.config.image_px);
+            return Err(Error::invalid("image_px", format!("{image_px:?}"), &expected));
+        }
+        if num_labels != slot.world.bodies().len() {
+            let expected = format!("{}, one a body", slot.world.bodies().len());
+            return Err(Error::invalid("labels", num_labels, &expected));
+        }
+        *self.slot_mut(index)? = Some(slot);
+        Ok(())
+    }
+
+    /// Gives an agent a goal, or takes it away.
+    ///
+    /// # Errors
+    /// As [`Self::slot`].
+    pub fn aim(&mut self, index: usize, field: Option<Arc<GeodesicField>>) -> Result<(), Error> {
+        self.placed_mut(index)?.field = field;
+        Ok(())
+    }
+
+    /// An agent.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if there is no such agent; [`Error::Simulation`] if it is nowhere.
+    pub fn slot(&self, index: usize) -> Result<&Slot, Error> {
+        let slot = self.slots.get(index).ok_or_else(|| no_slot(index, self.slots.len()))?;
+        slot.as_ref().ok_or_else(|| nowhere(index))
+    }
+
+    /// Carries out one action an agent; one that collides leaves its agent where it is.
+    ///
+    /// # Arguments
+    /// * `actions` - by agent, a number of [`Action::of`].
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the actions are not one an agent, or one is none;
+    /// [`Error::Simulation`] if an agent is nowhere. No agent has moved then.
+    ///
+    /// # Complexity
+    /// O(obstacles near) an agent, O(nodes of the visibility graph) for its distance.
+    pub fn step(&mut self, actions: &[u8]) -> Result<Vec<Stepped>, Error> {
+        self.require_one_each("actions", actions.len())?;
+        let actions: Vec<Action> =
+            actions.iter().map(|&number| Action::of(number)).collect::<Result<_, _>>()?;
+        let strides = self.config.strides;
+        let one = |(slot, action): (&mut Slot, Action)| {
+            let moved = act(&slot.world, &slot.pose, action, strides);
+            slot.pose = moved.unwrap_or(slot.pose);
+            Stepped { is_success: moved.is_some(), distance_m: slot.distance_m() }
+        };
+        let pool = self.pool.as_ref();
+        let slots = placed(&mut self.slots)?;
+        Ok(each(pool, slots.into_iter().zip(actions).collect(), one))
+    }
+
+    /// Shortest paths to one target an agent, and where a target is cut off, to the position
+    /// nearest to it that the agent could reach along a grid when one first was.
+    ///
+    /// # Returns
+    /// By agent, corners, both ends included; empty where there is no way, or `target_m` is `None`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if the targets are not one an agent; [`Error::Simulation`] if an
+    /// agent is nowhere.
+    pub fn plan(&mut self, targets_m: &[Option<Vec2>]) -> Result<Vec<Vec<Vec2>>, Error> {
+        self.require_one_each("targets_m", targets_m.len())?;
+        let grid_m = self.config.grid_m;
+        let one = |(slot, target_m): (&mut Slot, Option<Vec2>)| {
+            target_m.map_or_else(|| Ok(Vec::new()), |target_m| slot.plan(target_m, grid_m))
+        };
+        let pool = self.pool.as_ref();
+        let slots = placed(&mut self.slots)?;
+        each(pool, slots.into_iter().zip(targets_m.iter().copied()).collect(), one)
+            .into_iter()
+            .collect()
+    }
+
+    /// [`Self::plan`] of one agent.
+    ///
+    /// # Errors
+    /// As [`Self::slot`].
+    pub fn plan_one(&mut self, index: usize, target_m: Vec2) -> Result<Vec<Vec2>, Error> {
+        let grid_m = self.config.grid_m;
+        self.placed_mut(index)?.plan(target_m, grid_m)
+    }
+
+    /// Sets an agent down at points in turn, as far as it fits.
+    ///
+    /// # Arguments
+    /// * `stops` - `[x, z]` and yaw of each.
+    ///
+    /// # Returns
+    /// How many points it came to.
+    ///
+    /// # Errors
+    /// As [`Self::slot`].
+    pub fn follow(&mut self, index: usize, stops: &[(Vec2, f64)]) -> Result<usize, Error> {
+        let slot = self.placed_mut(index)?;
+        for (passed, &(point_m, yaw_rad)) in stops.iter().enumerate() {
+            match set_down(&slot.world, &slot.pose, point_m, yaw_rad) {
+                Some(pose) => slot.pose = pose,
+                None => return Ok(passed),
+            }
+        }
+        Ok(stops.len())
+    }
+
+    /// What every agent sees.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] if an array is not of the batch's size, or a house's labels or
+    /// camera cannot be used; [`Error::Simulation`] if an agent is nowhere.
+    ///
+    /// # Complexity
+    /// That of [`crate::sensors::raster::render_view`], an agent.
+    pub fn render(&self, images: Images<'_>) -> Result<(), Error> {
+        let slots: Vec<&Slot> =
+            (0..self.slots.len()).map(|index| self.slot(index)).collect::<Result<_, _>>()?;
+        let [width_px, height_px] = self.config.image_px;
+        let num_pixels = width_px * height_px;
+        let depth_m = parts("depth_m", images.depth_m, slots.len(), num_pixels)?;
+        let rgb = parts("rgb", images.rgb, slots.len(), 3 * num_pixels)?;
+        let labels = parts("labels", images.labels, slots.len(), num_pixels)?;
+        let jobs: Vec<_> = slots.into_iter().zip(depth_m).zip(rgb).zip(labels).collect();
+        let one = |(((slot, depth_m), rgb), labels): (((&Slot, _), _), _)| {
+            self.draw(slot, Images { depth_m, rgb, labels })
+        };
+        each(self.pool.as_ref(), jobs, one).into_iter().collect()
+    }
+
+    fn draw(&self, slot: &Slot, images: Images<'_>) -> Result<(), Error> {
+        // Of another pool's thread, if a single agent is drawn in one.
+        let thread = rayon::current_thread_index().unwrap_or(0) % self.frames.len();
+        // Its content is overwritten: a thread that panicked has left nothing that matters.
+        let mut frame = self.frames[thread].lock().unwrap_or_else(PoisonError::into_inner);
+        let want = Want { rgb: images.rgb.is_some(), instances: images.labels.is_some() };
+        slot.world.render(&slot.world.view(&slot.pose), want, &mut frame)?;
+        if let Some(depth_m) = images.depth_m {
+            let empty_m = self.config.empty_depth_m;
+            for (out, &depth) in depth_m.iter_mut().zip(&frame.depth_m) {
+                *out = if depth.is_finite() { depth } else { empty_m };
+            }
+        }
+        if let Some(rgb) = images.rgb {
+            rgb.copy_from_slice(&frame.rgb);
+        }
+        if let Some(labels) = images.labels {
+            let is_detectable: Vec<bool> = slot.labels.iter().map(|&label| label != 0).collect();
+            let width_px = self.config.image_px[0];
+            let filter = self.config.mask_filter;
+            let masks = number_instances(&frame.instances, width_px, &is_detectable, filter)?;
+            let label_of =
+                |mask: i32| usize::try_from(mask).map_or(0, |m| slot.labels[masks.instances[m]]);
+            for (out, &mask) in labels.iter_mut().zip(&masks.labels) {
+                *out = label_of(mask);
+            }
+        }
+        Ok(())
+    }
+
+    fn slot_mut(&mut self, index: usize) -> Result<&mut Option<Slot>, Error> {
+        let num_slots = self.slots.len();
+        self.slots.get_mut(index).ok_or_else(|| no_slot(index, num_slots))
+    }
+
+    fn placed_mut(&mut self, index: usize) -> Result<&mut Slot, Error> {
+        self.slot_mut(index)?.as_mut().ok_or_else(|| nowhere(index))
+    }
+
+    fn require_one_each(&self, name: &str, num: usize) -> Result<(), Error> {
+        let expected = format!("{}, one an agent", self.slots.len());
+        Error::require(name, num, &expected, |num| num == self.slots.len())
+    }
+}
+
+/// All agents, if none is nowhere.
+fn placed(slots: &mut [Option<Slot>]) -> Result<Vec<&mut Slot>, Error> {
+    let slots = slots.iter_mut().enumerate();
+    slots.map(|(index, slot)| slot.as_mut().ok_or_else(|| nowhere(index))).collect()
+}
+
+/// An image's share of an array for each agent.
+fn parts<'a, T>(
+    name: &str,
+    array: Option<&'a mut [T]>,
+    num_slots: usize,
+    num_elements: usize,
+) -> Result<Vec<Option<&'a mut [T]>>, Error> {
+    let Some(array) = array else {
+        return Ok((0..num_slots).map(|_| None).collect());
+    };
+    let expected = format!("{} elements", num_slots * num_elements);
+    Error::require(name, array.len(), &expected, |num| num == num_slots * num_elements)?;
+    Ok(array.chunks_exact_mut(num_elements).map(Some).collect())
+}
+
+/// Does every job, in the pool's threads if there is one; results are in the jobs' order.
+fn each<T: Send, U: Send>(
+    pool: Option<&ThreadPool>,
+    jobs: Vec<T>,
+    one: impl Fn(T) -> U + Sync + Send,
+) -> Vec<U> {
+    match pool {
+        Some(pool) if jobs.len() > 1 => {
+            pool.install(|| jobs.into_par_iter().with_max_len(1).map(one).collect())
+        }
+        _ => jobs.into_iter().map(one).collect(),
+    }
+}
+
+fn no_slot(index: usize, num_slots: usize) -> Error {
+    Error::invalid("slot", index, &format!("below {num_slots}"))
+}
+
+fn nowhere(index: usize) -> Error {
+    Error::Simulation { message: format!("agent {index} of the batch is in no house: place it") }
+}
