@@ -1,9 +1,13 @@
 """What every command that fills a folder does: one writer at a time, one configuration, whole files, checksums."""
 
+import errno
 import hashlib
 import os
+import re
+import shutil
+import socket
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +19,14 @@ except ImportError:  # Windows has no such lock
     fcntl = None  # type: ignore[assignment]
 
 LOCK_NAME = ".lock"
+_MOUNTS = Path("/proc/self/mountinfo")
+_ESCAPE = re.compile(r"\\([0-7]{3})")
+_NETWORK = frozenset(
+    ("nfs", "nfs4", "cifs", "smb3", "smbfs", "9p", "afs", "ceph", "lustre", "glusterfs", "beegfs", "gpfs",
+     "fuse.sshfs", "fuse.glusterfs", "fuse.ceph", "fuse.s3fs", "fuse.gcsfuse")
+)  # fmt: skip
+_UNLOCKED = frozenset(("nolock", "local_lock=all", "local_lock=flock", "nobrl"))
+"""Options of mounts whose locks another machine does not see."""
 
 
 @contextmanager
@@ -22,19 +34,35 @@ def writing(folder: Path) -> Iterator[None]:
     """Keeps a second writer out of a folder, which is made if need be; a writer that died keeps nobody out.
 
     Raises:
-        StoreError: Another process is writing there, or the folder cannot be made.
+        StoreError: Another process is writing there, the folder cannot be made, or its file system has no locks.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / LOCK_NAME).open("w")
+        file = (folder / LOCK_NAME).open("a+")
     except OSError as error:
         raise StoreError(f"{folder}: {error}") from error
     with file:
+        kind, options = _mount_of(folder)
+        if kind in _NETWORK and any(option in _UNLOCKED for option in options.split(",")):
+            raise StoreError(f"{folder}: a network file system without locks ({kind}); choose a folder of this machine")
         if fcntl is not None:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                file.seek(0)
+                who = file.read(100).strip()
+                raise StoreError(
+                    f"{folder}: another evonav is writing here{f' ({who})' if who else ''}; "
+                    "wait for it, stop it, or use another folder"
+                ) from error
             except OSError as error:
-                raise StoreError(f"{folder}: another evonav is writing here") from error
+                raise StoreError(
+                    f"{folder}: its file system has no locks ({error.strerror}); choose a folder of this machine"
+                ) from error
+            with suppress(OSError):  # a full disk: it is for people only
+                file.truncate(0)
+                file.write(f"process {os.getpid()} on {socket.gethostname()}\n")
+                file.flush()
         yield
 
 
@@ -51,21 +79,82 @@ def check_same_run(stored: Mapping[str, Any], asked: Mapping[str, Any], folder: 
         raise StoreError(f"{folder} holds a run of another configuration ({lines}); use another folder")
 
 
-def write_atomically(path: Path, text: str) -> None:
-    """Writes beside and renames, so that a reader sees the old file or the new one.
+def write_atomically(path: Path, data: str | bytes) -> None:
+    """Writes beside and renames, so that a reader sees the old file or the new one, also after a loss of power.
 
     Raises:
         StoreError: It cannot be written.
     """
     beside = path.with_name(path.name + ".partial")
     try:
-        with beside.open("w", encoding="utf-8") as file:
-            file.write(text)
+        with beside.open("wb") as file:
+            file.write(data.encode() if isinstance(data, str) else data)
             file.flush()
             os.fsync(file.fileno())
         beside.replace(path)
+        sync_folder(path.parent)
     except OSError as error:
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
         raise StoreError(f"{path}: {error}") from error
+
+
+def sync_folder(folder: Path) -> None:
+    """Makes what a folder lists outlast a loss of power, where the system can do that."""
+    if os.name != "posix":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # file systems that have no such thing
+            raise
+    finally:
+        os.close(descriptor)
+
+
+def put_folder(written: Path, root: Path, *, aside: Path) -> None:
+    """Moves a folder to its place, where one of the same name is replaced.
+
+    Killed at any moment, it leaves the old one or the new one in place, or the old one whole at `aside`.
+
+    Args:
+        written: What is moved.
+        root: To where.
+        aside: In the same file system, where the old one is put for as long as it takes; whatever is there goes.
+
+    Raises:
+        OSError: It cannot be moved.
+    """
+    if root.exists():
+        if aside.exists():
+            shutil.rmtree(aside)
+        root.rename(aside)
+    written.rename(root)
+    if aside.exists():
+        shutil.rmtree(aside)
+
+
+def is_on_network(path: Path) -> bool:
+    """Whether a path is on a file system of another machine, as far as this one tells."""
+    return _mount_of(path)[0] in _NETWORK
+
+
+def _mount_of(path: Path) -> tuple[str, str]:
+    """Type and options of the file system that holds a path; empty where the system does not tell."""
+    try:
+        lines = _MOUNTS.read_text().splitlines()
+        path = path.resolve()
+    except OSError:
+        return "", ""
+    best, found = -1, ("", "")
+    for line in lines:
+        fields, _, rest = line.partition(" - ")
+        place = Path(_ESCAPE.sub(lambda code: chr(int(code[1], 8)), fields.split()[4]))
+        if (path == place or place in path.parents) and len(place.parts) >= best:  # the last of equal ones hides others
+            kind, _, options = rest.split(" ", 2)
+            best, found = len(place.parts), (kind, f"{fields.split()[5]},{options}")
+    return found
 
 
 def sha256_of_file(path: Path) -> str:

@@ -1,22 +1,18 @@
 """Jobs on workers that may die or hang: in this process, in processes of this machine, or on a Ray cluster.
 
 A job is a text and so is its answer: nothing that a worker sends is unpickled. What workers do is named, not sent:
-`module:factory`, where `factory(settings)` is called once a worker and gives the function from a job's text to its
-answer's. A worker that dies has its job tried again by another, a job that takes too long ends its worker.
+`module:factory`. `factory(settings, alive)` is called once a worker and gives its `Work`, which turns a job's text into
+its answer's, at once or, where it is a generator, with news on the way; `alive()` says within a job that it goes on. A
+worker that dies has its job tried again by another, a job that says nothing for too long ends its worker.
 """
 
 import importlib
-import multiprocessing
-import os
-import signal
-import threading
 import time
 import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Literal, Protocol
 
@@ -24,13 +20,17 @@ from evonav.errors import EvonavError, InvalidArgumentError
 
 EngineName = Literal["local", "ray"]
 FailureKind = Literal["crash", "timeout", "error"]
+Work = Callable[[str], str | Generator[str, None, str]]
+"""May have a method `close`, called when its worker ends."""
 
 MAX_LOSSES = 2
-"""Workers that a job may lose before it is given up."""
-MAX_FAILED_STARTS = 10
+"""Workers that a job may lose before it is given up, unless said otherwise."""
+MAX_FAILED_STARTS = 5
 """Workers in a row that may die before they are ready."""
 START_TIMEOUT_S = 300.0
 """For a worker to be ready."""
+SIGN_OF_LIFE_S = 5.0
+"""Between two that a worker gives, at least."""
 
 
 class EngineError(EvonavError):
@@ -44,30 +44,43 @@ class Job:
     key: int
     """The caller's."""
     text: str
+    timeout_s: float | None = None
+    """Without a word of it; default: the pool's."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of a job: a text or a failure."""
+    """What became of a job: a text or a failure; or, before that, news of it."""
 
     key: int
     text: str = ""
+    is_end: bool = True
+    """Whether it is more than news."""
     failure: FailureKind | None = None
     detail: str = ""
     """Of a failure: a traceback, or one line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Resources:
+    """What a Ray cluster sets aside for each worker."""
+
+    num_cpus: float = 1.0
+    num_gpus: float = 0.0
+    """May be a part of one."""
 
 
 class Pool(Protocol):
     """Where jobs are done, in any order."""
 
     capacity: int
-    """Jobs that it takes before an answer must be fetched."""
+    """Jobs that it takes before one must have ended."""
 
     def submit(self, job: Job) -> None:
         """Takes a job."""
 
     def next_answer(self) -> Answer:
-        """Waits for the answer of some job. Call only while a submitted job is unanswered."""
+        """Waits for what some job says next. Call only while a submitted job has not ended."""
 
     def __enter__(self) -> "Pool":
         """Nothing."""
@@ -86,6 +99,8 @@ def open_pool(
     num_workers: int,
     timeout_s: float,
     ray_address: str | None = None,
+    resources: Resources | None = None,
+    max_losses: int = MAX_LOSSES,
 ) -> Pool:
     """Workers, to be used in a `with` statement.
 
@@ -94,8 +109,10 @@ def open_pool(
         settings: What the factory is called with.
         engine: Processes of this machine, or Ray actors.
         num_workers: 0 works in this process (engine `local` only), where nothing is contained but exceptions.
-        timeout_s: After which a job is given up.
+        timeout_s: After which a job that has said nothing is given up.
         ray_address: Of a cluster; default: one on this machine.
+        resources: Of each worker, for engine `ray`; default: a CPU.
+        max_losses: Workers that a job may lose before it is given up.
 
     Raises:
         EngineError: Ray is not installed or not to be reached.
@@ -108,11 +125,13 @@ def open_pool(
     if engine == "ray":
         from evonav.parallel_ray import RayHost
 
-        host = RayHost(work, settings, num_workers, ray_address)
-        return WorkerPool(host, min(num_workers, host.max_workers), timeout_s)
+        host = RayHost(work, settings, num_workers, ray_address, resources or Resources())
+        return WorkerPool(host, min(num_workers, host.max_workers), timeout_s, max_losses)
     if num_workers == 0:
         return InlinePool(work, settings)
-    return WorkerPool(ProcessHost(work, settings), num_workers, timeout_s)
+    from evonav.parallel_local import ProcessHost
+
+    return WorkerPool(ProcessHost(work, settings), num_workers, timeout_s, max_losses)
 
 
 class WorkerLostError(EngineError):
@@ -120,13 +139,17 @@ class WorkerLostError(EngineError):
 
 
 class Worker(Protocol):
-    """The pool's side of a worker. It says `ready` once, and then one thing a job."""
+    """The pool's side of a worker. It says `ready` once, and then what its jobs say."""
 
     def send(self, text: str) -> None:
         """Gives it a job; the loss of the worker shows in `receive`."""
 
     def receive(self) -> tuple[str, str]:
-        """`("ready", "")`, `("done", answer)` or `("error", traceback)`; there is something to receive.
+        """What it says next; there is something to receive.
+
+        Returns:
+            `("ready", "")`; of a job `("alive", "")`, `("news", text)`, and at its end `("done", answer)` or
+            `("error", traceback)`; or `("broken", traceback)` where the factory has failed.
 
         Raises:
             WorkerLostError: There will be no more.
@@ -156,25 +179,29 @@ class InlinePool:
 
     def __init__(self, work: str, settings: str) -> None:
         """Makes what does the jobs."""
-        self._function = load_work(work, settings)
-        self._queue: deque[Job] = deque()
+        self._work = load_work(work, settings, lambda: None)
+        self._key = 0
+        self._job: Generator[tuple[str, str]] | None = None
 
     def submit(self, job: Job) -> None:
         """Takes a job."""
-        self._queue.append(job)
+        self._key, self._job = job.key, steps(self._work, job.text)
 
     def next_answer(self) -> Answer:
-        """Does the oldest job."""
-        job = self._queue.popleft()
-        kind, text = do(self._function, job.text)
-        return Answer(job.key, text) if kind == "done" else Answer(job.key, failure="error", detail=text)
+        """Does the job until it says something."""
+        assert self._job is not None, "`submit` comes first"
+        kind, text = next(self._job)
+        return _answer(self._key, kind, text)
 
     def __enter__(self) -> "InlinePool":
         """Nothing."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Nothing."""
+        """Ends what the job is at."""
+        if self._job is not None:
+            self._job.close()
+        end_work(self._work)
 
 
 class _Slot:
@@ -194,12 +221,13 @@ class _Slot:
 class WorkerPool:
     """Jobs on workers, each of which has one at a time."""
 
-    def __init__(self, host: Host, num_workers: int, timeout_s: float) -> None:
+    def __init__(self, host: Host, num_workers: int, timeout_s: float, max_losses: int) -> None:
         """Starts nothing yet."""
         self.capacity = 2 * num_workers  # one at work and one waiting, so that no worker ever does
         self._host = host
         self._num_workers = num_workers
         self._timeout_s = timeout_s
+        self._max_losses = max_losses
         self._queue: deque[Job] = deque()
         self._answers: deque[Answer] = deque()
         self._slots: list[_Slot] = []
@@ -212,7 +240,7 @@ class WorkerPool:
         self._assign()
 
     def next_answer(self) -> Answer:
-        """Waits for the answer of some job."""
+        """Waits for what some job says next."""
         while not self._answers:
             self._assign()
             busy = [slot for slot in self._slots if not slot.is_idle]
@@ -228,7 +256,9 @@ class WorkerPool:
         return self._answers.popleft()
 
     def _limit_s(self, slot: _Slot) -> float:
-        return self._timeout_s if slot.is_ready else START_TIMEOUT_S
+        if slot.job is None:
+            return START_TIMEOUT_S
+        return self._timeout_s if slot.job.timeout_s is None else slot.job.timeout_s
 
     def _assign(self) -> None:
         idle = [slot for slot in self._slots if slot.is_idle]
@@ -245,12 +275,18 @@ class WorkerPool:
         except WorkerLostError as error:
             self._lose(slot, str(error))
             return
+        slot.since_s = time.monotonic()
+        if kind == "broken":
+            raise EngineError(f"workers do not start: {text.strip().splitlines()[-1]}")
         if kind == "ready":
             slot.is_ready = True
             self._num_failed_starts = 0
-        elif slot.job is not None:
-            key, slot.job = slot.job.key, None
-            self._answers.append(Answer(key, text) if kind == "done" else Answer(key, failure="error", detail=text))
+        elif slot.job is not None and kind != "alive":
+            answer = _answer(slot.job.key, kind, text)
+            self._answers.append(answer)
+            if answer.is_end:
+                self._losses.pop(answer.key, None)
+                slot.job = None
 
     def _lose(self, slot: _Slot, message: str) -> None:
         self._close(slot)
@@ -261,16 +297,17 @@ class WorkerPool:
         if slot.job is None:
             return
         self._losses[slot.job.key] += 1
-        if self._losses[slot.job.key] <= MAX_LOSSES:
+        if self._losses[slot.job.key] <= self._max_losses:
             self._queue.appendleft(slot.job)
         else:
+            del self._losses[slot.job.key]
             self._answers.append(Answer(slot.job.key, failure="crash", detail=message))
 
     def _give_up(self, slot: _Slot) -> None:
         self._close(slot)
         if slot.job is None:
             raise EngineError(f"a worker was not ready within {START_TIMEOUT_S:g} s")
-        detail = f"not done within {self._timeout_s:g} s"
+        detail = f"not done within {self._limit_s(slot):g} s"
         self._answers.append(Answer(slot.job.key, failure="timeout", detail=detail))
 
     def _close(self, slot: _Slot) -> None:
@@ -288,125 +325,60 @@ class WorkerPool:
         self._host.close()
 
 
-def load_work(work: str, settings: str) -> Callable[[str], str]:
+def load_work(work: str, settings: str, alive: Callable[[], None]) -> Work:
     """What a worker does."""
     module, _, factory = work.partition(":")
-    function: Callable[[str], str] = getattr(importlib.import_module(module), factory)(settings)
+    function: Work = getattr(importlib.import_module(module), factory)(settings, alive)
     return function
 
 
-def do(function: Callable[[str], str], text: str) -> tuple[str, str]:
-    """A job's answer, or the traceback of what it raised."""
+def end_work(work: Work) -> None:
+    """Lets what does the jobs give back what it holds."""
+    close = getattr(work, "close", None)
+    if close is not None:
+        close()
+
+
+def steps(work: Work, text: str) -> Generator[tuple[str, str]]:
+    """What a job says: its news, then its answer or the traceback of what it raised."""
     try:
-        return "done", function(text)
+        said = work(text)
+        if isinstance(said, str):
+            answer = said
+        else:
+            with closing(said):
+                answer = yield from _news(said)
     except Exception:
-        return "error", traceback.format_exc()
+        yield "error", traceback.format_exc()
+    else:
+        yield "done", answer
 
 
-class ProcessHost:
-    """Processes of this machine."""
-
-    def __init__(self, work: str, settings: str) -> None:
-        """Starts nothing yet."""
-        self._work, self._settings = work, settings
-
-    def start(self) -> "WorkerProcess":
-        """Another process."""
-        return WorkerProcess(self._work, self._settings)
-
-    def wait(self, workers: Sequence[Worker], timeout_s: float) -> Sequence[Worker]:
-        """Those with something to receive."""
-        connections = {worker.connection: worker for worker in workers if isinstance(worker, WorkerProcess)}
-        return [connections[ready] for ready in wait(list(connections), timeout_s) if isinstance(ready, Connection)]
-
-    def close(self) -> None:
-        """Nothing is left."""
-
-
-class WorkerProcess:
-    """A process that works until its parent hangs up or dies."""
-
-    def __init__(self, work: str, settings: str) -> None:
-        """Starts it."""
-        context = multiprocessing.get_context("spawn")
-        self.connection, far_end = context.Pipe()
-        with one_thread_each():
-            self._process = context.Process(target=_serve, args=(far_end, work, settings), daemon=True)
-            self._process.start()
-        far_end.close()
-
-    def send(self, text: str) -> None:
-        """Gives it a job."""
-        with suppress(BrokenPipeError):
-            self.connection.send_bytes(text.encode())
-
-    def receive(self) -> tuple[str, str]:
-        """What it says next."""
+def _news(said: Generator[str, None, str]) -> Generator[tuple[str, str], None, str]:
+    while True:
         try:
-            kind, _, text = self.connection.recv_bytes().decode().partition(" ")
-        except (EOFError, OSError):
-            raise WorkerLostError(f"the worker process died ({cause_of_death(self._process)})") from None
-        return kind, text
-
-    def close(self) -> None:
-        """Ends it at once."""
-        end_process(self._process, self.connection)
+            text = next(said)
+        except StopIteration as end:
+            answer: str = end.value
+            return answer
+        yield "news", text
 
 
-def _serve(connection: Connection, work: str, settings: str) -> None:
-    """A worker's life: jobs in, answers out."""
-    end_with_parent()
-    with suppress(EOFError, OSError):  # of the connection: the parent hung up
-        function = load_work(work, settings)
-        connection.send_bytes(b"ready ")
-        while True:
-            kind, text = do(function, connection.recv_bytes().decode())
-            connection.send_bytes(f"{kind} {text}".encode())
+def _answer(key: int, kind: str, text: str) -> Answer:
+    if kind == "error":
+        return Answer(key, failure="error", detail=text)
+    return Answer(key, text, is_end=kind == "done")
 
 
-def end_with_parent() -> None:
-    """Makes a child leave interrupts to its parent, and end with it by way of every `finally`."""
+@dataclass(slots=True)
+class Pulse:
+    """A worker's `alive`: passes on one sign of life in a while."""
 
-    def end(number: int, _: object) -> None:
-        raise SystemExit(128 + number)
+    tell: Callable[[], None]
+    told_s: float = field(default_factory=time.monotonic)
 
-    def watch() -> None:
-        parent = multiprocessing.parent_process()
-        if parent is not None:
-            parent.join()
-            os.kill(os.getpid(), signal.SIGTERM)
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, end)
-    threading.Thread(target=watch, daemon=True).start()
-
-
-def cause_of_death(process: multiprocessing.process.BaseProcess) -> str:
-    """How a process ended that has hung up."""
-    process.join(timeout=5.0)
-    code = process.exitcode
-    return f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
-
-
-def end_process(process: multiprocessing.process.BaseProcess, connection: Connection) -> None:
-    """Hangs up on a child and ends it; safe to call twice."""
-    connection.close()
-    if process.is_alive():
-        process.terminate()
-        process.join(timeout=2.0)
-        if process.is_alive():
-            process.kill()
-    process.join(timeout=5.0)
-
-
-@contextmanager
-def one_thread_each() -> Iterator[None]:
-    """Gives children that are started inside one thread each: the parallelism is over jobs."""
-    names = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-    added = [name for name in names if name not in os.environ]
-    os.environ.update(dict.fromkeys(added, "1"))
-    try:
-        yield
-    finally:
-        for name in added:
-            del os.environ[name]
+    def __call__(self) -> None:
+        """The job goes on."""
+        if time.monotonic() - self.told_s >= SIGN_OF_LIFE_S:
+            self.told_s = time.monotonic()
+            self.tell()

@@ -124,7 +124,7 @@ def test_a_worker_that_is_lost_costs_its_episode_alone(tasks, tmp_path, agent, k
         stage_timeout_s=8.0 if kind is ErrorKind.TIMEOUT else 600.0,
         hosting=AgentHosting(is_in_process=True),
     )
-    evaluate([agent, "toy_agents:Idle"], tasks[:1], tmp_path / "run", config=config, num_workers=1)
+    evaluate([agent, "toy_agents:Idle"], tasks[:1], tmp_path / "run", config=config, num_workers=1, num_retries=0)
     assert all(record.is_scored for record in records(tmp_path / "run", "toy_agents:Idle"))
     stages = records(tmp_path / "run", agent)
     assert [record.state for record in stages[1:]] == [EndState.ERRORED, EndState.NOT_RUN]

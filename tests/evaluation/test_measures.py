@@ -116,7 +116,7 @@ def test_costs_come_from_the_side_table_and_never_from_records(tmp_path):
         (row,) = stage_rows(store)
         assert "1.5" not in next(iter(store.record_texts()))
     assert (row.wall_s, row.cpu_s, row.agent_wall_s, row.input_tokens, row.cost_usd) == (2.0, 1.0, 1.5, 7, None)
-    assert row.num_simulator_restarts == 0
+    assert row.num_retries == 0
 
 
 def test_measures_of_another_version_or_none_are_derived_again(tmp_path):

@@ -7,10 +7,9 @@ from test_engine import CONFIG, records, texts
 from toy_house import write_tasks
 
 from evonav.evaluation.backend import Backend
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.engine import NUM_RETRIES, RunConfig, evaluate, task_files
 from evonav.evaluation.records import EndState, ErrorKind
 from evonav.evaluation.store import RunStore
-from evonav.evaluation.workers import MAX_SIMULATOR_RESTARTS
 from evonav.report.run import load_run
 
 AGENT = "random-walk"  # what it does depends on all that it did before
@@ -33,9 +32,10 @@ def flaky(folder, **options):
     return RunConfig(backend=backend, protocol=CONFIG.protocol)
 
 
-def restarts(run_dir):
+def retries(run_dir):
     with RunStore(run_dir) as store:
-        return store.simulator_restarts()
+        assert all(one.kind is ErrorKind.SIMULATOR_LOST for one in store.failures())
+        return store.retries()
 
 
 @pytest.mark.parametrize("num_workers", [0, 1])
@@ -47,9 +47,9 @@ def test_a_stage_is_tried_again_from_the_state_in_which_it_began(tasks, tmp_path
     (summary,) = evaluate([AGENT], tasks, tmp_path / "run", config=config, num_workers=num_workers)
     assert not summary.is_incomplete
     assert texts(tmp_path / "run") == texts(tmp_path / "whole")
-    assert restarts(tmp_path / "run") == {(AGENT, tasks[0].task_id, stage): num_losses}
-    assert restarts(tmp_path / "whole") == {}
-    assert load_run(tmp_path / "run").num_simulator_restarts == num_losses
+    assert retries(tmp_path / "run") == {(AGENT, tasks[0].task_id, stage): num_losses}
+    assert retries(tmp_path / "whole") == {}
+    assert load_run(tmp_path / "run").retries == {"simulator_lost": num_losses}
     assert len((tmp_path / "starts" / "starts").read_text()) == 1 + num_losses
 
 
@@ -62,8 +62,8 @@ def test_restarts_are_bounded(tasks, tmp_path):
     assert (second.state, second.error.kind) == (EndState.ERRORED, ErrorKind.SIMULATOR_LOST)
     assert "the process is gone" in second.error.message
     assert third.state is EndState.NOT_RUN
-    assert restarts(tmp_path / "run") == {(AGENT, tasks[0].task_id, 2): MAX_SIMULATOR_RESTARTS}
-    assert len((tmp_path / "starts" / "starts").read_text()) == 1 + MAX_SIMULATOR_RESTARTS
+    assert retries(tmp_path / "run") == {(AGENT, tasks[0].task_id, 2): NUM_RETRIES}
+    assert len((tmp_path / "starts" / "starts").read_text()) == 1 + NUM_RETRIES
 
 
 def test_stages_forgotten_are_forgotten_with_their_restarts(tasks, tmp_path):
@@ -71,17 +71,17 @@ def test_stages_forgotten_are_forgotten_with_their_restarts(tasks, tmp_path):
     evaluate([AGENT], tasks, tmp_path / "run", config=config, num_workers=0)
     with RunStore(tmp_path / "run") as store:
         store.forget_episode(AGENT, tasks[0].task_id, 3)
-        assert len(store.simulator_restarts()) == 1
+        assert len(store.failures()) == 1
         store.forget_episode(AGENT, tasks[0].task_id, 2)
-        assert store.simulator_restarts() == {}
+        assert store.failures() == []
 
 
-def test_runs_from_before_restarts_were_counted_are_read(tasks, tmp_path):
+def test_runs_from_before_failures_were_kept_are_read(tasks, tmp_path):
     evaluate([AGENT], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
     with sqlite3.connect(tmp_path / "run" / "records.sqlite") as database:
-        database.execute("DROP TABLE simulator_restarts")
+        database.execute("DROP TABLE failures")
     database.close()
-    assert load_run(tmp_path / "run").num_simulator_restarts == 0
+    assert load_run(tmp_path / "run").retries == {}
 
 
 def test_means_of_the_machine_do_not_make_another_run(tasks, tmp_path):

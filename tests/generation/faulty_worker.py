@@ -8,10 +8,10 @@ from pathlib import Path
 from evonav.generation import worker
 
 
-def make_worker(settings):
+def make_worker(settings, alive):
     """As `evonav.generation.worker.make_worker`."""
     faults = json.loads(os.environ["EVONAV_TEST_FAULTS"])
-    work = worker.make_worker(settings)
+    work = worker.make_worker(settings, alive)
 
     def faulty(text):
         index, _ = json.loads(text.partition("\n")[0])

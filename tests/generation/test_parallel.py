@@ -9,7 +9,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.parallel import EngineError, Job, open_pool
 
 
-def make_echo(settings):
+def make_echo(settings, alive):
     """A worker that answers with its settings and the job."""
 
     def echo(text):
@@ -20,7 +20,7 @@ def make_echo(settings):
     return echo
 
 
-def make_nothing(settings):
+def make_nothing(settings, alive):
     """A worker that does not start."""
     raise SystemExit(3)
 

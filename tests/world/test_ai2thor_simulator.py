@@ -227,9 +227,8 @@ def test_an_evaluation_outlives_its_simulators_process(tmp_path: Path) -> None:
             evaluate(["ftu"], tasks, tmp_path / name, config=config, num_workers=0)
     with RunStore(tmp_path / "whole") as one, RunStore(tmp_path / "killed") as other:
         assert list(one.record_texts()) == list(other.record_texts())
-        assert one.simulator_restarts() == {}
-        assert list(other.simulator_restarts().values()) == [1]
-        assert [stage for _, _, stage in other.simulator_restarts()] == [2]
+        assert one.failures() == []
+        assert [(lost.stage, lost.is_retried) for lost in other.failures()] == [(2, True)]
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])

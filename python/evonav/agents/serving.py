@@ -140,9 +140,9 @@ class _Server:
         try:
             parts: dict[str, str] = getattr(self, f"do_{operation}")(*arguments)
         except DecisionError as error:
-            return {"failed": json.dumps(["decision", wire.clean(str(error))])}
+            return {"failed": _failed("decision", wire.clean(str(error)), error)}
         except Exception as error:
-            return {"failed": json.dumps(["agent", wire.describe(error)])}
+            return {"failed": _failed("agent", wire.describe(error), error)}
         return parts
 
     @property
@@ -185,9 +185,9 @@ class _Server:
                 # What it said before belongs to that round's record.
                 parts["told"] = wire.diagnostics_json(told)
             except DecisionError as error:
-                parts["told_failed"] = json.dumps(["decision", wire.clean(str(error))])
+                parts["told_failed"] = _failed("decision", wire.clean(str(error)), error)
             except Exception as error:
-                parts["told_failed"] = json.dumps(["agent", wire.describe(error)])
+                parts["told_failed"] = _failed("agent", wire.describe(error), error)
         else:
             parts["told"] = wire.diagnostics_json(RoundDiagnostics())
         return parts
@@ -199,6 +199,10 @@ class _Server:
 
     def _sensing(self) -> dict[str, str]:
         return {"sensing": wire.sensing_json(self.agent.sensing)}
+
+
+def _failed(kind: str, message: str, error: Exception) -> str:
+    return json.dumps([kind, message, wire.traceback_of(error)])
 
 
 def _limit_memory(memory_mb: int) -> None:

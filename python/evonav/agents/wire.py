@@ -7,6 +7,7 @@ are the same. Nothing here trusts what it reads.
 import json
 import math
 import re
+import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from types import TracebackType
@@ -34,6 +35,8 @@ MAX_DEPTH = 32
 """Of lists and dictionaries in each other."""
 MAX_MESSAGE = 2000
 """Characters of an error's message that are kept."""
+MAX_TRACEBACK = 20_000
+"""Characters of a traceback that are kept: the last."""
 NUM_FRAMES = 3
 """Of a traceback, the innermost ones."""
 
@@ -55,6 +58,14 @@ def describe(error: BaseException) -> str:
     text = clean(text if len(text) <= MAX_MESSAGE else text[:MAX_MESSAGE] + " ...")
     places = _places(error.__traceback__)
     return f"{text} [{' > '.join(places)}]" if places else text
+
+
+def traceback_of(error: BaseException) -> str:
+    """All of an exception, for the one who looks for its cause; not the same wherever it was raised."""
+    try:
+        return clean("".join(traceback.format_exception(error)))[-MAX_TRACEBACK:]
+    except Exception:  # of a message that cannot be read
+        return f"{type(error).__name__}"
 
 
 def _places(trace: TracebackType | None) -> list[str]:

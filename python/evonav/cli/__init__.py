@@ -8,6 +8,7 @@ from evonav.cli.check_agent import check_agent
 from evonav.cli.compare import compare
 from evonav.cli.controlled import controlled_app
 from evonav.cli.evaluate import demo, evaluate, report, strip
+from evonav.cli.failures import failures
 from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
 from evonav.cli.mock_vlm import mock_vlm
@@ -30,6 +31,7 @@ COMMANDS = (
     evaluate,
     sweep,
     demo,
+    failures,
     report,
     compare,
     paper,

@@ -63,6 +63,22 @@ def print_table(summaries: "list[AgentSummary]") -> None:
             typer.echo(f"incomplete: {summary.agent} has {summary.n} of {summary.num_stages} stages ({states})")
 
 
+def print_failures(run: Path) -> None:
+    """How often attempts at stages have failed, if any has, and where to read why."""
+    from collections import Counter
+
+    from evonav.evaluation.store import RunStore
+
+    with RunStore(run) as store:
+        failures = store.failures()
+    for is_retried, what in ((True, "tried again"), (False, "errored")):
+        kinds = Counter(failure.kind.value for failure in failures if failure.is_retried is is_retried)
+        if kinds:
+            typer.echo(f"stages {what}: {', '.join(f'{count} after {kind}' for kind, count in sorted(kinds.items()))}")
+    if failures:
+        typer.echo(f"why: evonav failures {run}")
+
+
 def _percent(value: float | None) -> str:
     return "-" if value is None else f"{100 * value:.1f}"
 

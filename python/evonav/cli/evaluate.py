@@ -16,7 +16,7 @@ from evonav.cli.decision_options import (
     with_decision_options,
     with_decisions,
 )
-from evonav.cli.display import generation_progress, interruptible, print_table, progress, status
+from evonav.cli.display import generation_progress, interruptible, print_failures, print_table, progress, status
 from evonav.cli.options import (
     EXIT_INCOMPLETE,
     HEURISTICS,
@@ -25,11 +25,15 @@ from evonav.cli.options import (
     Agents,
     AgentTimeout,
     AnyAsset,
+    Engine,
+    EngineOption,
     Houses,
     InProcess,
     Limit,
     OneAgent,
     Out,
+    RayAddress,
+    Retries,
     Seed,
     SimulatorName,
     Subset,
@@ -41,7 +45,9 @@ from evonav.cli.options import (
     ThorPlatform,
     ThorTimeout,
     Which,
+    WorkerGpus,
     Workers,
+    check_engine,
     count_of,
 )
 from evonav.cli.view import make_pages
@@ -53,6 +59,8 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from evonav.evaluation.backend import Backend
     from evonav.evaluation.engine import RunConfig, TaskFile
     from evonav.evaluation.metrics import AgentSummary
+
+NUM_RETRIES = 2
 
 
 @with_decision_options
@@ -67,6 +75,10 @@ def evaluate(
     subset: Subset = None,
     seed: Seed = 0,
     workers: Workers = None,
+    engine: Engine = EngineOption.LOCAL,
+    ray_address: RayAddress = None,
+    worker_gpus: WorkerGpus = 0.0,
+    retries: Retries = NUM_RETRIES,
     retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
     in_process: InProcess = False,
     agent_timeout: AgentTimeout = None,
@@ -85,6 +97,7 @@ def evaluate(
         raise typer.BadParameter("give --houses or --tasks, not both")
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")
+    check_engine(engine, ray_address, worker_gpus)
     num_workers = count_of(workers)
     backend = _backend(
         simulator,
@@ -104,8 +117,16 @@ def evaluate(
         if decisions.dry_run:
             print_estimate(decisions, _names(names, agent or ()), task_files, config, num_workers)
             return
-        summaries = _evaluate(out, names, task_files, config, num_workers, retry_errored, agent or ())
+        crew: dict[str, Any] = {
+            "engine": engine.value,
+            "ray_address": ray_address,
+            "num_gpus": worker_gpus,
+            "num_retries": retries,
+            "retry_errored": retry_errored,
+        }
+        summaries = _evaluate(out, _names(names, agent or ()), task_files, config, num_workers, **crew)
     print_table(summaries)
+    print_failures(out)
     print_spending(out)
     _exit(summaries)
 
@@ -126,8 +147,9 @@ def demo(
         if decisions.dry_run:
             print_estimate(decisions, _names(agents, ()), task_files, config, num_workers)
             return
-        summaries = _evaluate(out, agents, task_files, config, num_workers, retry_errored=False)
+        summaries = _evaluate(out, _names(agents, ()), task_files, config, num_workers)
     print_table(summaries)
+    print_failures(out)
     print_spending(out)
     _, index = make_pages(out)
     _report(out)
@@ -204,27 +226,30 @@ def _names(agents: str, more: "Sequence[str]") -> list[str]:
 
 def _evaluate(
     out: Path,
-    agents: str,
+    agents: "Sequence[str]",
     task_files: "list[TaskFile]",
     config: "RunConfig",
     num_workers: int,
-    retry_errored: bool,
-    more: "Sequence[str]" = (),
+    *,
+    num_gpus: float = 0.0,
+    **crew: Any,  # noqa: ANN401 - of `evaluate`
 ) -> "list[AgentSummary]":
     from evonav.evaluation.engine import evaluate
+    from evonav.parallel import Resources
 
     with interruptible(out):
         with status("Starting the simulator"):
             config.backend.check()
         with progress() as show:
             return evaluate(
-                _names(agents, more),
+                agents,
                 task_files,
                 out,
                 config=config,
                 num_workers=num_workers,
-                retry_errored=retry_errored,
+                resources=Resources(num_gpus=num_gpus),
                 on_progress=show,
+                **crew,
             )
 
 

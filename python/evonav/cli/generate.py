@@ -6,7 +6,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import generation_progress, interruptible
-from evonav.cli.options import HOUSES, AnyAsset, EngineOption, Limit, Seed, Subset, Workers, count_of
+from evonav.cli.options import (
+    HOUSES,
+    AnyAsset,
+    Engine,
+    EngineOption,
+    Limit,
+    RayAddress,
+    Seed,
+    Subset,
+    Workers,
+    check_engine,
+    count_of,
+)
 
 if TYPE_CHECKING:
     from evonav.generation.engine import GenerationSummary
@@ -28,8 +40,8 @@ def generate(
         str | None, typer.Option(help="Numbers of stages to draw from, comma-separated; the paper's: 3,4,5.")
     ] = None,
     workers: Workers = None,
-    engine: Annotated[EngineOption, typer.Option(help="Processes here, or Ray.")] = EngineOption.LOCAL,
-    ray_address: Annotated[str | None, typer.Option(help="Of a Ray cluster that shares this file system.")] = None,
+    engine: Engine = EngineOption.LOCAL,
+    ray_address: RayAddress = None,
     house_timeout: Annotated[float, typer.Option(min=1.0, help="Seconds after which a house is given up.")] = 120.0,
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Do houses again at which the generator failed.")
@@ -44,8 +56,7 @@ def generate(
     from evonav.generation.engine import Workforce, generate_dataset
     from evonav.generation.worker import GenerationOptions
 
-    if ray_address is not None and engine is not EngineOption.RAY:
-        raise typer.BadParameter("--ray-address is for --engine ray")
+    check_engine(engine, ray_address)
     dataset, inherited_split = inherited_names(houses)
     options = GenerationOptions(
         seed=seed,

@@ -34,9 +34,9 @@ Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-
 Subset = Annotated[str | None, typer.Option(help="Named subset, SPLIT-N, such as test-90 (docs/tasks.md).")]
 Seed = Annotated[int, typer.Option(min=0, help="Decides everything random.")]
 Workers = Annotated[int | None, typer.Option(min=0, help="Processes; default: one a core. 0: in this process.")]
-AnyAsset = Annotated[
-    bool,
-    typer.Option("--allow-unknown-assets", help="Objaverse houses: unknown assets get their category's usual size."),
+Retries = Annotated[
+    int,
+    typer.Option(min=0, help="How often a stage is tried again that lost its worker, simulator or agent's process."),
 ]
 
 
@@ -45,6 +45,28 @@ class EngineOption(str, Enum):
 
     LOCAL = "local"
     RAY = "ray"
+
+
+Engine = Annotated[EngineOption, typer.Option(help="Processes here, or Ray.")]
+RayAddress = Annotated[str | None, typer.Option(help="Of a Ray cluster that shares this file system.")]
+WorkerGpus = Annotated[
+    float,
+    typer.Option(min=0.0, help="Ray: GPUs set aside for each worker, such as 0.5; for perception that needs one."),
+]
+
+
+def check_engine(engine: EngineOption, ray_address: str | None, worker_gpus: float = 0.0) -> None:
+    """Refuses options of Ray without it."""
+    if engine is not EngineOption.RAY:
+        for name, is_given in (("--ray-address", ray_address is not None), ("--worker-gpus", worker_gpus > 0.0)):
+            if is_given:
+                raise typer.BadParameter(f"{name} is for --engine ray")
+
+
+AnyAsset = Annotated[
+    bool,
+    typer.Option("--allow-unknown-assets", help="Objaverse houses: unknown assets get their category's usual size."),
+]
 
 
 class SimulatorName(str, Enum):

@@ -88,11 +88,14 @@ class OutputLog:
         self._thread.join(timeout=1.0)
 
     def _run(self) -> None:
-        with suppress(OSError), os.fdopen(self._reader, "rb") as output:
+        with os.fdopen(self._reader, "rb") as output:
             first = output.readline(_MAX_LINE_BYTES)
-            if first:  # no file where nothing is said
-                with self._path.open("ab", buffering=0) as file:
-                    self._copy(first, output, file)
+            with suppress(OSError):  # no such folder on this machine of a cluster, or a disk that is full
+                if first:  # no file where nothing is said
+                    with self._path.open("ab", buffering=0) as file:
+                        self._copy(first, output, file)
+            while output.read(_MAX_LINE_BYTES):  # an agent that prints is not to fail of it
+                pass
 
     def _copy(self, line: bytes, output: BinaryIO, file: BinaryIO) -> None:
         while line:

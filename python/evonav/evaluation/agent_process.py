@@ -30,7 +30,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.agent_channel import OutputLog, SharedBlock
 from evonav.evaluation.protocol import AgentFailedError
 from evonav.evaluation.records import ErrorKind
-from evonav.parallel import one_thread_each
+from evonav.parallel_local import one_thread_each
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
 
@@ -391,6 +391,8 @@ def check_importable(name: str) -> None:
 
 def _failure(said: object) -> AgentFailedError:
     """The failure that a process says its agent had."""
-    if isinstance(said, list) and len(said) == 2 and said[0] in ("agent", "decision") and isinstance(said[1], str):
-        return AgentFailedError(ErrorKind(said[0]), said[1])
+    if isinstance(said, list) and len(said) == 3 and all(isinstance(part, str) for part in said):
+        kind, message, traceback = said
+        if kind in ("agent", "decision"):
+            return AgentFailedError(ErrorKind(kind), message, traceback[-wire.MAX_TRACEBACK :])
     return AgentFailedError(ErrorKind.AGENT, "it failed and did not say how")

@@ -34,4 +34,4 @@ class StageCosts:
     """By the prices given; `None` without."""
     agent_peak_rss_mb: float | None = None
     """Of the agent's process, at its most so far: it serves many episodes."""
-    num_simulator_restarts: int | None = None
+    num_retries: int | None = None

@@ -2,7 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,20 +13,29 @@ from evonav.errors import InvalidArgumentError, TaskError
 from evonav.evaluation.agent_process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.backend import Backend, check_agent_name
 from evonav.evaluation.metrics import AgentSummary, paired_differences, summarise, summary_json
-from evonav.evaluation.protocol import (
-    EpisodeCase,
-    ProtocolConfig,
-    StageOutcome,
-    as_errored,
-    as_not_run,
-    unknown_case,
-)
-from evonav.evaluation.records import EndState, ErrorKind, StageRecord
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records import EndState
+from evonav.evaluation.running import Progress, Run, TaskFile, run_all
 from evonav.evaluation.store import RunStore
-from evonav.evaluation.workers import EpisodeJob, JobEvent, run_here, run_in_workers
+from evonav.evaluation.workers import WORK, EpisodeJob, Setup
 from evonav.folders import check_same_run, write_atomically, writing
-from evonav.parallel import EngineName
+from evonav.parallel import EngineName, Resources, open_pool
 from evonav.tasks.files import task_roots
+
+__all__ = [
+    "NUM_RETRIES",
+    "Progress",
+    "RunConfig",
+    "RunRequest",
+    "TaskFile",
+    "agent_seed",
+    "evaluate",
+    "evaluate_all",
+    "run_identity",
+    "task_file",
+    "task_files",
+    "write_summary",
+]
 
 SUMMARY_NAME = "summary.json"
 NUM_RETRIES = 2
@@ -47,17 +57,6 @@ class RunConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class TaskFile:
-    """A task of a run."""
-
-    task_id: str
-    path: Path
-    num_stages: int
-    digest: str
-    """Of `task.json`, which holds the checksums of all other files."""
-
-
-@dataclass(frozen=True, slots=True)
 class RunRequest:
     """Agents x tasks into one folder: a run, or a cell of a sweep."""
 
@@ -65,16 +64,6 @@ class RunRequest:
     tasks: tuple[TaskFile, ...]
     run_dir: Path
     config: RunConfig = field(default_factory=RunConfig)
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a run is."""
-
-    num_done: int
-    """Recorded stages, those of earlier calls included."""
-    num_stages: int
-    latest: StageRecord | None
 
 
 def task_files(directory: Path, limit: int | None = None) -> list[TaskFile]:
@@ -111,6 +100,7 @@ def evaluate(
     engine: EngineName = "local",
     num_workers: int = 1,
     ray_address: str | None = None,
+    resources: Resources | None = None,
     num_retries: int = NUM_RETRIES,
     retry_errored: bool = False,
     on_progress: Callable[[Progress], None] = lambda _: None,
@@ -125,6 +115,7 @@ def evaluate(
         engine: As for `evaluate_all`, like all that follows.
         num_workers: 0 runs everything in this process.
         ray_address: Of a cluster.
+        resources: Of the cluster, for each worker; default: a CPU.
         num_retries: A stage.
         retry_errored: Run errored stages again, and those that were not run because of them.
         on_progress: Called after every recorded stage.
@@ -135,7 +126,7 @@ def evaluate(
     Raises:
         InvalidArgumentError: An agent is unknown, or asked for twice.
         StoreError: The folder holds a run of another configuration or cannot be written.
-        TaskError: A task is malformed.
+        EngineError: Workers cannot be had.
     """
     request = RunRequest(tuple(agents), tuple(tasks), run_dir, config or RunConfig())
     (summaries,) = evaluate_all(
@@ -143,6 +134,7 @@ def evaluate(
         engine=engine,
         num_workers=num_workers,
         ray_address=ray_address,
+        resources=resources,
         num_retries=num_retries,
         retry_errored=retry_errored,
         on_progress=lambda _, news: on_progress(news),
@@ -156,6 +148,7 @@ def evaluate_all(
     engine: EngineName = "local",
     num_workers: int = 1,
     ray_address: str | None = None,
+    resources: Resources | None = None,
     num_retries: int = NUM_RETRIES,
     retry_errored: bool = False,
     on_progress: Callable[[int, Progress], None] = lambda _, __: None,
@@ -167,7 +160,9 @@ def evaluate_all(
         engine: Processes of this machine, or Ray actors.
         num_workers: Processes or actors; 0 runs everything in this process.
         ray_address: Of a cluster; default: one on this machine.
-        num_retries: How often a stage is tried again that lost its worker, its simulator or its agent's process.
+        resources: Of the cluster, for each worker; default: a CPU.
+        num_retries: How often a stage is tried again that lost its worker, its simulator or its agent's process, or at
+            which evonav itself failed. Each time is kept, see `RunStore.failures`.
         retry_errored: Run errored stages again, and those that were not run because of them.
         on_progress: Called with the index of a request as it begins and after each of its recorded stages.
 
@@ -177,39 +172,76 @@ def evaluate_all(
     Raises:
         InvalidArgumentError: An agent is unknown or asked for twice, or two requests have one folder.
         StoreError: A folder holds a run of another configuration or cannot be written.
-        TaskError: A task is malformed.
+        EngineError: Workers cannot be had.
     """
     folders = [request.run_dir.absolute() for request in requests]
     if len(set(folders)) != len(folders):
         raise InvalidArgumentError("two runs are asked for in one folder")
-    hostings = [_hosting(request, num_workers) for request in requests]
-    for request, hosting in zip(requests, hostings, strict=True):
-        _check_request(request.agents, request.tasks, num_workers, hosting)
-    for index, request in enumerate(requests):
-        agents, tasks, run_dir, config = request.agents, request.tasks, request.run_dir, request.config
-        with writing(run_dir), RunStore(run_dir, create=True) as store:
-            _claim(store, run_dir, tasks, config)
-            store.set_meta("agents", sorted({*(store.meta("agents") or []), *agents}))
-            store.set_meta("tasks_dir", str(tasks[0].path.absolute().parent))  # for `evonav view`
-            run = _Run(store, agents, tasks, config)
-            if retry_errored:
-                run.forget_errored()
-            jobs = run.jobs()
-            on_progress(index, run.progress(None))
-            if num_workers == 0:
-                events = run_here(jobs, config.backend, config.protocol)
-            else:
-                events = run_in_workers(
-                    jobs,
-                    config.backend,
-                    config.protocol,
-                    hostings[index],
-                    num_workers=num_workers,
-                    stage_timeout_s=config.stage_timeout_s,
-                )
-            for record in run.record_all(events):
-                on_progress(index, run.progress(record))
-    return [write_summary(request.run_dir, only=request.agents) for request in requests]
+    _check_requests(requests, num_workers)
+    with ExitStack() as stack:
+        runs: list[Run] = []
+        for index, request in enumerate(requests):
+            stack.enter_context(writing(request.run_dir))
+            runs.append(stack.enter_context(closing(_begun(request, num_workers, num_retries, retry_errored))))
+            on_progress(index, runs[-1].progress(None))
+        summaries: dict[int, list[AgentSummary]] = {}
+
+        def finish(index: int) -> None:
+            summaries[index] = write_summary(requests[index].run_dir, only=requests[index].agents)
+
+        num_jobs = sum(len(run.jobs) for run in runs)
+        if num_jobs:
+            with open_pool(
+                WORK,
+                "",
+                engine=engine,
+                num_workers=min(num_workers, num_jobs),
+                timeout_s=max(run.limit_s for run in runs),
+                ray_address=ray_address,
+                resources=resources,
+                max_losses=0,  # they are counted here
+            ) as pool:
+                for index, record in run_all(runs, pool, num_retries, finish):
+                    on_progress(index, runs[index].progress(record))
+        for index, run in enumerate(runs):
+            if not run.jobs:
+                finish(index)
+        return [summaries[index] for index in range(len(requests))]
+
+
+def _begun(request: RunRequest, num_workers: int, num_retries: int, retry_errored: bool) -> Run:
+    """A run whose folder is claimed, with what is left to do."""
+    config = request.config
+    hosting = _hosting(request, num_workers)
+    setup = Setup(config.backend, config.protocol, hosting, num_retries)
+    # An agent in a process of its own has a limit of its own, for every answer; what is left is for all the rest.
+    limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
+    with RunStore(request.run_dir, create=True) as store:
+        _claim(store, request.run_dir, request.tasks, config)
+        store.set_meta("agents", sorted({*(store.meta("agents") or []), *request.agents}))
+        store.set_meta("tasks_dir", str(request.tasks[0].path.absolute().parent))  # for `evonav view`
+        if retry_errored:
+            _forget_errored(store, request)
+        states = store.states()
+    jobs = [
+        EpisodeJob(agent, task.task_id, str(task.path.absolute()), agent_seed(config.seed, agent, task.task_id))
+        for task in request.tasks
+        for agent in request.agents
+        if any((agent, task.task_id, stage) not in states for stage in range(1, task.num_stages + 1))
+    ]
+    return Run(request.run_dir, setup, limit_s, request.agents, request.tasks, jobs, states)
+
+
+def _forget_errored(store: RunStore, request: RunRequest) -> None:
+    """Drops episodes' stages from the first errored one on."""
+    first: dict[tuple[str, str], int] = {}
+    for (agent, task_id, stage), state in store.states().items():
+        if state is EndState.ERRORED:
+            first[agent, task_id] = min(stage, first.get((agent, task_id), stage))
+    tasks = {task.task_id for task in request.tasks}
+    for (agent, task_id), stage in first.items():
+        if agent in request.agents and task_id in tasks:
+            store.forget_episode(agent, task_id, stage)
 
 
 def _hosting(request: RunRequest, num_workers: int) -> AgentHosting:
@@ -241,115 +273,35 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
     return [summaries[agent] for agent in only or agents]
 
 
-class _Run:
-    """The bookkeeping of one call."""
-
-    def __init__(self, store: RunStore, agents: Sequence[str], tasks: Sequence[TaskFile], config: RunConfig) -> None:
-        self._store = store
-        self._agents = agents
-        self._tasks = {task.task_id: task for task in tasks}
-        self._config = config
-        self._states = store.states()
-        self._num_stages = len(agents) * sum(task.num_stages for task in tasks)
-
-    def jobs(self) -> list[EpisodeJob]:
-        """Episodes with a stage that has no record, task by task."""
-        return [
-            EpisodeJob(agent, task.task_id, str(task.path), agent_seed(self._config.seed, agent, task.task_id))
-            for task in self._tasks.values()
-            for agent in self._agents
-            if any((agent, task.task_id, stage) not in self._states for stage in range(1, task.num_stages + 1))
-        ]
-
-    def forget_errored(self) -> None:
-        """Drops episodes' stages from the first errored one on."""
-        for task in self._tasks.values():
-            for agent in self._agents:
-                stages = range(1, task.num_stages + 1)
-                first = next(
-                    (k for k in stages if self._states.get((agent, task.task_id, k)) is EndState.ERRORED), None
-                )
-                if first is not None:
-                    self._store.forget_episode(agent, task.task_id, first)
-        self._states = self._store.states()
-
-    def progress(self, latest: StageRecord | None) -> Progress:
-        num_done = sum(agent in self._agents and task_id in self._tasks for agent, task_id, _ in self._states)
-        return Progress(num_done, self._num_stages, latest)
-
-    def record_all(self, events: Iterator[JobEvent]) -> Iterator[StageRecord]:
-        """Records every outcome. Stages that a job leaves behind are errored or not run, never missing."""
-        for event in events:
-            if event.outcome is not None:
-                record, plan = event.outcome.record, event.outcome.stage_map
-                if plan is not None:
-                    self._store.add_map(plan)
-                if self._add(event.outcome):
-                    yield record
-            elif event.failure is not None:
-                for record in self._left_behind(event.job, *event.failure):
-                    if self._add(StageOutcome(record, None, 0.0, 0.0)):
-                        yield record
-
-    def _add(self, outcome: StageOutcome) -> bool:
-        """Commits a record, unless the same was there: a resumed episode runs its recorded stages again.
-
-        An agent that is not deterministic may do otherwise than recorded. Mixing two rollouts in one episode would join
-        what never happened, so the newer rollout then replaces the older from that stage on.
-        """
-        record = outcome.record
-        key = (record.agent, record.task_id, record.stage)
-        if key in self._states:
-            if self._store.record_text(*key) == record.model_dump_json():
-                return False
-            self._store.forget_episode(*key)
-            self._states = self._store.states()
-        self._store.add_stage(
-            record,
-            wall_s=outcome.wall_s,
-            cpu_s=outcome.cpu_s,
-            num_simulator_restarts=outcome.num_simulator_restarts,
-        )
-        self._states[key] = record.state
-        return True
-
-    def _left_behind(self, job: EpisodeJob, kind: ErrorKind, message: str) -> Iterator[StageRecord]:
-        """Records of the stages of a job that ended early: the first errored, the rest not run."""
-        task = self._tasks[job.task_id]
-        try:
-            case: EpisodeCase = self._config.backend.load_case(task.path)
-        except Exception as error:  # whatever a broken file does to whatever reads it
-            kind, message = ErrorKind.HARNESS, f"the task cannot be read: {type(error).__name__}: {error}"
-            case = unknown_case(task.task_id, task.num_stages)
-        failed: StageRecord | None = None
-        for stage in range(1, task.num_stages + 1):
-            if (job.agent, job.task_id, stage) in self._states:
-                continue
-            blank = case.blank_record(job.agent, stage)
-            if failed is None or failed.error is None:
-                failed = as_errored(blank, kind, message)
-                yield failed
-            else:
-                yield as_not_run(blank, failed.error, failed.stage)
-
-
 def agent_seed(seed: int, agent: str, task_id: str) -> int:
     """The seed of an agent's random choices: a function of names, not of order or workers."""
     digest = hashlib.sha256(f"{seed}\0{agent}\0{task_id}".encode()).digest()
     return int.from_bytes(digest[:6], "big")
 
 
-def _check_request(agents: Sequence[str], tasks: Sequence[TaskFile], num_workers: int, hosting: AgentHosting) -> None:
-    if not agents:
-        raise InvalidArgumentError("no agent to evaluate")
-    if len(set(agents)) != len(agents):
-        raise InvalidArgumentError(f"an agent is named twice: {', '.join(agents)}")
-    if not tasks:
-        raise InvalidArgumentError("no task to evaluate on")
+def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
     if num_workers < 0:
         raise InvalidArgumentError(f"num_workers = {num_workers}: must be >= 0")
-    for agent in agents:
-        check_agent_name(agent, is_in_process=hosting.is_in_process)
+    checked: set[tuple[str, bool]] = set()
+    for request in requests:
+        if not request.agents:
+            raise InvalidArgumentError("no agent to evaluate")
+        if len(set(request.agents)) != len(request.agents):
+            raise InvalidArgumentError(f"an agent is named twice: {', '.join(request.agents)}")
+        if not request.tasks:
+            raise InvalidArgumentError("no task to evaluate on")
+        is_in_process = _hosting(request, num_workers).is_in_process
+        backend = request.config.backend
+        for name in (*request.agents, backend.cases, backend.simulator, backend.perception, backend.decision):
+            if num_workers and name.startswith("__main__:"):
+                raise InvalidArgumentError(
+                    f"`{name}`: a worker cannot import the script that is running; move it to a module of its own, "
+                    "or use num_workers=0"
+                )
+        for agent in request.agents:
+            if (agent, is_in_process) not in checked:
+                check_agent_name(agent, is_in_process=is_in_process)
+                checked.add((agent, is_in_process))
 
 
 def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]:

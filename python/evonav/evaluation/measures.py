@@ -197,7 +197,7 @@ def stage_rows(store: "RunStore", agents: Sequence[str] | None = None) -> list[S
         StoreError: The run cannot be read.
     """
     kept = _kept(store, agents)
-    costs, timings, restarts = store.costs(), store.timings(), store.simulator_restarts()
+    costs, timings, retries = store.costs(), store.timings(), store.retries()
     rows: list[StageRow] = []
     for _, episode in groupby(kept, key=lambda one: (one.measures.agent, one.measures.task_id)):
         before: _Kept | None = None
@@ -212,7 +212,7 @@ def stage_rows(store: "RunStore", agents: Sequence[str] | None = None) -> list[S
                 "wall_s": wall_s,
                 "cpu_s": cpu_s,
                 **costs.get(key, {}),
-                "num_simulator_restarts": restarts.get(key, 0),
+                "num_retries": retries[key],
                 **{
                     field: one.counters[name] - counted.get(name, 0) if name in one.counters else None
                     for name, field in COUNTERS.items()

@@ -13,6 +13,7 @@ from evonav.evaluation.records import (
     GoalRecord,
     Point2,
     StageError,
+    StageFailure,
     StageMap,
     StageRecord,
     TargetRecord,
@@ -25,10 +26,17 @@ from evonav.world.pose import Pose
 class AgentFailedError(EvonavError):
     """An agent in a process of its own has failed: it raised, died, or did not answer in time."""
 
-    def __init__(self, kind: ErrorKind, message: str) -> None:
-        """An error of one of the kinds that are the agent's own."""
+    def __init__(self, kind: ErrorKind, message: str, traceback: str = "") -> None:
+        """An error of one of the kinds that are the agent's own.
+
+        Args:
+            kind: Which.
+            message: In a line or few.
+            traceback: Of the agent's process.
+        """
         super().__init__(message)
         self.kind = kind
+        self.traceback = traceback
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,8 +176,16 @@ class StageOutcome:
     """Of the stage's house; `None` when the stage never got one."""
     wall_s: float
     cpu_s: float
-    num_simulator_restarts: int = 0
-    """How often the simulator's process was lost in this stage; see `evonav.evaluation.workers.run_job`."""
+    traceback: str = ""
+    """Of an errored stage."""
+
+    @property
+    def failure(self) -> StageFailure | None:
+        """Why the stage is errored, if it is."""
+        record = self.record
+        if record.error is None or record.state is not EndState.ERRORED:
+            return None
+        return StageFailure(record.stage, record.error.kind, record.error.message, self.traceback)
 
 
 def as_errored(record: StageRecord, kind: ErrorKind, message: str) -> StageRecord:

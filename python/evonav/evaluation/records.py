@@ -5,6 +5,7 @@ Everything in it is a function of the run's inputs: wall-clock figures live in a
 Points are `(x, y, z)` or `(x, z)` in metres, AI2-THOR's world frame; angles are radians.
 """
 
+from dataclasses import dataclass
 from enum import Enum
 from typing import Annotated, Any, Literal
 
@@ -67,6 +68,17 @@ class StageError(_Record):
 
     kind: ErrorKind
     message: str
+
+
+@dataclass(frozen=True, slots=True)
+class StageFailure:
+    """An attempt at a stage that has failed."""
+
+    stage: int
+    """0: the first that did not end."""
+    kind: ErrorKind
+    message: str
+    traceback: str = ""
 
 
 class PoseRecord(_Record):

@@ -115,6 +115,11 @@ def _blame(kind: ErrorKind) -> Iterator[None]:
         raise _StageError(kind, f"{type(error).__name__}: {error}") from error
 
 
+def _traceback_of(failure: _StageError) -> str:
+    cause = failure.__cause__ or failure
+    return (isinstance(cause, AgentFailedError) and cause.traceback) or wire.traceback_of(cause)
+
+
 class Episode:
     """One agent's run through one task."""
 
@@ -163,7 +168,8 @@ class Episode:
             wall_s, cpu_s = time.perf_counter(), self._cpu_s()
             run = _StageRun(self, record, pose)
             record = run.run()
-            yield StageOutcome(record, run.plan, time.perf_counter() - wall_s, self._cpu_s() - cpu_s)
+            wall_s, cpu_s = time.perf_counter() - wall_s, self._cpu_s() - cpu_s
+            yield StageOutcome(record, run.plan, wall_s, cpu_s, run.traceback)
             if run.failure is None:
                 pose = self._end_pose(stage)
             elif run.failure.is_agents:
@@ -211,6 +217,7 @@ class _StageRun:
         self.plan: StageMap | None = None
         self.failure: ErrorKind | None = None
         """Why the stage could not be finished."""
+        self.traceback = ""
 
     def run(self) -> StageRecord:
         try:
@@ -224,6 +231,7 @@ class _StageRun:
                 return self._measured(reference_length_m, stop_reason)
         except _StageError as failure:
             self.failure = failure.kind
+            self.traceback = _traceback_of(failure)
             return as_errored(self._with_trace(self._record), failure.kind, str(failure))
 
     def _start(self) -> None:

@@ -2,14 +2,16 @@
 
 A finished stage is one transaction: wholly there or not at all. `INSERT` under a primary key makes a stage that is
 reported twice an error instead of a second row. What is not a function of the run's inputs sits apart from the records,
-so that records of equal runs are equal to the byte: wall-clock figures in `timings`, lost simulator processes in
-`simulator_restarts`.
+so that records of equal runs are equal to the byte: wall-clock figures in `timings`, every attempt that failed, with
+its traceback, in `failures`.
 """
 
 import json
 import sqlite3
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -19,9 +21,13 @@ from pydantic import ValidationError
 from evonav.errors import StoreError
 from evonav.evaluation.costs import StageCosts
 from evonav.evaluation.measures import MEASURES_VERSION, kept_measures
-from evonav.evaluation.records import SCHEMA_VERSION, EndState, StageMap, StageRecord
+from evonav.evaluation.records import SCHEMA_VERSION, EndState, ErrorKind, StageFailure, StageMap, StageRecord
+from evonav.folders import is_on_network, sync_folder
 
 FILE_NAME = "records.sqlite"
+_ADD_FAILURE = (
+    "INSERT INTO failures (agent, task_id, stage, kind, message, traceback, is_retried) VALUES (?, ?, ?, ?, ?, ?, ?)"
+)
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
@@ -42,25 +48,40 @@ CREATE TABLE IF NOT EXISTS timings (
 ) WITHOUT ROWID;
 """
 
-# Later than the first runs of this schema version: made where it is missing. Stages without a restart have no row.
+# Later than the first runs of this schema version: a run without them is read as if they were empty.
 # Measures are derived from the record (`evonav.evaluation.measures`), so that tables need no traces.
-_LATER_SCHEMA = (
-    """CREATE TABLE IF NOT EXISTS measures (
+_LATER = {
+    "measures": """(
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
     version INTEGER NOT NULL, measures TEXT NOT NULL,
     PRIMARY KEY (agent, task_id, stage)
 ) WITHOUT ROWID""",
-    """CREATE TABLE IF NOT EXISTS costs (
+    "costs": """(
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
     costs TEXT NOT NULL,
     PRIMARY KEY (agent, task_id, stage)
 ) WITHOUT ROWID""",
-    """CREATE TABLE IF NOT EXISTS simulator_restarts (
+    "failures": """(
+    id INTEGER PRIMARY KEY,
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
-    num_restarts INTEGER NOT NULL,
-    PRIMARY KEY (agent, task_id, stage)
-) WITHOUT ROWID""",
-)
+    kind TEXT NOT NULL, message TEXT NOT NULL, traceback TEXT NOT NULL, is_retried INTEGER NOT NULL
+)""",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class FailureRow:
+    """An attempt at a stage that has failed; of an errored stage, the last one is why."""
+
+    agent: str
+    task_id: str
+    stage: int
+    kind: ErrorKind
+    message: str
+    traceback: str
+    """Empty where a process was lost."""
+    is_retried: bool
+    """Whether the stage was tried again after it."""
 
 
 class RunStore:
@@ -80,10 +101,16 @@ class RunStore:
             if create:
                 run_dir.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(self.path, isolation_level=None, timeout=30.0)
-            self._db.execute("PRAGMA journal_mode = WAL")
             self._db.execute("PRAGMA synchronous = FULL")
             if create:
+                # A write-ahead log needs memory that all readers share, which a network file system does not give.
+                self._db.execute(f"PRAGMA journal_mode = {'DELETE' if is_on_network(run_dir) else 'WAL'}")
                 self._db.executescript(_SCHEMA)
+                sync_folder(run_dir.absolute().parent)
+            self._db.execute("PRAGMA temp_store = MEMORY")
+            there = {name for (name,) in self._db.execute("SELECT name FROM sqlite_master")}
+            for name in _LATER.keys() - there:
+                self._db.execute(f"CREATE {'' if create else 'TEMP '}TABLE {name} {_LATER[name]}")
             version = self.meta("schema_version")
         except (sqlite3.Error, OSError) as error:
             raise StoreError(f"{self.path}: {error}") from error
@@ -91,8 +118,6 @@ class RunStore:
             self.set_meta("schema_version", SCHEMA_VERSION)
         elif version != SCHEMA_VERSION:
             raise StoreError(f"{self.path}: schema version {version}, this evonav reads {SCHEMA_VERSION}")
-        for statement in _LATER_SCHEMA:
-            self._execute(statement, ())
 
     def __enter__(self) -> "RunStore":
         return self
@@ -108,8 +133,8 @@ class RunStore:
 
     def meta(self, key: str) -> Any:  # noqa: ANN401 - JSON
         """A JSON value of the run's header, or `None`."""
-        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
-        return None if row is None else json.loads(row[0])
+        rows = self._query("SELECT value FROM meta WHERE key = ?", (key,))
+        return json.loads(rows[0][0]) if rows else None
 
     def set_meta(self, key: str, value: Any) -> None:  # noqa: ANN401 - JSON
         """Sets a JSON value of the run's header."""
@@ -117,7 +142,7 @@ class RunStore:
 
     def states(self) -> dict[tuple[str, str, int], EndState]:
         """End state of every recorded (agent, task, stage)."""
-        rows = self._db.execute("SELECT agent, task_id, stage, state FROM stages")
+        rows = self._query("SELECT agent, task_id, stage, state FROM stages")
         return {(agent, task_id, stage): EndState(state) for agent, task_id, stage, state in rows}
 
     def add_stage(
@@ -126,17 +151,16 @@ class RunStore:
         *,
         wall_s: float,
         cpu_s: float,
-        num_simulator_restarts: int = 0,
         costs: StageCosts | None = None,
+        traceback: str = "",
     ) -> None:
-        """Commits a finished stage, with the measures that are derived from it.
+        """Commits a finished stage, with the measures that are derived from it; of an errored one, with its failure.
 
         Raises:
             StoreError: The stage is already recorded, or the file cannot be written.
         """
         key = (record.agent, record.task_id, record.stage)
-        try:
-            self._db.execute("BEGIN IMMEDIATE")
+        with self._transaction(f"stage {key}: "):
             text = record.model_dump_json()
             self._db.execute("INSERT INTO stages VALUES (?, ?, ?, ?, ?)", (*key, record.state.value, text))
             measures = kept_measures(record)
@@ -145,13 +169,14 @@ class RunStore:
             if costs is not None:
                 told = {name: value for name, value in asdict(costs).items() if value is not None}
                 self._db.execute("INSERT INTO costs VALUES (?, ?, ?, ?)", (*key, _json(told)))
-            if num_simulator_restarts:
-                self._db.execute("INSERT INTO simulator_restarts VALUES (?, ?, ?, ?)", (*key, num_simulator_restarts))
-            self._db.execute("COMMIT")
-        except sqlite3.Error as error:
-            if self._db.in_transaction:
-                self._db.execute("ROLLBACK")
-            raise StoreError(f"{self.path}: stage {key}: {error}") from error
+            if record.state is EndState.ERRORED and record.error is not None:
+                row = (*key, record.error.kind.value, record.error.message, traceback, False)
+                self._db.execute(_ADD_FAILURE, row)
+
+    def add_retry(self, agent: str, task_id: str, failure: StageFailure) -> None:
+        """Records a failure after which the stage is tried again."""
+        what = (failure.kind.value, failure.message, failure.traceback, True)
+        self._execute(_ADD_FAILURE, (agent, task_id, failure.stage, *what))
 
     def add_map(self, stage_map: StageMap) -> None:
         """Records a stage's house from above; the first writer wins, all of them would write the same."""
@@ -161,13 +186,9 @@ class RunStore:
     def forget_episode(self, agent: str, task_id: str, from_stage: int) -> None:
         """Drops an episode's stages from `from_stage` on, so that they can be run again."""
         key = (agent, task_id, from_stage)
-        try:
-            self._db.execute("BEGIN IMMEDIATE")
-            for table in ("stages", "measures", "timings", "costs", "simulator_restarts"):
+        with self._transaction():
+            for table in ("stages", "timings", *_LATER):
                 self._db.execute(f"DELETE FROM {table} WHERE agent = ? AND task_id = ? AND stage >= ?", key)  # noqa: S608
-            self._db.execute("COMMIT")
-        except sqlite3.Error as error:
-            raise StoreError(f"{self.path}: {error}") from error
 
     def records(
         self, agent: str | None = None, task_id: str | None = None, *, is_brief: bool = False
@@ -199,7 +220,7 @@ class RunStore:
             f"SELECT {column} FROM stages WHERE (?1 IS NULL OR agent = ?1) AND (?2 IS NULL OR task_id = ?2) "  # noqa: S608
             "ORDER BY agent, task_id, stage"
         )
-        for (text,) in self._db.execute(query, (agent, task_id)):
+        for (text,) in self._rows(query, (agent, task_id)):
             yield text
 
     def record(self, agent: str, task_id: str, stage: int) -> StageRecord:
@@ -222,19 +243,19 @@ class RunStore:
             "SELECT agent, task_id, stage, version, measures FROM stages LEFT JOIN measures "
             "USING (agent, task_id, stage) ORDER BY agent, task_id, stage"
         )
-        for agent, task_id, stage, version, measures in self._db.execute(query):
+        for agent, task_id, stage, version, measures in self._rows(query):
             yield (agent, task_id, stage), version, measures
 
     def record_text(self, agent: str, task_id: str, stage: int) -> str | None:
         """One record as stored, or `None`."""
         query = "SELECT record FROM stages WHERE agent = ? AND task_id = ? AND stage = ?"
-        row = self._db.execute(query, (agent, task_id, stage)).fetchone()
-        return None if row is None else str(row[0])
+        rows = self._query(query, (agent, task_id, stage))
+        return str(rows[0][0]) if rows else None
 
     def maps(self, task_id: str | None = None) -> Iterator[StageMap]:
         """Stage maps by task and stage."""
         query = "SELECT map FROM stage_maps WHERE ?1 IS NULL OR task_id = ?1 ORDER BY task_id, stage"
-        for (text,) in self._db.execute(query, (task_id,)):
+        for (text,) in self._rows(query, (task_id,)):
             try:
                 yield StageMap.model_validate_json(text)
             except ValidationError as error:
@@ -242,24 +263,54 @@ class RunStore:
 
     def timings(self) -> dict[tuple[str, str, int], tuple[float, float]]:
         """Wall and CPU seconds of every recorded stage; not deterministic, hence not in the records."""
-        rows = self._db.execute("SELECT agent, task_id, stage, wall_s, cpu_s FROM timings")
+        rows = self._query("SELECT agent, task_id, stage, wall_s, cpu_s FROM timings")
         return {(agent, task_id, stage): (wall_s, cpu_s) for agent, task_id, stage, wall_s, cpu_s in rows}
 
     def costs(self) -> dict[tuple[str, str, int], dict[str, Any]]:
         """What else the stages cost, by field of `StageCosts`; like `timings`, not in the records."""
-        rows = self._db.execute("SELECT agent, task_id, stage, costs FROM costs")
+        rows = self._query("SELECT agent, task_id, stage, costs FROM costs")
         return {(agent, task_id, stage): json.loads(costs) for agent, task_id, stage, costs in rows}
 
-    def simulator_restarts(self) -> dict[tuple[str, str, int], int]:
-        """How often the simulator's process was lost and the stage tried again, of stages where it was."""
-        rows = self._db.execute("SELECT agent, task_id, stage, num_restarts FROM simulator_restarts")
-        return {(agent, task_id, stage): num_restarts for agent, task_id, stage, num_restarts in rows}
+    def failures(self) -> list[FailureRow]:
+        """Attempts that failed, by agent, task and stage, in the order in which they happened."""
+        rows = self._query(
+            "SELECT agent, task_id, stage, kind, message, traceback, is_retried FROM failures "
+            "ORDER BY agent, task_id, stage, id"
+        )
+        return [
+            FailureRow(agent, task_id, stage, ErrorKind(kind), message, traceback, bool(is_retried))
+            for agent, task_id, stage, kind, message, traceback, is_retried in rows
+        ]
 
-    def _execute(self, query: str, values: tuple[Any, ...]) -> None:
+    def retries(self) -> Counter[tuple[str, str, int]]:
+        """How often stages were tried again, by agent, task and stage."""
+        return Counter((one.agent, one.task_id, one.stage) for one in self.failures() if one.is_retried)
+
+    def _rows(self, query: str, values: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         try:
-            self._db.execute(query, values)
+            yield from self._db.execute(query, values)
         except sqlite3.Error as error:
             raise StoreError(f"{self.path}: {error}") from error
+
+    def _query(self, query: str, values: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+        return list(self._rows(query, values))
+
+    def _execute(self, query: str, values: tuple[Any, ...]) -> None:
+        with self._transaction():
+            self._db.execute(query, values)
+
+    @contextmanager
+    def _transaction(self, what: str = "") -> Iterator[None]:
+        """All that is done inside, or nothing."""
+        try:
+            self._db.execute("BEGIN IMMEDIATE")
+            yield
+            self._db.execute("COMMIT")
+        except sqlite3.Error as error:
+            with suppress(sqlite3.Error):  # a disk that is full may have ended it already
+                if self._db.in_transaction:
+                    self._db.execute("ROLLBACK")
+            raise StoreError(f"{self.path}: {what}{error}") from error
 
 
 def _json(value: Any) -> str:  # noqa: ANN401 - JSON

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import EvonavError, HouseError, InvalidArgumentError, SimulationError, TaskError
-from evonav.folders import sha256_of_file
+from evonav.folders import put_folder, sha256_of_file
 from evonav.generation.journal import Outcome
 from evonav.generation.pipeline import TaskRejectedError, generate_task, short_name
 from evonav.house import House
@@ -61,7 +61,7 @@ class GenerationOptions:
         )
 
 
-def make_worker(settings: str) -> Callable[[str], str]:
+def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """The function from a house to its `Outcome`, as `evonav.parallel` calls it.
 
     Args:
@@ -133,14 +133,7 @@ def put(task: Task, out: Path, label: str) -> Path:
         OSError: It cannot be moved.
     """
     beside = out / PARTIAL_NAME / label
+    shutil.rmtree(beside / task.task_id, ignore_errors=True)  # of an attempt that was not finished
     root = out / task.task_id
-    replaced = beside / "replaced"
-    for left in (beside / task.task_id, replaced):  # by an attempt that was not finished
-        if left.exists():
-            shutil.rmtree(left)
-    written = write_task(task, beside)
-    if root.exists():
-        root.rename(replaced)
-        shutil.rmtree(replaced)
-    written.rename(root)
+    put_folder(write_task(task, beside), root, aside=beside / "replaced")
     return root

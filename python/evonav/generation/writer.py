@@ -23,6 +23,7 @@ from evonav.decision.prompts import Prompt
 from evonav.decision.vlm import VlmClient
 from evonav.decision.vlm_errors import LASTING, VlmError
 from evonav.errors import TaskError
+from evonav.folders import put_folder
 from evonav.generation.prompts import appearance_question, cleaned, fault_of, repair_request, unified_question
 from evonav.tasks.dataset import DATASET_NAME, TaskEntry, entry_of, read_dataset, write_dataset
 from evonav.tasks.files import checksums_of, load_task, task_roots, write_task
@@ -205,10 +206,7 @@ def _swap(task: Task, root: Path) -> None:
     old, new = root.with_name(f".{root.name}.old"), root.with_name(f".{root.name}.new")
     try:
         shutil.rmtree(new, ignore_errors=True)
-        write_task(task, new)
-        root.rename(old)
-        (new / root.name).rename(root)
-        shutil.rmtree(old)
+        put_folder(write_task(task, new), root, aside=old)
         new.rmdir()
     except OSError as error:
         raise TaskError(f"{root}: cannot be written: {error.strerror or error}") from error

@@ -148,8 +148,8 @@ def _run_facts(run: Run) -> list[tuple[str, str]]:
     facts += [("tasks recorded", str(len(run.num_stages))), ("agents", ", ".join(run.agents))]
     facts += [(f"sha256 of the records, {agent}", digest) for agent, digest in run.rows_sha256.items()]
     facts += [(f"mean wall time a stage, {agent}", f"{wall_s:.2f} s") for agent, wall_s in run.wall_s.items()]
-    if run.num_simulator_restarts:
-        facts += [("restarts of the simulator's process", str(run.num_simulator_restarts))]
+    if run.retries:
+        facts += [("stages tried again", ", ".join(f"{count} after {kind}" for kind, count in run.retries.items()))]
     return facts
 
 

@@ -63,8 +63,8 @@ class Run:
     """By agent, of its records as stored: equal runs have equal ones."""
     wall_s: Mapping[str, float]
     """Mean of a stage's wall time, by agent; not part of the records."""
-    num_simulator_restarts: int
-    """Processes of the simulator that were lost, their stages tried again; not part of the records."""
+    retries: Mapping[str, int]
+    """How often stages were tried again, by what had failed; not part of the records."""
     summaries: tuple[AgentSummary, ...]
     pairs: tuple[PairedDifference, ...]
 
@@ -139,7 +139,7 @@ def load_run(run_dir: Path) -> Run:
         num_stages = _num_stages(store.meta("num_stages"), outcomes)
         config = store.meta("config") or {}
         wall_s = _mean_wall_s(store.timings())
-        num_simulator_restarts = sum(store.simulator_restarts().values())
+        retries = Counter(failure.kind.value for failure in store.failures() if failure.is_retried)
     records: dict[str, list[StageRecord]] = {agent: [] for agent in agents}
     for (agent, _, _), outcome in outcomes.items():
         records[agent].append(outcome.record)
@@ -152,7 +152,7 @@ def load_run(run_dir: Path) -> Run:
         outcomes=outcomes,
         rows_sha256=digests,
         wall_s=wall_s,
-        num_simulator_restarts=num_simulator_restarts,
+        retries=retries,
         summaries=tuple(summarise(agent, records[agent], total) for agent in agents),
         pairs=tuple(paired_differences(records)),
     )

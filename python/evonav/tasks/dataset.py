@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeInt, PositiveInt
 
-from evonav.errors import TaskError
+from evonav.errors import StoreError, TaskError
+from evonav.folders import write_atomically
 from evonav.tasks.manifest import GenerationParameters, Task, TaskId
 from evonav.tasks.records import Id, Record, Sha256, field_error, parse_record, read_file, record_bytes, sha256_of
 
@@ -105,13 +106,11 @@ def write_dataset(record: DatasetRecord, directory: Path | str) -> Path:
         TaskError: It cannot be written.
     """
     path = Path(directory) / DATASET_NAME
-    partial = path.with_suffix(".partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(record_bytes(record))
-        partial.replace(path)
-    except OSError as error:
-        raise TaskError(f"{path}: cannot be written: {error.strerror or error}") from error
+        write_atomically(path, record_bytes(record))
+    except (OSError, StoreError) as error:
+        raise TaskError(f"{path}: cannot be written: {error}") from error
     return path
 
 

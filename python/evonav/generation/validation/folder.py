@@ -90,7 +90,7 @@ def validate_folder(
     return FolderReport(ordered, (*problems, *(problem for report in ordered for problem in report.problems)))
 
 
-def make_worker(settings: str) -> Callable[[str], str]:
+def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """The function from a task's folder to its `Report`, as `evonav.parallel` calls it."""
     allow = bool(json.loads(settings)["allow_unknown_assets"])
     return lambda root: validate_files(root, allow_unknown_assets=allow).model_dump_json()

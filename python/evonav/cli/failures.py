@@ -1,0 +1,25 @@
+"""What went wrong in a run: `failures`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def failures(
+    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    agent: Annotated[str | None, typer.Option(help="Only of this agent.")] = None,
+    brief: Annotated[bool, typer.Option("--brief", help="Without tracebacks.")] = False,
+) -> None:
+    """Lists the attempts at stages that failed, those tried again included, with their tracebacks."""
+    from evonav.evaluation.store import RunStore
+
+    with RunStore(run) as store:
+        rows = [row for row in store.failures() if agent in (None, row.agent)]
+    for row in rows:
+        what = "tried again" if row.is_retried else "errored"
+        typer.echo(f"{row.agent} {row.task_id} stage {row.stage}: {what} after {row.kind.value}: {row.message}")
+        if row.traceback and not brief:
+            typer.echo("".join(f"    {line}\n" for line in row.traceback.rstrip().splitlines()))
+    if not rows:
+        typer.echo("no attempt has failed")

@@ -1,0 +1,227 @@
+"""The bookkeeping of runs that are under way: news of workers into records."""
+
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import count
+from pathlib import Path
+
+from evonav.evaluation.protocol import (
+    EpisodeCase,
+    StageOutcome,
+    as_errored,
+    as_not_run,
+    unknown_case,
+)
+from evonav.evaluation.records import EndState, ErrorKind, StageFailure, StageRecord
+from evonav.evaluation.store import RunStore
+from evonav.evaluation.workers import RETRIED, EpisodeJob, Setup, read_news
+from evonav.parallel import Answer, Job, Pool
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFile:
+    """A task of a run."""
+
+    task_id: str
+    path: Path
+    num_stages: int
+    digest: str
+    """Of `task.json`, which holds the checksums of all other files."""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a run is."""
+
+    num_done: int
+    """Recorded stages, those of earlier calls included."""
+    num_stages: int
+    latest: StageRecord | None
+
+
+class Run:
+    """One run's: what is recorded, and what is left."""
+
+    def __init__(
+        self,
+        run_dir: Path,
+        setup: Setup,
+        limit_s: float,
+        agents: Sequence[str],
+        tasks: Sequence[TaskFile],
+        jobs: Sequence[EpisodeJob],
+        states: dict[tuple[str, str, int], EndState],
+    ) -> None:
+        """Opens nothing yet.
+
+        Args:
+            run_dir: Holds a store.
+            setup: Of the episodes.
+            limit_s: Without a word of an episode.
+            agents: Asked for.
+            tasks: Of the run.
+            jobs: Episodes with a stage that has no record.
+            states: Of all that is recorded.
+        """
+        self.jobs = jobs
+        self.setup = setup
+        self.setup_text = setup.text
+        self.limit_s = limit_s
+        self.num_left = len(jobs)
+        self._run_dir = run_dir
+        self._tasks = {task.task_id: task for task in tasks}
+        self._states = states
+        self._keys = {
+            (agent, task.task_id, stage)
+            for agent in agents
+            for task in tasks
+            for stage in range(1, task.num_stages + 1)
+        }
+        self._num_done = len(self._keys & states.keys())
+        self._store: RunStore | None = None
+
+    @property
+    def store(self) -> RunStore:
+        """Open from the first use on."""
+        if self._store is None:
+            self._store = RunStore(self._run_dir)
+        return self._store
+
+    def close(self) -> None:
+        """Closes the store; safe to call twice."""
+        if self._store is not None:
+            self._store.close()
+        self._store = None
+
+    def progress(self, latest: StageRecord | None) -> Progress:
+        """How far it is."""
+        return Progress(self._num_done, len(self._keys), latest)
+
+    def add(self, outcome: StageOutcome) -> bool:
+        """Commits a record, unless the same was there: a resumed episode runs its recorded stages again.
+
+        An agent that is not deterministic may do otherwise than recorded. Mixing two rollouts in one episode would join
+        what never happened, so the newer rollout then replaces the older from that stage on.
+        """
+        if outcome.stage_map is not None:
+            self.store.add_map(outcome.stage_map)
+        record = outcome.record
+        key = (record.agent, record.task_id, record.stage)
+        if key in self._states:
+            if self.store.record_text(*key) == record.model_dump_json():
+                return False
+            self.store.forget_episode(*key)
+            self._states = self.store.states()
+            self._num_done = len(self._keys & self._states.keys())
+        self.store.add_stage(record, wall_s=outcome.wall_s, cpu_s=outcome.cpu_s, traceback=outcome.traceback)
+        self._states[key] = record.state
+        self._num_done += 1
+        return True
+
+    def left_behind(self, job: EpisodeJob, failure: StageFailure) -> Iterator[StageOutcome]:
+        """The stages of a job that ended early: the first errored, the rest not run; errored or not run, never missing.
+
+        Yields:
+            Outcomes to `add`, of the stages that have none.
+        """
+        task = self._tasks[job.task_id]
+        try:
+            case: EpisodeCase = self.setup.backend.load_case(task.path)
+        except Exception as error:  # whatever a broken file does to whatever reads it
+            message = f"the task cannot be read: {type(error).__name__}: {error}"
+            failure = replace(failure, kind=ErrorKind.HARNESS, message=message)
+            case = unknown_case(task.task_id, task.num_stages)
+        failed: StageRecord | None = None
+        for stage in range(1, task.num_stages + 1):
+            if (job.agent, job.task_id, stage) in self._states:
+                continue
+            blank = case.blank_record(job.agent, stage)
+            if failed is None or failed.error is None:
+                failed = as_errored(blank, failure.kind, failure.message)
+                yield StageOutcome(failed, None, 0.0, 0.0, failure.traceback)
+            else:
+                yield StageOutcome(as_not_run(blank, failed.error, failed.stage), None, 0.0, 0.0)
+
+
+@dataclass(slots=True)
+class _Episode:
+    """A job and how it goes."""
+
+    index: int
+    """Of its run."""
+    job: EpisodeJob
+    stage: int = 1
+    """That this attempt is at."""
+    num_tried: Counter[int] = field(default_factory=Counter)
+    """Attempts that failed, by the stage that they were at."""
+
+
+def run_all(
+    runs: Sequence[Run], pool: Pool, num_retries: int, on_done: Callable[[int], None]
+) -> Iterator[tuple[int, StageRecord]]:
+    """Has all jobs of runs done and records what comes of them.
+
+    Args:
+        runs: Where to.
+        pool: Who does it.
+        num_retries: Of a stage whose worker was lost.
+        on_done: Called with the index of a run of which nothing is left.
+
+    Yields:
+        Index of the run, and a record that was committed.
+    """
+    waiting = deque(_Episode(index, job) for index, run in enumerate(runs) for job in run.jobs)
+    under_way: dict[int, _Episode] = {}
+    numbers = count()
+    while waiting or under_way:
+        while waiting and len(under_way) < pool.capacity:
+            episode, number = waiting.popleft(), next(numbers)
+            under_way[number] = episode
+            run = runs[episode.index]
+            pool.submit(Job(number, episode.job.text(run.setup_text), run.limit_s))
+        answer = pool.next_answer()
+        episode = under_way[answer.key]
+        run = runs[episode.index]
+        if answer.is_end:
+            del under_way[answer.key]
+        news = _news_of(answer, run)
+        if isinstance(news, StageOutcome):
+            episode.stage = news.record.stage + 1
+            if run.add(news):
+                yield episode.index, news.record
+        elif news is not None:
+            failure = replace(news, stage=news.stage or episode.stage)
+            if not answer.is_end:  # the worker tries again itself
+                _note_retry(run, episode, failure)
+            elif failure.kind in RETRIED and episode.num_tried[failure.stage] < num_retries:
+                episode.num_tried[failure.stage] += 1
+                _note_retry(run, episode, failure)
+                waiting.appendleft(episode)
+                continue
+            else:
+                for outcome in run.left_behind(episode.job, failure):
+                    if run.add(outcome):
+                        yield episode.index, outcome.record
+        if answer.is_end:
+            run.num_left -= 1
+            if run.num_left == 0:
+                run.close()
+                on_done(episode.index)
+
+
+def _note_retry(run: Run, episode: _Episode, failure: StageFailure) -> None:
+    run.store.add_retry(episode.job.agent, episode.job.task_id, failure)
+    episode.stage = 1
+
+
+def _news_of(answer: Answer, run: Run) -> StageOutcome | StageFailure | None:
+    if answer.failure == "crash":
+        return StageFailure(0, ErrorKind.CRASH, answer.detail)
+    if answer.failure == "timeout":
+        what = "stage" if run.setup.hosting.is_in_process else "round"
+        return StageFailure(0, ErrorKind.TIMEOUT, f"no {what} ended within {run.limit_s:g} s")
+    if answer.failure == "error":
+        message = answer.detail.strip().rpartition("\n")[2]
+        return StageFailure(0, ErrorKind.HARNESS, message, answer.detail)
+    return read_news(answer.text)
