@@ -96,7 +96,7 @@ class RunStore:
         """
         self.path = run_dir / FILE_NAME
         if not create and not self.path.is_file():
-            raise StoreError(f"{run_dir}: no run here ({FILE_NAME} not found)")
+            raise StoreError(f"{run_dir}: {_what_is_there(run_dir)}")
         try:
             if create:
                 run_dir.mkdir(parents=True, exist_ok=True)
@@ -311,6 +311,16 @@ class RunStore:
                 if self._db.in_transaction:
                     self._db.execute("ROLLBACK")
             raise StoreError(f"{self.path}: {what}{error}") from error
+
+
+def _what_is_there(run_dir: Path) -> str:
+    """Why a folder is no run, and which one may have been meant."""
+    if not run_dir.is_dir():
+        return f"no run here (there is no such folder); `evonav evaluate --out {run_dir}` makes one"
+    inner = sorted(path.parent for path in (*run_dir.glob(f"*/{FILE_NAME}"), *run_dir.glob(f"runs/*/{FILE_NAME}")))
+    if inner:
+        return f"no run here, but {len(inner)} below: name one, such as {inner[0]}"
+    return f"no run here ({FILE_NAME} not found)"
 
 
 def _json(value: Any) -> str:  # noqa: ANN401 - JSON

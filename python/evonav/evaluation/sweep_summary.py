@@ -17,6 +17,8 @@ from evonav.evaluation.sweep import RUNS_NAME, read_claim
 from evonav.significance import Interval
 
 AXES = ("simulator", "perception", "decision", "tasks", "seed")
+STATES = ("success", "failure", "errored", "not_run")
+"""In which a stage of a sweep ends, in the order of tables."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,7 @@ class SweepRow:
     @property
     def is_incomplete(self) -> bool:
         """Some stage is errored or not run: no rate may be quoted as final."""
-        return self.n != self.num_stages
+        return self.n + self.counts.get(EndState.FORCED.value, 0) != self.num_stages
 
 
 def sweep_rows(out: Path) -> list[SweepRow]:
@@ -80,7 +82,7 @@ def sweep_json(out: Path, rows: list[SweepRow]) -> dict[str, Any]:
 def _cell_rows(run_dir: Path, name: str, cell: Mapping[str, Any]) -> list[SweepRow]:
     found = _run_summary(run_dir)
     num_stages = cell["num_stages"] // len(cell["agents"])
-    blank = {**{state.value: 0 for state in EndState}, EndState.NOT_RUN.value: num_stages}
+    blank = {**dict.fromkeys(STATES, 0), "not_run": num_stages}
     rows = []
     for agent in cell["agents"]:
         summary = found.get(agent, {})
@@ -125,7 +127,7 @@ def _over_seeds(out: Path, cells: Mapping[str, Mapping[str, Any]], rows: list[Sw
         if len(parts) < 2:
             continue
         pooled = _pooled([out / RUNS_NAME / row.cell for row in parts], agent)
-        counts = {state.value: sum(row.counts[state.value] for row in parts) for state in EndState}
+        counts = {state: sum(row.counts[state] for row in parts) for state in STATES}
         found.append(
             SweepRow(
                 cell="",

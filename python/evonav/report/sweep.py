@@ -6,8 +6,7 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from evonav.evaluation.records import EndState
-from evonav.evaluation.sweep_summary import AXES, SweepRow, sweep_json, sweep_rows
+from evonav.evaluation.sweep_summary import AXES, STATES, SweepRow, sweep_json, sweep_rows
 from evonav.folders import write_atomically
 from evonav.report.tables import Table, percent
 
@@ -48,9 +47,7 @@ def sweep_csv(rows: Sequence[SweepRow]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     ends = [f"{measure}_{end}" for measure in ("sr", "spl") for end in ("mean", "low95", "high95")]
-    writer.writerow(
-        ["cell", *AXES, "agent", "n", "num_stages", *ends, *(state.value for state in EndState), "is_incomplete"]
-    )
+    writer.writerow(["cell", *AXES, "agent", "n", "num_stages", *ends, *STATES, "is_incomplete"])
     for row in rows:
         axes = ["all" if axis == "seed" and row.seed is None else getattr(row, axis) for axis in AXES]
         rates = [row.sr, *(row.sr_ci95 or (None, None)), row.spl, *(row.spl_ci95 or (None, None))]
@@ -62,7 +59,7 @@ def sweep_csv(rows: Sequence[SweepRow]) -> str:
                 row.n,
                 row.num_stages,
                 *("" if value is None else repr(value) for value in rates),
-                *(row.counts[state.value] for state in EndState),
+                *(row.counts[state] for state in STATES),
                 str(row.is_incomplete).lower(),
             ]
         )
