@@ -135,3 +135,43 @@ def evaluate(
         print_table(of_arm)
     if any(summary.is_incomplete for of_arm in summaries.values() for summary in of_arm):
         raise typer.Exit(EXIT_INCOMPLETE)
+
+
+@controlled_app.command()
+def report(
+    directory: Directory,
+    out: Annotated[Path | None, typer.Option(help="Where to write; default: DIRECTORY/report.")] = None,
+) -> None:
+    """Prints the tables, and writes them, the figures and a page of all pairs."""
+    from rich.console import Console
+
+    from evonav.report.controlled import load_analysis
+    from evonav.report.controlled_page import tables_of, write_controlled_report
+
+    console = Console()
+    for table in tables_of(load_analysis(directory)):
+        console.print(table.rich())
+    typer.echo(f"page: {write_controlled_report(directory, out)}")
+
+
+@controlled_app.command()
+def picture(
+    directory: Directory,
+    out: Annotated[Path, typer.Option(help="SVG file to write.")],
+    task: Annotated[str | None, typer.Argument(help="Id of a task; default: the most telling pair.")] = None,
+    agent: Annotated[str, typer.Option(help="Whose rollouts.")] = "fu",
+) -> None:
+    """Draws one agent in one pair: Fixed on the left, Not Fixed on the right."""
+    from evonav.errors import InvalidArgumentError
+    from evonav.report.controlled import load_analysis
+    from evonav.report.rollouts import telling_pairs, write_pair
+
+    analysis = load_analysis(directory)
+    if agent not in analysis.agents:
+        raise InvalidArgumentError(f"{directory}: no agent {agent!r}; there are {', '.join(analysis.agents)}")
+    found = [key for key in analysis.keys(agent) if task is None or key[0] == task]
+    if task is None:
+        found = [key for _, key in telling_pairs(analysis, agent)] or found
+    if not found:
+        raise InvalidArgumentError(f"{directory}: no pair {task or ''} that {agent!r} has finished")
+    typer.echo(f"picture: {write_pair(analysis, agent, found[0], out)}")

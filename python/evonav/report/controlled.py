@@ -1,0 +1,273 @@
+"""A controlled analysis read back: outcomes by arm, and what the arms differ in (docs/controlled.md)."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from evonav.errors import StoreError
+from evonav.evaluation.measures import StageRow, stage_rows
+from evonav.evaluation.records import StageRecord
+from evonav.evaluation.store import RunStore
+from evonav.paired import PairedEffect, paired_effect
+from evonav.report.run import PAPER_ORDER
+from evonav.report.tables import NONE, Table
+from evonav.significance import Interval
+from evonav.tasks.controlled import ControlledRecord, read_controlled, run_of
+
+BASELINE = "stage-reset"
+"""What forgets everything: against it memory is judged."""
+MINUS = "\N{MINUS SIGN}"
+SPLITS = {
+    "target": "the target moved",
+    "room": "its room changed, not it",
+    "other": "another room changed",
+}
+
+Key = tuple[str, int]
+"""Task and stage."""
+Measure = Callable[["Outcome"], float]
+MEASURES: dict[str, Measure] = {"SR": lambda one: one.success, "SPL": lambda one: one.spl}
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A scored stage of one agent in one arm."""
+
+    row: StageRow
+    record: StageRecord
+    """Without trace and entries."""
+
+    @property
+    def success(self) -> float:
+        """1 or 0."""
+        return float(bool(self.row.success))
+
+    @property
+    def spl(self) -> float:
+        """Of the stage."""
+        return self.row.spl or 0.0
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What agents did in every arm."""
+
+    directory: Path
+    record: ControlledRecord
+    agents: tuple[str, ...]
+    """The paper's in its order, then others by name."""
+    outcomes: Mapping[tuple[str, str], Mapping[Key, Outcome]]
+    """By arm and agent; scored stages only."""
+    num_unscored: int
+    """Stages that should count and have no score: errored, or not run."""
+
+    @property
+    def arms(self) -> tuple[str, ...]:
+        """Their names, in order."""
+        return tuple(arm.name for arm in self.record.arms)
+
+    def keys(self, *agents: str) -> list[Key]:
+        """Stages that all of some agents have scored in every arm."""
+        scored = [set(self.outcomes[arm, agent]) for agent in agents for arm in self.arms]
+        return sorted(set.intersection(*scored)) if scored else []
+
+    def effect(
+        self, a: tuple[str, str], b: tuple[str, str], measure: Measure, keys: Sequence[Key] | None = None
+    ) -> PairedEffect | None:
+        """`b` less `a`, each an arm and an agent, over the stages that both scored in every arm.
+
+        Returns:
+            `None` without a stage.
+        """
+        keys = self.keys(a[1], b[1]) if keys is None else keys
+        if not keys:
+            return None
+        houses = [self.outcomes[a][key].row.house for key in keys]
+        values = [np.array([measure(self.outcomes[side][key]) for key in keys]) for side in (a, b)]
+        return paired_effect(values[0], values[1], houses)
+
+    def effect_on_change(self, a: str, b: str, measure: Measure) -> PairedEffect | None:
+        """What agent `b` gains from the first arm to the last, less what agent `a` does, pair by pair."""
+        keys = self.keys(a, b)
+        if not keys:
+            return None
+        first, last = self.arms[0], self.arms[-1]
+        gains = [
+            np.array(
+                [measure(self.outcomes[last, name][key]) - measure(self.outcomes[first, name][key]) for key in keys]
+            )
+            for name in (a, b)
+        ]
+        houses = [self.outcomes[first, a][key].row.house for key in keys]
+        return paired_effect(gains[0], gains[1], houses)
+
+
+def load_analysis(directory: Path) -> Analysis:
+    """Reads the runs of a controlled analysis, finished or not.
+
+    Raises:
+        TaskError: There is no controlled analysis.
+        StoreError: No agent was run in it, or a run cannot be read.
+    """
+    record = read_controlled(directory)
+    outcomes: dict[tuple[str, str], dict[Key, Outcome]] = {}
+    agents: set[str] = set()
+    num_unscored = 0
+    for arm in record.arms:
+        run_dir = run_of(directory, arm.name)
+        if not run_dir.is_dir():
+            raise StoreError(f"{run_dir}: no run here yet: `evonav controlled evaluate {directory}` first")
+        with RunStore(run_dir) as store:
+            records = {(one.agent, one.task_id, one.stage): one for one in store.records(is_brief=True)}
+            for row in stage_rows(store):
+                agents.add(row.agent)
+                found = outcomes.setdefault((arm.name, row.agent), {})
+                if row.is_scored:
+                    found[row.task_id, row.stage] = Outcome(row, records[row.agent, row.task_id, row.stage])
+                elif row.state != "forced":
+                    num_unscored += 1
+    if not agents:
+        raise StoreError(f"{directory}: no agent was run: `evonav controlled evaluate {directory}` first")
+    rank = {agent: i for i, agent in enumerate(PAPER_ORDER)}
+    ordered = tuple(sorted(agents, key=lambda agent: (rank.get(agent, len(rank)), agent)))
+    for arm in record.arms:
+        for agent in ordered:
+            outcomes.setdefault((arm.name, agent), {})
+    return Analysis(directory, record, ordered, outcomes, num_unscored)
+
+
+def split_of(evolved: Outcome) -> str:
+    """What a pair's change touched: a key of `SPLITS`."""
+    record = evolved.record
+    if record.target.is_relocated_now:
+        return "target"
+    return "room" if record.transition.room_id == record.target.room_id else "other"
+
+
+def pair_tables(analysis: Analysis) -> list[Table]:
+    """Fixed / Not Fixed in all, by what changed, against Stage-Reset, and how stages ended."""
+    tables = [_drop_table(analysis), _split_table(analysis)]
+    if BASELINE in analysis.agents and len(analysis.agents) > 1:
+        tables.append(_baseline_table(analysis))
+    return [*tables, _ends_table(analysis)]
+
+
+def _drop_table(analysis: Analysis) -> Table:
+    fixed, evolved = analysis.arms
+    rows = []
+    for name, measure in MEASURES.items():
+        for agent in analysis.agents:
+            effect = analysis.effect((fixed, agent), (evolved, agent), measure)
+            rows.append((f"{agent}, {name}", str(len(analysis.keys(agent))), *effect_cells(effect)))
+    num_houses = len({outcome.row.house for found in analysis.outcomes.values() for outcome in found.values()})
+    notes = (
+        f"{num_houses} houses. Rates in %; changes in points, Not Fixed less Fixed, with 95% intervals (bootstrap by "
+        "house) and paired two-sided p (signs exchanged by house).",
+        *_caveats(analysis),
+    )
+    return Table("Fixed / Not Fixed", ("agent", "pairs", "Fixed", "Not Fixed", "change", "p"), tuple(rows), notes)
+
+
+def _caveats(analysis: Analysis) -> list[str]:
+    """What a reader has to know of the pairs."""
+    first = analysis.arms[0]
+    agent = analysis.agents[0]
+    radius_m = 2.0
+    near = [key for key, one in analysis.outcomes[first, agent].items() if (one.row.start_distance_m or 0) < radius_m]
+    found = []
+    if near:
+        found.append(f"In {len(near)} pairs the evaluated stage begins within {radius_m:g} m of the target.")
+    if analysis.num_unscored:
+        found.append(f"{analysis.num_unscored} stages are errored or not run, and left out with their pairs.")
+    return found
+
+
+def _split_table(analysis: Analysis) -> Table:
+    fixed, evolved = analysis.arms
+    rows = []
+    for split, words in SPLITS.items():
+        for agent in analysis.agents:
+            keys = analysis.keys(agent)
+            part = [key for key in keys if split_of(analysis.outcomes[evolved, agent][key]) == split]
+            effect = analysis.effect((fixed, agent), (evolved, agent), MEASURES["SR"], part)
+            rows.append((f"{words}: {agent}", str(len(part)), *effect_cells(effect)))
+    columns = ("what changed, agent", "pairs", "SR Fixed", "Not Fixed", "change", "p")
+    return Table("By what changed", columns, tuple(rows))
+
+
+def _baseline_table(analysis: Analysis) -> Table:
+    rows = []
+    for agent in analysis.agents:
+        if agent == BASELINE:
+            continue
+        row = [agent, str(len(analysis.keys(agent, BASELINE)))]
+        for arm in analysis.arms:
+            row += effect_cells(analysis.effect((arm, BASELINE), (arm, agent), MEASURES["SR"]))[2:]
+        row += effect_cells(analysis.effect_on_change(BASELINE, agent, MEASURES["SR"]))[2:]
+        rows.append(tuple(row))
+    columns = ("agent", "pairs", "Fixed", "p", "Not Fixed", "p", "what the change does to it", "p")
+    notes = (f"SR of the agent less that of {BASELINE} on the same pairs, in points; last, Not Fixed less Fixed.",)
+    return Table("Against searching from scratch", columns, tuple(rows), notes)
+
+
+def _ends_table(analysis: Analysis) -> Table:
+    rows = []
+    for agent in analysis.agents:
+        keys = analysis.keys(agent)
+        for arm, words in zip(analysis.arms, ("Fixed", "Not Fixed"), strict=True):
+            found = [analysis.outcomes[arm, agent][key].row for key in keys]
+            if not found:
+                continue
+            rows.append(
+                (
+                    f"{agent}, {words}",
+                    str(len(found)),
+                    str(sum(not row.success for row in found)),
+                    str(sum(row.cause == "stale_entry" for row in found)),
+                    f"{sum(row.num_stale_visits for row in found) / len(found):.2f}",
+                    f"{sum(row.stale_path_m for row in found) / len(found):.2f}",
+                    f"{sum(row.path_length_m or 0.0 for row in found) / len(found):.1f}",
+                    f"{sum(row.num_rounds for row in found) / len(found):.1f}",
+                )
+            )
+    columns = (
+        "agent, arm",
+        "stages",
+        "failures",
+        "stopped at a stale entry",
+        "visits to stale entries a stage",
+        "metres on them",
+        "metres in all",
+        "rounds",
+    )
+    return Table("How the evaluated stages went", columns, tuple(rows))
+
+
+def effect_cells(effect: PairedEffect | None) -> list[str]:
+    """Mean of a, mean of b, difference with interval, and p."""
+    if effect is None:
+        return [NONE] * 4
+    return [
+        f"{100 * effect.mean_a:.1f}",
+        f"{100 * effect.mean_b:.1f}",
+        signed(effect.difference, effect.ci95),
+        p_words(effect.p),
+    ]
+
+
+def signed(value: float, interval: Interval | None) -> str:
+    """`-6.3 (-13.9 to +1.2)` in points, from differences of -1 to 1."""
+    ends = "" if interval is None else f" ({_point(interval[0])} to {_point(interval[1])})"
+    return f"{_point(value)}{ends}"
+
+
+def _point(value: float) -> str:
+    text = f"{100 * value:+.1f}"
+    return "0.0" if text in ("+0.0", "-0.0") else text.replace("-", MINUS)
+
+
+def p_words(p: float) -> str:
+    """To two digits, or what it is below."""
+    return "<0.001" if p < 0.001 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"

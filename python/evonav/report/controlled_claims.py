@@ -1,0 +1,85 @@
+"""What the paper says of Fixed / Not Fixed (Sec. 4.3), and whether it is so here."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from evonav.paired import PairedEffect
+from evonav.report.controlled import BASELINE, MEASURES, Analysis, p_words, signed
+from evonav.report.tables import Table
+
+MEMORY_AGENTS = ("fu", "ftu", "3d-mem", "msgnav")
+"""Agents of the paper's figure that keep object entries."""
+LEVEL = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """That one figure is above another."""
+
+    paper: str
+    """In the paper's words, or nearly."""
+    what: str
+    effect: PairedEffect
+    """Positive where it is as the paper says."""
+
+    @property
+    def verdict(self) -> str:
+        """Whether it holds, as far as interval and p allow."""
+        if self.effect.difference == 0.0:
+            return "no difference"
+        if self.effect.p > LEVEL:
+            return (
+                "same direction, not significant" if self.effect.difference > 0 else "other direction, not significant"
+            )
+        return "holds" if self.effect.difference > 0 else "the opposite holds"
+
+
+def claims(analysis: Analysis) -> list[Claim]:
+    """The paper's statements of Sec. 4.3 that can be tested with the agents that were run."""
+    fixed, evolved = analysis.arms
+    found: list[Claim] = []
+
+    def add(paper: str, what: str, effect: PairedEffect | None) -> None:
+        if effect is not None:
+            found.append(Claim(paper, what, effect))
+
+    there = [agent for agent in MEMORY_AGENTS if agent in analysis.agents]
+    if BASELINE in analysis.agents:
+        for agent in there:
+            effect = analysis.effect((fixed, BASELINE), (fixed, agent), MEASURES["SR"])
+            add("Fixed: memory is ahead of Stage-Reset", f"{agent} less {BASELINE}, Fixed", effect)
+        if "fu" in there:
+            effect = analysis.effect((evolved, "fu"), (evolved, BASELINE), MEASURES["SR"])
+            add("Not Fixed: FU is behind Stage-Reset", f"{BASELINE} less fu, Not Fixed", effect)
+    for agent in there:
+        effect = analysis.effect((evolved, agent), (fixed, agent), MEASURES["SR"])
+        add("Memory drops when the scene evolves", f"{agent}, Fixed less Not Fixed", effect)
+    for careful in ("msgnav", "ftu"):
+        for trusting in ("3d-mem", "fu"):
+            if careful in there and trusting in there:
+                effect = analysis.effect_on_change(trusting, careful, MEASURES["SR"])
+                add("MSGNav and FTU drop less than 3D-Mem and FU", f"drop of {trusting} less that of {careful}", effect)
+    if "ftu" in there:
+        for agent in [*there, BASELINE]:
+            if agent != "ftu" and agent in analysis.agents:
+                effect = analysis.effect((evolved, agent), (evolved, "ftu"), MEASURES["SR"])
+                add("Not Fixed: FTU is best", f"ftu less {agent}, Not Fixed", effect)
+    return found
+
+
+def claim_table(analysis: Analysis) -> Table:
+    """The claims as a table."""
+    rows: Sequence[tuple[str, ...]] = [
+        (
+            one.paper,
+            one.what,
+            str(one.effect.n),
+            signed(one.effect.difference, one.effect.ci95),
+            p_words(one.effect.p),
+            one.verdict,
+        )
+        for one in claims(analysis)
+    ]
+    columns = ("the paper, Sec. 4.3", "here", "pairs", "SR, points", "p", "")
+    notes = (f"Each by itself; no adjustment for their number. Holds: p at most {LEVEL:g}.",)
+    return Table("The paper's statements", columns, tuple(rows), notes)

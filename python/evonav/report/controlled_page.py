@@ -1,0 +1,222 @@
+"""Writes what came of a controlled analysis: tables, figures, pictures of telling pairs, and a page of all pairs."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from evonav.errors import StoreError
+from evonav.report.causes import sentence
+from evonav.report.controlled import BASELINE, MEASURES, Analysis, Key, load_analysis, pair_tables
+from evonav.report.controlled_claims import claim_table
+from evonav.report.controlled_figures import bars_svg, lines_svg, write_figures
+from evonav.report.controlled_rates import rate_tables
+from evonav.report.html import page_environment, text_of
+from evonav.report.legend import legend
+from evonav.report.maps import map_css, outcome_words
+from evonav.report.overlay import change, rounds
+from evonav.report.plan import furniture, ground, labels, moving_ids
+from evonav.report.rollouts import (
+    REASONS,
+    Rollout,
+    arm_words,
+    changed_words,
+    load_rollouts,
+    pair_frame,
+    pair_svg,
+    split_words,
+    telling_pairs,
+    walk_and_course,
+)
+from evonav.report.svg import join, slug
+from evonav.report.tables import Table
+
+PAGE_NAME = "index.html"
+PAIRS_DIR, PICTURES_DIR = "pairs", "rollouts"
+TELLING_AGENT = "fu"
+"""Of the paper's pictures; where it was not run, the first agent that is not the baseline."""
+
+
+def tables_of(analysis: Analysis) -> list[Table]:
+    """All tables of an analysis."""
+    if analysis.record.kind == "rates":
+        return rate_tables(analysis)
+    return [*pair_tables(analysis), claim_table(analysis)]
+
+
+def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
+    """Writes `tables.md`, figures as SVG (and PNG and PDF where matplotlib is), and `index.html`.
+
+    Args:
+        directory: Of the analysis; its runs may be unfinished.
+        out: Default: its folder `report`.
+
+    Returns:
+        Path of the page.
+
+    Raises:
+        TaskError: There is no controlled analysis.
+        StoreError: A run cannot be read, or a file not written.
+    """
+    out = out or directory / "report"
+    analysis = load_analysis(directory)
+    tables = tables_of(analysis)
+    figures = _figures(analysis)
+    is_pairs = analysis.record.kind == "pairs"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "tables.md").write_text("\n".join(f"## {t.title}\n\n{t.markdown()}" for t in tables), encoding="utf-8")
+        (out / "tables.tex").write_text("\n".join(table.latex() for table in tables), encoding="utf-8")
+        for name, drawn in figures.items():
+            (out / f"{name}.svg").write_text(drawn, encoding="utf-8")
+        write_figures(analysis, out)
+        page = page_environment().get_template("controlled.html.j2")
+        path = out / PAGE_NAME
+        path.write_text(
+            page.render(
+                name=directory.resolve().name,
+                kind=analysis.record.kind,
+                record=analysis.record,
+                css=text_of("report.css") + map_css(),
+                figures=[Markup(drawn) for drawn in figures.values()],  # noqa: S704 - our own SVG
+                tables=tables,
+                telling=_write_telling(analysis, out) if is_pairs else [],
+                pairs=_write_pairs(analysis, out) if is_pairs else [],
+                agents=analysis.agents,
+                facts=_facts(analysis),
+            ),
+            encoding="utf-8",
+        )
+    except OSError as error:
+        raise StoreError(f"{out}: {error}") from error
+    return path
+
+
+def _figures(analysis: Analysis) -> dict[str, str]:
+    if analysis.record.kind == "pairs":
+        return {"fixed-not-fixed": bars_svg(analysis)}
+    return {f"rates-{name.lower()}": lines_svg(analysis, name, measure) for name, measure in MEASURES.items()}
+
+
+def _write_telling(analysis: Analysis, out: Path) -> list[dict[str, str]]:
+    """Pictures of the pairs that tell most, and where they are."""
+    others = [agent for agent in analysis.agents if agent != BASELINE]
+    agent = TELLING_AGENT if TELLING_AGENT in others else next(iter(others), analysis.agents[0])
+    found = []
+    for reason, key in telling_pairs(analysis, agent, per_reason=2):
+        name = f"{reason}_{slug(key[0])}_{slug(agent)}.svg"
+        folder = out / PICTURES_DIR
+        folder.mkdir(exist_ok=True)
+        (folder / name).write_text(pair_svg(load_rollouts(analysis, agent, key)), encoding="utf-8")
+        found.append(
+            {
+                "agent": agent,
+                "reason": REASONS[reason],
+                "task_id": key[0],
+                "page": f"{PAIRS_DIR}/{_page_name(key)}",
+                "picture": f"{PICTURES_DIR}/{name}",
+            }
+        )
+    return found
+
+
+def _write_pairs(analysis: Analysis, out: Path) -> list[dict[str, Any]]:
+    """A page a pair, and its line in the index."""
+    keys = sorted({key for found in analysis.outcomes.values() for key in found})
+    template = page_environment().get_template("controlled_pair.html.j2")
+    (out / PAIRS_DIR).mkdir(exist_ok=True)
+    lines = []
+    for key in keys:
+        agents = [a for a in analysis.agents if all(key in analysis.outcomes[arm, a] for arm in analysis.arms)]
+        if not agents:
+            continue
+        context = _pair_context(analysis, agents, key)
+        (out / PAIRS_DIR / _page_name(key)).write_text(template.render(**context), encoding="utf-8")
+        first = analysis.outcomes[analysis.arms[0], agents[0]][key].record
+        cells = [
+            [
+                ("none", "no score")
+                if (one := analysis.outcomes[arm, agent].get(key)) is None
+                else (one.record.state.value, f"{arm_words(arm)}: {outcome_words(one.record)}")
+                for arm in analysis.arms
+            ]
+            for agent in analysis.agents
+        ]
+        lines.append(
+            {
+                "task_id": key[0],
+                "page": f"{PAIRS_DIR}/{_page_name(key)}",
+                "category": first.goal.category,
+                "change": context["change"],
+                "cells": cells,
+            }
+        )
+    return lines
+
+
+def _page_name(key: Key) -> str:
+    return f"{slug(key[0])}.html"
+
+
+def _pair_context(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[str, Any]:
+    """What the page of a pair shows: the house once, what moved once an arm, every agent over them."""
+    by_agent = {agent: load_rollouts(analysis, agent, key) for agent in agents}
+    told = by_agent[agents[0]]
+    frame = pair_frame(told)
+    here = [one.maps[key[1]] for one in told if key[1] in one.maps]
+    moving = moving_ids(here)
+    shared = ground(here[0], frame, moving) if here else ""
+    defs = [f'<g class="map" id="house">{shared}</g>']
+    for i, one in enumerate(told):
+        stage_map = one.maps.get(key[1])
+        items = [] if stage_map is None else [item for item in stage_map.objects if item.object_id in moving]
+        changed = change(one.record.transition, frame, stage_map=stage_map, previous_map=one.maps.get(key[1] - 1))
+        names = "" if stage_map is None else labels(stage_map, frame)
+        defs.append(f'<g class="map" id="arm{i}">{furniture(items, frame)}{changed}{names}</g>')
+
+    def cell(i: int, one: Rollout) -> dict[str, Any]:
+        drawn = f'<use href="#house"/><use href="#arm{i}"/>{walk_and_course(one, frame)}'
+        return {
+            "state": one.record.state.value,
+            "words": outcome_words(one.record),
+            "sentence": sentence(one.record),
+            "rounds": rounds(one.record.trace),
+            "svg": Markup(f'<svg class="map" viewBox="{frame.view_box}" role="img">{drawn}</svg>'),  # noqa: S704
+        }
+
+    first = told[0].record
+    return {
+        "css": text_of("report.css") + map_css(),
+        "legend": legend(),
+        "task_id": key[0],
+        "change": split_words(analysis, agents[0], key),
+        "instruction": first.goal.instruction,
+        "image": here[0].reference_image if here else None,
+        "defs": Markup(join(defs)),  # noqa: S704 - our own SVG
+        "arms": [
+            {
+                "words": arm_words(one.arm),
+                "change": changed_words(one),
+                "is_static": one.record.transition.kind == "static",
+            }
+            for one in told
+        ],
+        "rows": [(agent, [cell(i, one) for i, one in enumerate(found)]) for agent, found in by_agent.items()],
+        "commands": [f"evonav view runs/{arm} --task {key[0]}" for arm in analysis.arms],
+    }
+
+
+def _facts(analysis: Analysis) -> list[tuple[str, str]]:
+    record = analysis.record
+    rates = ",".join(f"{arm.evolve_probability:g}" for arm in record.arms)
+    parts = ["evonav controlled generate HOUSES --out DIR", f"--seed {record.seed}"]
+    parts += [f"--limit {record.limit}"] if record.limit else []
+    parts += [f"--per-house {record.per_house}"] if record.per_house > 1 else []
+    parts += [f"--rates {rates}"] if record.kind == "rates" else []
+    return [
+        ("tasks", " ".join(parts)),
+        ("runs", f"evonav controlled evaluate DIR --agents {','.join(analysis.agents)}"),
+        ("houses", ", ".join(f"{source.name} (sha256 {source.sha256[:12]})" for source in record.sources[:20])),
+        ("generation", record.parameters.model_dump_json()),
+    ]

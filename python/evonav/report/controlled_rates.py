@@ -1,0 +1,147 @@
+"""A sweep of the evolution rate: SR and SPL by rate, and where searching from scratch overtakes memory."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.paired import cluster_means
+from evonav.report.controlled import BASELINE, MEASURES, Analysis, Key, Measure, effect_cells
+from evonav.report.tables import Table, percent
+from evonav.significance import Interval
+
+NUM_RESAMPLES = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Crossover:
+    """Where the straight line through an agent's lead over the baseline, by rate, falls to zero."""
+
+    rate: float
+    """May lie outside of 0 to 1; -inf: the baseline is ahead at every rate, inf: at none."""
+    ci95: Interval
+    """Of resampled houses."""
+    share_within: float
+    """Of resamples, those in which it lies in 0 to 1."""
+
+    @property
+    def is_found(self) -> bool:
+        """Whether there is one between never and always."""
+        return 0.0 <= self.rate <= 1.0
+
+    def words(self) -> str:
+        """`0.62 (0.31 to >1)`, or that there is none."""
+        interval = f"({_rate_words(self.ci95[0])} to {_rate_words(self.ci95[1])})"
+        if self.is_found:
+            return f"{self.rate:.2f} {interval}"
+        who = "memory is ahead at every rate" if self.rate > 1 else f"{BASELINE} is ahead at every rate"
+        return f"none found: {who} {interval}"
+
+
+def rate_keys(analysis: Analysis, *agents: str) -> list[Key]:
+    """Stages that count: before the first one nothing can evolve."""
+    return [key for key in analysis.keys(*agents) if key[1] > 1]
+
+
+def by_rate(analysis: Analysis, agent: str, measure: Measure) -> list[tuple[float, float, Interval | None]]:
+    """Rate, mean and interval in each arm, over the stages that the agent has scored in all."""
+    keys = rate_keys(analysis, agent)
+    if not keys:
+        return []
+    values = np.array([[measure(analysis.outcomes[arm, agent][key]) for arm in analysis.arms] for key in keys])
+    houses = [analysis.outcomes[analysis.arms[0], agent][key].row.house for key in keys]
+    found = cluster_means(values, houses)
+    return [(arm.evolve_probability, *one) for arm, one in zip(analysis.record.arms, found, strict=True)]
+
+
+def crossover(analysis: Analysis, agent: str, measure: Measure, *, seed: int = 0) -> Crossover | None:
+    """Where the baseline overtakes an agent; `None` without stages of both."""
+    keys = rate_keys(analysis, agent, BASELINE)
+    if not keys or agent == BASELINE:
+        return None
+    leads = np.array(
+        [
+            [
+                measure(analysis.outcomes[arm, agent][key]) - measure(analysis.outcomes[arm, BASELINE][key])
+                for arm in analysis.arms
+            ]
+            for key in keys
+        ]
+    )
+    houses = [analysis.outcomes[analysis.arms[0], agent][key].row.house for key in keys]
+    names, rows = np.unique(np.asarray(houses), return_inverse=True)
+    sums = np.zeros((len(names), leads.shape[1] + 1))
+    np.add.at(sums, rows, np.column_stack([leads, np.ones(len(leads))]))
+    rates = np.array([arm.evolve_probability for arm in analysis.record.arms])
+    generator = np.random.Generator(np.random.PCG64(seed))
+    counts = generator.multinomial(len(names), np.full(len(names), 1 / len(names)), size=NUM_RESAMPLES)
+    drawn = counts @ sums
+    crossed = np.sort([_crossing(rates, row[:-1] / row[-1]) for row in drawn])
+    low, high = (crossed[round(share * (NUM_RESAMPLES - 1))] for share in (0.025, 0.975))
+    return Crossover(
+        rate=_crossing(rates, leads.mean(axis=0)),
+        ci95=(float(low), float(high)),
+        share_within=float(((crossed >= 0.0) & (crossed <= 1.0)).mean()),
+    )
+
+
+def _crossing(rates: NDArray[np.float64], leads: NDArray[np.float64]) -> float:
+    """Where the line of least squares through leads falls through zero.
+
+    Returns:
+        `inf` where it does not fall and is above zero at rate 1, `-inf` where it does not fall and is not.
+    """
+    offsets = rates - rates.mean()
+    slope = float(offsets @ leads / (offsets @ offsets))
+    middle = float(leads.mean())
+    if slope >= 0.0:
+        return math.inf if middle + slope * (1.0 - float(rates.mean())) > 0.0 else -math.inf
+    return float(rates.mean()) - middle / slope
+
+
+def rate_tables(analysis: Analysis) -> list[Table]:
+    """SR and SPL by rate, leads over the baseline, and crossovers."""
+    tables = []
+    for name, measure in MEASURES.items():
+        rows = []
+        for agent in analysis.agents:
+            found = by_rate(analysis, agent, measure)
+            if found:
+                cells = [percent(mean, interval) for _, mean, interval in found]
+                rows.append((agent, str(len(rate_keys(analysis, agent))), *cells))
+        columns = ("agent", "stages", *(f"p = {arm.evolve_probability:g}" for arm in analysis.record.arms))
+        note = "In %, with 95% intervals (bootstrap by house); stages from the second on, the same in every arm."
+        tables.append(Table(f"{name} by evolution rate", columns, tuple(rows), (note,)))
+    if BASELINE in analysis.agents and len(analysis.agents) > 1:
+        tables.append(_lead_table(analysis))
+    return tables
+
+
+def _lead_table(analysis: Analysis) -> Table:
+    rows = []
+    for agent in analysis.agents:
+        keys = rate_keys(analysis, agent, BASELINE)
+        if agent == BASELINE or not keys:
+            continue
+        for name, measure in MEASURES.items():
+            cells = []
+            for arm in analysis.arms:
+                _, _, lead, p = effect_cells(analysis.effect((arm, BASELINE), (arm, agent), measure, keys))
+                cells.append(f"{lead}, p {p}")
+            found = crossover(analysis, agent, measure)
+            rows.append((f"{agent}, {name}", *cells, "" if found is None else found.words()))
+    columns = (
+        "agent, measure",
+        *(f"p = {arm.evolve_probability:g}" for arm in analysis.record.arms),
+        f"overtaken by {BASELINE} at p",
+    )
+    notes = (
+        f"Points ahead of {BASELINE} on the same stages, with 95% interval and paired p. Overtaken: where the line of "
+        "least squares through the leads falls through zero, with the interval of resampled houses.",
+    )
+    return Table(f"Ahead of {BASELINE}", columns, tuple(rows), notes)
+
+
+def _rate_words(rate: float) -> str:
+    return "<0" if rate < 0.0 else ">1" if rate > 1.0 else f"{rate:.2f}"

@@ -1,0 +1,205 @@
+"""Paired rollouts: what one agent did in a house as it was, beside what it did where the house had changed."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.records import EndState, StageMap, StageRecord
+from evonav.evaluation.store import RunStore
+from evonav.report.causes import sentence
+from evonav.report.controlled import SPLITS, Analysis, Key, split_of
+from evonav.report.legend import legend_row
+from evonav.report.maps import change_words, file_css, outcome_words, success_radius_of, task_frame
+from evonav.report.overlay import change, course
+from evonav.report.plan import Frame, ground, labels
+from evonav.report.svg import arrow_head, cm, escape, join, polyline, simplified, text_lines, title
+from evonav.tasks.controlled import run_of
+
+PANEL_PX, GAP_PX, HEAD_PX, FOOT_PX, IMAGE_PX = 560, 20, 96, 58, 84
+ARM_WORDS = {"fixed": "Fixed", "evolved": "Not Fixed"}
+REASONS = {
+    "misled": "led to where the target was, and lost it",
+    "recovered": "led to where the target was, and found it after all",
+    "unharmed": "the target moved, and it was found without a detour to its old place",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Rollout:
+    """One agent's evaluated stage in one arm, and the walk before it."""
+
+    arm: str
+    record: StageRecord
+    walks: tuple[StageRecord, ...]
+    """Stages of the same episode in which it looked on."""
+    maps: Mapping[int, StageMap]
+    success_radius_m: float
+
+
+def load_rollouts(analysis: Analysis, agent: str, key: Key) -> list[Rollout]:
+    """A pair with its traces, an arm each.
+
+    Raises:
+        InvalidArgumentError: There is no such pair.
+        StoreError: A run cannot be read.
+    """
+    task_id, stage = key
+    found = []
+    for arm in analysis.arms:
+        with RunStore(run_of(analysis.directory, arm)) as store:
+            records = {one.stage: one for one in store.records(agent, task_id)}
+            maps = {one.stage: one for one in store.maps(task_id)}
+            radius_m = success_radius_of(store.meta("config") or {})
+        if stage not in records:
+            raise InvalidArgumentError(f"{analysis.directory}: no task {task_id!r} by agent {agent!r} in arm {arm}")
+        walks = tuple(one for _, one in sorted(records.items()) if one.state is EndState.FORCED)
+        found.append(Rollout(arm, records[stage], walks, maps, radius_m))
+    return found
+
+
+def telling_pairs(analysis: Analysis, agent: str, per_reason: int = 1) -> list[tuple[str, Key]]:
+    """Pairs that show what a moved target does to an agent, each with its reason, a key of `REASONS`.
+
+    Where it was misled, those on whose stale entries it walked farthest come first; else the shortest ways.
+    """
+    fixed, evolved = analysis.arms
+    ranked: dict[str, list[tuple[float, Key]]] = {reason: [] for reason in REASONS}
+    for key in analysis.keys(agent):
+        before, after = (analysis.outcomes[arm, agent][key] for arm in (fixed, evolved))
+        if not before.success or split_of(after) != "target":
+            continue
+        if after.row.num_stale_visits and not after.success:
+            ranked["misled"].append((-after.row.stale_path_m, key))
+        elif after.row.num_stale_visits:
+            ranked["recovered"].append((-after.row.stale_path_m, key))
+        elif after.success:
+            ranked["unharmed"].append((after.row.path_length_m or 0.0, key))
+    return [(reason, key) for reason, found in ranked.items() for _, key in sorted(found)[:per_reason]]
+
+
+def write_pair(analysis: Analysis, agent: str, key: Key, path: Path) -> Path:
+    """Draws a pair into an SVG file.
+
+    Raises:
+        InvalidArgumentError: There is no such pair.
+        StoreError: A run cannot be read, or the file not written.
+    """
+    drawn = pair_svg(load_rollouts(analysis, agent, key))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(drawn, encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{path}: {error}") from error
+    return path
+
+
+def pair_svg(rollouts: Sequence[Rollout]) -> str:
+    """Fixed on the left, Not Fixed on the right, the goal above and the legend below."""
+    frame = pair_frame(rollouts)
+    map_px = round(PANEL_PX * frame.height / frame.width)
+    first = rollouts[0].record
+    width_px = GAP_PX + len(rollouts) * (PANEL_PX + GAP_PX)
+    image = rollouts[0].maps[first.stage].reference_image if first.stage in rollouts[0].maps else None
+    shown = (
+        ""
+        if image is None
+        else f'<image href="{escape(image)}" x="{width_px - GAP_PX - IMAGE_PX}" y="6" width="{IMAGE_PX}" '
+        f'height="{IMAGE_PX}"/>'
+    )
+    lines = join(
+        f'<text class="instruction" x="{GAP_PX}" y="{48 + 17 * i}">{escape(line)}</text>'
+        for i, line in enumerate(text_lines(first.goal.instruction, 140, 2))
+    )
+    head = f'<text class="stage" x="{GAP_PX}" y="27">{escape(first.agent)}: {escape(first.goal.category)}</text>'
+    panels = join(_panel(one, frame, map_px, GAP_PX + i * (PANEL_PX + GAP_PX)) for i, one in enumerate(rollouts))
+    legend, legend_px = legend_row(width_px - 2 * GAP_PX)
+    top_px = HEAD_PX + map_px + FOOT_PX
+    height_px = top_px + legend_px + 28
+    dotted = (
+        f'<g transform="translate({GAP_PX} {top_px + legend_px})"><path class="walk" d="M0 8h40" stroke-width="3"/>'
+        '<text class="quiet" x="48" y="12">reference trajectory that the agent was walked along before</text></g>'
+    )
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="0 0 {width_px} {height_px}" '
+        f'width="{width_px}" height="{height_px}" role="img"><title>{escape(first.task_id)}: {escape(first.agent)}'
+        f'</title><style>{file_css()}</style><rect class="page" width="100%" height="100%" rx="10"/>{head}{lines}'
+        f'{shown}{panels}<g transform="translate({GAP_PX} {top_px})">{legend}</g>{dotted}</svg>\n'
+    )
+
+
+def pair_frame(rollouts: Sequence[Rollout]) -> Frame:
+    """The frame that all arms of a pair share."""
+    maps = {i: stage_map for i, one in enumerate(rollouts) for stage_map in one.maps.values()}
+    return task_frame(maps, [one.record for one in rollouts])
+
+
+def _panel(rollout: Rollout, frame: Frame, map_px: int, left_px: int) -> str:
+    record = rollout.record
+    verdict = "ok" if record.state is EndState.SUCCESS else "bad"
+    why = text_lines(sentence(record), 90, 1)[0]
+    changed = text_lines(changed_words(rollout), 90, 1)[0]
+    css = "quiet" if record.transition.kind == "static" else "change-words"
+    return (
+        f'<g transform="translate({left_px} {HEAD_PX})"><svg width="{PANEL_PX}" height="{map_px}" '
+        f'viewBox="{frame.view_box}">{house_drawing(rollout, frame)}{walk_and_course(rollout, frame)}</svg>'
+        f'<text class="verdict" y="{map_px + 18}"><tspan class="ink">{arm_words(rollout.arm)}</tspan> '
+        f'<tspan class="{verdict}">{escape(outcome_words(record))}</tspan></text>'
+        f'<text class="quiet" y="{map_px + 34}">{escape(why)}</text>'
+        f'<text class="{css}" y="{map_px + 50}">{escape(changed)}</text></g>'
+    )
+
+
+def arm_words(arm: str) -> str:
+    """`Fixed`, `Not Fixed`, or the name of another arm."""
+    return ARM_WORDS.get(arm, arm)
+
+
+def changed_words(rollout: Rollout) -> str:
+    """What had happened since the walk."""
+    words = change_words(rollout.record, rollout.maps)
+    return f"{words}, the target among them" if rollout.record.target.is_relocated_now else words
+
+
+def split_words(analysis: Analysis, agent: str, key: Key) -> str:
+    """What the pair's change touched."""
+    return SPLITS[split_of(analysis.outcomes[analysis.arms[-1], agent][key])]
+
+
+def house_drawing(rollout: Rollout, frame: Frame) -> str:
+    """The house of the evaluated stage, and what changed before."""
+    stage = rollout.record.stage
+    here, before = rollout.maps.get(stage), rollout.maps.get(stage - 1)
+    changed = change(rollout.record.transition, frame, stage_map=here, previous_map=before)
+    return changed if here is None else ground(here, frame) + changed + labels(here, frame)
+
+
+def walk_and_course(rollout: Rollout, frame: Frame) -> str:
+    """The way that the agent was walked, and what it then did itself."""
+    points = [cm(point) for walk in rollout.walks for taken in walk.trace for point in taken.path_m]
+    drawn = ""
+    if len(points) > 1:
+        hint = title("reference trajectory that the agent was walked along before")
+        width = f"{0.7 * frame.unit:.1f}"
+        drawn = f'<path class="walk" stroke-width="{width}" d="{polyline(simplified(points))}">{hint}</path>'
+    return drawn + target_move(rollout.record, frame) + course(rollout.record, frame, rollout.success_radius_m)
+
+
+def target_move(record: StageRecord, frame: Frame) -> str:
+    """An arrow from where the target stood to where it is, if it moved."""
+    target = record.target
+    if target.first_position_m is None or not target.is_relocated_now:
+        return ""
+    start, end = (cm((point[0], point[2])) for point in (target.first_position_m, target.position_m))
+    length = math.dist(start, end)
+    if length < 4 * frame.unit:
+        return ""
+    direction = ((end[0] - start[0]) / length, (end[1] - start[1]) / length)
+    tip = (end[0] - 2.4 * frame.unit * direction[0], end[1] - 2.4 * frame.unit * direction[1])
+    head = arrow_head(tip, direction, 2.6 * frame.unit)
+    hint = title(f"the target moved {length / 100:.1f} m")
+    return (
+        f'<g class="target-move" stroke-width="{0.9 * frame.unit:.1f}">{hint}'
+        f'<path d="{polyline([start, (round(tip[0]), round(tip[1]))])}"/><path class="head" d="{head}"/></g>'
+    )
