@@ -7,6 +7,7 @@ import typer
 from evonav.cli.check_agent import check_agent
 from evonav.cli.compare import compare
 from evonav.cli.controlled import controlled_app
+from evonav.cli.doctor import doctor
 from evonav.cli.evaluate import demo, evaluate, report, strip
 from evonav.cli.failures import failures
 from evonav.cli.generate import generate
@@ -42,6 +43,7 @@ COMMANDS = (
     pack,
     verify,
     mock_vlm,
+    doctor,
 )
 for command in COMMANDS:
     app.command()(command)

@@ -1,0 +1,270 @@
+"""What works on this machine, a check a capability: quick, and none of them changes anything."""
+
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
+
+State = Literal["ok", "missing", "failed"]
+RENDER_S = 1.0
+PING_S = 5.0
+MIN_FREE_GB = 2.0
+
+EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
+    "data": (("pyarrow",), "Parquet tables"),
+    "ray": (("ray",), "--engine ray: many machines"),
+    "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
+    "thor": (("ai2thor", "msgpack", "prior"), "--simulator ai2thor, ProcTHOR-10k"),
+    "video": (("imageio", "av"), "videos of episodes"),
+    "viz": (("matplotlib",), "figures as PNG and PDF"),
+    "vlm": (("openai",), "--decision vlm: a model behind an endpoint"),
+}
+"""Packages of each extra, and what it is for."""
+_MODULES = {"rerun-sdk": "rerun"}
+_X86_FEATURES = ("sse4_2", "avx", "avx2", "fma", "avx512f")
+_ARM_FEATURES = ("asimd", "neon", "sve")
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """What came of a look at one capability."""
+
+    name: str
+    state: State
+    """missing: something optional; failed: it is there and does not work, or nothing works without it."""
+    said: str
+    remedy: str = ""
+    """What to do about it."""
+    is_essential: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """What the checks are about, beside the machine."""
+
+    out: Path
+    """Folder that runs would go to; need not exist."""
+    uses_network: bool = True
+    base_url: str | None = None
+
+
+def all_checks(where: Where) -> Iterator[Check]:
+    """Every check, in reading order; one that goes wrong itself is a failed check, not an error."""
+    essential: tuple[tuple[str, Callable[[], Check]], ...] = (
+        ("evonav", _core),
+        ("python", _python),
+        ("bundled tasks", _bundled),
+        ("renderer", _renderer),
+    )
+    for name, check in essential:
+        yield _guarded(name, check, is_essential=True)
+    yield _guarded("processor", _processor)
+    yield _guarded("run folder", lambda: _folder(where.out))
+    for extra in EXTRAS:
+        yield _guarded(f"extra {extra}", lambda extra=extra: _extra(extra))  # type: ignore[misc]
+    yield _guarded("GPU", _gpu)
+    yield _guarded("AI2-THOR", _thor)
+    yield _guarded("ProcTHOR-10k", _procthor)
+    yield _guarded("model endpoint", lambda: _endpoint(where))
+
+
+def _guarded(name: str, check: Callable[[], Check], *, is_essential: bool = False) -> Check:
+    try:
+        return check()
+    except Exception as error:  # whatever is broken here is what is to be told
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        return Check(name, "failed", said, "pip install --force-reinstall evonav" if is_essential else "", is_essential)
+
+
+def _core() -> Check:
+    import evonav
+    from evonav import _core as core
+
+    said = f"{evonav.__version__}, Rust core {core.__version__}, in {Path(evonav.__file__).parent}"
+    return Check("evonav", "ok", said, is_essential=True)
+
+
+def _python() -> Check:
+    said = f"{platform.python_version()} ({sys.executable}), numpy {version('numpy')}, {platform.platform(terse=True)}"
+    return Check("python", "ok", said, is_essential=True)
+
+
+def _bundled() -> Check:
+    from evonav.evaluation.datasets import bundled_tasks
+    from evonav.tasks.files import load_task, task_roots
+
+    with bundled_tasks() as folder:
+        roots = task_roots(folder)
+        task = load_task(roots[0])
+    return Check("bundled tasks", "ok", f"{len(roots)}, the first of {task.num_stages} stages", is_essential=True)
+
+
+def _renderer() -> Check:
+    """Turns and looks for a second."""
+    from dataclasses import replace
+
+    from evonav.house import bundled_houses
+    from evonav.world.embedded import EmbeddedSimulator
+
+    simulator = EmbeddedSimulator()
+    pose = simulator.reset(next(iter(bundled_houses())).to_json())
+    num, most = 0, 0
+    began_s = time.monotonic()
+    while (took_s := time.monotonic() - began_s) < RENDER_S:
+        frame = simulator.render(replace(pose, yaw_rad=pose.yaw_rad + 0.5 * num), rgb=True, instances=True)
+        most = max(most, int(frame.instances.max()) if frame.instances is not None else 0)
+        num += 1
+    simulator.close()
+    if most == 0:
+        return Check("renderer", "failed", "sees nothing in a bundled house", "tell us: it is a bug", is_essential=True)
+    size = f"{simulator.config.width_px}x{simulator.config.height_px}"
+    said = f"{num / took_s:.0f} views/s of {size} (colour, depth, instances) on one core"
+    return Check("renderer", "ok", said, is_essential=True)
+
+
+def _processor() -> Check:
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    info = Path("/proc/cpuinfo")
+    text = info.read_text(encoding="utf-8", errors="replace") if info.is_file() else ""
+    flags = set(" ".join(re.findall(r"^(?:flags|Features)\s*:(.*)$", text, re.MULTILINE)[:1]).split())
+    known = [name for name in (*_X86_FEATURES, *_ARM_FEATURES) if name in flags]
+    told = f", {' '.join(known)}" if known else ""
+    return Check("processor", "ok", f"{platform.machine()}, {cores} cores for workers{told}")
+
+
+def _folder(out: Path) -> Check:
+    """Space and locks where runs would go."""
+    place = next(folder for folder in (out.absolute(), *out.absolute().parents) if folder.is_dir())
+    free_gb = shutil.disk_usage(place).free / 1e9
+    try:
+        with tempfile.TemporaryDirectory(dir=place, prefix=".evonav-doctor-") as folder:
+            has_locks = _has_locks(Path(folder) / "lock")
+    except OSError as error:
+        remedy = "name a folder that you may write to with --out"
+        return Check("run folder", "failed", f"{place}: {error.strerror or error}", remedy)
+    said = f"{place}: {free_gb:.0f} GB free, {'locks work' if has_locks else 'no file locks'}"
+    if not has_locks:
+        return Check("run folder", "failed", said, "put runs on a local disk: two commands could write to one run")
+    if free_gb < MIN_FREE_GB:
+        return Check("run folder", "failed", said, "a run takes about 0.1 MB a stage, with a model 1 MB: make room")
+    return Check("run folder", "ok", said)
+
+
+def _has_locks(path: Path) -> bool:
+    """Whether a second opening of a locked file is kept out."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        return False
+    with path.open("w") as first, path.open("w") as second:
+        try:
+            fcntl.flock(first, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        try:
+            fcntl.flock(second, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return True
+    return False
+
+
+def _extra(extra: str) -> Check:
+    packages, purpose = EXTRAS[extra]
+    found, lacking = [], []
+    for package in packages:
+        try:
+            found.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            lacking.append(package)
+    name = f"extra {extra}"
+    if lacking:
+        return Check(name, "missing", f"{purpose} (no {', '.join(lacking)})", f"pip install 'evonav[{extra}]'")
+    broken = [package for package in packages if find_spec(_MODULES.get(package, package)) is None]
+    if broken:
+        remedy = f"pip install --force-reinstall 'evonav[{extra}]'"
+        return Check(name, "failed", f"{purpose} ({', '.join(broken)} is installed and cannot be found)", remedy)
+    return Check(name, "ok", f"{purpose} ({', '.join(found)})")
+
+
+def _gpu() -> Check:
+    """By NVIDIA's own tool; PyTorch is named by its version and not loaded, which takes seconds."""
+    try:
+        torch = f", torch {version('torch')}"
+    except PackageNotFoundError:
+        torch = ""
+    tool = shutil.which("nvidia-smi")
+    none = Check("GPU", "missing", f"none found{torch}; evonav's own simulator and agents need none")
+    if tool is None:
+        return none
+    command = [tool, "--query-gpu=name,memory.total,driver_version", "--format=csv,noheader"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)  # noqa: S603 - nvidia-smi
+    names = [" ".join(line.split()) for line in done.stdout.splitlines() if line.strip()]
+    return Check("GPU", "ok", "; ".join(names) + torch) if done.returncode == 0 and names else none
+
+
+def _thor() -> Check:
+    from evonav.errors import SimulationError
+    from evonav.thor import executable
+
+    try:
+        engine = f"evonav-thor in {Path(executable().strip(chr(39))).parent}"
+    except SimulationError as error:
+        return Check("AI2-THOR", "failed", str(error), "pip install --force-reinstall evonav")
+    releases = Path.home() / ".ai2thor" / "releases"
+    builds = sorted(path.name for path in releases.glob("*") if path.is_dir()) if releases.is_dir() else []
+    unity = f"{len(builds)} Unity builds in {releases}" if builds else "no Unity build (downloaded at first use)"
+    if find_spec("ai2thor") is None:
+        return Check("AI2-THOR", "missing", f"no client; {engine}", "pip install 'evonav[thor]'")
+    return Check("AI2-THOR", "ok", f"client {version('ai2thor')}, {engine}, {unity}")
+
+
+def _procthor() -> Check:
+    from evonav.house.procthor10k import dataset_folder, read_manifest
+
+    folder = dataset_folder()
+    manifest = read_manifest(folder)
+    if manifest is None:
+        return Check("ProcTHOR-10k", "missing", f"not in {folder}", "evonav houses fetch procthor-10k")
+    told = ", ".join(f"{name} {split.num_houses}" for name, split in manifest.splits.items())
+    return Check("ProcTHOR-10k", "ok", f"{told} houses in {folder}")
+
+
+def _endpoint(where: Where) -> Check:
+    """Lists the models of an endpoint, only where one is configured."""
+    from evonav.decision.vlm import KEY_VARIABLE, URL_VARIABLE
+
+    key, url = os.environ.get(KEY_VARIABLE), where.base_url or os.environ.get(URL_VARIABLE)
+    if not key and not url:
+        remedy = f"export {KEY_VARIABLE}=..., or {URL_VARIABLE} of your own server (docs/decision.md)"
+        return Check("model endpoint", "missing", "none configured; rules decide without one", remedy)
+    url = (url or "https://api.openai.com/v1").rstrip("/")
+    shown = re.sub(r"//[^/@]*@", "//", url)
+    if not where.uses_network:
+        return Check("model endpoint", "ok", f"{shown} configured, not asked (--no-network)")
+    from urllib.error import HTTPError, URLError
+    from urllib.request import Request, urlopen
+
+    if not url.startswith(("http://", "https://")):
+        return Check("model endpoint", "failed", f"{shown}: no http address", f"set {URL_VARIABLE} to http(s)://.../v1")
+    request = Request(f"{shown}/models", headers={"Authorization": f"Bearer {key or 'none'}"})  # noqa: S310 - http
+    try:
+        with urlopen(request, timeout=PING_S) as answer:  # noqa: S310 - http
+            answer.read(1)
+    except HTTPError as error:
+        is_key = error.code in (401, 403)
+        remedy = f"check {KEY_VARIABLE}" if is_key else f"check {URL_VARIABLE}: it ends in /v1 for most servers"
+        return Check("model endpoint", "failed", f"{shown} answers {error.code}", remedy)
+    except (URLError, OSError, ValueError) as error:
+        reason = getattr(error, "reason", error)
+        return Check("model endpoint", "failed", f"{shown}: {reason}", "is the server up? --no-network skips this")
+    return Check("model endpoint", "ok", f"{shown} answers; {KEY_VARIABLE} is {'set' if key else 'not set'}")
