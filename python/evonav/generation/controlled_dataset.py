@@ -117,7 +117,7 @@ def generate_controlled(
         return ControlledSummary(record, len(outcomes) - num_before)
 
 
-def make_worker(settings: str) -> Callable[[str], str]:
+def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """The function from a house to its `Outcome`, as `evonav.parallel` calls it.
 
     Args:
