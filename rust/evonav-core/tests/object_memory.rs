@@ -120,11 +120,12 @@ proptest! {
     #[test]
     fn overlap_counts_the_points_with_a_near_one(
         points in points(), others in points(), more in points(), radius in 0.01_f32..0.2,
+        voxel_m in 0.01..0.1,
     ) {
-        let mut cloud = Cloud::new(&others, 1e-4, radius);
+        let mut cloud = Cloud::new(&others, voxel_m, radius);
         cloud.merge(&more);
         let kept = cloud.points().to_vec();
-        prop_assert!(kept.len() <= others.len() + more.len());
+        prop_assert_eq!(&kept, &first_of_voxels(&[others, more].concat(), voxel_m));
         prop_assert_eq!(cloud.overlap(&points), overlap_naive(&points, &kept, radius));
     }
 }

@@ -1,5 +1,7 @@
 //! Cleaning point clouds.
 
+use std::borrow::Cow;
+
 use crate::{
     geometry::{Aabb, Vec3},
     memory::{
@@ -15,9 +17,10 @@ pub(crate) fn clean(points: &[Point], config: &ObjectMapConfig) -> Option<(Vec<P
     }
     let filtered = voxel_filter(points, config.voxel_m);
     let radius_m = config.cluster_radius_m as f32;
-    let cluster = largest_cluster(&filtered, radius_m, config.cluster_min_points)
-        .filter(|cluster| cluster.len() >= 5)
-        .unwrap_or(filtered);
+    let cluster = match largest_cluster(&filtered, radius_m, config.cluster_min_points) {
+        Some(Cow::Owned(cluster)) if cluster.len() >= 5 => cluster,
+        _ => filtered,
+    };
     let bounds_m = Aabb::of_points(cluster.iter().map(|point| point.map(f64::from)));
     // A picture seen from the front is a plane; as a set of voxels it has a volume all the same.
     let volume_m3: f64 = bounds_m.size_m().iter().map(|edge| edge.max(config.voxel_m)).product();

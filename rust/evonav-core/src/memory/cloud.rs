@@ -4,7 +4,7 @@ use crate::{
     geometry::Aabb,
     memory::{
         dbscan::distance2,
-        voxels::{VoxelTable, voxel_of},
+        voxels::{VoxelSet, VoxelTable, voxel_of},
     },
     sensors::unproject::Point,
 };
@@ -15,7 +15,7 @@ pub struct Cloud {
     points: Vec<Point>,
     bounds_m: Aabb,
     inverse_edge: f64,
-    voxels: VoxelTable,
+    voxels: VoxelSet,
     radius_m: f32,
     /// First point of each cell of edge `radius_m`; `next` leads to the others.
     cells: VoxelTable,
@@ -35,7 +35,7 @@ impl Cloud {
             points: Vec::with_capacity(points.len()),
             bounds_m: Aabb::EMPTY,
             inverse_edge: 1.0 / voxel_m,
-            voxels: VoxelTable::with_capacity(points.len()),
+            voxels: VoxelSet::with_capacity(points.len() / 8),
             radius_m,
             cells: VoxelTable::with_capacity(points.len() / 4),
             next: Vec::with_capacity(points.len()),
@@ -59,8 +59,7 @@ impl Cloud {
         let inverse_radius = 1.0 / f64::from(self.radius_m);
         for &point in points {
             let index = self.points.len() as u32;
-            let (_, is_new) = self.voxels.entry(voxel_of(point, self.inverse_edge), index);
-            if !is_new {
+            if !self.voxels.insert(voxel_of(point, self.inverse_edge)) {
                 continue;
             }
             let (first, is_new) = self.cells.entry(voxel_of(point, inverse_radius), index);
@@ -77,6 +76,22 @@ impl Cloud {
     pub fn overlap(&self, points: &[Point]) -> f64 {
         let num = points.iter().filter(|&&point| self.has_near(point)).count();
         num as f64 / points.len().max(1) as f64
+    }
+
+    /// Whether [`Cloud::overlap`] is `enough`, which every larger overlap must be, too; looks at no more points than it takes.
+    pub(crate) fn overlaps(&self, points: &[Point], enough: impl Fn(f64) -> bool) -> bool {
+        let share = |num: usize| num as f64 / points.len().max(1) as f64;
+        let mut num = 0;
+        for (index, &point) in points.iter().enumerate() {
+            num += usize::from(self.has_near(point));
+            if enough(share(num)) {
+                return true;
+            }
+            if !enough(share(num + points.len() - index - 1)) {
+                return false;
+            }
+        }
+        enough(share(num))
     }
 
     fn has_near(&self, point: Point) -> bool {

@@ -1,5 +1,7 @@
 //! Density clusters of a point cloud.
 
+use std::{borrow::Cow, sync::LazyLock};
+
 use crate::{
     memory::voxels::{Voxel, VoxelIndex, voxel_of},
     sensors::unproject::Point,
@@ -22,16 +24,24 @@ pub fn dbscan(points: &[Point], radius_m: f32, min_points: usize) -> Vec<i32> {
     let grid = Grid::new(points, radius_m);
     let is_core = grid.core_points(min_points);
     let clusters = grid.join_cells(&is_core);
-    grid.label(&is_core, clusters)
+    grid.label(&is_core, &clusters)
 }
 
-/// The points of the largest cluster (the first of equal ones), in their order; `None` if all is noise.
-pub fn largest_cluster(points: &[Point], radius_m: f32, min_points: usize) -> Option<Vec<Point>> {
+/// The points of the largest cluster (the first of equal ones), in their order; `None` if all is
+/// noise. Borrowed if they are all points.
+pub fn largest_cluster(
+    points: &[Point],
+    radius_m: f32,
+    min_points: usize,
+) -> Option<Cow<'_, [Point]>> {
     let labels = dbscan(points, radius_m, min_points);
     let num = labels.iter().max().map_or(0, |&last| (last + 1) as usize);
     let mut sizes = vec![0_usize; num];
     labels.iter().filter(|&&label| label != NOISE).for_each(|&label| sizes[label as usize] += 1);
     let largest = (0..num).max_by_key(|&i| (sizes[i], std::cmp::Reverse(i)))?;
+    if sizes[largest] == points.len() {
+        return Some(Cow::Borrowed(points));
+    }
     let is_inside = |&(_, &label): &(&Point, &i32)| label == largest as i32;
     Some(points.iter().zip(&labels).filter(is_inside).map(|(&point, _)| point).collect())
 }
@@ -42,14 +52,17 @@ pub(crate) fn distance2(a: Point, b: Point) -> f32 {
     x * x + y * y + z * z
 }
 
+/// Points by cell. A point has mostly enough neighbours in its own cell and the first ones beside
+/// it; so cells are looked up where they are needed, and as they are needed.
 struct Grid<'a> {
     points: &'a [Point],
     radius2: f32,
+    cell_of: Vec<u32>,
     /// Point indices by cell, ascending in each; cell `c` has `members[starts[c]..starts[c + 1]]`.
     members: Vec<u32>,
     starts: Vec<u32>,
-    /// Cells that may hold neighbours of each other, each pair once, the nearest first.
-    pairs: Vec<[u32; 2]>,
+    voxels: Vec<Voxel>,
+    index: VoxelIndex,
 }
 
 impl<'a> Grid<'a> {
@@ -77,16 +90,28 @@ impl<'a> Grid<'a> {
             members[next[cell as usize] as usize] = point as u32;
             next[cell as usize] += 1;
         }
-        let pairs = neighbour_pairs(&voxels, &index);
-        Self { points, radius2: radius_m * radius_m, members, starts, pairs }
+        Self { points, radius2: radius_m * radius_m, cell_of, members, starts, voxels, index }
     }
 
     fn num_cells(&self) -> usize {
-        self.starts.len() - 1
+        self.voxels.len()
     }
 
     fn members(&self, cell: usize) -> &[u32] {
         &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    /// The cell some steps away, if points lie there.
+    fn beside(&self, cell: usize, step: Voxel) -> Option<usize> {
+        let voxel = self.voxels[cell];
+        let beside = [0, 1, 2].map(|i| voxel[i].saturating_add(step[i]));
+        self.index.get(beside).map(|other| other as usize)
+    }
+
+    /// Cells that may hold neighbours of a cell's points, the nearest first.
+    fn around(&self, cell: usize) -> impl Iterator<Item = usize> {
+        let steps = HALF_STEPS.iter().flat_map(|&step| [step, step.map(|i| -i)]);
+        steps.filter_map(move |step| self.beside(cell, step))
     }
 
     fn is_near(&self, a: u32, b: u32) -> bool {
@@ -94,89 +119,83 @@ impl<'a> Grid<'a> {
     }
 
     fn core_points(&self, min_points: usize) -> Vec<bool> {
-        // Neighbours found so far; there is no need to count on from `min_points`.
-        let mut counts = vec![0_usize; self.points.len()];
+        let mut is_core = vec![true; self.points.len()];
+        // Points of a cell that are short of neighbours, and how many they have.
+        let mut lacking: Vec<(u32, usize)> = Vec::new();
         for cell in 0..self.num_cells() {
             let here = self.members(cell);
-            here.iter().for_each(|&point| counts[point as usize] = here.len());
-        }
-        for &[a, b] in &self.pairs {
-            for (cell, other) in [(a, b), (b, a)] {
-                let here = self.members(cell as usize);
-                if here.len() >= min_points {
-                    continue;
-                }
-                for &point in here {
-                    let count = &mut counts[point as usize];
-                    if *count < min_points {
-                        let others = self.members(other as usize).iter();
-                        *count += others.filter(|&&other| self.is_near(point, other)).count();
-                    }
+            if here.len() >= min_points {
+                continue;
+            }
+            lacking.extend(here.iter().map(|&point| (point, here.len())));
+            for other in self.around(cell) {
+                let others = self.members(other);
+                lacking.retain_mut(|(point, count)| {
+                    *count += others.iter().filter(|&&other| self.is_near(*point, other)).count();
+                    *count < min_points
+                });
+                if lacking.is_empty() {
+                    break;
                 }
             }
+            lacking.drain(..).for_each(|(point, _)| is_core[point as usize] = false);
         }
-        counts.into_iter().map(|count| count >= min_points).collect()
+        is_core
     }
 
     /// Cells joined by core points within the radius: a representative a cell.
     fn join_cells(&self, is_core: &[bool]) -> Vec<u32> {
         let mut parents: Vec<u32> = (0..self.num_cells() as u32).collect();
-        let core_of = |cell: u32| {
-            self.members(cell as usize).iter().copied().filter(|&point| is_core[point as usize])
+        let cores = |cell: usize| {
+            self.members(cell).iter().copied().filter(|&point| is_core[point as usize])
         };
-        // Near cells first: most of the farther pairs are then joined already.
-        for &[cell, other] in &self.pairs {
-            let (a, b) = (root(&mut parents, cell), root(&mut parents, other));
-            if a != b && core_of(cell).any(|a| core_of(other).any(|b| self.is_near(a, b))) {
-                parents[a.max(b) as usize] = a.min(b);
+        let has_core: Vec<bool> =
+            (0..self.num_cells()).map(|cell| cores(cell).next().is_some()).collect();
+        let mut num_apart = has_core.iter().filter(|&&has| has).count();
+        // Near cells first: nearly always they join them all, or most of the pairs farther apart.
+        for &step in HALF_STEPS.iter() {
+            if num_apart < 2 {
+                break;
+            }
+            for cell in (0..self.num_cells()).filter(|&cell| has_core[cell]) {
+                let Some(other) = self.beside(cell, step).filter(|&other| has_core[other]) else {
+                    continue;
+                };
+                let (a, b) = (root(&mut parents, cell as u32), root(&mut parents, other as u32));
+                if a != b && cores(cell).any(|a| cores(other).any(|b| self.is_near(a, b))) {
+                    parents[a.max(b) as usize] = a.min(b);
+                    num_apart -= 1;
+                }
             }
         }
         (0..self.num_cells() as u32).map(|cell| root(&mut parents, cell)).collect()
     }
 
-    fn label(&self, is_core: &[bool], cluster_of_cell: Vec<u32>) -> Vec<i32> {
+    fn label(&self, is_core: &[bool], cluster_of_cell: &[u32]) -> Vec<i32> {
         let mut labels = vec![NOISE; self.points.len()];
-        let mut cell_of = vec![0; self.points.len()];
-        for cell in 0..self.num_cells() {
-            self.members(cell).iter().for_each(|&point| cell_of[point as usize] = cell);
-        }
         let mut number_of = vec![NOISE; self.num_cells()];
         let mut num = 0;
         for point in (0..self.points.len()).filter(|&point| is_core[point]) {
-            let number = &mut number_of[cluster_of_cell[cell_of[point]] as usize];
+            let number = &mut number_of[cluster_of_cell[self.cell_of[point] as usize] as usize];
             if *number == NOISE {
                 *number = num;
                 num += 1;
             }
             labels[point] = *number;
         }
-        self.label_borders(is_core, &mut labels);
+        for border in (0..self.points.len()).filter(|&point| !is_core[point]) {
+            labels[border] = self.border_label(border, is_core, &labels);
+        }
         labels
     }
 
-    fn label_borders(&self, is_core: &[bool], labels: &mut [i32]) {
-        let is_border = |point: &&u32| !is_core[**point as usize];
-        let borders: Vec<Vec<u32>> = (0..self.num_cells())
-            .map(|cell| self.members(cell).iter().filter(is_border).copied().collect())
-            .collect();
-        // The borders in one cell take the first cluster among the core points of another.
-        let mut adopt = |borders: &[u32], cell: usize| {
-            for &border in borders {
-                for &core in self.members(cell) {
-                    if is_core[core as usize] && self.is_near(border, core) {
-                        let (label, mine) = (labels[core as usize], &mut labels[border as usize]);
-                        *mine = if *mine == NOISE { label } else { label.min(*mine) };
-                    }
-                }
-            }
-        };
-        for (cell, borders) in borders.iter().enumerate() {
-            adopt(borders, cell);
-        }
-        for [a, b] in self.pairs.iter().map(|pair| pair.map(|cell| cell as usize)) {
-            adopt(&borders[a], b);
-            adopt(&borders[b], a);
-        }
+    /// The first cluster among the core points around one that is none.
+    fn border_label(&self, border: usize, is_core: &[bool], labels: &[i32]) -> i32 {
+        let cell = self.cell_of[border] as usize;
+        let others = std::iter::once(cell).chain(self.around(cell));
+        let near = others.flat_map(|other| self.members(other)).copied();
+        let cores = near.filter(|&i| is_core[i as usize] && self.is_near(border as u32, i));
+        cores.map(|core| labels[core as usize]).min().unwrap_or(NOISE)
     }
 }
 
@@ -193,20 +212,12 @@ fn root(parents: &mut [u32], mut cell: u32) -> u32 {
 /// Cells at most this many steps away an axis may hold neighbours.
 const REACH: i32 = 2;
 
-fn neighbour_pairs(voxels: &[Voxel], index: &VoxelIndex) -> Vec<[u32; 2]> {
-    let reach = -REACH..=REACH;
-    let mut steps: Vec<Voxel> = reach
-        .clone()
-        .flat_map(|x| reach.clone().flat_map(move |y| (-REACH..=REACH).map(move |z| [x, y, z])))
-        .filter(|&step| step > [0, 0, 0])
-        .collect();
+/// One of every two opposite steps to such cells, the shortest first.
+static HALF_STEPS: LazyLock<Vec<Voxel>> = LazyLock::new(|| {
+    let side = 2 * REACH + 1;
+    let step = |i: i32| [i / (side * side), i / side % side, i % side].map(|i| i - REACH);
+    let mut steps: Vec<Voxel> =
+        (0..side.pow(3)).map(step).filter(|&step| step > [0, 0, 0]).collect();
     steps.sort_by_key(|step| step.iter().map(|i| i * i).sum::<i32>());
-    let mut pairs = Vec::with_capacity(8 * voxels.len());
-    for step in steps {
-        for (cell, voxel) in voxels.iter().enumerate() {
-            let beside = [0, 1, 2].map(|i| voxel[i].saturating_add(step[i]));
-            pairs.extend(index.get(beside).map(|other| [cell as u32, other]));
-        }
-    }
-    pairs
-}
+    steps
+});

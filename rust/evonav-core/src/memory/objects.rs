@@ -318,17 +318,31 @@ impl ObjectMap {
     /// The entry, among the first `num`, that resembles a sighting most, if it does enough.
     fn best_match(&self, sighting: &Sighting, num: usize) -> Option<usize> {
         let threshold = self.config.match_threshold;
+        let visual = |entry: &Entry| {
+            self.config.visual_weight
+                * entry.similarity(&sighting.label, sighting.feature.as_deref())
+        };
+        // Even lying wholly inside any other entry could not lift it over the threshold.
+        let candidates: Vec<(usize, f64)> = self.entries[..num]
+            .iter()
+            .enumerate()
+            .filter(|(_, entry)| entry.is_beside(&sighting.bounds_m, &self.config))
+            .map(|(index, entry)| (index, visual(entry)))
+            .filter(|&(_, visual)| visual + 1.0 > threshold)
+            .collect();
+        // With one candidate, as mostly, it only matters whether it resembles it enough.
+        if let [(index, visual)] = candidates[..] {
+            let is_enough = |overlap| visual + overlap > threshold;
+            let cloud = &self.entries[index].cloud;
+            return cloud.overlaps(&sighting.points, is_enough).then_some(index);
+        }
         let mut best = (threshold, None);
-        for (index, entry) in self.entries[..num].iter().enumerate() {
-            let visual = self.config.visual_weight
-                * entry.similarity(&sighting.label, sighting.feature.as_deref());
-            // Even lying wholly inside the entry could not lift it over the best so far.
-            if visual + 1.0 <= best.0 || !entry.is_beside(&sighting.bounds_m, &self.config) {
-                continue;
-            }
-            let similarity = visual + entry.cloud.overlap(&sighting.points);
-            if similarity > best.0 {
-                best = (similarity, Some(index));
+        for (index, visual) in candidates {
+            if visual + 1.0 > best.0 {
+                let similarity = visual + self.entries[index].cloud.overlap(&sighting.points);
+                if similarity > best.0 {
+                    best = (similarity, Some(index));
+                }
             }
         }
         best.1
@@ -378,9 +392,9 @@ impl ObjectMap {
                 // Two that have not changed were not to be merged the last time, nor are they now.
                 let is_new = i != j && (a.is_changed || b.is_changed);
                 if is_new && a.is_beside(b.cloud.bounds_m(), &config) && is_alike() {
-                    let overlap = b.cloud.overlap(a.cloud.points());
-                    if overlap > config.merge_overlap {
-                        pairs.push((overlap, i, j));
+                    let points = a.cloud.points();
+                    if b.cloud.overlaps(points, |overlap| overlap > config.merge_overlap) {
+                        pairs.push((b.cloud.overlap(points), i, j));
                     }
                 }
             }

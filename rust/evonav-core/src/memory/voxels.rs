@@ -72,6 +72,42 @@ impl VoxelTable {
     }
 }
 
+/// A set of voxels: a word of bits for each block of 4 x 4 x 4, since those of a surface lie together.
+#[derive(Debug, Clone)]
+pub(crate) struct VoxelSet {
+    /// Where the bits of a block are.
+    blocks: VoxelTable,
+    bits: Vec<u64>,
+    /// The block that was used last, and where its bits are.
+    last: (Voxel, usize),
+}
+
+impl VoxelSet {
+    pub(crate) fn with_capacity(num_blocks: usize) -> Self {
+        let nowhere = ([i32::MAX; 3], 0);
+        Self { blocks: VoxelTable::with_capacity(num_blocks), bits: Vec::new(), last: nowhere }
+    }
+
+    /// Enters a voxel; whether it was not there.
+    pub(crate) fn insert(&mut self, voxel: Voxel) -> bool {
+        let voxel = clamped(voxel);
+        let block = voxel.map(|i| i >> 2);
+        if block != self.last.0 {
+            let (&mut index, is_new) = self.blocks.entry(block, self.bits.len() as u32);
+            if is_new {
+                self.bits.push(0);
+            }
+            self.last = (block, index as usize);
+        }
+        let [x, y, z] = voxel.map(|i| i & 3);
+        let bit = 1_u64 << (x << 4 | y << 2 | z);
+        let bits = &mut self.bits[self.last.1];
+        let is_new = *bits & bit == 0;
+        *bits |= bit;
+        is_new
+    }
+}
+
 /// From voxels to small numbers: an array where the voxels are close together, else a table.
 #[derive(Debug, Clone)]
 pub(crate) enum VoxelIndex {
@@ -134,10 +170,15 @@ fn slot_of(voxel: Voxel, corner: &Voxel, size: &[usize; 3]) -> usize {
     (x * size[1] + y) * size[2] + z
 }
 
-/// Exact for voxels within a million of the origin (10 km at 0.01 m); beyond, indices clamp.
+const HALF: i32 = 1 << 20;
+
+/// Voxels within a million of the origin (10 km at 0.01 m) are told apart; beyond, indices clamp.
+fn clamped(voxel: Voxel) -> Voxel {
+    voxel.map(|i| i.clamp(-HALF, HALF - 1))
+}
+
 fn key_of(voxel: Voxel) -> u64 {
-    const HALF: i32 = 1 << 20;
-    let [x, y, z] = voxel.map(|i| (i.clamp(-HALF, HALF - 1) + HALF) as u64);
+    let [x, y, z] = clamped(voxel).map(|i| (i + HALF) as u64);
     x << 42 | y << 21 | z
 }
 
