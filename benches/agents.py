@@ -139,7 +139,7 @@ def _measure_growth(name: str) -> None:
     case = _case(backend)
     agent: Any = make_agent(name, TextMatchWithImages())
     simulator.reset(case.stages[0].house_json, case.start)
-    sensors = Sensors(simulator, perception, agent.sensing, case.stages[0].target.object_id, 50)
+    sensors = Sensors(simulator, perception, agent.sensing)
     sensors.observe(is_first=True, is_action_success=True, has_arrived=False, num_rounds_left=1)
     before_mb = _peak_mb()
     led = Led(agent, lambda _: None, never_stops=agent.sensing.motion == "waypoints")
@@ -167,13 +167,15 @@ def _play(case: EpisodeCase, name: str, led: Led, simulator: Simulator, percepti
 def _tour(agent: Agent, simulator: Simulator, perception: Perception) -> None:
     """Leads an agent through every room: it looks ahead and back from places about 1.5 m apart."""
     start = simulator.pose
-    sensors = Sensors(simulator, perception, agent.sensing, "", 50)
+    sensors = Sensors(simulator, perception, agent.sensing)
     is_first = True
     for x_m, z_m in _places(simulator):
         for yaw_rad in (0.0, math.pi):
             simulator.teleport(replace(start, x_m=x_m, z_m=z_m, yaw_rad=yaw_rad))
-            sensed = sensors.observe(is_first=is_first, is_action_success=True, has_arrived=False, num_rounds_left=50)
-            agent.act(sensed.observation)
+            observation = sensors.observe(
+                is_first=is_first, is_action_success=True, has_arrived=False, num_rounds_left=50
+            )
+            agent.act(observation)
             is_first = False
     simulator.teleport(start)
 

@@ -159,6 +159,8 @@ def number_instances(
     min_area_px: int,
     max_box_fraction: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]: ...
+def instance_areas(instances: NDArray[np.int32], num_instances: int) -> NDArray[np.int64]:
+    """`(N,)` pixels of each instance of an `(H, W)` image: 0 where nothing is, else 1 + index."""
 
 # memory
 

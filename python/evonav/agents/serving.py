@@ -24,6 +24,7 @@ from typing import Any
 from evonav.agents import wire
 from evonav.agents.agent import Agent, ExplainingAgent, RoundDiagnostics
 from evonav.agents.registry import agent_factory, imported, new_agent
+from evonav.decision.metered import Metered
 from evonav.errors import DecisionError
 
 LENGTH = struct.Struct("<Q")
@@ -134,6 +135,7 @@ class _Server:
     def __init__(self) -> None:
         self._factory: Callable[..., Agent] | None = None
         self._agent: Agent | None = None
+        self._decision: Metered | None = None
 
     def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, str]:
         """Does as asked; what the agent raises is an answer too."""
@@ -162,7 +164,8 @@ class _Server:
         """Makes a decision model, and a fresh agent with it; whatever was there before is dropped."""
         assert self._factory is not None, "`load` comes first"
         self._agent = None
-        self._agent = new_agent(self._factory, imported(decision, "decision model")(seed, **options))
+        self._decision = Metered(imported(decision, "decision model")(seed, **options))
+        self._agent = new_agent(self._factory, self._decision)
         return self._sensing()
 
     def do_begin_task(self, task: Any) -> dict[str, str]:  # noqa: ANN401 - `TaskInfo`
@@ -193,9 +196,14 @@ class _Server:
         return parts
 
     def do_entries(self) -> dict[str, str]:
-        """The object memory."""
+        """The object memory; of an agent that tells none, `null`."""
         agent = self.agent
-        return {"entries": wire.entries_json(agent.entries() if isinstance(agent, ExplainingAgent) else ())}
+        return {"entries": wire.entries_json(agent.entries()) if isinstance(agent, ExplainingAgent) else "null"}
+
+    def do_costs(self) -> dict[str, str]:
+        """What the decision model has cost since it was made, and the memory that this process has taken."""
+        assert self._decision is not None, "`make` comes first"
+        return {"costs": json.dumps({**self._decision.costs(), **_peak_rss()})}
 
     def _sensing(self) -> dict[str, str]:
         return {"sensing": wire.sensing_json(self.agent.sensing)}
@@ -203,6 +211,16 @@ class _Server:
 
 def _failed(kind: str, message: str, error: Exception) -> str:
     return json.dumps([kind, message, wire.traceback_of(error)])
+
+
+def _peak_rss() -> dict[str, float]:
+    """Resident memory at its most; nothing where the system does not tell."""
+    try:
+        with open("/proc/self/status") as status:  # noqa: PTH123 - nothing of ours, and read often
+            found = next((line.split()[1] for line in status if line.startswith("VmHWM")), None)
+    except OSError:
+        found = None
+    return {} if found is None else {"agent_peak_rss_mb": int(found) / 1024}
 
 
 def _limit_memory(memory_mb: int) -> None:

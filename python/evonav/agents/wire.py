@@ -239,6 +239,31 @@ def entries_of(said: Any) -> list[EntryBelief]:  # noqa: ANN401 - JSON
         raise InvalidArgumentError(f"no entries: {type(error).__name__}: {error}") from error
 
 
+COSTS = (
+    "decision_wall_s",
+    "decision_cpu_s",
+    "num_questions",
+    "num_replayed",
+    "input_tokens",
+    "output_tokens",
+    "cost_usd",
+    "agent_peak_rss_mb",
+)
+"""What an agent's process may say of its costs."""
+
+
+def costs_of(said: Any) -> dict[str, float]:  # noqa: ANN401 - JSON
+    """The costs that were said, as far as they are numbers: they decide nothing."""
+    if not isinstance(said, Mapping):
+        return {}
+    told = {name: said[name] for name in COSTS if name in said}
+    return {
+        name: value
+        for name, value in told.items()
+        if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value >= 0
+    }
+
+
 def read_json(text: bytes) -> Any:  # noqa: ANN401 - JSON
     """JSON that a stranger wrote.
 

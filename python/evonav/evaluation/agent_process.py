@@ -303,6 +303,8 @@ class RemoteAgent:
         self._told: Mapping[str, Any] = {}
         self._label = name
         self._cpu_s = 0.0
+        self.tells_entries = True
+        """Whether it is an `ExplainingAgent`; known once it was asked for entries."""
 
     @property
     def cpu_s(self) -> float:
@@ -346,7 +348,13 @@ class RemoteAgent:
 
     def entries(self) -> Sequence[EntryBelief]:
         """Its object memory."""
-        return wire.entries_of(self._ask("entries").get("entries"))
+        said = self._ask("entries").get("entries")
+        self.tells_entries = said is not None
+        return () if said is None else wire.entries_of(said)
+
+    def costs(self) -> Mapping[str, float]:
+        """What its decision model has cost since it was made; empty if its process is gone."""
+        return {} if self._process is None else wire.costs_of(self._ask("costs").get("costs"))
 
     def _make(self) -> None:
         self._process = self._processes.process(self._name)

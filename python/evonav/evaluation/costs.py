@@ -1,6 +1,16 @@
 """What a stage cost: time by component, questions, tokens, money and memory. None of it is part of a record."""
 
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Literal
+
+Part = Literal["simulation", "perception", "agent"]
+
+LEVELS = ("agent_peak_rss_mb",)
+"""Fields that are no sums: what an agent's process says of them is not taken off what it said before."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,3 +45,42 @@ class StageCosts:
     agent_peak_rss_mb: float | None = None
     """Of the agent's process, at its most so far: it serves many episodes."""
     num_retries: int | None = None
+
+
+class Stopwatch:
+    """Wall and CPU time by component; what is in none of them is the evaluator's."""
+
+    def __init__(self, cpu_s: Callable[[], float] = time.process_time) -> None:
+        """Starts.
+
+        Args:
+            cpu_s: CPU time so far, of all processes that count.
+        """
+        self._clock = cpu_s
+        self._spent_s: defaultdict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
+        self._begun_s = (time.perf_counter(), cpu_s())
+
+    @contextmanager
+    def timing(self, part: Part) -> Iterator[None]:
+        """Books what happens inside; not to be nested."""
+        wall_s, cpu_s = time.perf_counter(), self._clock()
+        try:
+            yield
+        finally:
+            spent_s = self._spent_s[part]
+            spent_s[0] += time.perf_counter() - wall_s
+            spent_s[1] += self._clock() - cpu_s
+
+    def costs(self, told: Mapping[str, float] | None = None) -> StageCosts:
+        """All of it until now.
+
+        Args:
+            told: More of the stage, by field of `StageCosts`.
+        """
+        wall_s, cpu_s = time.perf_counter() - self._begun_s[0], self._clock() - self._begun_s[1]
+        parts: dict[str, float] = {}
+        for part in ("simulation", "perception", "agent"):
+            parts[f"{part}_wall_s"], parts[f"{part}_cpu_s"] = self._spent_s[part]
+        parts["evaluator_wall_s"] = wall_s - sum(spent_s[0] for spent_s in self._spent_s.values())
+        parts["evaluator_cpu_s"] = cpu_s - sum(spent_s[1] for spent_s in self._spent_s.values())
+        return StageCosts(wall_s=wall_s, cpu_s=cpu_s, **parts, **(told or {}))  # type: ignore[arg-type]

@@ -17,8 +17,11 @@ def record_differences(stored: str, again: str, verb: str) -> tuple[str, ...]:
     """
     if again == stored:
         return ()
-    found = list(_departures(json.loads(stored), json.loads(again), "", verb))
-    return tuple(found[:MAX_DIFFERENCES]) or ("the same values in other bytes",)
+    was, is_now = json.loads(stored), json.loads(again)
+    # An older evonav recorded less: what is not there cannot differ.
+    shared = {key: value for key, value in is_now.items() if key in was}
+    found = list(_departures(was, shared, "", verb))
+    return tuple(found[:MAX_DIFFERENCES]) or (() if len(shared) < len(is_now) else ("the same values in other bytes",))
 
 
 def _departures(was: Any, is_now: Any, where: str, verb: str) -> Iterator[str]:  # noqa: ANN401 - JSON

@@ -35,6 +35,25 @@ def polyline_length_m(path_m: Sequence[Point2]) -> float:
     return math.fsum(math.dist(a, b) for a, b in pairwise(path_m))
 
 
+def length_outside_m(path_m: Sequence[Point2], centre_m: Point2, radius_m: float) -> float:
+    """Length of a polyline up to where it first comes within a radius; all of it, if it never does."""
+    walked_m = 0.0
+    for (x0, z0), (x1, z1) in pairwise([*path_m, *path_m[-1:]]):
+        dx, dz, ox, oz = x1 - x0, z1 - z0, x0 - centre_m[0], z0 - centre_m[1]
+        if math.hypot(ox, oz) <= radius_m:
+            return walked_m
+        length_m = math.hypot(dx, dz)
+        # |o + t d| = r for the least t in 0..1.
+        a, half_b = dx * dx + dz * dz, ox * dx + oz * dz
+        discriminant = half_b * half_b - a * (ox * ox + oz * oz - radius_m * radius_m)
+        if a > 0.0 and discriminant >= 0.0:
+            share = (-half_b - math.sqrt(discriminant)) / a
+            if 0.0 <= share <= 1.0:
+                return walked_m + share * length_m
+        walked_m += length_m
+    return walked_m
+
+
 def waypoints(corners_m: Sequence[Point2], spacing_m: float, max_travel_m: float) -> tuple[list[Point2], bool]:
     """Points along a path, every corner and at most `spacing_m` apart.
 

@@ -23,6 +23,8 @@ class Sighting:
     """What perfect recognition tells about a round's views."""
 
     is_target_visible: bool
+    is_target_seen: bool
+    """In this or an earlier round of the episode, from near enough to be remembered; it may have been elsewhere."""
 
 
 class PrivilegedAgent:
@@ -34,6 +36,7 @@ class PrivilegedAgent:
     def __init__(self) -> None:
         self._target_m: tuple[float, float] = (math.nan, math.nan)
         self._is_target_visible = False
+        self._is_target_seen = False
 
     def reveal_target(self, position_m: Point3) -> None:
         """Where the target is, at the start of a stage."""
@@ -42,6 +45,7 @@ class PrivilegedAgent:
     def reveal_sighting(self, sighting: Sighting) -> None:
         """Whether the target is in view, before each `act`."""
         self._is_target_visible = sighting.is_target_visible
+        self._is_target_seen = sighting.is_target_seen
 
     def begin_task(self, task: TaskInfo) -> None:
         """Nothing to forget."""

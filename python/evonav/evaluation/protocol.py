@@ -6,6 +6,7 @@ import numpy as np
 
 from evonav.agents.agent import Sensing
 from evonav.errors import EvonavError, InvalidArgumentError
+from evonav.evaluation.costs import StageCosts
 from evonav.evaluation.metrics import SUCCESS_RADIUS_M
 from evonav.evaluation.records import (
     EndState,
@@ -178,6 +179,7 @@ class StageOutcome:
     cpu_s: float
     traceback: str = ""
     """Of an errored stage."""
+    costs: StageCosts | None = None
 
     @property
     def failure(self) -> StageFailure | None:

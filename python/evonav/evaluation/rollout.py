@@ -5,11 +5,9 @@ that remembers nothing. The records of later stages say so. A failure of anythin
 """
 
 import math
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol, runtime_checkable
+from time import process_time
 
 from evonav.agents import wire
 from evonav.agents.agent import (
@@ -23,13 +21,20 @@ from evonav.agents.agent import (
     Sensing,
     Stop,
 )
-from evonav.errors import DecisionError, SimulationError, SimulatorLostError
 from evonav.evaluation import motion
 from evonav.evaluation.cases import room_at, stage_map
+from evonav.evaluation.costs import LEVELS, Stopwatch
+from evonav.evaluation.episode_parts import (
+    LOSSES,
+    EpisodeObserver,
+    HasOwnProcess,
+    StageFailedError,
+    blame,
+    traceback_of,
+)
 from evonav.evaluation.metrics import stage_soft_spl, stage_spl
 from evonav.evaluation.privileged import Sighting, privileges_of
 from evonav.evaluation.protocol import (
-    AgentFailedError,
     EpisodeCase,
     ForcedWalk,
     ProtocolConfig,
@@ -42,82 +47,17 @@ from evonav.evaluation.records import (
     EndState,
     EntryRecord,
     ErrorKind,
+    MemoryRecord,
     RoundRecord,
     StageMap,
     StageRecord,
 )
-from evonav.evaluation.sensing import Perception, Sensed, Sensors, map_frame
+from evonav.evaluation.sensing import Perception, Sensors, map_frame
+from evonav.evaluation.witness import Witness, Witnessed
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
 from evonav.world.pose import Pose
-from evonav.world.simulator import SceneObject, Simulator
-
-
-class EpisodeObserver(Protocol):
-    """Looks on as an episode runs (`evonav.evaluation.trace`); nothing of it reaches agent or record.
-
-    What it raises as `AgentFailedError` fails the stage as if the agent had.
-    """
-
-    def stage_begins(self, stage: int, simulator: Simulator) -> None:
-        """A stage's house is loaded; the agent was not told yet."""
-        ...
-
-    def round_begins(self, observation: Observation) -> None:
-        """What the agent is about to be given."""
-        ...
-
-    def round_ends(self, record: RoundRecord) -> None:
-        """The agent has acted, and its action was carried out."""
-        ...
-
-
-LOSSES = (ErrorKind.CRASH, ErrorKind.TIMEOUT)
-"""Failures that end the agent's process, and its memory with it."""
-
-
-@runtime_checkable
-class HasOwnProcess(Protocol):
-    """An agent in a process of its own: what it says has crossed the border as JSON already."""
-
-    @property
-    def cpu_s(self) -> float:
-        """CPU time that its processes have used."""
-        ...
-
-
-class _StageError(Exception):
-    """A stage that cannot go on; carries whose fault it is."""
-
-    def __init__(self, kind: ErrorKind, message: str) -> None:
-        super().__init__(message)
-        self.kind = kind
-
-
-@contextmanager
-def _blame(kind: ErrorKind) -> Iterator[None]:
-    """Turns what is raised inside into a stage failure of `kind`; errors that name their own cause keep it."""
-    try:
-        yield
-    except _StageError:
-        raise
-    except AgentFailedError as error:
-        raise _StageError(error.kind, str(error)) from error
-    except DecisionError as error:
-        raise _StageError(ErrorKind.DECISION, wire.clean(str(error))) from error
-    except Exception as error:
-        if kind is ErrorKind.AGENT:
-            raise _StageError(kind, wire.describe(error)) from error
-        if isinstance(error, SimulationError):
-            is_lost = isinstance(error, SimulatorLostError)
-            kind = ErrorKind.SIMULATOR_LOST if is_lost else ErrorKind.SIMULATION
-            raise _StageError(kind, str(error)) from error
-        raise _StageError(kind, f"{type(error).__name__}: {error}") from error
-
-
-def _traceback_of(failure: _StageError) -> str:
-    cause = failure.__cause__ or failure
-    return (isinstance(cause, AgentFailedError) and cause.traceback) or wire.traceback_of(cause)
+from evonav.world.simulator import Simulator
 
 
 class Episode:
@@ -144,6 +84,8 @@ class Episode:
         self._seed = seed
         self._has_begun = False
         """The agent knows the task."""
+        self._witnessed = Witnessed()
+        self._told_costs: Mapping[str, float] = {}
 
     def run(self) -> Iterator[StageOutcome]:
         """Runs the stages in order.
@@ -165,11 +107,12 @@ class Episode:
             if is_lost:
                 memory_lost_at, is_lost = stage, False
             record = record.model_copy(update={"failed_before": failed, "memory_lost_at": memory_lost_at})
-            wall_s, cpu_s = time.perf_counter(), self._cpu_s()
-            run = _StageRun(self, record, pose)
+            stopwatch = Stopwatch(self._cpu_s)
+            run = _StageRun(self, record, pose, stopwatch)
             record = run.run()
-            wall_s, cpu_s = time.perf_counter() - wall_s, self._cpu_s() - cpu_s
-            yield StageOutcome(record, run.plan, wall_s, cpu_s, run.traceback)
+            costs = stopwatch.costs(self._new_costs(run.failure))
+            wall_s, cpu_s = costs.wall_s or 0.0, costs.cpu_s or 0.0
+            yield StageOutcome(record, run.plan, wall_s, cpu_s, run.traceback, costs)
             if run.failure is None:
                 pose = self._end_pose(stage)
             elif run.failure.is_agents:
@@ -177,6 +120,7 @@ class Episode:
                 pose = self._end_pose(stage)
                 is_lost = run.failure in LOSSES
                 self._has_begun = self._has_begun and not is_lost
+                self._witnessed = Witnessed() if is_lost else self._witnessed
             else:
                 failure = record
 
@@ -185,19 +129,30 @@ class Episode:
         pose, forced = self._simulator.pose, self._case.stages[stage - 1].forced
         return pose if forced is None else replace(forced.end, y_m=pose.y_m, horizon_rad=pose.horizon_rad)
 
+    def _new_costs(self, failure: ErrorKind | None) -> Mapping[str, float]:
+        """What the agent's decision model has cost in the stage; empty where its process tells nothing."""
+        if not isinstance(self._agent, HasOwnProcess):
+            return {}
+        if failure in LOSSES:
+            self._told_costs = {}
+            return {}
+        told, before = self._agent.costs(), self._told_costs
+        self._told_costs = told
+        return {name: value if name in LEVELS else value - before.get(name, 0) for name, value in told.items()}
+
     def replace_agent(self, agent: Agent) -> None:
         """Another agent from the next stage on, as after the loss of a process; for replays in one process."""
         self._agent = agent
 
     def _cpu_s(self) -> float:
         """Of this process, and of the agent's where it has one."""
-        return time.process_time() + (self._agent.cpu_s if isinstance(self._agent, HasOwnProcess) else 0.0)
+        return process_time() + (self._agent.cpu_s if isinstance(self._agent, HasOwnProcess) else 0.0)
 
 
 class _StageRun:
     """One stage of an episode: start, rounds, measures."""
 
-    def __init__(self, episode: Episode, record: StageRecord, requested: Pose) -> None:
+    def __init__(self, episode: Episode, record: StageRecord, requested: Pose, stopwatch: Stopwatch) -> None:
         self._episode = episode
         self._case = episode._case
         self._agent = episode._agent
@@ -211,7 +166,11 @@ class _StageRun:
         self._requested = requested
         self._sensing = Sensing()
         self._planner = motion.Planner(self._simulator)
-        self._bodies: dict[str, list[SceneObject]] = {}
+        self._stopwatch = stopwatch
+        self._witness = Witness((), "", (), episode._witnessed, 1)
+        self._memory_at_start: MemoryRecord | None = None
+        self._beliefs: Sequence[EntryBelief] | None = None
+        """Of the last round, if they were asked for."""
         self._trace: list[RoundRecord] = []
         self._length_m = 0.0
         self.plan: StageMap | None = None
@@ -221,27 +180,33 @@ class _StageRun:
 
     def run(self) -> StageRecord:
         try:
-            with _blame(ErrorKind.HARNESS):
+            with blame(ErrorKind.HARNESS):
                 self._start()
                 if self._stage.forced is not None:
                     return self._forced(self._stage.forced)
-                with _blame(ErrorKind.SIMULATION):
-                    reference_length_m = self._reference_length_m()
+                with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+                    reference_m = self._path_to_target_m()
                 stop_reason = self._rounds()
-                return self._measured(reference_length_m, stop_reason)
-        except _StageError as failure:
+                return self._measured(reference_m, stop_reason)
+        except StageFailedError as failure:
             self.failure = failure.kind
-            self.traceback = _traceback_of(failure)
+            self.traceback = traceback_of(failure)
+            self._witness.close(())
             return as_errored(self._with_trace(self._record), failure.kind, str(failure))
 
     def _start(self) -> None:
         """Loads the stage's house, puts the agent where it ended, and tells it the goal."""
         stage = self._record.stage
-        with _blame(ErrorKind.SIMULATION):
+        with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
             start = self._simulator.reset(self._stage.house_json, self._requested)
             is_snapped = math.dist((start.x_m, start.z_m), (self._requested.x_m, self._requested.z_m)) > 1e-6
-        for body in self._simulator.objects:
-            self._bodies.setdefault(body.category, []).append(body)
+        self._witness = Witness(
+            self._simulator.objects,
+            self._stage.target.object_id,
+            self._stage.transition.relocations,
+            self._episode._witnessed,
+            self._protocol.min_visible_px,
+        )
         self.plan = stage_map(self._case, stage, self._simulator.objects)
         room_id = room_at(self.plan, (self._requested.x_m, self._requested.z_m))
         evolved_room_id = self._record.transition.room_id
@@ -257,8 +222,11 @@ class _StageRun:
         )
         if self._observer is not None:
             self._observer.stage_begins(stage, self._simulator)
-        with _blame(ErrorKind.AGENT):
-            self._tell_goal()
+        with blame(ErrorKind.AGENT):
+            with self._stopwatch.timing("agent"):
+                self._tell_goal()
+            beliefs = self._told_entries()
+        self._memory_at_start = None if beliefs is None else self._witness.begin(beliefs)
         self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensing)})
 
     def _tell_goal(self) -> None:
@@ -286,11 +254,10 @@ class _StageRun:
         self._protocol.check(sensing)
         return sensing
 
-    def _reference_length_m(self) -> float | None:
-        """L*: the planner's path from the effective start to the target, or `None` when there is none."""
+    def _path_to_target_m(self) -> list[motion.Point2]:
+        """The planner's path from where the agent stands to the target; empty when there is none."""
         x_m, _, z_m = self._stage.target.position_m
-        path_m = self._planner.path_m((x_m, z_m))
-        return motion.polyline_length_m(path_m) if path_m else None
+        return self._planner.path_m((x_m, z_m))
 
     def _rounds(self) -> str | None:
         """Decision rounds until the agent stops (returns why) or the budget ends (returns `None`)."""
@@ -298,17 +265,18 @@ class _StageRun:
         last = motion.Motion((), is_success=True)
         budget = self._protocol.budget(self._sensing)
         for number in range(budget):
-            with _blame(ErrorKind.SIMULATION):
-                sensed = sensors.observe(
+            self._witness.begin_round(number)
+            with blame(ErrorKind.SIMULATION):
+                observation = sensors.observe(
                     is_first=number == 0,
                     is_action_success=last.is_success,
                     has_arrived=last.has_arrived,
                     num_rounds_left=budget - number,
                 )
-            action = self._answer(sensed)
-            with _blame(ErrorKind.SIMULATION):
+            action = self._answer(observation)
+            with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                 last = self._carry_out(action)
-            self._end_round(number, sensed, action, last)
+            self._end_round(number, observation, action, last)
             if isinstance(action, Stop):
                 return action.reason
         return None
@@ -320,50 +288,48 @@ class _StageRun:
         travel_m = self._protocol.waypoint_m if is_stepwise else self._protocol.max_travel_m
         legs = motion.legs(forced.path_m, travel_m)
         for number in range(len(legs) + 1):
-            with _blame(ErrorKind.SIMULATION):
-                sensed = sensors.observe(is_first=number == 0, num_rounds_left=len(legs) + 1 - number, is_guided=True)
-            action = self._answer(sensed)
+            self._witness.begin_round(number)
+            with blame(ErrorKind.SIMULATION):
+                num_left = len(legs) + 1 - number
+                observation = sensors.observe(is_first=number == 0, num_rounds_left=num_left, is_guided=True)
+            action = self._answer(observation)
             pose = self._simulator.pose
             done = motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
             if number < len(legs):
                 is_last = number + 1 == len(legs)
-                with _blame(ErrorKind.SIMULATION):
+                with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     done = motion.walk(self._simulator, legs[number], forced.end.yaw_rad if is_last else None)
-            self._end_round(number, sensed, action, done)
+            self._end_round(number, observation, action, done)
             if not done.is_success:
-                raise _StageError(ErrorKind.SIMULATION, f"the reference trajectory is blocked at {legs[number][-1]}")
+                raise StageFailedError(
+                    ErrorKind.SIMULATION, f"the reference trajectory is blocked at {legs[number][-1]}"
+                )
         end = self._simulator.pose
-        return self._with_trace(self._record).model_copy(
-            update={
-                "state": EndState.FORCED,
-                "terminal": pose_record(end),
-                "path_length_m": self._length_m,
-                "entries": self._entries(),
-            }
+        return self._with_memory(self._with_trace(self._record)).model_copy(
+            update={"state": EndState.FORCED, "terminal": pose_record(end), "path_length_m": self._length_m}
         )
 
     def _sensors(self) -> Sensors:
-        with _blame(ErrorKind.SIMULATION):
-            return Sensors(
-                self._simulator,
-                self._perception,
-                self._sensing,
-                self._stage.target.object_id,
-                self._protocol.min_visible_px,
-            )
+        with blame(ErrorKind.SIMULATION):
+            return Sensors(self._simulator, self._perception, self._sensing, self._witness, self._stopwatch)
 
-    def _answer(self, sensed: Sensed) -> AgentAction:
+    def _answer(self, observation: Observation) -> AgentAction:
         """What the agent answers to what it is given."""
         if self._observer is not None:
-            self._observer.round_begins(sensed.observation)
-        with _blame(ErrorKind.AGENT):
+            self._observer.round_begins(observation)
+        with blame(ErrorKind.AGENT), self._stopwatch.timing("agent"):
             if (privileged := privileges_of(self._agent)) is not None:
-                privileged.reveal_sighting(Sighting(sensed.is_target_visible))
-            return wire.checked_action(self._agent.act(sensed.observation), self._sensing)
+                privileged.reveal_sighting(Sighting(self._witness.is_target_visible, self._witness.is_target_seen))
+            return wire.checked_action(self._agent.act(observation), self._sensing)
 
-    def _end_round(self, number: int, sensed: Sensed, action: AgentAction, done: motion.Motion) -> None:
+    def _end_round(self, number: int, observation: Observation, action: AgentAction, done: motion.Motion) -> None:
         self._length_m += done.length_m
-        self._trace.append(self._round_record(number, sensed, action, done))
+        self._trace.append(self._round_record(number, observation, action, done))
+        self._beliefs = None
+        if self._memory_at_start is not None and self._witness.wants_entries:
+            with blame(ErrorKind.AGENT):
+                self._beliefs = self._told_entries()
+            self._witness.take_entries(self._beliefs or ())
         if self._observer is not None:
             self._observer.round_ends(self._trace[-1])
 
@@ -381,16 +347,18 @@ class _StageRun:
         pose = self._simulator.pose
         return motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
 
-    def _round_record(self, number: int, sensed: Sensed, action: AgentAction, done: motion.Motion) -> RoundRecord:
-        with _blame(ErrorKind.AGENT):
+    def _round_record(
+        self, number: int, observation: Observation, action: AgentAction, done: motion.Motion
+    ) -> RoundRecord:
+        with blame(ErrorKind.AGENT):
             told = self._told()
             return RoundRecord(
                 round=number,
-                pose=pose_record(sensed.observation.pose),
+                pose=pose_record(observation.pose),
                 action=action_record(action),
                 path_m=done.path_m,
                 is_action_success=done.is_success,
-                is_target_visible=sensed.is_target_visible,
+                is_target_visible=self._witness.is_target_visible,
                 choice=told.choice,
                 chosen_entry=None if told.chosen_entry is None else self._entry_record(told.chosen_entry),
                 num_entries=told.num_entries,
@@ -408,14 +376,18 @@ class _StageRun:
             return told
         return wire.diagnostics_of(wire.read_json(wire.diagnostics_json(told).encode()))
 
-    def _measured(self, reference_length_m: float | None, stop_reason: str | None) -> StageRecord:
+    def _measured(self, reference_m: list[motion.Point2], stop_reason: str | None) -> StageRecord:
         start, end = self._record.effective_start, self._simulator.pose
         assert start is not None  # set by _start
         x_m, _, z_m = self._stage.target.position_m
+        radius_m = self._protocol.success_radius_m
         start_distance_m = math.dist((start.x_m, start.z_m), (x_m, z_m))
         distance_m = math.dist((end.x_m, end.z_m), (x_m, z_m))
-        is_success = distance_m < self._protocol.success_radius_m
-        record = self._with_trace(self._record).model_copy(
+        is_success = distance_m < radius_m
+        with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+            left_m = self._path_to_target_m()
+        geodesic_m = motion.polyline_length_m(left_m) if left_m else None
+        record = self._with_memory(self._with_trace(self._record)).model_copy(
             update={
                 "state": EndState.SUCCESS if is_success else EndState.FAILURE,
                 "terminal": pose_record(end),
@@ -423,18 +395,41 @@ class _StageRun:
                 "stop_reason": stop_reason or "",
                 "start_distance_m": start_distance_m,
                 "terminal_distance_m": distance_m,
+                "terminal_box_distance_m": self._witness.target_box_distance_m((end.x_m, end.z_m)),
+                "terminal_geodesic_m": geodesic_m,
+                "is_geodesic_success": geodesic_m is not None and geodesic_m < radius_m,
                 "path_length_m": self._length_m,
-                "reference_length_m": reference_length_m,
-                "entries": self._entries(),
             }
         )
-        if reference_length_m is None:
+        if not reference_m:
             # The agent's memory and pose are sound, so the episode goes on; only this stage has no measure.
             return as_errored(record, ErrorKind.REFERENCE, "no path from the effective start to the target")
+        reference_length_m = motion.polyline_length_m(reference_m)
         return record.model_copy(
             update={
+                "reference_length_m": reference_length_m,
+                "reference_ring_m": motion.length_outside_m(reference_m, (x_m, z_m), radius_m),
                 "spl": stage_spl(is_success, self._length_m, reference_length_m),
                 "soft_spl": stage_soft_spl(start_distance_m, distance_m, self._length_m, reference_length_m),
+            }
+        )
+
+    def _with_memory(self, record: StageRecord) -> StageRecord:
+        """The record with what the agent holds at the end, judged."""
+        with blame(ErrorKind.AGENT):
+            beliefs = self._told_entries() if self._beliefs is None else self._beliefs
+        if beliefs is None:
+            self._witness.close(())
+            return record
+        memory, num_forgotten = self._witness.end(beliefs)
+        return record.model_copy(
+            update={
+                "entries": tuple(self._entry_record(belief) for belief in beliefs),
+                "memory_at_start": self._memory_at_start,
+                "memory_at_end": memory,
+                "num_forgotten": num_forgotten,
+                "stale_entries": self._witness.stale_entries(),
+                "moved_objects": self._witness.moved_objects(),
             }
         )
 
@@ -447,14 +442,15 @@ class _StageRun:
             }
         )
 
-    def _entries(self) -> tuple[EntryRecord, ...]:
+    def _told_entries(self) -> Sequence[EntryBelief] | None:
+        """The agent's object memory, the same whatever process it is in; `None` if it tells none."""
         if not isinstance(self._agent, ExplainingAgent):
-            return ()
-        with _blame(ErrorKind.AGENT):
+            return None
+        with self._stopwatch.timing("agent"):
             entries = self._agent.entries()
-            if not isinstance(self._agent, HasOwnProcess):
-                entries = wire.entries_of(wire.read_json(wire.entries_json(entries).encode()))
-            return tuple(self._entry_record(belief) for belief in entries)
+            if isinstance(self._agent, HasOwnProcess):
+                return entries if self._agent.tells_entries else None
+            return wire.entries_of(wire.read_json(wire.entries_json(entries).encode()))
 
     def _entry_record(self, belief: EntryBelief) -> EntryRecord:
-        return entry_record(belief, self._bodies)
+        return entry_record(belief, self._witness.bodies)

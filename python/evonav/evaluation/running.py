@@ -114,7 +114,9 @@ class Run:
             self.store.forget_episode(*key)
             self._states = self.store.states()
             self._num_done = len(self._keys & self._states.keys())
-        self.store.add_stage(record, wall_s=outcome.wall_s, cpu_s=outcome.cpu_s, traceback=outcome.traceback)
+        self.store.add_stage(
+            record, wall_s=outcome.wall_s, cpu_s=outcome.cpu_s, traceback=outcome.traceback, costs=outcome.costs
+        )
         self._states[key] = record.state
         self._num_done += 1
         return True

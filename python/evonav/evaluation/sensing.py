@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Protocol
 
 from evonav.agents.agent import Sensing, ViewSchedule
+from evonav.evaluation.costs import Stopwatch
+from evonav.evaluation.witness import Witness
 from evonav.sensors.observation import Detections, MapFrame, Observation, View
 from evonav.sensors.visibility import visible_occupancy
 from evonav.world.pose import Pose
@@ -35,14 +37,6 @@ def map_frame(grid: OccupancyGrid) -> MapFrame:
     return MapFrame(rows=rows, cols=cols, cell_m=grid.cell_m, corner_m=grid.corner_m)
 
 
-@dataclass(frozen=True, slots=True)
-class Sensed:
-    """One round's observation, and what the evaluator alone learns from it."""
-
-    observation: Observation
-    is_target_visible: bool
-
-
 class Sensors:
     """An agent's sensors in one stage's house."""
 
@@ -51,17 +45,25 @@ class Sensors:
         simulator: Simulator,
         perception: Perception,
         sensing: Sensing,
-        target_id: str,
-        min_visible_px: int,
+        witness: Witness | None = None,
+        stopwatch: Stopwatch | None = None,
     ) -> None:
+        """Sensors at the simulator's pose, wherever it is.
+
+        Args:
+            simulator: With the stage's house.
+            perception: Of the run.
+            sensing: As granted.
+            witness: Is shown every frame.
+            stopwatch: Books what rendering and perceiving take.
+        """
         self._simulator = simulator
         self._perception = perception
         self._sensing = sensing
         self._objects = simulator.objects
         self._grid = simulator.occupancy()
-        ids = [body.id for body in self._objects]
-        self._target_instance = ids.index(target_id) + 1 if target_id in ids else None
-        self._min_visible_px = min_visible_px
+        self._witness = witness
+        self._stopwatch = stopwatch or Stopwatch()
 
     def observe(
         self,
@@ -71,16 +73,12 @@ class Sensors:
         is_action_success: bool = True,
         has_arrived: bool = False,
         is_guided: bool = False,
-    ) -> Sensed:
+    ) -> Observation:
         """Looks around from the agent's pose."""
         pose = self._simulator.pose
         schedule = self._sensing.first_round if is_first else self._sensing.later_rounds
-        views, is_target_visible = [], False
-        for yaw_rad in view_yaws_rad(schedule, pose.yaw_rad):
-            view, sees_target = self._look(replace(pose, yaw_rad=yaw_rad))
-            views.append(view)
-            is_target_visible |= sees_target
-        observation = Observation(
+        views = [self._look(replace(pose, yaw_rad=yaw_rad)) for yaw_rad in view_yaws_rad(schedule, pose.yaw_rad)]
+        return Observation(
             views=tuple(views),
             pose=pose,
             is_action_success=is_action_success,
@@ -88,19 +86,19 @@ class Sensors:
             has_arrived=has_arrived,
             is_guided=is_guided,
         )
-        return Sensed(observation, is_target_visible)
 
-    def _look(self, pose: Pose) -> tuple[View, bool]:
-        frame = self._simulator.render(pose, rgb=self._sensing.needs_rgb, instances=True)
-        occupancy = visible_occupancy(self._grid, pose, frame.intrinsics, self._sensing.occupancy_range_m)
-        view = View(
-            pose=frame.pose,
-            intrinsics=frame.intrinsics,
-            depth_m=frame.depth_m,
-            detections=self._perception.detect(frame, self._objects),
-            occupancy=occupancy,
-            rgb=frame.rgb,
-        )
-        if self._target_instance is None or frame.instances is None:
-            return view, False
-        return view, int((frame.instances == self._target_instance).sum()) >= self._min_visible_px
+    def _look(self, pose: Pose) -> View:
+        with self._stopwatch.timing("simulation"):
+            frame = self._simulator.render(pose, rgb=self._sensing.needs_rgb, instances=True)
+        with self._stopwatch.timing("perception"):
+            view = View(
+                pose=frame.pose,
+                intrinsics=frame.intrinsics,
+                depth_m=frame.depth_m,
+                detections=self._perception.detect(frame, self._objects),
+                occupancy=visible_occupancy(self._grid, pose, frame.intrinsics, self._sensing.occupancy_range_m),
+                rgb=frame.rgb,
+            )
+        if self._witness is not None:
+            self._witness.look(frame)
+        return view

@@ -18,9 +18,10 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.differences import record_differences
 from evonav.evaluation.engine import agent_seed
+from evonav.evaluation.episode_parts import LOSSES
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
-from evonav.evaluation.rollout import LOSSES, Episode
+from evonav.evaluation.rollout import Episode
 from evonav.evaluation.settings import EXCHANGES_NAME
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.traced import TracedRound, TracedStage

@@ -21,10 +21,12 @@ from evonav.agents import wire
 from evonav.agents.agent import Agent, AgentAction, Sensing
 from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.backend import Backend, make_agent
+from evonav.evaluation.costs import StageCosts
+from evonav.evaluation.episode_parts import LOSSES
 from evonav.evaluation.privileged import YARDSTICKS
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
 from evonav.evaluation.records import ErrorKind, RoundRecord, StageFailure, StageMap, StageRecord
-from evonav.evaluation.rollout import LOSSES, Episode
+from evonav.evaluation.rollout import Episode
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.simulator import Simulator
@@ -236,10 +238,11 @@ def read_news(text: str) -> StageOutcome | StageFailure | None:
     """What a job says: a stage that ended, a failure, or nothing that went wrong."""
     values = json.loads(text)
     if "record" in values:
-        plan = values.pop("map")
+        plan, costs = values.pop("map"), values.pop("costs")
         return StageOutcome(
             record=StageRecord.model_validate_json(values.pop("record")),
             stage_map=None if plan is None else StageMap.model_validate_json(plan),
+            costs=None if costs is None else StageCosts(**costs),
             **values,
         )
     return StageFailure(**{**values, "kind": ErrorKind(values["kind"])}) if values else None
@@ -254,6 +257,7 @@ def _outcome_text(outcome: StageOutcome) -> str:
             "wall_s": outcome.wall_s,
             "cpu_s": outcome.cpu_s,
             "traceback": outcome.traceback,
+            "costs": None if outcome.costs is None else asdict(outcome.costs),
         }
     )
 

@@ -11,7 +11,7 @@ use evonav_core::{
         occupancy::{BLOCKED, FREE, OccupancyMap, UNKNOWN},
     },
     sensors::{
-        ground_truth::{MaskFilter, number_instances},
+        ground_truth::{MaskFilter, instance_areas, number_instances},
         raycast::{VisibleCells, visible_cells},
     },
 };
@@ -335,6 +335,17 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..Default::default() })]
 
     #[test]
+    fn areas_are_counts_of_equal_pixels(image in vec(0..6_i32, 0..60), num_more in 0..3_usize) {
+        let areas = instance_areas(&image, 5 + num_more).unwrap();
+        let expected: Vec<i64> = (1..=5 + num_more as i32)
+            .map(|value| image.iter().filter(|v| **v == value).count() as i64)
+            .collect();
+        prop_assert_eq!(areas, expected);
+        let fits = image.iter().all(|&value| value <= 3);
+        prop_assert_eq!(instance_areas(&image, 3).is_ok(), fits);
+    }
+
+    #[test]
     fn detections_are_the_instances_that_pass_in_the_order_of_their_pixels(
         image in vec(0..6_i32, 8 * 10),
         is_detectable in vec(any::<bool>(), 5),
@@ -397,6 +408,7 @@ fn arguments_outside_their_domain_are_named() {
     let filter = MaskFilter { min_area_px: 1, max_box_fraction: 1.0 };
     for image in [[7, 0], [-1, 0], [i32::MAX, 0]] {
         names("instances", number_instances(&image, 2, &[true], filter).unwrap_err().to_string());
+        names("instances", instance_areas(&image, 1).unwrap_err().to_string());
     }
     names("instances", number_instances(&[0, 0, 0], 2, &[], filter).unwrap_err().to_string());
 }

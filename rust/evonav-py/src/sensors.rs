@@ -52,8 +52,22 @@ fn number_instances<'py>(
     Ok((arrays::image_of(py, masks.labels, shape)?, PyArray1::from_vec(py, instances)))
 }
 
+/// Pixels of each instance.
+#[pyfunction]
+fn instance_areas<'py>(
+    py: Python<'py>,
+    instances: PyReadonlyArray2<'py, i32>,
+    num_instances: usize,
+) -> PyResult<Bound<'py, PyArray1<i64>>> {
+    let (image, _) = arrays::row_major("instances", &instances)?;
+    let areas =
+        py.detach(|| ground_truth::instance_areas(image, num_instances)).map_err(error::to_py)?;
+    Ok(PyArray1::from_vec(py, areas))
+}
+
 /// Adds the functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(visible_cells, module)?)?;
-    module.add_function(wrap_pyfunction!(number_instances, module)?)
+    module.add_function(wrap_pyfunction!(number_instances, module)?)?;
+    module.add_function(wrap_pyfunction!(instance_areas, module)?)
 }

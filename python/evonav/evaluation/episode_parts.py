@@ -1,0 +1,89 @@
+"""Who looks on at an episode, what hosts its agent, and whose fault it is when a stage cannot go on."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Protocol, runtime_checkable
+
+from evonav.agents import wire
+from evonav.errors import DecisionError, SimulationError, SimulatorLostError
+from evonav.evaluation.protocol import AgentFailedError
+from evonav.evaluation.records import ErrorKind, RoundRecord
+from evonav.sensors.observation import Observation
+from evonav.world.simulator import Simulator
+
+
+class EpisodeObserver(Protocol):
+    """Looks on as an episode runs (`evonav.evaluation.trace`); nothing of it reaches agent or record.
+
+    What it raises as `AgentFailedError` fails the stage as if the agent had.
+    """
+
+    def stage_begins(self, stage: int, simulator: Simulator) -> None:
+        """A stage's house is loaded; the agent was not told yet."""
+        ...
+
+    def round_begins(self, observation: Observation) -> None:
+        """What the agent is about to be given."""
+        ...
+
+    def round_ends(self, record: RoundRecord) -> None:
+        """The agent has acted, and its action was carried out."""
+        ...
+
+
+LOSSES = (ErrorKind.CRASH, ErrorKind.TIMEOUT)
+"""Failures that end the agent's process, and its memory with it."""
+
+
+@runtime_checkable
+class HasOwnProcess(Protocol):
+    """An agent in a process of its own: what it says has crossed the border as JSON already."""
+
+    @property
+    def cpu_s(self) -> float:
+        """CPU time that its processes have used."""
+        ...
+
+    @property
+    def tells_entries(self) -> bool:
+        """Whether it is an `ExplainingAgent`; known once it was asked for entries."""
+        ...
+
+    def costs(self) -> Mapping[str, float]:
+        """What its decision model has cost so far, by field of `StageCosts`; empty where that is not known."""
+        ...
+
+
+class StageFailedError(Exception):
+    """A stage that cannot go on; carries whose fault it is."""
+
+    def __init__(self, kind: ErrorKind, message: str) -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
+@contextmanager
+def blame(kind: ErrorKind) -> Iterator[None]:
+    """Turns what is raised inside into a stage failure of `kind`; errors that name their own cause keep it."""
+    try:
+        yield
+    except StageFailedError:
+        raise
+    except AgentFailedError as error:
+        raise StageFailedError(error.kind, str(error)) from error
+    except DecisionError as error:
+        raise StageFailedError(ErrorKind.DECISION, wire.clean(str(error))) from error
+    except Exception as error:
+        if kind is ErrorKind.AGENT:
+            raise StageFailedError(kind, wire.describe(error)) from error
+        if isinstance(error, SimulationError):
+            is_lost = isinstance(error, SimulatorLostError)
+            kind = ErrorKind.SIMULATOR_LOST if is_lost else ErrorKind.SIMULATION
+            raise StageFailedError(kind, str(error)) from error
+        raise StageFailedError(kind, f"{type(error).__name__}: {error}") from error
+
+
+def traceback_of(failure: StageFailedError) -> str:
+    """Where it came from; of an agent in a process of its own, in that."""
+    cause = failure.__cause__ or failure
+    return (isinstance(cause, AgentFailedError) and cause.traceback) or wire.traceback_of(cause)
