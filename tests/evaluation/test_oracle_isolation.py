@@ -166,7 +166,7 @@ class Impostor(PrivilegedAgent):
         Impostor.told = True
 
     def act(self, observation):
-        return self._approach(observation)
+        return self._go_to_target(observation)
 
 
 def test_inheriting_from_a_yardstick_gives_no_privilege():

@@ -26,6 +26,9 @@ SELF_REPORTED = (
     r"trace\.\d+\.(choice|num_entries|num_frontiers)",
     r"trace\.\d+\.(counters|details)\..*",
     r"(trace\.\d+\.chosen_entry|entries\.\d+)\.(entry_id|label|centre_m\.\d|size_m\.\d|num_detections)",
+    # What it held between rounds and stages, which records tell of the end of a stage alone.
+    r"(memory_at_start|stale_entries\.\d+|moved_objects\.\d+)\..*",
+    r"num_forgotten",
 )
 """What an agent says of itself: no part of a score, and mostly nothing can tell whether it is true."""
 

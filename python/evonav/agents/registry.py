@@ -25,6 +25,7 @@ BUILT_IN: dict[str, tuple[str, str]] = {
     "msgnav": ("evonav.agents.msgnav:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
     "unigoal": ("evonav.agents.unigoal:UniGoal", "UniGoal as released: single actions, detector, nearest frontiers"),
     "unigoal-paper": ("evonav.agents.unigoal:UniGoalAsPublished", "UniGoal as published: the graphs do match"),
+    "stay-still": ("evonav.agents.stay_still:StayStill", "yardstick: stops at once; its successes are free"),
     "random-walk": ("evonav.agents.random_walk:RandomWalk", "yardstick: walks in random directions"),
 }
 """Import path and description by name."""

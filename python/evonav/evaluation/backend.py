@@ -108,7 +108,7 @@ def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
     Raises:
         InvalidArgumentError: There is none of this name.
     """
-    return yardstick(name) if name in YARDSTICKS else new_agent(agent_factory(name), decision)
+    return yardstick(name, decision) if name in YARDSTICKS else new_agent(agent_factory(name), decision)
 
 
 def check_agent_name(name: str, *, is_in_process: bool = True) -> None:

@@ -22,6 +22,10 @@ MEASURES_VERSION = 1
 """Raised whenever a measure changes: measures kept under another version are derived again from their records."""
 STRICT_RADIUS_M = 1.0
 """Of `is_strict_success`."""
+YARDSTICKS = frozenset(
+    {"shortest-path", "nearest-frontier", "oracle-memory", "oracle-flags", "random-walk", "stay-still"}
+)
+"""Agents that are no contestants: floors, and bounds that know more than an agent may."""
 COUNTERS = {
     "decisions": "num_decisions",
     "failed_decisions": "num_failed_decisions",
@@ -37,6 +41,8 @@ class RecordMeasures:
     """What one record tells by itself. Without a score (errored, not run), scores and distances are `None`."""
 
     agent: str
+    is_yardstick: bool
+    """One of `YARDSTICKS`: never to be ranked among agents."""
     task_id: str
     house: str
     stage: int
@@ -243,6 +249,7 @@ def measures_of(record: StageRecord) -> RecordMeasures:
     num_stale = sum(entry.is_stale for entry in record.entries)
     return RecordMeasures(
         agent=record.agent,
+        is_yardstick=record.agent in YARDSTICKS,
         task_id=record.task_id,
         house=record.house,
         stage=record.stage,

@@ -5,10 +5,14 @@ Privilege is to be one of the classes of `YARDSTICKS`: neither methods of the sa
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
+from evonav.agents.frontier_update import FrontierUpdate
 from evonav.agents.nearest_frontier import NearestFrontier
+from evonav.agents.registry import new_agent
+from evonav.decision.questions.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records import Point3
 from evonav.sensors.observation import Observation
@@ -47,6 +51,9 @@ class PrivilegedAgent:
         self._is_target_visible = sighting.is_target_visible
         self._is_target_seen = sighting.is_target_seen
 
+    def reveal_stale(self, entry_ids: Sequence[int]) -> None:
+        """Which of its entries are stale, at the start of a stage."""
+
     def begin_task(self, task: TaskInfo) -> None:
         """Nothing to forget."""
 
@@ -57,7 +64,7 @@ class PrivilegedAgent:
         """One decision round."""
         raise NotImplementedError
 
-    def _approach(self, observation: Observation) -> AgentAction:
+    def _go_to_target(self, observation: Observation) -> AgentAction:
         pose = observation.pose
         if observation.has_arrived or math.dist((pose.x_m, pose.z_m), self._target_m) <= STOP_DISTANCE_M:
             return Stop()
@@ -71,7 +78,7 @@ class ShortestPath(PrivilegedAgent):
 
     def act(self, observation: Observation) -> AgentAction:
         """Follows the path until the target is near."""
-        return self._approach(observation)
+        return self._go_to_target(observation)
 
 
 class PerfectRecognition(PrivilegedAgent):
@@ -99,10 +106,10 @@ class PerfectRecognition(PrivilegedAgent):
         action = self._explorer.act(observation)
         if self._is_target_visible and not self._has_seen_target:
             self._has_seen_target = True
-            return self._approach_from_anywhere(observation)
-        return self._approach(observation) if self._has_seen_target else action
+            return self._go_from_anywhere(observation)
+        return self._go_to_target(observation) if self._has_seen_target else action
 
-    def _approach_from_anywhere(self, observation: Observation) -> AgentAction:
+    def _go_from_anywhere(self, observation: Observation) -> AgentAction:
         # `has_arrived` still speaks of the last frontier.
         pose = observation.pose
         is_near = math.dist((pose.x_m, pose.z_m), self._target_m) <= STOP_DISTANCE_M
@@ -117,9 +124,38 @@ class PerfectRecognition(PrivilegedAgent):
         return ()
 
 
+class OracleMemory(PerfectRecognition):
+    """The same with a perfect memory: it knows where everything that it has seen in the episode stands now."""
+
+    description = "the same, and goes at once to what it has seen in an earlier stage, wherever that stands now"
+
+    def reveal_sighting(self, sighting: Sighting) -> None:
+        """What was seen counts as in view."""
+        super().reveal_sighting(
+            Sighting(sighting.is_target_visible or sighting.is_target_seen, sighting.is_target_seen)
+        )
+
+
+class OracleFlags(FrontierUpdate, PrivilegedAgent):
+    """Frontier-Update that is told, as a stage begins, which of its entries the change has made stale."""
+
+    description = "Frontier-Update whose stale entries are taken out as a stage begins"
+
+    def __init__(self, decision: DecisionModel | None = None) -> None:
+        PrivilegedAgent.__init__(self)
+        FrontierUpdate.__init__(self, decision=decision)
+
+    def reveal_stale(self, entry_ids: Sequence[int]) -> None:
+        """Forgets them."""
+        for entry_id in entry_ids:
+            self._navigator.objects.remove(entry_id)
+
+
 YARDSTICKS: dict[str, type[PrivilegedAgent]] = {
     "shortest-path": ShortestPath,
     "nearest-frontier": PerfectRecognition,
+    "oracle-memory": OracleMemory,
+    "oracle-flags": OracleFlags,
 }
 """By name, for `evonav evaluate --agents`."""
 
@@ -129,12 +165,18 @@ def privileges_of(agent: object) -> PrivilegedAgent | None:
     return agent if isinstance(agent, PrivilegedAgent) and type(agent) in YARDSTICKS.values() else None
 
 
-def yardstick(name: str) -> PrivilegedAgent:
+def yardstick(name: str, decision: DecisionModel | None = None) -> PrivilegedAgent:
     """A privileged yardstick by name.
+
+    Args:
+        name: Of `YARDSTICKS`.
+        decision: Handed to one that takes one; default: its own.
 
     Raises:
         InvalidArgumentError: There is none of this name.
     """
     if name not in YARDSTICKS:
         raise InvalidArgumentError(f"no yardstick `{name}`; there are {', '.join(sorted(YARDSTICKS))}")
-    return YARDSTICKS[name]()
+    made = new_agent(YARDSTICKS[name], decision)
+    assert isinstance(made, PrivilegedAgent)
+    return made

@@ -226,6 +226,9 @@ class _StageRun:
             with self._stopwatch.timing("agent"):
                 self._tell_goal()
             beliefs = self._told_entries()
+            if beliefs and (privileged := privileges_of(self._agent)) is not None:
+                privileged.reveal_stale(self._witness.stale_ids(beliefs))
+                beliefs = self._told_entries()
         self._memory_at_start = None if beliefs is None else self._witness.begin(beliefs)
         self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensing)})
 

@@ -115,6 +115,11 @@ class Witness:
         self._stale = [_Stale(belief) for belief, body in zip(beliefs, held, strict=True) if body is None]
         return self._memory(beliefs, held)
 
+    def stale_ids(self, beliefs: Sequence[EntryBelief]) -> list[int]:
+        """Entries that no object stands for."""
+        held = held_by(beliefs, self.bodies)
+        return [belief.entry_id for belief, body in zip(beliefs, held, strict=True) if body is None]
+
     def begin_round(self, number: int) -> None:
         """Another round, whose views come next."""
         self._round = number
