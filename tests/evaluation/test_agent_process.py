@@ -150,7 +150,8 @@ def test_built_in_agents_do_the_same_in_either_process(tmp_path, agent):
         for name, is_in_process in (("own", False), ("shared", True)):
             config = RunConfig(protocol=protocol, hosting=AgentHosting(is_in_process=is_in_process))
             evaluate([agent], tasks, tmp_path / name, config=config, num_workers=1)
-    assert any('"num_rounds":4' in text or '"num_rounds":8' in text for text in texts(tmp_path / "own"))
+    if agent != "stay-still":  # which stops at once
+        assert any('"num_rounds":4' in text or '"num_rounds":8' in text for text in texts(tmp_path / "own"))
     assert texts(tmp_path / "own") == texts(tmp_path / "shared")
 
 
