@@ -138,6 +138,13 @@ def load_analysis(directory: Path) -> Analysis:
     return Analysis(directory, record, ordered, outcomes, num_unscored)
 
 
+def moved_keys(analysis: Analysis, *agents: str) -> list[Key]:
+    """Pairs of agents whose target moved."""
+    last = analysis.arms[-1]
+    keys = analysis.keys(*agents)
+    return [key for key in keys if split_of(analysis.outcomes[last, agents[0]][key]) == "target"]
+
+
 def split_of(evolved: Outcome) -> str:
     """What a pair's change touched: a key of `SPLITS`."""
     record = evolved.record
@@ -161,7 +168,8 @@ def _drop_table(analysis: Analysis) -> Table:
         for agent in analysis.agents:
             effect = analysis.effect((fixed, agent), (evolved, agent), measure)
             rows.append((f"{agent}, {name}", str(len(analysis.keys(agent))), *effect_cells(effect)))
-    num_houses = len({outcome.row.house for found in analysis.outcomes.values() for outcome in found.values()})
+    keys = {(fixed, agent, key) for agent in analysis.agents for key in analysis.keys(agent)}
+    num_houses = len({analysis.outcomes[arm, agent][key].row.house for arm, agent, key in keys})
     notes = (
         f"{num_houses} houses. Rates in %; changes in points, Not Fixed less Fixed, with 95% intervals (bootstrap by "
         "house) and paired two-sided p (signs exchanged by house).",

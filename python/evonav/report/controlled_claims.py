@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from evonav.paired import PairedEffect
-from evonav.report.controlled import BASELINE, MEASURES, Analysis, p_words, signed
+from evonav.report.controlled import BASELINE, MEASURES, Analysis, moved_keys, p_words, signed
 from evonav.report.tables import Table
 
 MEMORY_AGENTS = ("fu", "ftu", "3d-mem", "msgnav")
@@ -51,6 +51,9 @@ def claims(analysis: Analysis) -> list[Claim]:
         if "fu" in there:
             effect = analysis.effect((evolved, "fu"), (evolved, BASELINE), MEASURES["SR"])
             add("Not Fixed: FU is behind Stage-Reset", f"{BASELINE} less fu, Not Fixed", effect)
+            moved = moved_keys(analysis, "fu", BASELINE)
+            effect = analysis.effect((evolved, "fu"), (evolved, BASELINE), MEASURES["SR"], moved)
+            add("the same", f"{BASELINE} less fu, Not Fixed, where the target moved", effect)
     for agent in there:
         effect = analysis.effect((evolved, agent), (fixed, agent), MEASURES["SR"])
         add("Memory drops when the scene evolves", f"{agent}, Fixed less Not Fixed", effect)

@@ -1,0 +1,255 @@
+"""Reports of controlled analyses, on made-up runs whose figures can be told by hand."""
+
+import math
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from made_up_run import OLD_TABLE_M, entry, stage_map, stage_record
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.records import EndState, TransitionRecord
+from evonav.evaluation.store import RunStore
+from evonav.paired import mcnemar
+from evonav.report.controlled import MEASURES, load_analysis, pair_tables, signed, split_of
+from evonav.report.controlled_claims import claims
+from evonav.report.controlled_page import write_controlled_report
+from evonav.report.controlled_rates import Crossover, _crossing, by_rate, crossover
+from evonav.report.rollouts import load_rollouts, pair_svg, telling_pairs
+from evonav.tasks.controlled import Arm, ControlledRecord, run_of, write_controlled
+from evonav.tasks.dataset import SourceFile
+from evonav.tasks.manifest import GenerationParameters
+
+S, F = EndState.SUCCESS, EndState.FAILURE
+TASKS = tuple(f"task-{i}" for i in range(6))
+PAIRS = {  # by agent: fixed, evolved
+    "fu": ([S, S, S, S, S, F], [F, F, F, S, S, F]),
+    "stage-reset": ([S, S, S, F, F, F], [S, S, F, F, F, F]),
+}
+
+
+def write_analysis(folder, kind, arms, outcomes, *, num_tasks=6, stages=(2,)):
+    """Runs of made-up outcomes: by agent, a list of states for each arm."""
+    for number, arm in enumerate(arms):
+        with RunStore(run_of(folder, arm.name), create=True) as store:
+            store.set_meta("agents", list(outcomes))
+            store.set_meta("num_stages", dict.fromkeys(TASKS[:num_tasks], 2))
+            store.set_meta("config", {"protocol": {"success_radius_m": 2.0}})
+            for agent, states in outcomes.items():
+                for i, state in enumerate(states[number][:num_tasks]):
+                    for record in made_up(agent, i, state, is_evolved=number > 0, stages=stages):
+                        store.add_stage(record, wall_s=1.0, cpu_s=0.5)
+                        store.add_map(stage_map(record.task_id, 1 if number == 0 else record.stage))
+    record = ControlledRecord(
+        kind=kind,
+        arms=tuple(arms),
+        generator="evonav test",
+        sources=(SourceFile(name="houses", sha256="0" * 64),),
+        seed=0,
+        limit=None,
+        per_house=1,
+        allow_unknown_assets=False,
+        parameters=GenerationParameters(),
+        task_ids=TASKS[:num_tasks],
+        num_attempts=num_tasks,
+        rejections=(),
+    )
+    folder.mkdir(exist_ok=True)
+    write_controlled(record, folder)
+    return folder
+
+
+def made_up(agent, index, state, *, is_evolved, stages):
+    """The walk, and the stage that counts; where the scene evolved, the target moves in even tasks only."""
+    walk = stage_record(agent, TASKS[index], 1, S)
+    walk = walk.model_copy(update={"state": EndState.FORCED, "spl": None, "soft_spl": None, "has_stopped": False})
+    stale = entry("Plate", (OLD_TABLE_M[0] + 0.3, 0.8, OLD_TABLE_M[2]), is_stale=True)
+    is_misled = is_evolved and state is F and agent == "fu"
+    made = [walk]
+    for stage in stages:
+        record = stage_record(agent, TASKS[index], stage, state, chosen=stale if is_misled else None)
+        update = {"house": f"house-{index}"}
+        if not is_evolved:
+            target = {"is_relocated": False, "is_relocated_now": False, "first_position_m": None}
+            update |= {"transition": TransitionRecord(), "target": record.target.model_copy(update=target)}
+        elif index % 2:
+            update["target"] = record.target.model_copy(update={"is_relocated_now": False, "is_relocated": False})
+        made.append(record.model_copy(update=update))
+    return made
+
+
+ARMS = (Arm(name="fixed", evolve_probability=0.0), Arm(name="evolved", evolve_probability=1.0))
+
+
+@pytest.fixture
+def pairs(tmp_path):
+    return write_analysis(tmp_path / "pairs", "pairs", ARMS, PAIRS)
+
+
+def test_rates_and_changes_are_those_of_the_pairs(pairs):
+    analysis = load_analysis(pairs)
+    assert analysis.agents == ("fu", "stage-reset")
+    assert len(analysis.keys("fu")) == len(analysis.keys("fu", "stage-reset")) == 6
+    drop = analysis.effect(("fixed", "fu"), ("evolved", "fu"), MEASURES["SR"])
+    assert (drop.n, drop.mean_a, drop.mean_b) == (6, 5 / 6, 2 / 6)
+    assert drop.difference == pytest.approx(-0.5)
+    assert drop.p == pytest.approx(mcnemar(3, 0)) == pytest.approx(0.25)
+    assert drop.ci95[0] < -0.5 < drop.ci95[1]
+    spl = analysis.effect(("fixed", "fu"), ("evolved", "fu"), MEASURES["SPL"])
+    assert spl.mean_a == pytest.approx(0.8 * 5 / 6)
+    more = analysis.effect_on_change("stage-reset", "fu", MEASURES["SR"])
+    assert more.difference == pytest.approx(-0.5 + 1 / 6)
+
+
+def test_pairs_that_one_arm_lacks_are_left_out(tmp_path):
+    outcomes = {"fu": ([S] * 6, [F] * 6)}
+    folder = write_analysis(tmp_path / "a", "pairs", ARMS, outcomes)
+    with RunStore(run_of(folder, "evolved")) as store:
+        store.forget_episode("fu", "task-5", 1)
+    analysis = load_analysis(folder)
+    assert len(analysis.keys("fu")) == 5
+    assert "5" in pair_tables(analysis)[0].rows[0][1]
+
+
+def test_splits_go_by_the_target_its_room_and_other_rooms(pairs):
+    analysis = load_analysis(pairs)
+    found = [split_of(analysis.outcomes["evolved", "fu"][task, 2]) for task in TASKS]
+    assert found == ["target", "room", "target", "room", "target", "room"]
+    one = analysis.outcomes["evolved", "fu"]["task-1", 2]
+    elsewhere = one.record.model_copy(update={"transition": TransitionRecord(mode="FULL_SHUFFLE", room_id="room|2")})
+    assert split_of(type(one)(one.row, elsewhere)) == "other"
+    rows = {row[0]: row[1:4] for row in pair_tables(analysis)[1].rows}
+    assert rows["the target moved: fu"] == ("3", "100.0", "33.3")
+    assert rows["another room changed: fu"][0] == "0"
+
+
+def test_claims_say_what_holds_and_what_is_not_told_apart(tmp_path):
+    many = 12
+    names = tuple(f"task-{i}" for i in range(many))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("test_controlled_report.TASKS", names)
+        outcomes = {"fu": ([S] * many, [F] * many), "stage-reset": ([F] * many, [F] * (many - 1) + [S])}
+        folder = write_analysis(tmp_path / "many", "pairs", ARMS, outcomes, num_tasks=many)
+    found = {claim.what: claim for claim in claims(load_analysis(folder))}
+    assert found["fu less stage-reset, Fixed"].verdict == "holds"
+    assert found["stage-reset less fu, Not Fixed"].verdict == "same direction, not significant"
+    assert found["fu, Fixed less Not Fixed"].effect.difference == 1.0
+    assert {claim.effect.n for claim in found.values()} == {12, 6}
+
+
+def test_points_are_written_with_signs():
+    assert signed(-0.0626, (-0.139, 0.0123)) == "\N{MINUS SIGN}6.3 (\N{MINUS SIGN}13.9 to +1.2)"
+    assert signed(0.0, None) == "0.0"
+
+
+class _Text(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.links, self.text = [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.links += [value for name, value in attrs if name in ("href", "src") and value and value[0] != "#"]
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def test_the_page_holds_tables_pictures_and_every_pair(pairs):
+    path = write_controlled_report(pairs)
+    page = _Text()
+    page.feed(path.read_text(encoding="utf-8"))
+    text = " ".join(page.text)
+    for words in ("Fixed / Not Fixed", "By what changed", "The paper's statements", "Telling pairs", "All pairs"):
+        assert words in text
+    local = [link for link in page.links if not link.startswith("data:")]
+    assert len([link for link in local if link.startswith("pairs/")]) >= len(TASKS)
+    assert all((path.parent / link).is_file() for link in local)
+    for name in ("tables.md", "tables.tex", "fixed-not-fixed.svg"):
+        assert (path.parent / name).stat().st_size > 100
+    one = (path.parent / "pairs" / "task-0.html").read_text(encoding="utf-8")
+    assert one.count('class="cell') == 4
+    assert "evonav view runs/evolved --task task-0" in one
+    again = {file.name: file.read_bytes() for file in path.parent.rglob("*.html")}
+    write_controlled_report(pairs)
+    assert again == {file.name: file.read_bytes() for file in path.parent.rglob("*.html")}
+
+
+def test_telling_pairs_are_of_moved_targets_that_memory_had_found(pairs):
+    analysis = load_analysis(pairs)
+    assert telling_pairs(analysis, "fu", per_reason=9) == [
+        ("misled", ("task-0", 2)),
+        ("misled", ("task-2", 2)),
+        ("unharmed", ("task-4", 2)),
+    ]
+    drawn = pair_svg(load_rollouts(analysis, "fu", ("task-0", 2)))
+    fixed, _, evolved = drawn.partition("Not Fixed")
+    assert "Fixed" in fixed
+    assert evolved
+    assert drawn.count("target-move") == 1 + drawn.count(".target-move")
+    assert "visited" in drawn
+    with pytest.raises(InvalidArgumentError, match="no task 'task-9'"):
+        load_rollouts(analysis, "fu", ("task-9", 2))
+
+
+def test_pictures_are_asked_for_by_id(pairs, tmp_path):
+    runner = CliRunner()
+    out = tmp_path / "p.svg"
+    done = runner.invoke(
+        app, ["controlled", "picture", str(pairs), "task-3", "--out", str(out)], catch_exceptions=False
+    )
+    assert done.exit_code == 0
+    assert "task-3" in out.read_text(encoding="utf-8")
+    with pytest.raises(InvalidArgumentError, match="there are fu, stage-reset"):
+        runner.invoke(
+            app, ["controlled", "picture", str(pairs), "--agent", "x", "--out", str(out)], catch_exceptions=False
+        )
+
+
+def test_a_run_that_is_missing_is_told(tmp_path):
+    folder = write_analysis(tmp_path / "a", "pairs", ARMS, {})
+    with pytest.raises(StoreError, match="no agent was run"):
+        load_analysis(folder)
+
+
+RATES = np.array([0.0, 0.5, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("leads", "expected"),
+    [
+        ([0.3, 0.0, -0.3], 0.5),
+        ([0.4, 0.2, 0.0], 1.0),
+        ([0.2, 0.1, 0.0], 1.0),
+        ([0.4, 0.3, 0.2], 2.0),
+        ([0.1, 0.2, 0.3], math.inf),
+        ([-0.3, -0.2, -0.1], -math.inf),
+        ([-0.1, -0.2, -0.3], -0.5),
+    ],
+)
+def test_the_crossover_is_where_the_line_falls_through_zero(leads, expected):
+    assert _crossing(RATES, np.array(leads)) == pytest.approx(expected)
+
+
+def test_crossovers_in_words():
+    assert Crossover(0.5, (0.25, math.inf), 0.9).words() == "0.50 (0.25 to >1)"
+    assert "ahead at every rate" in Crossover(2.0, (1.5, math.inf), 0.0).words()
+    assert Crossover(-math.inf, (-math.inf, 0.2), 0.1).words().startswith("none found: stage-reset is ahead")
+
+
+def test_a_sweep_tells_rates_leads_and_crossover(tmp_path):
+    arms = tuple(Arm(name=f"p{rate:.2f}", evolve_probability=rate) for rate in RATES)
+    outcomes = {
+        "fu": ([S] * 6, [S, S, S, F, F, F], [F] * 6),
+        "stage-reset": ([S, S, S, F, F, F],) * 3,
+    }
+    analysis = load_analysis(write_analysis(tmp_path / "rates", "rates", arms, outcomes))
+    assert [mean for _, mean, _ in by_rate(analysis, "fu", MEASURES["SR"])] == [1.0, 0.5, 0.0]
+    found = crossover(analysis, "fu", MEASURES["SR"])
+    assert found.rate == pytest.approx(0.5)
+    assert found.ci95[0] <= 0.5 <= found.ci95[1]
+    assert crossover(analysis, "stage-reset", MEASURES["SR"]) is None
+    path = write_controlled_report(tmp_path / "rates")
+    assert (path.parent / "rates-sr.svg").is_file()
+    assert "overtaken by stage-reset at p" in path.read_text(encoding="utf-8")
