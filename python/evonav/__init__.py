@@ -25,6 +25,7 @@ __all__ = [
     "TaskError",
     "__version__",
     "check_agent",
+    "load",
 ]
 
 if "gymnasium" in sys.modules:  # which imports this package to look for `evonav:evonav/LifelongNav-v0`
@@ -35,4 +36,6 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 - of a module
     """What is imported when it is first used, so that the package starts fast."""
     if name == "check_agent":
         return import_module("evonav.evaluation.agent_check").check_agent
+    if name == "load":
+        return import_module("evonav.report.notebook").load
     raise AttributeError(f"module `evonav` has no attribute `{name}`")

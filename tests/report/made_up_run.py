@@ -175,3 +175,21 @@ def record_run(
             store.add_stage(record, wall_s=1.0, cpu_s=0.5)
             store.add_map(stage_map(record.task_id, record.stage))
     return run_dir
+
+
+def lettered_run(folder: Path, outcomes: dict[str, str], *, protocol: float = 1.5, seed: int = 3) -> Path:
+    """A run of houses of one two-stage task each; an agent's outcomes are letters: `s`, `f`, `e`, or `-` for none."""
+    states = {"s": EndState.SUCCESS, "f": EndState.FAILURE, "e": EndState.ERRORED}
+    records = [
+        stage_record(agent, f"task-{i // 2:02}", i % 2 + 1, states[letter]).model_copy(
+            update={"house": f"house-{i // 2:02}"}
+        )
+        for agent, letters in outcomes.items()
+        for i, letter in enumerate(letters)
+        if letter != "-"
+    ]
+    tasks = {f"task-{i:02}": 2 for i in range(max(map(len, outcomes.values())) // 2)}
+    record_run(folder, records, tasks, list(outcomes))
+    with RunStore(folder) as store:
+        store.set_meta("config", {"seed": seed, "tasks": "same", "protocol": {"success_radius_m": protocol}})
+    return folder

@@ -4,11 +4,13 @@ import sys
 
 import typer
 
+from evonav.cli.breakdown import breakdown
 from evonav.cli.check_agent import check_agent
 from evonav.cli.compare import compare
 from evonav.cli.controlled import controlled_app
 from evonav.cli.doctor import doctor
 from evonav.cli.evaluate import demo, evaluate, report, strip
+from evonav.cli.export import export
 from evonav.cli.failures import failures
 from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
@@ -35,6 +37,8 @@ COMMANDS = (
     failures,
     report,
     compare,
+    breakdown,
+    export,
     paper,
     strip,
     view,

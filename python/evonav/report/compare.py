@@ -6,7 +6,7 @@ The statistics are those of `evonav.paired`; what they mean and how they were ca
 import shlex
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,11 @@ from typing import Any
 import numpy as np
 
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.measures import StageRow
+from evonav.evaluation.records import EndState
 from evonav.paired import PairedEffect, holm, mcnemar, paired_effects
+from evonav.report.causes import WORDS, Cause
 from evonav.report.maps import VIEW_DIR, page_name
-from evonav.report.rows import StageRow
 from evonav.report.sides import Side, config_differences
 
 MEASURES = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_success": "strict SR"}
@@ -33,6 +35,8 @@ MODES = {
     "extensions": "other extensions",
 }
 ALL = "all"
+FORCED = EndState.FORCED.value
+"""Stages that the evaluator walked: nobody is scored on them, and nobody misses them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +68,7 @@ class Flip:
     winner: str
     loser: str
     cause: str
-    """Why the other failed."""
+    """Why the other failed, in words."""
     pages: tuple[str | None, str | None]
     """Where `evonav view` has shown the winner and the loser, as paths with a fragment."""
     command: str
@@ -114,14 +118,28 @@ def compare(
         InvalidArgumentError: There are not two sides, their runs differ, or a name is unknown.
     """
     pairs = _pairs(sides, baseline)
-    fields = _fields(sides, measures)
-    found = [_compare(a, b, fields, allow_differences) for a, b in pairs]
+    names = _fields(sides, measures)
+    found = [_compare(a, b, names, allow_differences) for a, b in pairs]
     adjusted: list[dict[str, float]] = [{} for _ in found]
-    for field in fields:
+    for field in names:
         of_field = [(i, one.all.effects[field].p) for i, one in enumerate(found) if field in one.all.effects]
         for (i, _), p in zip(of_field, holm([p for _, p in of_field]), strict=True):
             adjusted[i][field] = p
     return [replace(one, adjusted=ps) for one, ps in zip(found, adjusted, strict=True)]
+
+
+def check_measure(name: str) -> None:
+    """Whether a field of a row can be averaged.
+
+    Raises:
+        InvalidArgumentError: It cannot, or there is none of that name.
+    """
+    numeric = [field.name for field in fields(StageRow) if any(kind in str(field.type) for kind in _NUMBERS)]
+    if name not in numeric:
+        raise InvalidArgumentError(f"measure {name!r} is none of {', '.join(sorted(numeric))}")
+
+
+_NUMBERS = ("int", "float", "bool")
 
 
 def comparison_json(comparisons: Sequence[Comparison]) -> dict[str, Any]:
@@ -171,14 +189,11 @@ def _pairs(sides: Sequence[Side], baseline: str | None) -> list[tuple[Side, Side
 
 
 def _fields(sides: Sequence[Side], measures: Sequence[str]) -> list[str]:
-    row = next((row for side in sides for row in side.rows.values()), None)
-    if row is None:
+    if not any(side.rows for side in sides):
         raise InvalidArgumentError(f"no recorded stage in {', '.join(str(side.run_dir) for side in sides)}")
     for name in measures:
-        if not hasattr(row, name) or isinstance(getattr(row, name), str):
-            numeric = sorted(key for key, value in asdict(row).items() if not isinstance(value, str))
-            raise InvalidArgumentError(f"measure {name!r} is none of {', '.join(numeric)}")
-    return list(dict.fromkeys([*(name for name in MEASURES if hasattr(row, name)), *measures]))
+        check_measure(name)
+    return list(dict.fromkeys([*MEASURES, *measures]))
 
 
 def _compare(a: Side, b: Side, fields: Sequence[str], allow_differences: bool) -> Comparison:
@@ -194,6 +209,8 @@ def _compare(a: Side, b: Side, fields: Sequence[str], allow_differences: bool) -
     pairs: list[tuple[StageRow, StageRow]] = []
     for key in sorted(_stages(a) | _stages(b)):
         reason = _reason(a, b, key)
+        if reason == FORCED:
+            continue
         if reason is None:
             pairs.append((a.rows[key], b.rows[key]))
         else:
@@ -224,7 +241,8 @@ def _reason(a: Side, b: Side, key: tuple[str, int]) -> str | None:
             is_foreign = key[0] not in side.num_stages
             return f"{'no such task' if is_foreign else 'not run yet'} in {side.name}"
         if side.rows[key].success is None:
-            return f"{side.rows[key].state.replace('_', ' ')} in {side.name}"
+            state = side.rows[key].state
+            return FORCED if state == FORCED else f"{state.replace('_', ' ')} in {side.name}"
     first, second = a.rows[key], b.rows[key]
     same = ("house", "category", "stratum", "mode", "num_stages")
     if any(getattr(first, name) != getattr(second, name) for name in same):
@@ -263,7 +281,7 @@ def _flip(a: Side, b: Side, pair: tuple[StageRow, StageRow]) -> Flip:
         mode=row.mode,
         winner=winner.name,
         loser=loser.name,
-        cause=row.cause or "",
+        cause=WORDS[Cause(row.cause)] if row.cause else "",
         pages=(_page(winner, row), _page(loser, row)),
         command=_view_command(winner, loser, row),
     )

@@ -76,7 +76,7 @@ def _shown(flip: Flip, out_dir: Path | None) -> dict[str, object]:
         for name, page in zip((flip.winner, flip.loser), flip.pages, strict=True)
         if page is not None
     ]
-    return {"flip": flip, "where": words.where(flip), "cause": words.cause(flip), "links": links}
+    return {"flip": flip, "where": words.where(flip), "links": links}
 
 
 def _relative(page: str, out_dir: Path | None) -> str:

@@ -8,7 +8,18 @@ from evonav.report.export import csv_text
 from evonav.report.tables import NONE, Table
 from evonav.significance import Interval
 
-RATES = frozenset({*MEASURES, "ring_spl", "is_geodesic_success"})
+RATES = frozenset(
+    {
+        *MEASURES,
+        "ring_spl",
+        "is_geodesic_success",
+        "has_stopped",
+        "precision",
+        "recall",
+        "precision_at_start",
+        "recall_at_start",
+    }
+)
 """Measures of 0 to 1, shown in percent; others are shown in their own unit."""
 MAX_FLIPS = 5
 """Stages that flipped, each way, in a terminal."""
@@ -138,7 +149,7 @@ def part_table(one: Comparison) -> Table:
 def flip_table(one: Comparison) -> Table:
     """Stages where exactly one of the two succeeded, those of `b` first."""
     rows = [
-        (f"{flip.task_id} {flip.stage}", flip.category, where(flip), winner, f"{flip.loser}: {cause(flip)}")
+        (f"{flip.task_id} {flip.stage}", flip.category, where(flip), winner, f"{flip.loser}: {flip.cause}")
         for winner in (one.b, one.a)
         for flip in one.flips
         if flip.winner == winner
@@ -306,11 +317,6 @@ def where(flip: Flip) -> str:
     """Stratum and mode in words."""
     stratum = _stratum(flip)
     return stratum if flip.mode == "first" else f"{stratum}, {flip.mode.upper() if '_' in flip.mode else flip.mode}"
-
-
-def cause(flip: Flip) -> str:
-    """Why the loser failed, in words."""
-    return flip.cause.replace("_", " ")
 
 
 def _stratum(flip: Flip) -> str:

@@ -1,11 +1,200 @@
-"""Stages as rows for other programs: CSV, JSON lines, Parquet."""
+"""Stages as rows for other programs: CSV, JSON lines, Parquet, and columns for a notebook."""
 
+import ast
 import csv
+import inspect
 import io
-from collections.abc import Iterable, Sequence
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+from evonav.errors import StoreError
+from evonav.evaluation import costs, measures
+from evonav.evaluation.measures import StageRow, stage_rows
+from evonav.evaluation.records import RoundRecord
+from evonav.evaluation.store import RunStore
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 """What a spreadsheet takes for the start of a formula."""
+ROUND_COLUMNS = {
+    "agent": "The name that it was asked for by.",
+    "task_id": "Of the task.",
+    "stage": "1-based.",
+    "round": "0-based.",
+    "x_m": "Where the agent stood when it observed.",
+    "z_m": "As `x_m`; AI2-THOR's world frame.",
+    "yaw_rad": "Clockwise from +z, seen from above.",
+    "action": "`move`, `navigate_to` or `stop`.",
+    "target_x_m": "Of a `navigate_to`.",
+    "target_z_m": "Of a `navigate_to`.",
+    "is_action_success": "Whether it could be carried out.",
+    "is_target_visible": "Whether the target was in one of the round's views.",
+    "choice": "In the agent's words: `object 12`, `frontier 3`, `none`.",
+    "chosen_label": "Of the entry that was chosen.",
+    "is_chosen_stale": "Whether an object of that label was there.",
+    "num_entries": "In the agent's memory.",
+    "num_frontiers": "That it could choose from.",
+}
+"""Columns of a table of rounds, and what they hold."""
+_ARROW = {"str": "string", "bool": "bool_", "int": "int64", "float": "float64"}
+
+
+def stage_columns() -> dict[str, str]:
+    """Columns of a table of stages and what they hold: the fields of `StageRow`."""
+    told = {**_told(costs), **_told(measures)}
+    return {field.name: told.get(field.name, "") for field in fields(StageRow)}
+
+
+def stage_table(run_dir: Path, agents: Sequence[str] | None = None) -> list[dict[str, Any]]:
+    """One row a recorded stage, by agent, task and stage.
+
+    Raises:
+        StoreError: The run cannot be read.
+    """
+    with RunStore(run_dir) as store:
+        return [asdict(row) for row in stage_rows(store, agents)]
+
+
+def round_table(run_dir: Path, agents: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
+    """One row a decision round, of whole traces: a stage is read at a time.
+
+    Raises:
+        StoreError: The run cannot be read.
+    """
+    with RunStore(run_dir) as store:
+        for agent in agents if agents is not None else (None,):
+            for record in store.records(agent):
+                for taken in record.trace:
+                    yield {
+                        "agent": record.agent,
+                        "task_id": record.task_id,
+                        "stage": record.stage,
+                        **_round_row(taken),
+                    }
+
+
+def _round_row(taken: RoundRecord) -> dict[str, Any]:
+    goal_m = taken.action.position_m or (None, None)
+    entry = taken.chosen_entry
+    return {
+        "round": taken.round,
+        "x_m": taken.pose.x_m,
+        "z_m": taken.pose.z_m,
+        "yaw_rad": taken.pose.yaw_rad,
+        "action": taken.action.kind,
+        "target_x_m": goal_m[0],
+        "target_z_m": goal_m[1],
+        "is_action_success": taken.is_action_success,
+        "is_target_visible": taken.is_target_visible,
+        "choice": taken.choice,
+        "chosen_label": None if entry is None else entry.label,
+        "is_chosen_stale": None if entry is None else entry.is_stale,
+        "num_entries": taken.num_entries,
+        "num_frontiers": taken.num_frontiers,
+    }
+
+
+def write_table(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: Path) -> Path:
+    """Writes rows as the file's suffix says: `.csv`, `.jsonl` or `.parquet`.
+
+    Args:
+        rows: All with these columns.
+        columns: With what they hold, which Parquet keeps.
+        path: Its folder is made.
+
+    Raises:
+        StoreError: The suffix is none of these, pyarrow is not there, or the file cannot be written.
+    """
+    writers = {".csv": _write_csv, ".jsonl": _write_jsonl, ".parquet": _write_parquet}
+    if path.suffix not in writers:
+        raise StoreError(f"{path}: expected a file {', '.join(writers)}")
+    beside = path.with_name(path.name + ".partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        writers[path.suffix](rows, columns, beside)
+        beside.replace(path)
+    except OSError as error:
+        raise StoreError(f"{path}: {error}") from error
+    finally:
+        beside.unlink(missing_ok=True)
+    return path
+
+
+def _write_csv(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: Path) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows([csv_cell(row[name]) for name in columns] for row in rows)
+
+
+def _write_jsonl(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: Path) -> None:
+    with path.open("w", encoding="utf-8") as file:
+        for row in rows:
+            file.write(json.dumps({name: row[name] for name in columns}, allow_nan=False) + "\n")
+
+
+def _write_parquet(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: Path) -> None:
+    try:
+        import pyarrow
+        import pyarrow.parquet as parquet
+    except ImportError as error:
+        raise StoreError(f"Parquet needs pyarrow ({error}): pip install 'evonav[data]'") from error
+    kinds = {**_kinds(StageRow), **_round_kinds()}
+    schema = pyarrow.schema(
+        [
+            pyarrow.field(name, getattr(pyarrow, _ARROW[kinds[name]])(), metadata={"description": told})
+            for name, told in columns.items()
+        ],
+        metadata={"evonav": "one row a stage or round; docs/measures.md"},
+    )
+    with parquet.ParquetWriter(path, schema) as writer:
+        for block in _blocks(rows):
+            writer.write_table(
+                pyarrow.Table.from_pylist([{name: row[name] for name in columns} for row in block], schema)
+            )
+
+
+def _blocks(rows: Iterable[dict[str, Any]], size: int = 20_000) -> Iterator[list[dict[str, Any]]]:
+    block: list[dict[str, Any]] = []
+    for row in rows:
+        block.append(row)
+        if len(block) == size:
+            yield block
+            block = []
+    yield block
+
+
+def _kinds(kind: type) -> dict[str, str]:
+    """Plain type of every field: `float` for `float | None`."""
+    found = {}
+    for field in fields(kind):
+        name = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", str(field.type))
+        text = str(field.type) if "|" in str(field.type) else name
+        found[field.name] = next(plain for plain in ("bool", "str", "float", "int") if plain in text)
+    return found
+
+
+def _round_kinds() -> dict[str, str]:
+    texts = {"action", "choice", "chosen_label"}
+    return {
+        name: "str" if name in texts else "bool" if name.startswith("is_") else "int" if "num_" in name else "float"
+        for name in ROUND_COLUMNS
+        if name not in ("agent", "task_id", "stage", "round")
+    } | {"round": "int"}
+
+
+def _told(module: Any) -> dict[str, str]:  # noqa: ANN401 - a module
+    """What the strings under fields say: a field without one is told by the one before it, or by its name."""
+    found: dict[str, str] = {}
+    for node in ast.walk(ast.parse(inspect.getsource(module))):
+        if isinstance(node, ast.ClassDef):
+            for one, following in zip(node.body, [*node.body[1:], ast.Pass()], strict=True):
+                if isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name):
+                    is_told = isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant)
+                    found[one.target.id] = str(following.value.value) if is_told else ""  # type: ignore[attr-defined]
+    return {name: " ".join(text.split()) for name, text in found.items()}
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.measures import StageRow, stage_rows
 from evonav.evaluation.store import RunStore
-from evonav.report.rows import StageRow, stage_rows
 from evonav.report.run import agents_in_order
 
 

@@ -1,0 +1,59 @@
+"""`evonav breakdown`: rates by kind of stage."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def breakdown(
+    runs: Annotated[
+        list[str], typer.Argument(help="Runs (all their agents), RUN:AGENT, or a run and then names of its agents.")
+    ],
+    by: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="stratum, mode, path-length, earlier-stages, room-count, category, radius, or any field of a stage's "
+            "row; repeat it for more. Default: all of these."
+        ),
+    ] = None,
+    measure: Annotated[str, typer.Option(help="Any numeric field of a stage's row.")] = "success",
+    md: Annotated[Path | None, typer.Option(help="Markdown file to write.")] = None,
+    latex: Annotated[Path | None, typer.Option(help="LaTeX file to write (booktabs).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="CSV file to write, unrounded.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .svg, or .png or .pdf with `[viz]`.")] = None,
+) -> None:
+    """Shows rates by kind of stage, each with n and a 95% interval by house.
+
+    evonav breakdown out/run
+    evonav breakdown out/run fu ftu --by path-length --measure spl --figure out/length.pdf
+    evonav breakdown out/gpt-4o out/rules --by num_stale_at_start --csv out/stale.csv
+    """
+    from rich.console import Console
+
+    from evonav.folders import write_atomically
+    from evonav.report import breakdown as made
+    from evonav.report.figures import check_figure, write_plots
+    from evonav.report.sides import read_sides
+
+    if figure is not None and figure.suffix.lower() != ".svg":
+        check_figure(figure)
+    sides = read_sides(runs)
+    found = [made.breakdown(sides, name, measure) for name in by or made.STANDARD]
+    found = [one for one in found if one.groups]
+    tables = [made.breakdown_table(one) for one in found]
+    console = Console()
+    for one in found:
+        console.print(made.breakdown_table(one, is_brief=True).rich())
+    texts = (
+        (md, "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables)),
+        (latex, "\n".join(table.latex() for table in tables)),
+        (csv, made.breakdown_csv(found)),
+    )
+    for path, text in texts:
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_atomically(path, text)
+            typer.echo(f"written: {path}")
+    if figure is not None:
+        typer.echo(f"written: {write_plots([made.breakdown_plot(one) for one in found], figure)}")

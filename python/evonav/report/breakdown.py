@@ -1,0 +1,311 @@
+"""Rates of agents by kind of stage: a field of its row, bins of a length, the size of the house, the success radius."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
+
+import numpy as np
+
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.measures import StageRow
+from evonav.evaluation.store import RunStore
+from evonav.paired import cluster_means
+from evonav.report.compare import MODES, STRATA, check_measure
+from evonav.report.compare_words import RATES, measure_name
+from evonav.report.export import csv_text
+from evonav.report.line_chart import Line
+from evonav.report.plots import CurvePlot, Dots, GroupPlot, Plot
+from evonav.report.sides import Side
+from evonav.report.tables import NONE, Table
+from evonav.significance import Interval
+
+RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
+RADIUS = "radius"
+LENGTH_EDGES_M = (0.0, 2.0, 4.0, 6.0, 8.0, 12.0, 16.0)
+ROOM_EDGES = (1, 2, 4, 6, 11)
+"""First of each group of rooms: 1, 2-3, 4-5, 6-10, more."""
+MAX_PLOTTED = 10
+NUM_BINS = 4
+"""Of a number that has no bins of its own: quarters."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One agent on one kind of stage."""
+
+    n: int
+    num_houses: int
+    value: float | None
+    ci95: Interval | None
+    """Bootstrap by house."""
+
+
+@dataclass(frozen=True, slots=True)
+class Breakdown:
+    """A measure of every agent by group."""
+
+    by: str
+    words: str
+    measure: str
+    groups: tuple[str, ...]
+    agents: tuple[str, ...]
+    cells: Mapping[tuple[str, str], Cell]
+    """By (group, agent)."""
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Grouping:
+    """How stages are grouped."""
+
+    words: str
+    group_of: Callable[[StageRow], str | None]
+    """`None` for a stage that belongs nowhere."""
+    order: Sequence[str] | None
+    """Of groups; `None`: the largest first."""
+    note: str = ""
+
+
+STANDARD = ("stratum", "mode", "path-length", "earlier-stages", "room-count", "category", RADIUS)
+"""What `evonav breakdown` shows unless it is told what."""
+
+
+def breakdown(sides: Sequence[Side], by: str, measure: str = "success") -> Breakdown:
+    """A measure by group, for every side.
+
+    Args:
+        sides: From `read_sides`.
+        by: One of `STANDARD`, or any field of a stage's row.
+        measure: Any numeric field of it; of the radius sweep always success.
+
+    Raises:
+        InvalidArgumentError: There is no such field.
+        StoreError: A run cannot be read.
+    """
+    check_measure(measure)
+    if by == RADIUS:
+        return _by_radius(sides)
+    grouping = _grouping(sides, by)
+    rows: dict[tuple[str, str], list[StageRow]] = {}
+    for side in sides:
+        for row in side.rows.values():
+            group = grouping.group_of(row)
+            if group is not None and row.is_scored and getattr(row, measure) is not None:
+                rows.setdefault((group, side.name), []).append(row)
+    sizes: dict[str, int] = {}
+    for (group, _), part in rows.items():
+        sizes[group] = sizes.get(group, 0) + len(part)
+    known = grouping.order or sorted(sizes, key=lambda group: (-sizes[group], group))
+    return Breakdown(
+        by=by,
+        words=grouping.words,
+        measure=measure,
+        groups=tuple(group for group in known if group in sizes),
+        agents=tuple(side.name for side in sides),
+        cells={key: _cell(part, [float(getattr(row, measure)) for row in part]) for key, part in rows.items()},
+        note=grouping.note,
+    )
+
+
+def _cell(rows: Sequence[StageRow], values: Sequence[float]) -> Cell:
+    first_task: dict[str, str] = {}
+    for row in rows:
+        first_task.setdefault(row.house, row.task_id)
+    houses = [first_task[row.house] for row in rows]
+    ((mean, ends),) = cluster_means(np.array(values)[:, None], houses)
+    return Cell(len(rows), len(first_task), mean, ends)
+
+
+def _by_radius(sides: Sequence[Side]) -> Breakdown:
+    cells: dict[tuple[str, str], Cell] = {}
+    words = {f"{radius_m:g} m": radius_m for radius_m in RADII_M}
+    for side in sides:
+        scored = [row for row in side.rows.values() if row.is_scored and row.terminal_distance_m is not None]
+        for group, radius_m in words.items() if scored else ():
+            cells[group, side.name] = _cell(scored, [float(bool(row.is_success_at(radius_m))) for row in scored])
+        for name, field in (("strict", "is_strict_success"), ("geodesic", "is_geodesic_success")):
+            told = [row for row in scored if getattr(row, field) is not None]
+            if told:
+                cells[name, side.name] = _cell(told, [float(getattr(row, field)) for row in told])
+    note = (
+        "The agents were run under their own radius; these are the same stages judged by others. Strict: it called "
+        "stop within 1 m of the target's box with the target in view. Geodesic: the way to it is under the radius."
+    )
+    groups = [group for group in (*words, "strict", "geodesic") if any(group == key for key, _ in cells)]
+    agents = tuple(side.name for side in sides)
+    return Breakdown(RADIUS, "success radius", "success", tuple(groups), agents, cells, note)
+
+
+def _grouping(sides: Sequence[Side], by: str) -> Grouping:
+    if by == "stratum":
+        return Grouping("stratum", lambda row: STRATA.get(row.stratum), list(STRATA.values()))
+    if by == "mode":
+        note = "The transition before the stage; stages 2 and on."
+        return Grouping("evolution", lambda row: MODES.get(row.mode), list(MODES.values()), note)
+    if by == "path-length":
+        names = [f"{a:g}-{b:g} m" for a, b in pairwise(LENGTH_EDGES_M)] + [f"{LENGTH_EDGES_M[-1]:g} m and more"]
+        note = "Shortest path from where the stage began to the target, which depends on where the agent was."
+        return Grouping("path length", lambda row: _length_bin(row, names), names, note)
+    if by == "earlier-stages":
+        names = [str(k) for k in range(20)]
+        note = "Stages of the task before this one: how long memory has grown, and could grow stale."
+        return Grouping("earlier stages", lambda row: str(row.stage - 1), names, note)
+    if by == "room-count":
+        counts = _room_counts(sides)
+        names = [_room_group(k) for k in ROOM_EDGES]
+        return Grouping("rooms", lambda row: _rooms_of(counts, row), names)
+    return _field_grouping(sides, by.replace("-", "_"))
+
+
+def _field_grouping(sides: Sequence[Side], field: str) -> Grouping:
+    known = {one.name for one in fields(StageRow)}
+    if field not in known:
+        raise InvalidArgumentError(
+            f"argument `by` is {field!r}, expected one of {', '.join(STANDARD)}, or a field of a stage's row: "
+            f"{', '.join(sorted(known))}"
+        )
+    words = field.replace("_", " ")
+    values = [getattr(row, field) for side in sides for row in side.rows.values() if row.is_scored]
+    there = [value for value in values if value is not None]
+    kinds = {type(value) for value in there}
+    if kinds <= {bool}:
+        return Grouping(words, lambda row: _yes(getattr(row, field)), ["yes", "no"])
+    if kinds <= {int} and len(set(there)) <= 12:
+        return Grouping(words, lambda row: _text(getattr(row, field)), [str(k) for k in sorted(set(there))])
+    if kinds <= {int, float}:
+        edges = sorted(
+            {float(edge) for edge in np.quantile(np.array(there, dtype=float), np.linspace(0, 1, NUM_BINS + 1))}
+        )
+        names = [f"{a:.3g} to {b:.3g}" for a, b in pairwise(edges)] or [f"{edges[0]:.3g}"]
+        return Grouping(words, lambda row: _bin(getattr(row, field), edges, names), names, "Quarters of all stages.")
+    return Grouping(words, lambda row: _text(getattr(row, field)), None)
+
+
+def _yes(value: bool | None) -> str | None:
+    return None if value is None else "yes" if value else "no"
+
+
+def _text(value: object) -> str | None:
+    return None if value is None else str(value)
+
+
+def _bin(value: float | None, edges: Sequence[float], names: Sequence[str]) -> str | None:
+    if value is None:
+        return None
+    return names[min(len(names) - 1, max(0, int(np.searchsorted(edges, value, side="right")) - 1))]
+
+
+def _length_bin(row: StageRow, names: Sequence[str]) -> str | None:
+    return _bin(row.reference_length_m, LENGTH_EDGES_M, names)
+
+
+def _room_counts(sides: Sequence[Side]) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for run_dir in {side.run_dir: None for side in sides}:
+        with RunStore(run_dir) as store:
+            for task_id in {
+                row.task_id: None for side in sides if side.run_dir == run_dir for row in side.rows.values()
+            }:
+                first = next(store.maps(task_id), None)
+                if first is not None:
+                    counts[task_id] = len(first.rooms)
+    return counts
+
+
+def _room_group(first: int) -> str:
+    following = [edge for edge in ROOM_EDGES if edge > first]
+    if not following:
+        return f"{first} and more"
+    return str(first) if following[0] == first + 1 else f"{first}-{following[0] - 1}"
+
+
+def _rooms_of(counts: Mapping[str, int], row: StageRow) -> str | None:
+    count = counts.get(row.task_id)
+    return None if count is None else _room_group(max(edge for edge in ROOM_EDGES if edge <= max(1, count)))
+
+
+def breakdown_table(found: Breakdown, *, is_brief: bool = False) -> Table:
+    """A row a group, a column an agent.
+
+    Args:
+        found: The breakdown.
+        is_brief: Half of an interval's width in place of its ends: six agents fit a terminal.
+    """
+    rows = []
+    for group in found.groups:
+        cells = [found.cells.get((group, agent)) for agent in found.agents]
+        sizes = sorted({cell.n for cell in cells if cell is not None})
+        told = (_brief(cell, found.measure) if is_brief else cell_words(cell, found.measure) for cell in cells)
+        rows.append((group, "-".join(map(str, sizes[:1] + sizes[1:][-1:])), *told))
+    unit = " %" if found.measure in RATES else ""
+    ends = "± half of its 95% interval" if is_brief else "[95% CI]"
+    notes = [f"{measure_name(found.measure)}{unit} {ends}, bootstrap by house; n stages of an agent."]
+    notes += [found.note] if found.note else []
+    columns = (found.words, "n", *found.agents)
+    return Table(f"{measure_name(found.measure)} by {found.words}", columns, tuple(rows), tuple(notes))
+
+
+def cell_words(cell: Cell | None, measure: str) -> str:
+    """`61.1 [54.0, 68.2]`."""
+    if cell is None or cell.value is None:
+        return NONE
+    scale = 100 if measure in RATES else 1
+    ends = "" if cell.ci95 is None else f" [{scale * cell.ci95[0]:.1f}, {scale * cell.ci95[1]:.1f}]"
+    return f"{scale * cell.value:.1f}{ends}"
+
+
+def _brief(cell: Cell | None, measure: str) -> str:
+    if cell is None or cell.value is None:
+        return NONE
+    scale = 100 if measure in RATES else 1
+    half = None if cell.ci95 is None else scale * (cell.ci95[1] - cell.ci95[0]) / 2
+    return f"{scale * cell.value:.1f}" + ("" if half is None else f" ±{half:.0f}" if scale == 100 else f" ±{half:.2g}")
+
+
+def breakdown_csv(found: Sequence[Breakdown]) -> str:
+    """A row a group and agent, unrounded."""
+    columns = ("by", "group", "agent", "measure", "n", "num_houses", "value", "low", "high")
+    rows = []
+    for one in found:
+        for group in one.groups:
+            for agent in one.agents:
+                cell = one.cells.get((group, agent))
+                if cell is not None:
+                    low, high = cell.ci95 or (None, None)
+                    rows.append((one.by, group, agent, one.measure, cell.n, cell.num_houses, cell.value, low, high))
+    return csv_text(columns, rows)
+
+
+def breakdown_plot(found: Breakdown) -> Plot:
+    """Dots with whiskers; lines for the radius sweep."""
+    scale = 100 if found.measure in RATES else 1
+    name = f"{measure_name(found.measure)}, %" if scale == 100 else measure_name(found.measure)
+    if found.by == RADIUS:
+        radii = [group for group in found.groups if group.endswith(" m")]
+        lines = []
+        for agent in found.agents:
+            there = [(group, found.cells[group, agent]) for group in radii if (group, agent) in found.cells]
+            points = [(float(group[:-2]), 100 * cell.value) for group, cell in there if cell.value is not None]
+            if points:
+                lines.append(Line(agent, points, [_scaled(cell.ci95, 100) for _, cell in there]))
+        return CurvePlot("SR by success radius", tuple(lines), "success radius, m", "SR, %")
+    groups = found.groups[:MAX_PLOTTED]
+    series = []
+    for agent in found.agents:
+        cells = [found.cells.get((group, agent)) for group in groups]
+        values = tuple(None if cell is None or cell.value is None else scale * cell.value for cell in cells)
+        series.append(Dots(agent, values, tuple(None if cell is None else _scaled(cell.ci95, scale) for cell in cells)))
+    sizes = [
+        {found.cells[group, agent].n for agent in found.agents if (group, agent) in found.cells} for group in groups
+    ]
+    labels = tuple(
+        f"{group}\nn = {min(size)}" + (f"-{max(size)}" if len(size) > 1 else "")
+        for group, size in zip(groups, sizes, strict=True)
+    )
+    more = len(found.groups) - len(groups)
+    heading = f"{measure_name(found.measure)} by {found.words}" + (f" (the {MAX_PLOTTED} largest)" if more > 0 else "")
+    return GroupPlot(heading, labels, tuple(series), name)
+
+
+def _scaled(interval: Interval | None, scale: int) -> Interval | None:
+    return None if interval is None else (scale * interval[0], scale * interval[1])

@@ -1,0 +1,132 @@
+import csv
+import io
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from made_up_run import lettered_run
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.metrics import rates
+from evonav.report.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
+from evonav.report.figures import write_plots
+from evonav.report.plots import CurvePlot, Gap, GapPlot, gap_range, plot_svg, ticks
+from evonav.report.run import load_run
+from evonav.report.sides import read_sides
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    return lettered_run(tmp_path / "run", {"fu": "sf" * 8 + "ss", "ftu": "ss" * 6 + "sfse-s"})
+
+
+def test_every_scored_stage_is_in_one_group_and_rates_are_those_of_the_metrics(run: Path) -> None:
+    sides = read_sides([str(run)])
+    records = load_run(run).records_by_agent()
+    for by in STANDARD[:-1]:
+        found = breakdown(sides, by)
+        for agent, num_scored in (("fu", 18), ("ftu", 16)):
+            expected = num_scored // 2 if by == "mode" else num_scored  # the first stage comes after nothing
+            assert sum(cell.n for (_, name), cell in found.cells.items() if name == agent) == expected, by
+    found = breakdown(sides, "stratum")
+    assert found.groups == ("first", "relocated")
+    told = rates([record for record in records["ftu"] if record.stage == 2])
+    cell = found.cells["relocated", "ftu"]
+    assert (cell.n, cell.num_houses, cell.value) == (told.n, 8, told.sr)
+    assert cell.ci95 is not None
+    assert told.sr_ci95 is not None
+    assert cell.ci95[0] <= told.sr_ci95[0] + 0.01  # widened for few houses
+    assert cell.ci95[1] >= told.sr_ci95[1] - 0.01
+    assert found.cells["first", "ftu"].ci95 is None  # all houses agree
+    assert breakdown(sides, "room-count").groups == ("2-3",)
+    assert breakdown(sides, "path-length").groups == ("2-4 m",)
+    assert breakdown(sides, "earlier-stages", "spl").cells["1", "fu"].value == pytest.approx(0.8 / 9)
+
+
+def test_any_field_groups_and_any_number_is_measured(run: Path) -> None:
+    sides = read_sides([str(run), "fu"])
+    assert breakdown(sides, "has-stopped").groups == ("yes",)
+    assert breakdown(sides, "cause").groups == ("no_object",)
+    assert breakdown(sides, "num_rounds").groups == ("4",)
+    assert breakdown(sides, "terminal_distance_m", "num_rounds").cells
+    with pytest.raises(InvalidArgumentError, match="argument `by` is 'weather', expected one of stratum"):
+        breakdown(sides, "weather")
+    with pytest.raises(InvalidArgumentError, match="measure 'house' is none of"):
+        breakdown(sides, "mode", "house")
+
+
+def test_success_at_another_radius(run: Path) -> None:
+    """Successes of this run end 1 m from the target, failures 3.5 m."""
+    found = breakdown(read_sides([str(run)]), "radius")
+    assert [found.cells[group, "fu"].value for group in ("0.5 m", "1 m", "1.5 m", "3 m")] == [0, 0, 10 / 18, 10 / 18]
+    plot = breakdown_plot(found)
+    assert isinstance(plot, CurvePlot)
+    assert [x for x, _ in plot.lines[0].points] == [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
+
+
+def test_tables_and_csv_hold_n_and_interval(run: Path) -> None:
+    found = breakdown(read_sides([str(run)]), "stratum")
+    table = breakdown_table(found)
+    assert table.columns == ("stratum", "n", "fu", "ftu")
+    assert table.rows[0] == ("first", "8-9", "100.0", "100.0")
+    assert table.rows[1][2].startswith("11.1 [0.0, ")
+    assert breakdown_table(found, is_brief=True).rows[1][2].startswith("11.1 ±")
+    rows = list(csv.DictReader(io.StringIO(breakdown_csv([found]))))
+    assert [(row["group"], row["agent"], row["n"]) for row in rows] == [
+        ("first", "fu", "9"),
+        ("first", "ftu", "8"),
+        ("relocated", "fu", "9"),
+        ("relocated", "ftu", "8"),
+    ]
+
+
+def test_a_plot_has_a_mark_for_every_value_where_it_belongs(run: Path) -> None:
+    found = breakdown(read_sides([str(run)]), "stratum")
+    root = ElementTree.fromstring(plot_svg(breakdown_plot(found)))
+    marks = [node for node in root.iter(f"{SVG}g") if node.find(f"{SVG}title") is not None]
+    told = {node.findtext(f"{SVG}title"): float(node.find(f"{SVG}circle").get("cy")) for node in marks}
+    assert len(told) == 4
+    high = next(y for words, y in told.items() if words.startswith("fu, first, n = 8-9: 100.0"))
+    low = next(y for words, y in told.items() if words.startswith("fu, relocated"))
+    assert high < low
+    assert "fu" in [node.text for node in root.iter(f"{SVG}text")]
+
+
+def test_differences_are_drawn_around_zero() -> None:
+    plot = GapPlot("a<b", (Gap("x", "n = 3", 12.0, (-3.0, 27.0)), Gap("y", "", -1.0, None, True)), "left", "right")
+    marks = gap_range(plot)
+    assert 0.0 in marks
+    assert marks[0] <= -3
+    assert marks[-1] >= 27
+    root = ElementTree.fromstring(plot_svg(plot))
+    x, y = (float(node.get("cx")) for node in root.iter(f"{SVG}circle"))
+    assert y < x
+    assert ticks(0.0, 100.0, 7) == [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]
+    assert ticks(-0.5, 0.2)[0] <= -0.5
+
+
+def test_figures_are_written_in_every_format(run: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    sides = read_sides([str(run)])
+    plots = [breakdown_plot(breakdown(sides, by)) for by in ("stratum", "radius")]
+    plots.append(GapPlot("gaps", (Gap("x", "n = 3", 12.0, (-3.0, 27.0)),), "left", "right"))
+    assert write_plots(plots, tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
+    assert write_plots(plots[-1:], tmp_path / "f.pdf").read_bytes().startswith(b"%PDF")
+    write_plots(plots, tmp_path / "f.svg")
+    assert sorted(path.name for path in tmp_path.glob("*.svg")) == ["f-2.svg", "f-3.svg", "f.svg"]
+    with pytest.raises(InvalidArgumentError, match=r"expected a file \.pdf"):
+        write_plots(plots, tmp_path / "f.gif")
+
+
+def test_the_command_prints_all_and_writes_what_is_asked(run: Path, tmp_path: Path) -> None:
+    md, tex, table = tmp_path / "b.md", tmp_path / "b.tex", tmp_path / "b.csv"
+    asked = ["breakdown", str(run), "--md", str(md), "--latex", str(tex), "--csv", str(table)]
+    result = CliRunner().invoke(app, asked)
+    assert result.exit_code == 0, result.output
+    assert "SR by success radius" in result.output
+    assert md.read_text().count("\n## ") + 1 == tex.read_text().count(r"\toprule") == 7
+    assert len({row["by"] for row in csv.DictReader(table.read_text().splitlines())}) == 7
