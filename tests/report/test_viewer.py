@@ -4,6 +4,7 @@ import base64
 import json
 import re
 import shutil
+import zlib
 from io import BytesIO
 from pathlib import Path
 
@@ -245,15 +246,25 @@ def test_the_index_keeps_earlier_pages_and_the_report_links_to_them(
     run_dir: Path, task_id: str, tmp_path: Path
 ) -> None:
     run = Path(shutil.copytree(run_dir, tmp_path / "run", ignore=shutil.ignore_patterns("view")))
-    assert "round by round" not in write_report(run).read_text("utf-8")
+    assert ">round by round<" not in write_report(run).read_text("utf-8")
     for agent in ("random-walk", "fu"):
         assert CliRunner().invoke(app, ["view", str(run), "--agent", agent, "--task", task_id]).exit_code == 0
     index = (run / "view" / "index.html").read_text("utf-8")
     assert all(f'<a href="{page_name(task_id, agent)}">' in index for agent in ("fu", "random-walk"))
     (run / "view" / page_name(task_id, "random-walk")).unlink()
-    links = re.findall(r'<a href="([^"]+)">round by round</a>', write_report(run).read_text("utf-8"))
-    assert links == [f"view/{page_name(task_id, 'fu')}#stage={k}&amp;round=1" for k in (1, 2, 3)]
-    assert "round by round" not in write_report(run, tmp_path / "elsewhere").read_text("utf-8")
+
+    def links(report: Path) -> list[str]:
+        return re.findall(r'<a href="([^"]+)">round by round</a>', report.read_text("utf-8"))
+
+    name = page_name(task_id, "fu")
+    inside = [f"#replay={name}&amp;stage={k}&amp;round=1" for k in (1, 2, 3)]
+    assert links(write_report(run)) == links(write_report(run, tmp_path / "elsewhere")) == inside
+    report = write_report(run).read_text("utf-8")
+    (content,) = re.findall(rf'id="replay={re.escape(name)}"[^>]*>(.*?)</script>', report)
+    assert zlib.decompress(base64.b64decode(content)) == (run / "view" / name).read_bytes()
+    beside = [f"view/{name}#stage={k}&amp;round=1" for k in (1, 2, 3)]
+    assert links(write_report(run, max_replay_bytes=1000)) == beside
+    assert links(write_report(run, tmp_path / "x", max_replay_bytes=1000))[0] == f"../run/{beside[0]}"
 
 
 def test_an_agent_without_belief_has_views_and_way_alone(pages: Path, task_id: str) -> None:

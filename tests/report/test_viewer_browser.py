@@ -1,21 +1,18 @@
 """The viewer's pages in headless Chromium: they load without errors, and every control does what it says."""
 
-import html
 import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
+from browser import needs_browser, probed
 from typer.testing import CliRunner
 
 from evonav.cli import app
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)
 PROBE = (Path(__file__).parent / "viewer_probe.js").read_text("utf-8")
 
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
+pytestmark = needs_browser
 
 
 @pytest.fixture(scope="module")
@@ -27,25 +24,10 @@ def pages(viewed_run: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[st
     return {agent: next(path.glob(f"*_{agent}.html")) for agent in ("fu", "random-walk")}
 
 
-def probed(page: Path, tmp_path: Path, size: str) -> dict:
-    """What the probe found on a page; console messages are failures."""
-    assert BROWSER is not None
-    copy = tmp_path / "index.html"
-    copy.write_text(page.read_text("utf-8").replace("</body>", f"<script>{PROBE}</script></body>"), "utf-8")
-    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0"]
-    command += [f"--user-data-dir={tmp_path / 'profile'}", f"--window-size={size}", "--virtual-time-budget=60000"]
-    done = subprocess.run(
-        [*command, "--dump-dom", copy.as_uri()], capture_output=True, text=True, timeout=200, check=True
-    )
-    assert [line for line in done.stderr.splitlines() if "CONSOLE" in line] == []
-    (text,) = re.findall(r'<pre id="probe">(.*?)</pre>', done.stdout, re.DOTALL)
-    return json.loads(html.unescape(text))
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("size", ["1280,800", "420,900"])
 def test_every_round_can_be_gone_to_and_fills_its_panels(pages: dict[str, Path], tmp_path: Path, size: str) -> None:
-    found = probed(pages["fu"], tmp_path, size)
+    found = probed(pages["fu"], PROBE, tmp_path, size)
     assert found["errors"] == []
     rounds = found["rounds"]
     text = pages["fu"].read_text("utf-8")
@@ -92,7 +74,7 @@ def test_every_round_can_be_gone_to_and_fills_its_panels(pages: dict[str, Path],
 
 @pytest.mark.slow
 def test_an_agent_that_tells_nothing_has_a_page_too(pages: dict[str, Path], tmp_path: Path) -> None:
-    found = probed(pages["random-walk"], tmp_path, "1280,800")
+    found = probed(pages["random-walk"], PROBE, tmp_path)
     assert found["errors"] == []
     assert all(shown["images"] and shown["entries"] == 0 and shown["cells"] == 0 for shown in found["rounds"])
     assert all(shown["agent"] for shown in found["rounds"])

@@ -1,4 +1,4 @@
-// Works the page as a reader would, and leaves what it found in the document.
+// Works the page as a reader would, and returns what it found.
 (async () => {
   const found = { errors: [], rounds: [] };
   addEventListener("error", (event) => found.errors.push(String(event.message)));
@@ -66,11 +66,10 @@
     $("follow").click(); found.whole = map.getAttribute("viewBox") === box;
     found.labels = [...document.querySelectorAll("button")].every((button) => button.textContent.trim() || button.getAttribute("aria-label"));
     found.alts = [...document.images].every((image) => image.alt);
+    found.handlers = [...document.querySelectorAll("*")].flatMap((part) => [...part.attributes]).filter(({ name, value }) =>
+      name.startsWith("on") || (["href", "src", "action", "formaction", "xlink:href"].includes(name) && /^\s*(javascript|vbscript):/i.test(value))).map(({ name }) => name);
   } catch (error) {
     found.errors.push(String(error.stack));
   }
-  const pre = document.createElement("pre");
-  pre.id = "probe";
-  pre.textContent = JSON.stringify(found);
-  document.body.append(pre);
+  return found;
 })();

@@ -9,13 +9,14 @@ from evonav.cli.check_agent import check_agent
 from evonav.cli.compare import compare
 from evonav.cli.controlled import controlled_app
 from evonav.cli.doctor import doctor
-from evonav.cli.evaluate import demo, evaluate, report, strip
+from evonav.cli.evaluate import demo, evaluate
 from evonav.cli.export import export
 from evonav.cli.failures import failures
 from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
 from evonav.cli.mock_vlm import mock_vlm
 from evonav.cli.paper import paper
+from evonav.cli.report import report, strip
 from evonav.cli.submission import pack, verify
 from evonav.cli.sweep import sweep
 from evonav.cli.tasks import tasks_app

@@ -1,4 +1,4 @@
-"""Running agents, and what comes of it: `evaluate`, `demo`, `report`, `strip`."""
+"""Running agents: `evaluate`, `demo`."""
 
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -148,38 +148,15 @@ def demo(
             print_estimate(decisions, _names(agents, ()), task_files, config, num_workers)
             return
         summaries = _evaluate(out, _names(agents, ()), task_files, config, num_workers)
+    from evonav.report import write_report
+
     print_table(summaries)
     print_failures(out)
     print_spending(out)
     _, index = make_pages(out)
-    _report(out)
+    typer.echo(f"report: {write_report(out)}")
     typer.echo(f"round by round: {index}")
     _exit(summaries)
-
-
-def report(run: Annotated[Path, typer.Argument(help="Folder of a run.")]) -> None:
-    """Writes a run's HTML report, from its records alone."""
-    from evonav.evaluation.engine import write_summary
-
-    print_table(write_summary(run))
-    _report(run)
-
-
-def strip(
-    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
-    out: Annotated[Path, typer.Option(help="SVG file to write.")],
-    task: Annotated[str | None, typer.Argument(help="Id of a task of the run; default: the most telling one.")] = None,
-    agents: Annotated[str, typer.Option(help="Agents of the run, comma-separated: a row each.")] = "ftu",
-    stages: Annotated[str, typer.Option(help="Stages, comma-separated; default: all.")] = "",
-) -> None:
-    """Draws one task of a run as a picture: stages side by side, agents below each other."""
-    from evonav.report import write_strip
-
-    try:
-        numbers = [int(stage) for stage in stages.split(",")] if stages else None
-    except ValueError:
-        raise typer.BadParameter(f"--stages {stages}: numbers, comma-separated") from None
-    typer.echo(f"picture: {write_strip(run, task, agents.split(','), out, stages=numbers)}")
 
 
 @contextmanager
@@ -278,9 +255,3 @@ def _backend(simulator: SimulatorName, **options: Any) -> "Backend":  # noqa: AN
 def _exit(summaries: "list[AgentSummary]") -> None:
     if any(summary.is_incomplete for summary in summaries):
         raise typer.Exit(EXIT_INCOMPLETE)
-
-
-def _report(run: Path) -> None:
-    from evonav.report import write_report
-
-    typer.echo(f"report: {write_report(run)}")

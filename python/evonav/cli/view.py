@@ -10,6 +10,7 @@ from evonav.cli.display import status
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from evonav.report.run import Run
     from evonav.report.viewer import WrittenPage
 
 
@@ -58,34 +59,54 @@ def make_pages(
         exchanges: File of a model's answers.
         out: Where to write.
     """
-    from evonav.evaluation.trace import RunReplay
-    from evonav.report.maps import VIEW_DIR
     from evonav.report.run import load_run
-    from evonav.report.strip import most_telling
-    from evonav.report.viewer import write_episode, write_index
+    from evonav.report.telling import most_telling
 
     found = load_run(run)
     agents = agents or found.agents
     # Telling is a task in which memory misleads some, the first named, and not the last one.
     ranked = sorted(agents, key=lambda name: name not in ("fu", "stage-reset"))
     task_id = task if task is not None else most_telling(found, ranked)[0]
-    replay = RunReplay(run, _task_path(run, tasks), exchanges)
-    out_dir = out or run / VIEW_DIR
+    episodes = [(name, task_id) for name in agents]
+    return replay_pages(found, episodes, stage=stage, tasks=tasks, exchanges=exchanges, out=out)
+
+
+def replay_pages(
+    found: "Run",
+    episodes: "Sequence[tuple[str, str]]",
+    *,
+    stage: int | None = None,
+    tasks: Path | None = None,
+    exchanges: Path | None = None,
+    out: Path | None = None,
+) -> "tuple[list[WrittenPage], Path]":
+    """Replays these episodes (agent, task) of a run, and writes their pages and the index; the rest as `make_pages`."""
+    from evonav.evaluation.trace import RunReplay
+    from evonav.report.maps import VIEW_DIR
+    from evonav.report.viewer import write_episode, write_index
+
+    replay = RunReplay(found.run_dir, task_path(found.run_dir, tasks), exchanges)
+    out_dir = out or found.run_dir / VIEW_DIR
     pages = []
     with status("Replaying") as tell:
-        for name in agents:
+        for name, task_id in episodes:
             stages = list(replay.episode(name, task_id, _teller(tell, name, task_id), last_stage=stage))
             pages += write_episode(
-                stages, out_dir, budget=replay.budget(name), success_radius_m=found.success_radius_m, only=stage
+                stages,
+                out_dir,
+                budget=replay.budget(name),
+                success_radius_m=found.success_radius_m,
+                only=stage,
+                records_sha256=found.episodes_sha256[name, task_id],
             )
-    return pages, write_index(pages, out_dir, run.resolve().name)
+    return pages, write_index(pages, out_dir, found.run_dir.resolve().name)
 
 
 def _teller(tell: "Callable[[str], None]", agent: str, task_id: str) -> "Callable[[int, int], None]":
     return lambda stage, round_: tell(f"{agent} in {task_id}, stage {stage}, round {round_ + 1}")
 
 
-def _task_path(run: Path, tasks: Path | None) -> "Callable[[str], Path]":
+def task_path(run: Path, tasks: Path | None) -> "Callable[[str], Path]":
     """Where the run's tasks are: as told, in the run's folder, where it had them, or bundled.
 
     Raises:

@@ -1,12 +1,13 @@
 """A task as the page shows it: what was asked, and a map with its outcome for every agent and stage."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from markupsafe import Markup
 
 from evonav.evaluation.records import EndState, StageRecord
 from evonav.report.causes import sentence
-from evonav.report.maps import change_words, outcome_words, page_href, task_frame
+from evonav.report.maps import change_words, outcome_words, task_frame
 from evonav.report.overlay import change, course, rounds
 from evonav.report.plan import Frame, furniture, ground, item_labels, labels, moving_ids
 from evonav.report.run import Run, Task
@@ -25,7 +26,7 @@ class Cell:
     svg: Markup
     change: str
     href: str | None = None
-    """Where `evonav view` shows it round by round."""
+    """Where it is shown round by round."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +44,14 @@ class TaskView:
     data: dict[str, str]
 
 
-def task_view(run: Run, task: Task, prefix: str, to_run: str | None = None) -> TaskView:
+def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, int], str]) -> TaskView:
     """Draws a task: the house once, what moves once a stage, every agent's stages over them.
 
     Args:
         run: Its run.
         task: With its records and maps.
         prefix: Of names in the page.
-        to_run: Way from the page to the run's folder, empty or ending in `/`; `None` for pages that are elsewhere.
+        hrefs: Where stages are shown round by round, by agent, task and stage; those that are.
     """
     records = list(task.records.values())
     frame = task_frame(task.maps, records)
@@ -86,7 +87,7 @@ def task_view(run: Run, task: Task, prefix: str, to_run: str | None = None) -> T
             rounds(record.trace),
             drawn,
             change_words(record, task.maps),
-            None if to_run is None or (href := page_href(run.run_dir, record)) is None else f"{to_run}{href}",
+            hrefs.get((agent, task.task_id, stage)),
         )
 
     goals = []

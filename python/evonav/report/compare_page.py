@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from evonav.report import compare_words as words
 from evonav.report.compare import Comparison, Flip
-from evonav.report.html import page_environment, text_of
+from evonav.report.page import page_environment, text_of
 from evonav.report.plots import Gap, GapPlot, plot_svg
 
 

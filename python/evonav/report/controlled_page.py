@@ -12,10 +12,10 @@ from evonav.report.controlled import BASELINE, MEASURES, Analysis, Key, load_ana
 from evonav.report.controlled_claims import claim_table
 from evonav.report.controlled_figures import bars_svg, lines_svg, write_figures
 from evonav.report.controlled_rates import rate_tables
-from evonav.report.html import page_environment, text_of
 from evonav.report.legend import legend
 from evonav.report.maps import map_css, outcome_words
 from evonav.report.overlay import change, rounds
+from evonav.report.page import page_environment, text_of
 from evonav.report.plan import furniture, ground, labels, moving_ids
 from evonav.report.rollouts import (
     REASONS,

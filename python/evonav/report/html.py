@@ -1,12 +1,11 @@
-"""The page of a run: `report.html` holds everything, or links to a page a task when there are many."""
+"""The page of a run: one file with its tables, every stage's map, and episodes round by round."""
 
-import json
+import os
 from collections.abc import Iterator
-from importlib.resources import files
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from evonav.errors import StoreError
@@ -14,28 +13,49 @@ from evonav.evaluation.metrics import AgentSummary
 from evonav.report import tables
 from evonav.report.cards import TaskView, filter_data, task_view
 from evonav.report.causes import WORDS, Cause
+from evonav.report.facts import failure_groups, reproduction, run_facts, task_digests
 from evonav.report.findings import latex_tables, markdown_tables, run_tables, statements
 from evonav.report.legend import legend
-from evonav.report.maps import map_css, map_name, outcome_words, stage_svg
-from evonav.report.run import Run, StageOutcome, load_run
-from evonav.report.svg import clean, slug
+from evonav.report.maps import VIEW_DIR, map_css, map_name, outcome_words, stage_svg
+from evonav.report.page import packed, page_environment, policy, text_of
+from evonav.report.run import Run, StageOutcome, Task, load_run
+from evonav.report.svg import slug
+from evonav.report.telling import telling_episodes
+from evonav.report.viewer import ListedPage, listed_pages, viewer_css, viewer_js
 from evonav.significance import Interval
 
-MAX_INLINE_STAGES = 400
-"""Recorded stages up to which `report.html` holds every map; beyond, each task has a page of its own."""
+MAX_OPEN_STAGES = 400
+"""Recorded stages up to which maps stand in the page as they are; beyond, each task is packed until it is looked at."""
+MAX_REPLAY_BYTES = 16_000_000
+"""Episodes round by round are part of the page up to this size; beyond, the page links to their files."""
 REPORT_NAME = "report.html"
-TASK_DIR = "tasks"
 MAP_DIR = "maps"
 
 
-def write_report(run_dir: Path, out_dir: Path | None = None) -> Path:
-    """Writes `report.html`, `table.md`, `.tex`, `.csv` and, for runs that are not large, `maps/*.svg`.
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """An episode's page of `evonav view`."""
 
-    Deterministic but for wall-clock figures, safe on a run that is not finished or still being written.
+    page: ListedPage
+    content: Markup | None
+    """Packed; `None` where it is a file beside the report."""
+    stages: list[tuple[int, str, str, str]]
+    """Number, state, words and address."""
+
+
+def write_report(
+    run_dir: Path, out_dir: Path | None = None, *, has_maps: bool = False, max_replay_bytes: int = MAX_REPLAY_BYTES
+) -> Path:
+    """Writes `report.html`, which needs no other file, and `table.md`, `.tex`, `.csv`.
+
+    Deterministic but for wall-clock figures, safe on a run that is not finished or still being written. Pages that
+    `evonav view` left in the run's folder become part of the report, as long as they show the records of now.
 
     Args:
         run_dir: A run.
         out_dir: Where to; default the run's own folder.
+        has_maps: Write every stage's map as a file of its own too, `maps/*.svg`.
+        max_replay_bytes: Of the pages of `evonav view` in the report; beyond, it links to them.
 
     Returns:
         Path of the page.
@@ -50,39 +70,65 @@ def write_report(run_dir: Path, out_dir: Path | None = None) -> Path:
         (out_dir / "table.md").write_text(markdown_tables(run), encoding="utf-8")
         (out_dir / "table.tex").write_text(latex_tables(run), encoding="utf-8")
         (out_dir / "table.csv").write_text(tables.summary_csv(run.summaries), encoding="utf-8")
-        is_paged = run.num_recorded > MAX_INLINE_STAGES
-        views = _paged_views(run, out_dir) if is_paged else _inline_views(run, out_dir)
+        replays = _replays(run, out_dir, max_replay_bytes)
         page = page_environment().get_template("report.html.j2")
         path = out_dir / REPORT_NAME
-        with path.open("w", encoding="utf-8") as file:
-            for part in page.generate(**_page_context(run), views=views, is_paged=is_paged):
-                file.write(part)
+        part = path.with_name(f".{REPORT_NAME}.part")
+        with part.open("w", encoding="utf-8") as file:
+            tasks = _tasks(run, replays, out_dir / MAP_DIR if has_maps else None)
+            for text in page.generate(**_page_context(run), tasks=tasks, replays=replays):
+                file.write(text)
+        part.replace(path)
     except OSError as error:
         raise StoreError(f"{out_dir}: {error}") from error
     return path
 
 
-def _inline_views(run: Run, out_dir: Path) -> Iterator[TaskView]:
-    """Views for the page itself, each stage's map also written as a file."""
-    maps = out_dir / MAP_DIR
+def _replays(run: Run, out_dir: Path, max_bytes: int) -> list[Replay]:
+    """Pages of `evonav view` that show this run's records, the most telling first."""
+    view_dir = run.run_dir / VIEW_DIR
+    order = {episode: i for i, episode in enumerate(telling_episodes(run))}
+    pages = [
+        page
+        for page in listed_pages(view_dir)
+        if run.episodes_sha256.get((page.agent, page.task_id)) == page.records_sha256
+    ]
+    pages.sort(key=lambda page: (order[page.agent, page.task_id], page.stages[0][0]))
+    found = []
+    for page in pages:
+        content = packed((view_dir / page.href).read_text(encoding="utf-8")) if page.is_current else None
+        if content is not None and len(content) > max_bytes:
+            content = None
+        max_bytes -= 0 if content is None else len(content)
+        file = os.path.relpath(view_dir / page.href, out_dir).replace(os.sep, "/")
+        where = f"#replay={page.href}&" if content is not None else f"{file}#"
+        stages = [(k, state, words, f"{where}stage={k}&round=1") for k, state, words in page.stages]
+        found.append(Replay(page, content, stages))
+    return found
+
+
+def _tasks(run: Run, replays: list[Replay], map_dir: Path | None) -> Iterator[tuple[TaskView, Markup, bool]]:
+    """Every task's view and section, and whether the section is packed."""
+    is_packed = run.num_recorded > MAX_OPEN_STAGES
+    hrefs = {
+        (replay.page.agent, replay.page.task_id, stage): href
+        for replay in replays
+        for stage, _, _, href in replay.stages
+    }
+    macros: Any = page_environment().get_template("macros.html.j2").module
     for i, task in enumerate(run.tasks()):
-        for record in task.records.values():
-            maps.mkdir(exist_ok=True)
-            drawn = stage_svg(record, task.maps, success_radius_m=run.success_radius_m)
-            (maps / map_name(record)).write_text(drawn, encoding="utf-8")
-        yield task_view(run, task, f"h{i}", "" if out_dir == run.run_dir else None)
+        if map_dir is not None:
+            _write_maps(run, task, map_dir)
+        view = task_view(run, task, f"h{i}", hrefs)
+        section = macros.task_section(view)
+        yield view, packed(section) if is_packed else section, is_packed
 
 
-def _paged_views(run: Run, out_dir: Path) -> Iterator[TaskView]:
-    """Writes a page a task; nothing is left for the index to hold but its overview."""
-    pages = out_dir / TASK_DIR
-    pages.mkdir(exist_ok=True)
-    template = page_environment().get_template("task.html.j2")
-    context = {"css": text_of("report.css") + map_css(), "js": text_of("report.js"), "legend": legend()}
-    for task in run.tasks():
-        view = task_view(run, task, "h", "../" if out_dir == run.run_dir else None)
-        (pages / f"{view.anchor}.html").write_text(template.render(view=view, **context), encoding="utf-8")
-    yield from ()
+def _write_maps(run: Run, task: Task, map_dir: Path) -> None:
+    map_dir.mkdir(exist_ok=True)
+    for record in task.records.values():
+        drawn = stage_svg(record, task.maps, success_radius_m=run.success_radius_m)
+        (map_dir / map_name(record)).write_text(drawn, encoding="utf-8")
 
 
 def _page_context(run: Run) -> dict[str, Any]:
@@ -100,20 +146,26 @@ def _page_context(run: Run) -> dict[str, Any]:
     ]
     headline, *others = run_tables(run)
     used = {outcome.cause for outcome in run.outcomes.values()}
+    columns = "".join(f".k{k}{{--k:{k}}}" for k in sorted(set(run.num_stages.values())))
+    css = text_of("report.css") + map_css() + columns
+    js = text_of("report.js")
     return {
         "run": run,
         "name": run.run_dir.resolve().name,
         "headline": headline,
         "bars": [_bars(summary) for summary in run.summaries],
-        "tables": [table for table in others if table.rows],
+        "others": [table for table in others if table.rows],
         "statements": statements(run),
         "overview": overview,
         "causes": [(cause.name, WORDS[cause]) for cause in Cause if cause in used],
-        "facts": _run_facts(run),
-        "css": text_of("report.css") + map_css(),
-        "js": text_of("report.js"),
+        "facts": run_facts(run),
+        "failures": failure_groups(run),
+        "commands": reproduction(run),
+        "digests": task_digests(run),
+        "css": css,
+        "js": js,
+        "policy": policy((css, viewer_css()), (js, viewer_js())),
         "legend": legend(),
-        "task_dir": TASK_DIR,
     }
 
 
@@ -140,36 +192,3 @@ def _bar(value: float | None, interval: Interval | None) -> Markup:
         '<rect class="track" width="100" height="10"/><rect class="value" width="{:.2f}" height="10"/>'
         '<path class="whisker" d="M{:.2f} 5H{:.2f}M{:.2f} 2V8M{:.2f} 2V8"/></svg>'
     ).format(100 * value, 100 * low, 100 * high, 100 * low, 100 * high)
-
-
-def _run_facts(run: Run) -> list[tuple[str, str]]:
-    """Name and value of what makes the run reproducible."""
-    facts = [(key, _json(value)) for key, value in sorted(run.config.items())]
-    facts += [("tasks recorded", str(len(run.num_stages))), ("agents", ", ".join(run.agents))]
-    facts += [(f"sha256 of the records, {agent}", digest) for agent, digest in run.rows_sha256.items()]
-    facts += [(f"mean wall time a stage, {agent}", f"{wall_s:.2f} s") for agent, wall_s in run.wall_s.items()]
-    if run.retries:
-        facts += [("stages tried again", ", ".join(f"{count} after {kind}" for kind, count in run.retries.items()))]
-    return facts
-
-
-def _json(value: object) -> str:
-    return value if isinstance(value, str) else json.dumps(value, sort_keys=True)
-
-
-def text_of(name: str) -> Markup:
-    """A file of the package, trusted as it is."""
-    text = (files("evonav.report") / "templates" / name).read_text(encoding="utf-8")
-    return Markup(text)  # noqa: S704 - our own file
-
-
-def page_environment() -> Environment:
-    """The package's templates; text is escaped, and characters that no page may hold are replaced."""
-    return Environment(
-        loader=PackageLoader("evonav.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=lambda value: clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value,
-    )

@@ -6,8 +6,6 @@ from markupsafe import Markup
 
 from evonav.report.svg import arrow_head, escape, join, star
 
-_DASH = "stroke-dasharray:3 2"
-
 ENTRIES = (
     (
         "path, from first round to last",
@@ -31,12 +29,12 @@ ENTRIES = (
     ("where it stood in stage 1", f'<path class="star old" stroke-width="1.4" d="{star((12, 12), 10)}"/>', 24),
     (
         "success radius",
-        '<circle class="ring" style="stroke-dasharray:4 3" cx="12" cy="12" r="9" stroke-width="1.6"/>',
+        '<circle class="ring dash" cx="12" cy="12" r="9" stroke-width="1.6"/>',
         24,
     ),
     (
         "object moved before this stage",
-        f'<g class="ghost"><rect class="item" style="{_DASH}" x="2" y="6" width="12" height="12" stroke-width="1.4"/>'
+        '<g class="ghost"><rect class="item dash" x="2" y="6" width="12" height="12" stroke-width="1.4"/>'
         "</g>"
         '<g class="moved"><rect class="item" x="40" y="6" width="12" height="12" stroke-width="1.4"/></g>'
         '<g class="arrow" stroke-width="2"><path d="M10 12h22"/>'
@@ -46,7 +44,7 @@ ENTRIES = (
     (
         "stale entry of the goal's category",
         '<g class="stale" stroke-width="1.8"><g class="goal">'
-        f'<rect style="{_DASH}" x="4" y="4" width="16" height="16"/>'
+        '<rect class="dash" x="4" y="4" width="16" height="16"/>'
         '<path d="M9 9l6 6m0-6l-6 6"/></g></g>',
         24,
     ),
@@ -59,7 +57,7 @@ ENTRIES = (
     (
         "other stale entry",
         '<g class="stale" stroke-width="1.8"><g class="weak">'
-        f'<rect style="{_DASH}" x="7" y="7" width="10" height="10"/>'
+        '<rect class="dash" x="7" y="7" width="10" height="10"/>'
         "</g></g>",
         24,
     ),

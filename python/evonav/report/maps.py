@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
-from pathlib import Path
 
 from evonav.evaluation.metrics import SUCCESS_RADIUS_M
 from evonav.evaluation.records import EndState, StageMap, StageRecord
@@ -68,15 +67,6 @@ def map_name(record: StageRecord) -> str:
 def page_name(task_id: str, agent: str, stage: int | None = None) -> str:
     """File name of a viewer's page, of an episode or one stage of it."""
     return f"{slug(task_id)}_{slug(agent)}{'' if stage is None else f'_stage{stage}'}.html"
-
-
-def page_href(run_dir: Path, record: StageRecord) -> str | None:
-    """Where a stage is shown round by round, from the run's folder; `None` where it is not."""
-    for stage in (None, record.stage):
-        name = page_name(record.task_id, record.agent, stage)
-        if (run_dir / VIEW_DIR / name).is_file():
-            return f"{VIEW_DIR}/{name}#stage={record.stage}&round=1"
-    return None
 
 
 def change_words(record: StageRecord, maps: Mapping[int, StageMap]) -> str:

@@ -23,6 +23,8 @@ NUM_TIMES = 10
 """Colours of the path, from the first round to the last: classes `t0` to `t9`."""
 ARROW_EVERY = 16.0
 """Units of a frame between direction arrows."""
+MANY_ROUNDS = 100
+"""Rounds of a stage from which on those of the same choice are drawn as one."""
 LARGE_M2 = 0.3
 """Footprint from which on a relocated object has a thick arrow."""
 CARRIED_GAP_M = 0.05
@@ -165,23 +167,46 @@ def _path(record: StageRecord, frame: Frame) -> str:
     if not record.trace:
         return ""
     u = frame.unit
-    pieces = [simplified([cm(point) for point in entry.path_m]) for entry in record.trace]
+    legs = _legs(record.trace)
+    pieces = [simplified([cm(point) for entry in leg for point in entry.path_m]) for leg in legs]
     whole = [point for piece in pieces for point in piece]
     last = max(1, len(record.trace) - 1)
     gone = 0.0
     drawn = []
-    for entry, piece in zip(record.trace, pieces, strict=True):
+    for leg, piece in zip(legs, pieces, strict=True):
+        entry = leg[0]
         arrow, gone = _direction_arrow(piece, gone, frame)
-        time = min(NUM_TIMES - 1, NUM_TIMES * entry.round // (last + 1))
+        time = _time(entry, last)
         yaw_deg = round(math.degrees(entry.pose.yaw_rad)) % 360
         x, y = cm((entry.pose.x_m, entry.pose.z_m))
-        hint = title(f"round {entry.round + 1}: {_choice(entry)}")
+        which = f"round {entry.round + 1}" if len(leg) == 1 else f"rounds {entry.round + 1} to {leg[-1].round + 1}"
+        hint = title(f"{which}: {_choice(leg[-1])}")
         head = f'<path class="head" d="{arrow}"/>' if arrow else ""
         drawn.append(f'<g class="r t{time}" data-p="{x},{y},{yaw_deg}">{hint}<path d="{polyline(piece)}"/>{head}</g>')
     return (
         f'<path class="casing" stroke-width="{1.9 * u:.1f}" d="{polyline(whole)}"/>'
         f'<g class="path" stroke-width="{0.95 * u:.1f}">{join(drawn)}</g>'
     )
+
+
+def _time(entry: RoundRecord, last: int) -> int:
+    """Which colour of the path a round has."""
+    return min(NUM_TIMES - 1, NUM_TIMES * entry.round // (last + 1))
+
+
+def _legs(trace: Sequence[RoundRecord]) -> list[list[RoundRecord]]:
+    """What is drawn as one: a round, or, of an agent whose rounds are single actions, rounds of the same choice."""
+    if len(trace) <= MANY_ROUNDS:
+        return [[entry] for entry in trace]
+    legs: list[list[RoundRecord]] = []
+    for entry in trace:
+        last = legs[-1][-1] if legs else None
+        is_same = last is not None and _choice(last) == _choice(entry)
+        if last is not None and is_same and _time(last, len(trace) - 1) == _time(entry, len(trace) - 1):
+            legs[-1].append(entry)
+        else:
+            legs.append([entry])
+    return legs
 
 
 def _direction_arrow(piece: Sequence[tuple[int, int]], gone: float, frame: Frame) -> tuple[str, float]:

@@ -14,12 +14,14 @@ from pydantic import ValidationError
 from evonav.errors import StoreError
 from evonav.evaluation.metrics import AgentSummary, PairedDifference, paired_differences, summarise
 from evonav.evaluation.records import StageMap, StageRecord
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.store import FailureRow, RunStore
 from evonav.report.causes import Cause, cause_of
 from evonav.report.maps import success_radius_of
 
 PAPER_ORDER = ("unigoal", "3d-mem", "msgnav", "fu", "stage-reset", "ftu")
 """Agents in the order of the paper's tables."""
+NOTES = ("tasks_dir", "task_digests", "sessions")
+"""Of a run's header, no part of what the run is: where its tasks were and their digests, and how it was called."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,10 +63,16 @@ class Run:
     """By (agent, task, stage)."""
     rows_sha256: Mapping[str, str]
     """By agent, of its records as stored: equal runs have equal ones."""
+    episodes_sha256: Mapping[tuple[str, str], str]
+    """By agent and task: a page of an episode is of these records or of others."""
+    notes: Mapping[str, Any]
+    """What the run's header tells beside its config: `NOTES`, those that are there."""
+    total_wall_s: float
+    """Of all stages, one after another."""
     wall_s: Mapping[str, float]
     """Mean of a stage's wall time, by agent; not part of the records."""
-    retries: Mapping[str, int]
-    """How often stages were tried again, by what had failed; not part of the records."""
+    failures: tuple[FailureRow, ...]
+    """Attempts that failed, those that were tried again among them; not part of the records."""
     summaries: tuple[AgentSummary, ...]
     pairs: tuple[PairedDifference, ...]
 
@@ -127,6 +135,7 @@ def load_run(run_dir: Path) -> Run:
         states = store.states()
         agents = agents_in_order(store.meta("agents"), [agent for agent, _, _ in states])
         digests = {}
+        episodes: dict[tuple[str, str], Any] = {}
         for agent in agents:
             digest = hashlib.sha256()
             failed_before: dict[str, int] = {}
@@ -135,11 +144,13 @@ def load_run(run_dir: Path) -> Run:
                 digest.update(b"\n")
                 outcome = _outcome(text, run_dir, failed_before)
                 outcomes[agent, outcome.record.task_id, outcome.record.stage] = outcome
+                episodes.setdefault((agent, outcome.record.task_id), hashlib.sha256()).update(text.encode())
             digests[agent] = digest.hexdigest()
         num_stages = _num_stages(store.meta("num_stages"), outcomes)
         config = store.meta("config") or {}
-        wall_s = _mean_wall_s(store.timings())
-        retries = Counter(failure.kind.value for failure in store.failures() if failure.is_retried)
+        notes = {key: value for key in NOTES if (value := store.meta(key)) is not None}
+        timings = store.timings()
+        failures = tuple(store.failures())
     records: dict[str, list[StageRecord]] = {agent: [] for agent in agents}
     for (agent, _, _), outcome in outcomes.items():
         records[agent].append(outcome.record)
@@ -151,8 +162,11 @@ def load_run(run_dir: Path) -> Run:
         config=config,
         outcomes=outcomes,
         rows_sha256=digests,
-        wall_s=wall_s,
-        retries=retries,
+        failures=failures,
+        episodes_sha256={key: episode.hexdigest() for key, episode in episodes.items()},
+        notes=notes,
+        total_wall_s=sum(wall_s for wall_s, _ in timings.values()),
+        wall_s=_mean_wall_s(timings),
         summaries=tuple(summarise(agent, records[agent], total) for agent in agents),
         pairs=tuple(paired_differences(records)),
     )

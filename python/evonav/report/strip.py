@@ -6,7 +6,7 @@ from pathlib import Path
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.evaluation.store import RunStore
-from evonav.report.causes import Cause, sentence
+from evonav.report.causes import sentence
 from evonav.report.legend import legend_row
 from evonav.report.maps import (
     change_words,
@@ -17,8 +17,9 @@ from evonav.report.maps import (
     task_frame,
 )
 from evonav.report.plan import Frame
-from evonav.report.run import Run, load_run
+from evonav.report.run import load_run
 from evonav.report.svg import escape, join, text_lines
+from evonav.report.telling import most_telling
 
 PANEL_PX = 360
 GAP_PX = 18
@@ -66,47 +67,6 @@ def write_strip(
     except OSError as error:
         raise StoreError(f"{path}: {error}") from error
     return path
-
-
-def most_telling(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[str, list[int]]:
-    """The episode whose picture tells most about the benchmark, and the stages to show.
-
-    Looks for a stage where one of the agents is misled by a stale entry and another is not, or is misled and recovers;
-    then for moved targets, and for change and success on the way there. The first of equals.
-
-    Args:
-        run: A run.
-        agents: Whose episodes to show; the last one should succeed.
-        num_stages: How many stages to show, ending with the telling one.
-
-    Raises:
-        InvalidArgumentError: None of the run's tasks has a record of every one of the agents.
-    """
-    best: tuple[float, str, list[int]] | None = None
-    for task_id, last_stage in run.num_stages.items():
-        for stage in range(1, last_stage + 1):
-            shown = list(range(max(1, stage - num_stages + 1), stage + 1))
-            keys = [(agent, task_id, k) for agent in agents for k in shown]
-            if any(key not in run.outcomes for key in keys):
-                continue
-            score = _telling(run, agents, task_id, shown)
-            if best is None or score > best[0]:
-                best = (score, task_id, shown)
-    if best is None:
-        raise InvalidArgumentError(f"{run.run_dir}: no task has records of {', '.join(agents)}")
-    return best[1], best[2]
-
-
-def _telling(run: Run, agents: Sequence[str], task_id: str, stages: Sequence[int]) -> float:
-    last = [run.outcomes[agent, task_id, stages[-1]] for agent in agents]
-    hero = last[-1]
-    has_success = hero.record.state is EndState.SUCCESS
-    is_misled = any(outcome.cause is Cause.STALE_ENTRY for outcome in last)
-    score = 6.0 * (is_misled and has_success) + 4.0 * (hero.stale_path_m > 0 and has_success)
-    score += 2.0 * hero.record.target.is_relocated_now + 2.0 * has_success + len(stages)
-    window = [run.outcomes[agents[-1], task_id, k].record for k in stages]
-    score += sum(record.transition.kind != "static" for record in window)
-    return score + sum(record.state is EndState.SUCCESS for record in window)
 
 
 def strip_svg(rows: Sequence[Sequence[StageRecord]], maps: Mapping[int, StageMap], *, success_radius_m: float) -> str:

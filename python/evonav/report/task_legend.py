@@ -18,7 +18,7 @@ _ENTRIES = (
     ("moved, or about to", _items("moved"), 24),
     (
         "from where to where",
-        '<g class="ghost"><rect class="item" style="stroke-dasharray:3 2" x="2" y="6" width="12" height="12" '
+        '<g class="ghost"><rect class="item dash" x="2" y="6" width="12" height="12" '
         'stroke-width="1.4"/></g><g class="arrow" stroke-width="2"><path d="M10 12h14"/>'
         f'<path class="head" d="{arrow_head((34, 12), (1, 0), 9)}"/></g>',
         38,

@@ -7,8 +7,8 @@ from pathlib import Path
 from markupsafe import Markup
 
 from evonav.errors import StoreError
-from evonav.report.html import page_environment, text_of
 from evonav.report.maps import file_css, map_css
+from evonav.report.page import page_environment, text_of
 from evonav.report.plan import Frame
 from evonav.report.svg import escape, join, slug
 from evonav.report.task_legend import task_legend

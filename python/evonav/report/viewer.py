@@ -3,9 +3,10 @@
 What is drawn comes from `evonav.evaluation.traced`; no agent, model or task is read here.
 """
 
+import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,10 @@ from markupsafe import Markup
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records import StageMap, StageRecord
 from evonav.evaluation.traced import TracedStage
-from evonav.report.html import page_environment, text_of
 from evonav.report.legend import ENTRIES, legend_html
 from evonav.report.maps import map_css, outcome_words, page_name, task_frame
 from evonav.report.overlay import change, end_mark, ring, start_mark, target_mark
+from evonav.report.page import page_environment, policy, text_of
 from evonav.report.plan import Frame, floors, furniture, item_labels, labels, structure
 from evonav.report.svg import cm
 from evonav.report.viewer_data import PageData
@@ -43,6 +44,27 @@ class StageDrawing:
 
 
 @dataclass(frozen=True, slots=True)
+class ListedPage:
+    """A page in the list beside the pages."""
+
+    agent: str
+    task_id: str
+    href: str
+    stages: list[list[Any]]
+    """Number, state and words."""
+    differs: bool
+    records_sha256: str
+    """Of the episode's records that it shows."""
+    code: str
+    """Digest of the page's own style and script."""
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the page is what would be written now."""
+        return self.code == _code()
+
+
+@dataclass(frozen=True, slots=True)
 class WrittenPage:
     """A page on disk, for the index."""
 
@@ -52,10 +74,17 @@ class WrittenPage:
     stages: tuple[StageRecord, ...]
     """Without their traces."""
     differs: bool
+    records_sha256: str
 
 
 def write_episode(
-    stages: Sequence[TracedStage], out_dir: Path, *, budget: int, success_radius_m: float, only: int | None = None
+    stages: Sequence[TracedStage],
+    out_dir: Path,
+    *,
+    budget: int,
+    success_radius_m: float,
+    only: int | None = None,
+    records_sha256: str = "",
 ) -> list[WrittenPage]:
     """Writes an episode's page, or one a stage where one would be too large.
 
@@ -65,6 +94,7 @@ def write_episode(
         budget: Rounds that the agent had in a stage.
         success_radius_m: Of the ring around the target.
         only: The one stage to show.
+        records_sha256: Of the episode's records as stored.
 
     Raises:
         InvalidArgumentError: The one stage has no record.
@@ -76,11 +106,11 @@ def write_episode(
     maps = {stage.record.stage: stage.stage_map for stage in stages if stage.stage_map is not None}
     page = _page(shown, maps, _tabs(shown, shown), budget, success_radius_m)
     if len(page.encode()) <= MAX_PAGE_BYTES or len(shown) == 1:
-        return [_write(page, shown, out_dir, only)]
+        return [_write(page, shown, out_dir, only, records_sha256)]
     pages = []
     for stage in shown:
         text = _page([stage], maps, _tabs(shown, [stage]), budget, success_radius_m)
-        pages.append(_write(text, [stage], out_dir, stage.record.stage))
+        pages.append(_write(text, [stage], out_dir, stage.record.stage, records_sha256))
     return pages
 
 
@@ -90,36 +120,41 @@ def write_index(pages: Iterable[WrittenPage], out_dir: Path, run_name: str) -> P
     Raises:
         StoreError: It cannot be written.
     """
-    listed = out_dir / LIST_NAME
-    rows = {row["href"]: row for row in _read_rows(listed) if (out_dir / row["href"]).is_file()}
+    rows = {page.href: page for page in listed_pages(out_dir)}
     for page in pages:
         stages = [[record.stage, record.state.value, outcome_words(record)] for record in page.stages]
         name = page.path.name
-        rows[name] = {
-            "agent": page.agent,
-            "task_id": page.task_id,
-            "href": name,
-            "stages": stages,
-            "differs": page.differs,
-        }
-    ordered = sorted(rows.values(), key=lambda row: (row["task_id"], row["agent"], row["stages"][0][0]))
-    _save(listed, json.dumps(ordered, indent=1) + "\n")
-    text = (
-        page_environment()
-        .get_template("viewer_index.html.j2")
-        .render(name=run_name, rows=ordered, css=text_of("report.css"))
-    )
-    return _save(out_dir / INDEX_NAME, text)
+        rows[name] = ListedPage(page.agent, page.task_id, name, stages, page.differs, page.records_sha256, _code())
+    ordered = sorted(rows.values(), key=lambda row: (row.task_id, row.agent, row.stages[0][0]))
+    _save(out_dir / LIST_NAME, json.dumps([asdict(row) for row in ordered], indent=1) + "\n")
+    css = text_of("report.css")
+    template = page_environment().get_template("viewer_index.html.j2")
+    return _save(out_dir / INDEX_NAME, template.render(name=run_name, rows=ordered, css=css, policy=policy((css,))))
 
 
-def _read_rows(path: Path) -> list[dict[str, Any]]:
-    """Pages of earlier calls; a list that cannot be read is begun anew."""
+def listed_pages(view_dir: Path) -> list[ListedPage]:
+    """Pages that are there; a list that cannot be read, or is another version's, is empty."""
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        rows = json.loads((view_dir / LIST_NAME).read_text(encoding="utf-8"))
+        pages = [ListedPage(**row) for row in rows]
+        # Names from a file: only those of this folder.
+        return [page for page in pages if page.stages and page.href in {path.name for path in view_dir.iterdir()}]
+    except (OSError, ValueError, TypeError):
         return []
-    keys = {"agent", "task_id", "href", "stages", "differs"}
-    return [row for row in rows if isinstance(row, dict) and set(row) == keys] if isinstance(rows, list) else []
+
+
+def viewer_css() -> Markup:
+    """The style of an episode's page."""
+    return text_of("report.css") + map_css() + text_of("viewer.css")
+
+
+def viewer_js() -> Markup:
+    """The script of an episode's page."""
+    return text_of("viewer.js")
+
+
+def _code() -> str:
+    return hashlib.sha256((viewer_css() + viewer_js() + text_of("viewer.html.j2")).encode()).hexdigest()
 
 
 def _tabs(stages: Sequence[TracedStage], here: Sequence[TracedStage]) -> list[tuple[str, int, str, int]]:
@@ -155,8 +190,9 @@ def _page(
         drawings=[_drawing(stage, maps, frame, radius_m) for stage in stages],
         view_box=frame.view_box,
         legend=_legend(),
-        css=text_of("report.css") + map_css() + text_of("viewer.css"),
-        js=text_of("viewer.js"),
+        css=viewer_css(),
+        js=viewer_js(),
+        policy=policy((viewer_css(),), (viewer_js(),)),
         data=Markup(data.text()),  # noqa: S704 - JSON without `<`
     )
 
@@ -226,11 +262,14 @@ def _legend() -> Markup:
     )
 
 
-def _write(text: str, stages: Sequence[TracedStage], out_dir: Path, only: int | None) -> WrittenPage:
+def _write(
+    text: str, stages: Sequence[TracedStage], out_dir: Path, only: int | None, records_sha256: str
+) -> WrittenPage:
     first = stages[0].record
     path = _save(out_dir / page_name(first.task_id, first.agent, only), text)
     brief = tuple(stage.record.model_copy(update={"trace": (), "entries": ()}) for stage in stages)
-    return WrittenPage(first.agent, first.task_id, path, brief, any(stage.differences for stage in stages))
+    differs = any(stage.differences for stage in stages)
+    return WrittenPage(first.agent, first.task_id, path, brief, differs, records_sha256)
 
 
 def _save(path: Path, text: str) -> Path:

@@ -19,6 +19,36 @@
     });
   }
 
+  // What is large stands packed in the page and is unpacked when it is looked at.
+  const unpacked = async (script) => {
+    const bytes = Uint8Array.from(atob(script.textContent), (letter) => letter.charCodeAt(0));
+    return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).text();
+  };
+  let hidden = new Set();
+  const hideAgents = (root) => { for (const part of all("[data-agent]", root)) part.hidden = hidden.has(part.dataset.agent); };
+  const prepare = (root) => {
+    for (const svg of all(".cell svg.map", root)) svg.setAttribute("tabindex", "0");
+    hideAgents(root);
+  };
+  const fill = async (section) => {
+    const script = section.querySelector("script.packed");
+    if (!script) return;
+    waiting.unobserve(section);
+    script.classList.remove("packed");
+    const text = await unpacked(script);
+    script.remove();
+    section.insertAdjacentHTML("beforeend", text);
+    section.classList.remove("waiting");
+    prepare(section);
+  };
+  const waiting = new IntersectionObserver((entries) => {
+    for (const { isIntersecting, target } of entries) if (isIntersecting) fill(target);
+  }, { rootMargin: "600px" });
+  for (const script of all(".task > script.packed")) {
+    script.parentNode.classList.add("waiting");
+    waiting.observe(script.parentNode);
+  }
+
   // Episodes: filters act on the overview's rows and on the tasks alike.
   const filters = document.getElementById("filters");
   if (filters) {
@@ -43,7 +73,8 @@
         parent.append(...inside);
       }
       const off = new Set(all("input[type=checkbox]", filters).filter((box) => !box.checked).map((box) => box.value));
-      for (const part of all("[data-agent]")) part.hidden = off.has(part.dataset.agent);
+      hidden = off;
+      hideAgents(document);
       filters.querySelector("output").textContent = shown === total ? `${total} tasks` : `${shown} of ${total} tasks`;
     };
     filters.addEventListener("input", apply);
@@ -65,10 +96,9 @@
     }
   };
   slider.addEventListener("input", show);
-  const maps = all(".cell svg.map");
-  for (const svg of maps) svg.setAttribute("tabindex", "0");
+  prepare(document);
   document.addEventListener("keydown", (event) => {
-    if (event.key === "Enter" && maps.includes(event.target)) open(event.target);
+    if (event.key === "Enter" && event.target.matches?.(".cell svg.map")) open(event.target);
   });
   document.addEventListener("click", (event) => {
     const svg = event.target.closest(".cell svg.map");
@@ -97,5 +127,40 @@
     show();
     dialog.showModal();
   };
-  dialog.addEventListener("click", (event) => { if (event.target === dialog) dialog.close(); });
+  for (const box of all("dialog")) {
+    box.querySelector(".close").addEventListener("click", () => box.close());
+    box.addEventListener("click", (event) => { if (event.target === box) box.close(); });
+  }
+
+  // An episode round by round: `#replay=PAGE&stage=3&round=2` opens it, in a frame that can reach nothing.
+  const player = document.getElementById("player");
+  let speaker = null;
+  const play = async () => {
+    // What the frame before still has to say is not listened to.
+    speaker = null;
+    const { hash } = location, [name, ...place] = hash.slice(1).split("&");
+    const script = name.startsWith("replay=") && document.getElementById(name);
+    if (!script) { if (player.open) player.close(); return; }
+    const text = await unpacked(script);
+    if (location.hash !== hash) return;
+    player.querySelector("b").textContent = script.dataset.title;
+    const where = place.join("&").replace(/[^a-z0-9=&]/g, "").replaceAll("&", "&amp;");
+    const frame = player.querySelector("iframe").cloneNode();
+    frame.srcdoc = text.replace('<body class="viewer"', `<body data-place="${where}" class="viewer embedded"`);
+    player.querySelector("iframe").replaceWith(frame);
+    speaker = frame.contentWindow;
+    if (!player.open) player.showModal();
+  };
+  player.addEventListener("close", () => {
+    player.querySelector("iframe").removeAttribute("srcdoc");
+    if (location.hash.startsWith("#replay=")) history.replaceState(null, "", location.pathname + location.search);
+  });
+  addEventListener("message", ({ source, data }) => {
+    if (source !== speaker) return;
+    if (data === "close") player.close();
+    else if (/^#stage=\d+&round=\d+$/.test(data)) history.replaceState(null, "", `${location.hash.split("&")[0]}&${data.slice(1)}`);
+    else if (typeof data === "string" && /^[\w.-]+\.html#/.test(data)) location.hash = `replay=${data.replace("#", "&")}`;
+  });
+  addEventListener("hashchange", play);
+  play();
 })();

@@ -5,6 +5,7 @@
   const svgMap = $("map"), slider = $("slider"), timeline = $("timeline");
   const home = svgMap.getAttribute("viewBox");
   const NS = "http://www.w3.org/2000/svg";
+  const isEmbedded = parent !== self;
   let at = 0, now = 0, timer = null;
 
   const svg = (name, attributes = {}, parent = null, hint = "") => {
@@ -383,7 +384,8 @@
     tellRound(stage, round, rounds);
     if ($("follow").checked) closeUp(round);
     const place = `#stage=${stage.k}&round=${now + 1}`;
-    if (location.hash !== place) history.replaceState(null, "", place);
+    if (isEmbedded) parent.postMessage(place, "*");
+    else if (location.hash !== place) history.replaceState(null, "", place);
   };
   const enter = (index, round = 0) => {
     at = index; now = round;
@@ -444,7 +446,14 @@
   $("play").addEventListener("click", play);
   const tabs = [...document.querySelectorAll("[role=tab]")];
   tabs.forEach((tab, index) => tab.addEventListener("click", () => { stop(); enter(index); }));
+  if (isEmbedded) {
+    addEventListener("click", (event) => {
+      const link = event.target.closest?.("a[href]");
+      if (link) { event.preventDefault(); parent.postMessage(link.getAttribute("href"), "*"); }
+    });
+  }
   document.addEventListener("keydown", (event) => {
+    if (isEmbedded && event.key === "Escape") parent.postMessage("close", "*");
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const isTab = event.target.getAttribute?.("role") === "tab";
     if (isTab && (event.key === "ArrowLeft" || event.key === "ArrowRight")) {
@@ -463,7 +472,7 @@
     }
   });
   const enterPlace = () => {
-    const place = new URLSearchParams(location.hash.slice(1));
+    const place = new URLSearchParams(location.hash.slice(1) || document.body.dataset.place);
     const index = stages.findIndex((stage) => stage.k === Number(place.get("stage")));
     enter(Math.max(0, index), Math.max(0, (Number(place.get("round")) || 1) - 1));
   };

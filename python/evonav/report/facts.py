@@ -1,0 +1,105 @@
+"""What a report tells of a run beside its measures: how to run it again, what it is, what went wrong in it."""
+
+import json
+import shlex
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from evonav.evaluation.records import EndState
+from evonav.report.run import Run
+
+MAX_LISTED = 12
+"""Stages named of each kind of failure."""
+_DEFAULT_PARTS = {"decision": "text_match", "perception": "ground_truth", "simulator": "embedded_simulator"}
+
+
+@dataclass(frozen=True, slots=True)
+class FailureGroup:
+    """Errored stages with the same error."""
+
+    kind: str
+    message: str
+    traceback: str
+    """Of the first of them, where there is one."""
+    agents: tuple[str, ...]
+    stages: tuple[tuple[str, str, int], ...]
+    """Agent, task and stage of the first `MAX_LISTED`."""
+    num_stages: int
+
+
+def failure_groups(run: Run) -> list[FailureGroup]:
+    """Errored stages by error, the most frequent first."""
+    found: dict[tuple[str, str], list[tuple[str, str, int]]] = {}
+    tracebacks = {(failure.agent, failure.task_id, failure.stage): failure.traceback for failure in run.failures}
+    for key, outcome in run.outcomes.items():
+        error = outcome.record.error
+        if error is not None and outcome.record.state is EndState.ERRORED:
+            which = (error.kind.value.replace("_", " "), error.message)
+            found.setdefault(which, []).append(key)
+    groups = [
+        FailureGroup(
+            kind=kind,
+            message=message,
+            traceback=next((text for key in stages if (text := tracebacks.get(key))), ""),
+            agents=tuple(dict.fromkeys(agent for agent, _, _ in stages)),
+            stages=tuple(stages[:MAX_LISTED]),
+            num_stages=len(stages),
+        )
+        for (kind, message), stages in found.items()
+    ]
+    return sorted(groups, key=lambda group: -group.num_stages)
+
+
+def reproduction(run: Run) -> list[str]:
+    """Commands that run it again, as they were given; worked out from its config where they were not kept."""
+    given = [session["command"] for session in _sessions(run) if session.get("command")]
+    if given:
+        return list(dict.fromkeys(given))
+    backend = run.config.get("backend")
+    parts = backend if isinstance(backend, dict) else {}
+    if any(str(parts.get(name, "")).rpartition(":")[2] != part for name, part in _DEFAULT_PARTS.items()):
+        return []
+    words = ["evonav", "evaluate", "--agents", ",".join(run.agents), "--seed", str(run.config.get("seed", 0))]
+    if isinstance(run.notes.get("tasks_dir"), str):
+        words += ["--tasks", run.notes["tasks_dir"]]
+    return [shlex.join([*words, "--out", "out/again"])]
+
+
+def run_facts(run: Run) -> list[tuple[str, str]]:
+    """Name and value of what makes the run reproducible, and of what its figures hang on."""
+    facts = [(key, _json(value)) for key, value in sorted(run.config.items())]
+    facts += [("tasks recorded", str(len(run.num_stages))), ("agents", ", ".join(run.agents))]
+    facts += [(f"sha256 of the records, {agent}", digest) for agent, digest in run.rows_sha256.items()]
+    facts += [(f"mean wall time a stage, {agent}", f"{wall_s:.2f} s") for agent, wall_s in run.wall_s.items()]
+    if run.total_wall_s > 0:
+        facts += [("wall time of all stages, one after another", _duration(run.total_wall_s))]
+    retries = Counter(failure.kind.value.replace("_", " ") for failure in run.failures if failure.is_retried)
+    if retries:
+        facts.append(("stages tried again", ", ".join(f"{count} after {kind}" for kind, count in retries.items())))
+    for number, session in enumerate(_sessions(run), 1):
+        told = {key: value for key, value in session.items() if key != "command" and value not in (None, "")}
+        facts.append((f"call {number}", "; ".join(f"{key.replace('_', ' ')}: {_json(told[key])}" for key in told)))
+    return facts
+
+
+def task_digests(run: Run) -> Mapping[str, str]:
+    """SHA-256 of each task's files, where the run notes it."""
+    digests = run.notes.get("task_digests")
+    return digests if isinstance(digests, dict) else {}
+
+
+def _sessions(run: Run) -> list[dict[str, Any]]:
+    sessions = run.notes.get("sessions")
+    return [session for session in sessions if isinstance(session, dict)] if isinstance(sessions, list) else []
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {rest} s"
+
+
+def _json(value: object) -> str:
+    return value if isinstance(value, str) else json.dumps(value, sort_keys=True)

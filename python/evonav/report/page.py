@@ -1,0 +1,60 @@
+"""What every page of ours has in common: templates that escape, a policy that forbids the network, packed parts."""
+
+import base64
+import hashlib
+import zlib
+from importlib.resources import files
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from evonav.report.svg import clean
+
+
+def text_of(name: str) -> Markup:
+    """A file of the package, trusted as it is."""
+    text = (files("evonav.report") / "templates" / name).read_text(encoding="utf-8")
+    return Markup(text)  # noqa: S704 - our own file
+
+
+def page_environment() -> Environment:
+    """The package's templates; text is escaped, and characters that no page may hold are replaced."""
+    return Environment(
+        loader=PackageLoader("evonav.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: clean(value) if isinstance(value, str) and not isinstance(value, Markup) else value,
+    )
+
+
+def policy(styles: tuple[str, ...], scripts: tuple[str, ...] = ()) -> str:
+    """The content security policy of a page: these styles and scripts, images in the page itself, nothing else.
+
+    What a goal, a model or a task's name smuggles in can neither run nor load anything, even where it is not escaped.
+
+    Args:
+        styles: Contents of the page's `style` elements, and of pages that it embeds: they inherit its policy.
+        scripts: The same of `script` elements that run.
+    """
+    return "; ".join(
+        (
+            "default-src 'none'",
+            f"script-src {_hashes(scripts)}",
+            f"style-src {_hashes(styles)}",
+            "img-src data:",
+            "base-uri 'none'",
+            "form-action 'none'",
+        )
+    )
+
+
+def packed(text: str) -> Markup:
+    """Text as zlib in base64: a part of a page that is unpacked when it is looked at (`report.js`)."""
+    return Markup(base64.b64encode(zlib.compress(text.encode(), 9)).decode())  # noqa: S704 - letters and digits
+
+
+def _hashes(texts: tuple[str, ...]) -> str:
+    digests = (base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in texts)
+    return " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"

@@ -1,0 +1,94 @@
+"""Which of a run's episodes tell most about the benchmark: where memory misleads one agent and not another."""
+
+from collections.abc import Sequence
+
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.records import EndState
+from evonav.report.causes import Cause
+from evonav.report.run import Run, StageOutcome
+
+
+def most_telling(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[str, list[int]]:
+    """The episode whose picture tells most about the benchmark, and the stages to show.
+
+    Looks for a stage where one of the agents is misled by a stale entry and another is not, or is misled and recovers;
+    then for moved targets, and for change and success on the way there. The first of equals.
+
+    Args:
+        run: A run.
+        agents: Whose episodes to show; the last one should succeed.
+        num_stages: How many stages to show, ending with the telling one.
+
+    Raises:
+        InvalidArgumentError: None of the run's tasks has a record of every one of the agents.
+    """
+    best: tuple[float, str, list[int]] | None = None
+    for task_id, last_stage in run.num_stages.items():
+        for stage in range(1, last_stage + 1):
+            shown = list(range(max(1, stage - num_stages + 1), stage + 1))
+            keys = [(agent, task_id, k) for agent in agents for k in shown]
+            if any(key not in run.outcomes for key in keys):
+                continue
+            score = _telling(run, agents, task_id, shown)
+            if best is None or score > best[0]:
+                best = (score, task_id, shown)
+    if best is None:
+        raise InvalidArgumentError(f"{run.run_dir}: no task has records of {', '.join(agents)}")
+    return best[1], best[2]
+
+
+def telling_episodes(run: Run) -> list[tuple[str, str]]:
+    """Agent and task of every episode that has a record, the most telling ones first.
+
+    A pair tells most: in one stage, an agent that a stale entry misled, and one that succeeded. Of several such agents
+    of a task those with the fewest rounds are taken, which are the quickest to run again; a task's other episodes come
+    after all pairs.
+    """
+    pairs: list[tuple[float, list[tuple[str, str]]]] = []
+    rest: list[tuple[str, str]] = []
+    for task_id, num_stages in run.num_stages.items():
+        stages = range(1, num_stages + 1)
+        there = [agent for agent in run.agents if any((agent, task_id, k) in run.outcomes for k in stages)]
+        quickest = sorted(there, key=lambda agent: _num_rounds(run, agent, task_id))
+        best: tuple[float, list[str]] = (-1.0, [])
+        for stage in stages:
+            found = {
+                agent: run.outcomes[agent, task_id, stage]
+                for agent in quickest
+                if (agent, task_id, stage) in run.outcomes
+            }
+            best = max(best, _pair(found), key=lambda pair: pair[0])
+        pairs.append((best[0], [(agent, task_id) for agent in best[1]]))
+        rest += [(agent, task_id) for agent in quickest if agent not in best[1]]
+    pairs.sort(key=lambda pair: -pair[0])
+    return [episode for _, pair in pairs for episode in pair] + rest
+
+
+def _pair(found: dict[str, StageOutcome]) -> tuple[float, list[str]]:
+    """How much a stage tells, and by which of its agents."""
+    good = [agent for agent, outcome in found.items() if outcome.record.state is EndState.SUCCESS]
+    misled = [agent for agent, outcome in found.items() if outcome.cause is Cause.STALE_ENTRY]
+    bad = misled or [agent for agent, outcome in found.items() if outcome.record.state is EndState.FAILURE]
+    pair = bad[:1] + good[:1]
+    if not pair:
+        return -1.0, []
+    record = found[pair[0]].record
+    score = 6.0 * bool(misled) + 3.0 * (len(pair) == 2) + 2.0 * record.target.is_relocated_now
+    return score + (record.transition.kind != "static"), pair
+
+
+def _num_rounds(run: Run, agent: str, task_id: str) -> int:
+    keys = ((agent, task_id, stage) for stage in range(1, run.num_stages[task_id] + 1))
+    return sum(run.outcomes[key].record.num_rounds for key in keys if key in run.outcomes)
+
+
+def _telling(run: Run, agents: Sequence[str], task_id: str, stages: Sequence[int]) -> float:
+    last = [run.outcomes[agent, task_id, stages[-1]] for agent in agents]
+    hero = last[-1]
+    has_success = hero.record.state is EndState.SUCCESS
+    is_misled = any(outcome.cause is Cause.STALE_ENTRY for outcome in last)
+    score = 6.0 * (is_misled and has_success) + 4.0 * (hero.stale_path_m > 0 and has_success)
+    score += 2.0 * hero.record.target.is_relocated_now + 2.0 * has_success + len(stages)
+    window = [run.outcomes[agents[-1], task_id, k].record for k in stages]
+    score += sum(record.transition.kind != "static" for record in window)
+    return score + sum(record.state is EndState.SUCCESS for record in window)

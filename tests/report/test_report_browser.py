@@ -1,0 +1,164 @@
+"""The report in headless Chromium: no word in the console, controls that work, and no text that becomes a script."""
+
+import itertools
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from browser import needs_browser, probed
+from made_up_run import WriteRun, entry, record_run, stage_record
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.records import EndState, StageError, StageRecord
+from evonav.evaluation.trace import RunReplay
+from evonav.evaluation.traced import TracedStage
+from evonav.report import html, write_report
+from evonav.report.maps import page_name
+from evonav.report.viewer import write_episode
+
+HERE = Path(__file__).parent
+PROBE = (HERE / "report_probe.js").read_text("utf-8")
+VIEWER_PROBE = (HERE / "viewer_probe.js").read_text("utf-8")
+CORPUS: list[str] = json.loads((HERE / "xss_corpus.json").read_text("utf-8"))
+FOREIGN = {"iframe", "object", "embed", "base", "link", "form", "video", "audio", "math", "animate", "foreignobject"}
+"""Elements that the corpus brings; a report has one `iframe` of its own."""
+
+pytestmark = needs_browser
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("size", "is_packed"), [("1400,900", False), ("400,800", True)])
+def test_a_report_can_be_worked(
+    viewed_run: Path, tmp_path: Path, size: str, is_packed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if is_packed:
+        monkeypatch.setattr(html, "MAX_OPEN_STAGES", 1)
+    result = CliRunner().invoke(app, ["report", str(viewed_run), "--out", str(tmp_path / "out"), "--replays", "1"])
+    assert result.exit_code == 0, result.output
+    found = probed(tmp_path / "out" / "report.html", PROBE, tmp_path, size)
+    assert found["errors"] == []
+    assert found["packed"] == is_packed
+    assert sorted(found["rows"]) == ["fu", "random-walk"]
+    assert found["tables"] >= 6
+    num_stages = found["cells"] // 2
+    assert num_stages >= 3
+    assert found["maps"] == found["cells"] == 2 * num_stages
+    assert found["squares"] >= found["cells"]
+    assert found["uses"]
+    assert found["overflow"] <= 0
+    assert (found["nothing"], found["noTasks"], found["everything"]) == ("0 of 1 tasks", 0, "1 tasks")
+    assert found["before"] == num_stages
+    assert found["without"] == 0
+    assert found["sorted"] == "descending"
+    is_open, num_rounds = found["zoom"]
+    assert is_open
+    assert num_rounds > 1
+    assert found["round"][0].startswith("round 1: ")
+    assert found["round"][1] == 1
+    assert found["zoomClosed"]
+    is_open, place, sandbox, title = found["replay"]
+    assert is_open
+    assert place == re.sub("stage=.*", "stage=2&round=1", found["place"])
+    assert sandbox == "allow-scripts"
+    assert " in bundled-" in title
+    assert found["apart"]
+    assert found["replayClosed"] == [False, ""]
+    assert found["handlers"] == []
+
+
+def hostile_record(i: int, texts: list[str]) -> StageRecord:
+    """Every text of a record that a user, a model or a task chose."""
+    chosen = entry(texts[0], (2.3, 0.8, 2.0), is_stale=True)
+    state = [EndState.FAILURE, EndState.ERRORED, EndState.SUCCESS][i % 3]
+    record = stage_record(
+        "fu", texts[1], i % 2 + 1, state, chosen=chosen, entries=[chosen], instruction=texts[2], category=texts[3]
+    )
+    trace = tuple(
+        step.model_copy(update={"choice": texts[0], "details": {texts[1]: texts[2]}}) for step in record.trace
+    )
+    error = None if record.error is None else StageError(kind=record.error.kind, message=texts[2])
+    return record.model_copy(
+        update={
+            "trace": trace,
+            "error": error,
+            "house": texts[2],
+            "stop_reason": texts[3],
+            "target": record.target.model_copy(update={"category": texts[0], "room_id": texts[1]}),
+            "transition": record.transition.model_copy(update={"room_id": texts[3]}),
+        }
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("has_policy", [True, False])
+def test_no_text_of_a_run_becomes_a_script(tmp_path: Path, has_policy: bool) -> None:
+    assert len(set(CORPUS)) >= 100
+    records = [hostile_record(i, [CORPUS[(i + k) % len(CORPUS)] for k in range(4)]) for i in range(len(CORPUS))]
+    run_dir = record_run(tmp_path / "run", records, {record.task_id: 2 for record in records}, ["fu"])
+    page = write_report(run_dir)
+    text = page.read_text("utf-8")
+    if not has_policy:
+        # What the page would do in a browser that knows no policies.
+        text = text.replace("<head>", "<head><script>self.alert = () => { self.hacked = 1; };</script>")
+        text = re.sub(r'<meta http-equiv="Content-Security-Policy" content="[^"]*">', "", text)
+    page.write_text(text, "utf-8")
+    found = probed(page, PROBE, tmp_path)
+    assert found["errors"] == []
+    assert found["cells"] >= len(CORPUS)
+    assert found["groups"] >= 30
+    assert found["handlers"] == []
+    assert found["hacked"] == 0
+    assert FOREIGN.intersection(found["tags"]) == {"iframe"}
+
+
+@pytest.fixture(scope="module")
+def traced(viewed_run: Path) -> list[TracedStage]:
+    with bundled_tasks() as tasks:
+        task_id = sorted(path.name for path in tasks.iterdir() if path.is_dir())[1]
+        return list(RunReplay(viewed_run, lambda name: tasks / name).episode("fu", task_id))
+
+
+@pytest.mark.slow
+def test_no_answer_of_a_model_becomes_a_script(traced: list[TracedStage], tmp_path: Path) -> None:
+    texts = itertools.cycle(CORPUS)
+    stages = []
+    for stage in traced:
+        rounds = []
+        for step in stage.rounds:
+            asked = tuple(
+                replace(
+                    question,
+                    answer=next(texts),
+                    kind=next(texts),
+                    parts=((next(texts), next(texts)), ("user", next(texts))),
+                )
+                for question in step.asked * 4
+            )
+            record = None
+            if step.record is not None:
+                changes = {"choice": next(texts), "details": {next(texts): next(texts)}}
+                record = step.record.model_copy(update=changes)
+            rounds.append(replace(step, asked=asked, record=record, note=next(texts)))
+        goal = stage.record.goal.model_copy(update={"instruction": next(texts)})
+        changes = {"goal": goal, "stop_reason": next(texts)}
+        stages.append(replace(stage, rounds=tuple(rounds), record=stage.record.model_copy(update=changes)))
+    (page,) = write_episode(stages, tmp_path / "view", budget=9, success_radius_m=2.0)
+    assert page.path.name == page_name(page.task_id, "fu")
+    found = probed(page.path, VIEWER_PROBE, tmp_path)
+    assert found["errors"] == []
+    assert len(found["rounds"]) == 3 * len(stages)
+    assert any(shown["chips"] for shown in found["rounds"])
+    assert found["handlers"] == []
+
+
+def test_the_page_carries_its_policy_first(write_run: WriteRun) -> None:
+    text = write_report(write_run()).read_text("utf-8")
+    head = text.partition("<style>")[0]
+    (policy,) = re.findall(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', head)
+    assert policy.startswith("default-src &#39;none&#39;; script-src &#39;sha256-")
+    assert "unsafe" not in policy
+    assert not re.search(r"<[^>]+\sstyle=", text)
