@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.metrics import paired_differences, summarise, summary_json
 from evonav.evaluation.privileged import YARDSTICKS
-from evonav.evaluation.records import StageRecord
+from evonav.evaluation.records import EndState, StageRecord
 from evonav.evaluation.store import RunStore
 
 FORMAT_VERSION = 1
@@ -220,7 +220,7 @@ def _read_run(store: RunStore, run_dir: Path, agents: Sequence[str] | None) -> t
         if agent in YARDSTICKS:
             raise InvalidArgumentError(f"{agent} is a yardstick: it is told what agents are not")
         mine = list(store.records(agent))
-        num_scored = sum(record.is_scored for record in mine)
+        num_scored = sum(record.is_scored or record.state is EndState.FORCED for record in mine)
         if num_scored != num_stages:
             raise InvalidArgumentError(
                 f"{agent} is incomplete: {num_scored} of {num_stages} stages have a score;"

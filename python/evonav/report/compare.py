@@ -208,7 +208,7 @@ def _compare(a: Side, b: Side, fields: Sequence[str], allow_differences: bool) -
     dropped: Counter[str] = Counter()
     pairs: list[tuple[StageRow, StageRow]] = []
     for key in sorted(_stages(a) | _stages(b)):
-        reason = _reason(a, b, key)
+        reason = _reason(a, b, key, allow_differences)
         if reason == FORCED:
             continue
         if reason is None:
@@ -234,8 +234,8 @@ def _stages(side: Side) -> set[tuple[str, int]]:
     return asked | side.rows.keys()
 
 
-def _reason(a: Side, b: Side, key: tuple[str, int]) -> str | None:
-    """Why a stage is not compared."""
+def _reason(a: Side, b: Side, key: tuple[str, int], allow_differences: bool) -> str | None:
+    """Why a stage is not compared. Where differences are allowed, the house may have changed in other ways."""
     for side in (a, b):
         if key not in side.rows:
             is_foreign = key[0] not in side.num_stages
@@ -244,7 +244,7 @@ def _reason(a: Side, b: Side, key: tuple[str, int]) -> str | None:
             state = side.rows[key].state
             return FORCED if state == FORCED else f"{state.replace('_', ' ')} in {side.name}"
     first, second = a.rows[key], b.rows[key]
-    same = ("house", "category", "stratum", "mode", "num_stages")
+    same = ("house", "category", "num_stages", *(() if allow_differences else ("stratum", "mode")))
     if any(getattr(first, name) != getattr(second, name) for name in same):
         return "another stage under the same name"
     return None
