@@ -4,7 +4,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from made_up_run import lettered_run
+from made_up_run import lettered_run, record_run
 from typer.testing import CliRunner
 
 from evonav.cli import app
@@ -12,8 +12,10 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics import rates
 from evonav.report.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
 from evonav.report.figures import write_plots
+from evonav.report.findings import run_tables
 from evonav.report.plots import CurvePlot, Gap, GapPlot, gap_range, plot_svg, ticks
 from evonav.report.run import load_run
+from evonav.report.run_figures import run_figures
 from evonav.report.sides import read_sides
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -130,3 +132,27 @@ def test_the_command_prints_all_and_writes_what_is_asked(run: Path, tmp_path: Pa
     assert "SR by success radius" in result.output
     assert md.read_text().count("\n## ") + 1 == tex.read_text().count(r"\toprule") == 7
     assert len({row["by"] for row in csv.DictReader(table.read_text().splitlines())}) == 7
+
+
+def test_a_page_gets_the_figures_and_tables_of_its_run(run: Path) -> None:
+    loaded = load_run(run)
+    figures = run_figures(loaded)
+    assert [figure.title for figure in figures] == [
+        "SR differences, points",
+        "SR by stratum",
+        "SR by evolution",
+        "SR by path length",
+        "SR by earlier stages",
+        "SR by success radius",
+    ]
+    for figure in figures:
+        assert ElementTree.fromstring(figure.svg).tag == f"{SVG}svg"
+        assert figure.words.endswith(("house.", "interval."))
+    titles = [table.title for table in run_tables(loaded)]
+    assert [
+        title for title in ("SR by path length", "SR by rooms", "SR by success radius") if title not in titles
+    ] == []
+
+
+def test_a_run_without_a_stage_has_no_figure(tmp_path: Path) -> None:
+    assert run_figures(load_run(record_run(tmp_path / "empty", [], {"task": 2}, ["fu"]))) == []

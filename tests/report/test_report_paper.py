@@ -1,13 +1,18 @@
 import importlib.util
 import re
+import shutil
+import subprocess
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 from made_up_run import WriteRun, entry, record_run, stage_record
+from scipy import stats
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.evaluation.metrics import PairedDifference
 from evonav.evaluation.records import EndState
 from evonav.report import paper
 from evonav.report.line_chart import Line, line_chart
@@ -110,7 +115,67 @@ def test_the_command_prints_and_writes_the_tables(write_run: WriteRun, tmp_path:
     text = out.read_text(encoding="utf-8")
     assert text == paper.paper_markdown(load_run(run_dir))
     assert text.count("\n| ftu |") == 3
-    assert text.count("\n| ftu less fu |") == 1
+    assert text.count("\n| ftu less fu |") == 2
+
+
+def test_power_is_of_the_papers_houses(write_run: WriteRun) -> None:
+    pair = PairedDifference("fu", "ftu", 446, 110, 0.0, (-0.03, 0.03), 0.0, (0.0, 0.0), 1, 1)
+    (row,) = paper.power_table([pair]).rows
+    error = 0.03 / 1.96 * (110 / 90) ** 0.5
+    assert row[:2] == ("ftu less fu", "+6.3")
+    assert float(row[3]) == pytest.approx(280.16 * error, abs=0.06)
+    # 6.3 points are 3.7 standard errors.
+    assert float(row[4].rstrip("%")) == pytest.approx(100 * stats.norm.cdf(23 / 365 / error - 1.96), abs=0.6)
+    assert int(row[5]) == pytest.approx(90 * (2.8016 * error * 365 / 23) ** 2, abs=1)
+    assert paper.power_table([replace(pair, a="mine")]).rows == ()
+
+
+def latex_of(write_run: WriteRun, tmp_path: Path) -> str:
+    records = [
+        stage_record(agent, f"task-{i}", stage, EndState.SUCCESS if (i + stage) % k else EndState.FAILURE)
+        for k, agent in ((2, "fu"), (3, "ftu"), (4, "my_agent & co"))
+        for i in range(6)
+        for stage in (1, 2)
+    ]
+    run = record_run(tmp_path / "r_1", records, {f"task-{i}": 2 for i in range(6)}, ["fu", "ftu", "my_agent & co"])
+    out = tmp_path / "tables.tex"
+    asked = ["paper", str(run), "--latex", str(out), "--prediction", str(write_run())]
+    result = CliRunner().invoke(app, asked, env={"COLUMNS": "200"})
+    assert result.exit_code == 0, result.output
+    return out.read_text(encoding="utf-8")
+
+
+def test_latex_has_the_papers_layout_with_its_figures_in_grey(write_run: WriteRun, tmp_path: Path) -> None:
+    text = latex_of(write_run, tmp_path)
+    lines = [line for line in text.splitlines() if not line.startswith("%")]
+    assert text.count(r"\begin{table}") == text.count(r"\end{table}") == text.count(r"\begin{tabular}") == 2
+    assert [text.count(rule) for rule in (r"\toprule", r"\midrule", r"\bottomrule")] == [2, 4, 2]
+    body = "\n".join(lines)
+    assert body.count("{") == body.count("}")
+    # Two heads, six agents with a grey column each, one agent that the paper lacks.
+    assert r"\begin{tabular}{@{}ll" + 6 * r"c>{\color{gray}}c" + "c@{}}" in text
+    rows = [line for line in lines if line.endswith(r"\\") and "multicolumn" not in line]
+    assert len(rows) == 8
+    assert all(line.replace(r"\&", "").count("&") == 14 for line in rows)
+    assert r"my\_agent \& co" in text
+    gt, spl, *_ = rows
+    # Half of fu's stages succeed, two thirds of ftu's, and five sixths of the third's, which is the best.
+    assert gt.endswith(r"50.0 & 61.1 & -- & 61.9 & 66.7 & \textbf{67.4} & \textbf{83.3} \\")
+    assert spl.startswith(r" & SPL $\uparrow$ & -- & 14.9")
+    assert "% GT, SR, ftu: 66.7" in text
+    assert ", n = 12; paper n = 365" in text
+    assert len([line for line in rows if "Relocated" in line]) == 4
+    assert "54.1" in next(line for line in rows if r"\textbf{GT}" in line and "Relocated" in line)
+
+
+def test_latex_compiles_where_there_is_a_tex(write_run: WriteRun, tmp_path: Path) -> None:
+    program = next((name for name in ("tectonic", "pdflatex", "xelatex") if shutil.which(name)), None)
+    if program is None:
+        pytest.skip("no TeX on this machine: the tables' structure is checked above")
+    page = r"\documentclass{article}\usepackage{array,booktabs,multirow,xcolor}\begin{document}"
+    (tmp_path / "page.tex").write_text(f"{page}\n{latex_of(write_run, tmp_path)}\n" + r"\end{document}")
+    subprocess.run([program, "page.tex"], cwd=tmp_path, check=True, capture_output=True, stdin=subprocess.DEVNULL)
+    assert (tmp_path / "page.pdf").stat().st_size > 1000
 
 
 def counted(record, **counters):

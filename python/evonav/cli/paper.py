@@ -2,9 +2,13 @@
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from evonav.report.paper import Perception
+    from evonav.report.run import Run
 
 
 class Half(str, Enum):
@@ -18,18 +22,32 @@ def paper(
     run: Annotated[Path, typer.Argument(help="Folder of a run.")],
     perception: Annotated[Half, typer.Option(help="Which half of the paper's tables.")] = Half.GT,
     out: Annotated[Path | None, typer.Option(help="Markdown file to write, too.")] = None,
+    latex: Annotated[Path | None, typer.Option(help="LaTeX file: Tables 1 and 2 in the paper's layout.")] = None,
+    prediction: Annotated[
+        Path | None, typer.Option(help="Run with predicted perception, for the lower half of the LaTeX tables.")
+    ] = None,
 ) -> None:
-    """Shows the paper's Tables 1 and 2 and its stage-1 results beside a run's, and the order of agents."""
+    """Shows the paper's Tables 1 and 2 beside a run's, the order of agents, and what its differences could tell.
+
+    evonav paper out/six --latex out/tables.tex
+    """
     from rich.console import Console
 
     from evonav.folders import write_atomically
-    from evonav.report.paper import paper_markdown, paper_tables
+    from evonav.report.paper import paper_markdown, paper_tables, power_table
+    from evonav.report.paper_latex import paper_latex
     from evonav.report.run import load_run
 
     loaded = load_run(run)
     console = Console()
-    for table in paper_tables(loaded, perception.value):
+    for table in (*paper_tables(loaded, perception.value), power_table(loaded.pairs, perception.value)):
         console.print(table.rich())
     if out is not None:
         write_atomically(out, paper_markdown(loaded, perception.value))
         typer.echo(f"tables: {out}")
+    if latex is not None:
+        runs: dict[Perception, Run] = {perception.value: loaded}
+        if prediction is not None:
+            runs["prediction"] = load_run(prediction)
+        write_atomically(latex, paper_latex(runs))
+        typer.echo(f"LaTeX: {latex}")

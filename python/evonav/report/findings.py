@@ -4,7 +4,9 @@ from collections import Counter
 
 from evonav.evaluation.records import EndState
 from evonav.report import tables
+from evonav.report.breakdown import breakdown_table
 from evonav.report.run import Run
+from evonav.report.run_figures import run_breakdowns
 
 
 def markdown_tables(run: Run) -> str:
@@ -29,6 +31,7 @@ def run_tables(run: Run) -> list[tables.Table]:
         tables.cause_count_table(run.cause_counts()),
         effort_table(run),
         failure_table(run),
+        *(breakdown_table(one) for one in run_breakdowns(run)),
     ]
 
 

@@ -4,11 +4,13 @@ Counts are decoded from the paper's percentages: all twelve overall rates lie on
 and what is left of the sums is stage 1. SPL is as printed.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from evonav.evaluation.metrics import AgentSummary, PairedDifference, Rates
+from evonav.paired import DETECTABLE_Z, power
 from evonav.report.run import PAPER_ORDER, Run
 from evonav.report.tables import NONE, Table, percent, points, verdict
 from evonav.significance import wilson
@@ -75,7 +77,41 @@ def paper_tables(run: Run, perception: Perception = "gt") -> list[Table]:
 
 def paper_markdown(run: Run, perception: Perception = "gt") -> str:
     """The tables as one Markdown text."""
-    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in paper_tables(run, perception))
+    tables = [*paper_tables(run, perception), power_table(run.pairs, perception)]
+    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables if table.rows)
+
+
+def power_table(pairs: Sequence[PairedDifference], perception: Perception = "gt") -> Table:
+    """Whether the paper's differences in SR could be told from none on its houses, if they vary as ours do."""
+    paper = PAPER[perception]
+    rows = []
+    for pair in pairs:
+        width = pair.sr_ci95[1] - pair.sr_ci95[0]
+        if pair.a not in paper or pair.b not in paper or width == 0:
+            continue
+        gap = (paper[pair.b].num_all - paper[pair.a].num_all) / NUM_STAGES
+        error = width / (2 * 1.959963984540054) * math.sqrt(pair.num_tasks / NUM_FIRST)
+        chance = power(gap, error)
+        least = DETECTABLE_Z * error
+        needed = "–" if gap == 0 else f"{math.ceil(NUM_FIRST * (least / gap) ** 2)}"
+        rows.append(
+            (
+                f"{pair.b} less {pair.a}",
+                f"{100 * gap:+.1f}",
+                f"±{100 * 1.96 * error:.1f}",
+                f"{100 * least:.1f}",
+                f"{100 * chance:.0f}%",
+                needed,
+            )
+        )
+    columns = ("Agents", "SR, paper", "95% interval", "detectable", "power", "houses for 80%")
+    notes = (
+        f"Percentage points. Interval and detectable difference of {NUM_FIRST} houses, {NUM_STAGES} stages, if paired "
+        "outcomes vary from house to house as in this run; the paper does not give its pairs. Power: the chance that "
+        "such an experiment finds a true difference as large as the paper's, at 5%, two-sided, no adjustment for "
+        "several pairs. Houses: how many would find it four times in five.",
+    )
+    return Table("What the paper's differences could tell", columns, tuple(rows), notes)
 
 
 def _main_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:

@@ -57,10 +57,10 @@ class Table:
     def latex(self) -> str:
         """A `tabular` for `booktabs`, best values in bold, notes as comments."""
         lines = [f"% {_one_line(self.title)}", rf"\begin{{tabular}}{{l{'r' * (len(self.columns) - 1)}}}", r"\toprule"]
-        lines += [" & ".join(map(_latex_text, self.columns)) + r" \\", r"\midrule"]
+        lines += [" & ".join(map(latex_text, self.columns)) + r" \\", r"\midrule"]
         for i, row in enumerate(self.rows):
             cells = [
-                rf"\textbf{{{_latex_text(cell)}}}" if (i, j) in self.best else _latex_text(cell)
+                rf"\textbf{{{latex_text(cell)}}}" if (i, j) in self.best else latex_text(cell)
                 for j, cell in enumerate(row)
             ]
             lines.append(" & ".join(cells) + r" \\")
@@ -308,7 +308,8 @@ _LATEX = {
 }
 
 
-def _latex_text(text: str) -> str:
+def latex_text(text: str) -> str:
+    """Text as LaTeX shows it."""
     return "".join(_LATEX.get(character, character) for character in _one_line(text))
 
 
