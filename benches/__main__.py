@@ -10,6 +10,7 @@ SECTIONS = {
     "agent_process": "Agents in processes of their own",
     "agents": "Agents",
     "generation": "Task generation",
+    "gym": "Gymnasium",
     "memory": "Memory",
     "navigation": "Navigation",
     "rendering": "Rendering",

@@ -143,6 +143,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         numbers = [source.draw(random) for random in self._randoms]
         if options and "task" in options:
             numbers = [source.find(options["task"])] * self.num_envs
+        self.loader.forget()
         for number in numbers:
             self.loader.prefetch(number, 1)
         self._episodes = []
@@ -203,12 +204,12 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         at = self.loader.get(number, 1)
         # One draw a task, made a task ahead: the next house can be built meanwhile.
         next_number = self.loader.source.draw(random)
-        self.loader.prefetch(next_number, 1)
-        run, start = self._begin_stage(index, number, at, at.task.start)
+        run, start = self._begin_stage(index, (number, next_number), at, at.task.start)
         self._origins[index] = as_row(start)
         return _Episode(random, number, next_number, at, run, [])
 
-    def _begin_stage(self, index: int, number: int, at: StageWorld, pose: Pose) -> tuple[StageRun, Pose]:
+    def _begin_stage(self, index: int, numbers: tuple[int, int], at: StageWorld, pose: Pose) -> tuple[StageRun, Pose]:
+        """Puts an agent into a stage; `numbers` are of this task and the next."""
         simulator = at.world.entered()
         start = simulator.enter(pose)
         self._batch.place(
@@ -222,8 +223,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         path_m = self._batch.plan_one(index, at.data.target_m)
         if path_m:
             self._batch.aim(index, _core.GeodesicField(simulator.core, path_m[-1]))
-        if at.stage < len(at.task.stages):
-            self.loader.prefetch(number, at.stage + 1)
+        is_last = at.stage == len(at.task.stages)
+        self.loader.prefetch(numbers[is_last], 1 if is_last else at.stage + 1)
         length_m = motion.polyline_length_m(path_m) if path_m else None
         run = StageRun(self.config, at.data.target_m, start, length_m, self._batch.distance_m(index))
         return run, start
@@ -237,7 +238,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             episode.is_over = True
             return ended | {"task_result": task_result(episode.results)}
         episode.at = self.loader.get(episode.number, at.stage + 1)
-        episode.run, _ = self._begin_stage(index, episode.number, episode.at, end)
+        episode.run, _ = self._begin_stage(index, (episode.number, episode.next_number), episode.at, end)
         self._has_succeeded[index], self._has_arrived[index] = 1, 0
         return ended
 

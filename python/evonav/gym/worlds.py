@@ -81,6 +81,12 @@ class WorldLoader:
         self.prefetch(number, stage)
         return self._wanted.pop((number, stage)).result()
 
+    def forget(self) -> None:
+        """Gives up what was asked for and not fetched; houses that were built stay."""
+        for future in self._wanted.values():
+            future.cancel()
+        self._wanted.clear()
+
     def close(self) -> None:
         """Ends the thread."""
         self._thread.shutdown(wait=True, cancel_futures=True)

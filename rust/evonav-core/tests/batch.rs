@@ -178,7 +178,7 @@ proptest! {
             batch.render(images).expect("arrays of the right size");
             for (index, agent) in lone.iter_mut().enumerate() {
                 let is_success = agent.step(actions[index]);
-                prop_assert_eq!(batch.slot(index).map(|slot| slot.pose), Ok(agent.pose));
+                prop_assert_eq!(batch.slot(index).map(Slot::pose), Ok(agent.pose));
                 prop_assert_eq!(stepped[index].is_success, is_success);
                 prop_assert_eq!(stepped[index].distance_m.to_bits(), agent.distance_m().to_bits());
                 let share = |n: usize| index * n..(index + 1) * n;
@@ -242,7 +242,7 @@ fn following_ends_where_the_body_does_not_fit() {
     batch.place(0, slot).expect("a slot");
     let stops = [(a_m, 1.0), (b_m, 7.0), ([1e3, 0.0], 0.0), (a_m, 2.0)];
     assert_eq!(batch.follow(0, &stops), Ok(2));
-    let pose = batch.slot(0).expect("a slot").pose;
+    let pose = batch.slot(0).expect("a slot").pose();
     assert_eq!(pose.position_m, world.body_position_m(b_m));
     assert_eq!(pose.yaw_rad, canonical_yaw_rad(7.0));
     assert_eq!(batch.follow(0, &[([f64::NAN, 0.0], 0.0)]), Ok(0));
@@ -259,7 +259,7 @@ fn what_is_wrong_is_told_and_moves_nobody() {
     batch.place(0, slot()).expect("a slot");
     assert!(matches!(batch.step(&[0, 0]), Err(Error::Simulation { .. })));
     assert!(matches!(batch.render(Images::default()), Err(Error::Simulation { .. })));
-    assert_eq!(batch.slot(0).map(|slot| slot.pose), Ok(world.start()));
+    assert_eq!(batch.slot(0).map(Slot::pose), Ok(world.start()));
     assert!(matches!(batch.place(2, slot()), Err(Error::InvalidArgument { .. })));
     assert!(matches!(batch.aim(1, None), Err(Error::Simulation { .. })));
     let few = Slot::new(Arc::clone(&world), world.start(), Arc::from([1_u8]));
@@ -274,7 +274,7 @@ fn what_is_wrong_is_told_and_moves_nobody() {
     let mut short = [0.0_f32; 5];
     let images = Images { depth_m: Some(&mut short), ..Images::default() };
     assert!(matches!(batch.render(images), Err(Error::InvalidArgument { .. })));
-    assert_eq!(batch.slot(0).map(|slot| slot.pose), Ok(world.start()));
+    assert_eq!(batch.slot(0).map(Slot::pose), Ok(world.start()));
     assert_eq!(batch.slot(0).map(Slot::distance_m), Ok(f64::INFINITY));
     assert!(Action::of(4).is_err());
     for (num_slots, num_threads) in [(0, 1), (1, 0), (1 << 20, 1)] {

@@ -137,7 +137,7 @@ impl PyBatchSimulator {
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let rows = (0..self.core.num_slots()).map(|index| {
             let Pose { position_m: [x_m, y_m, z_m], yaw_rad, horizon_rad } =
-                self.core.slot(index)?.pose;
+                self.core.slot(index)?.pose();
             Ok([x_m, y_m, z_m, yaw_rad, horizon_rad])
         });
         arrays::rows_of(py, rows.collect::<Result<_, _>>().map_err(error::to_py)?)

@@ -46,12 +46,13 @@ pub struct BatchConfig {
 pub struct Slot {
     /// Its house.
     pub world: Arc<EmbeddedSimulator>,
-    /// Where it stands and looks.
-    pub pose: Pose,
+    pose: Pose,
     /// By body of the house, what its pixels get in images of labels; 0: nothing.
     pub labels: Arc<[u8]>,
     /// Distances to its goal; see [`Batch::aim`].
     field: Option<Arc<GeodesicField>>,
+    /// The distance from where it stands, if it was asked for there.
+    known_m: Option<f64>,
     /// Positions that could be reached when a target was first cut off; see [`Batch::plan`].
     reachable_m: Option<Vec<Vec2>>,
 }
@@ -59,7 +60,12 @@ pub struct Slot {
 impl Slot {
     /// An agent in a house, without a goal.
     pub fn new(world: Arc<EmbeddedSimulator>, pose: Pose, labels: Arc<[u8]>) -> Self {
-        Self { world, pose, labels, field: None, reachable_m: None }
+        Self { world, pose, labels, field: None, known_m: None, reachable_m: None }
+    }
+
+    /// Where it stands and looks.
+    pub fn pose(&self) -> Pose {
+        self.pose
     }
 
     fn point_m(&self) -> Vec2 {
@@ -69,7 +75,18 @@ impl Slot {
 
     /// Length of the shortest path to the goal, infinite if there is none or no field.
     pub fn distance_m(&self) -> f64 {
+        if let Some(known_m) = self.known_m {
+            return known_m;
+        }
         self.field.as_ref().map_or(f64::INFINITY, |field| field.distance_m(self.point_m()))
+    }
+
+    /// Moves the agent.
+    fn go(&mut self, pose: Pose) {
+        if pose.position_m != self.pose.position_m {
+            self.known_m = None;
+        }
+        self.pose = pose;
     }
 
     /// Corners of the shortest path to a point, or to the reachable position nearest to it where it
@@ -182,7 +199,8 @@ impl Batch {
     /// # Errors
     /// As [`Self::slot`].
     pub fn aim(&mut self, index: usize, field: Option<Arc<GeodesicField>>) -> Result<(), Error> {
-        self.placed_mut(index)?.field = field;
+        let slot = self.placed_mut(index)?;
+        (slot.field, slot.known_m) = (field, None);
         Ok(())
     }
 
@@ -213,8 +231,10 @@ impl Batch {
         let strides = self.config.strides;
         let one = |(slot, action): (&mut Slot, Action)| {
             let moved = act(&slot.world, &slot.pose, action, strides);
-            slot.pose = moved.unwrap_or(slot.pose);
-            Stepped { is_success: moved.is_some(), distance_m: slot.distance_m() }
+            slot.go(moved.unwrap_or(slot.pose));
+            let distance_m = slot.distance_m();
+            slot.known_m = Some(distance_m);
+            Stepped { is_success: moved.is_some(), distance_m }
         };
         let pool = self.pool.as_ref();
         let slots = placed(&mut self.slots)?;
@@ -266,7 +286,7 @@ impl Batch {
         let slot = self.placed_mut(index)?;
         for (passed, &(point_m, yaw_rad)) in stops.iter().enumerate() {
             match set_down(&slot.world, &slot.pose, point_m, yaw_rad) {
-                Some(pose) => slot.pose = pose,
+                Some(pose) => slot.go(pose),
                 None => return Ok(passed),
             }
         }
