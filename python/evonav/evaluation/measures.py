@@ -18,7 +18,7 @@ from evonav.evaluation.taxonomy import cause_of
 if TYPE_CHECKING:
     from evonav.evaluation.store import RunStore
 
-MEASURES_VERSION = 1
+MEASURES_VERSION = 2
 """Raised whenever a measure changes: measures kept under another version are derived again from their records."""
 STRICT_RADIUS_M = 1.0
 """Of `is_strict_success`."""
