@@ -109,6 +109,8 @@ def test_differences_are_drawn_around_zero() -> None:
     assert y < x
     assert ticks(0.0, 100.0, 7) == [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]
     assert ticks(-0.5, 0.2)[0] <= -0.5
+    assert ticks(0.0, 0.0)[-1] > 0.0
+    assert "<circle" in plot_svg(GapPlot("", (Gap("equal", "", 0.0, None),), "", ""))
 
 
 def test_figures_are_written_in_every_format(run: Path, tmp_path: Path) -> None:

@@ -218,7 +218,7 @@ def test_a_line_chart_draws_every_point_and_name_where_it_belongs() -> None:
     x, y = ([float(circle.get(axis, "")) for circle in circles] for axis in ("cx", "cy"))
     assert x[0] < x[1]
     assert y[0] == y[2] < y[3] < y[1]  # up is more
-    names = {node.text: float(node.get("y", "")) for node in root.findall(f"{svg}text") if node.get("style")}
+    names = {node.text: float(node.get("y", "")) for node in root.findall(f"{svg}text") if node.get("fill")}
     assert set(names) == {"fu", "a<b"}
     assert abs(names["fu"] - names["a<b"]) >= 14.0
 

@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from evonav.report import compare_words as words
 from evonav.report.compare import Comparison, Flip
+from evonav.report.line_chart import PLOT_CSS
 from evonav.report.page import page_environment, text_of
 from evonav.report.plots import Gap, GapPlot, plot_svg
 
@@ -38,7 +39,7 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
     sections = [
         {
             "title": f"{one.b} less {one.a}",
-            "plot": Markup(plot_svg(comparison_plot([one]))),  # noqa: S704 - our own SVG
+            "plot": Markup(plot_svg(comparison_plot([one]), is_inline=True)),  # noqa: S704 - our own SVG
             "table": words.part_table(one),
             "winners": [
                 (winner, [_shown(flip, out_dir) for flip in one.flips if flip.winner == winner])
@@ -52,11 +53,11 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
         .get_template("compare.html.j2")
         .render(
             title=f"{comparisons[0].b} and {comparisons[0].a}" if len(comparisons) == 1 else "agents",
-            css=text_of("report.css"),
+            css=text_of("report.css") + PLOT_CSS,
             statements=words.findings(comparisons),
             warnings=words.warnings(comparisons),
             pairs=words.pair_table(comparisons),
-            overview=Markup(plot_svg(comparison_plot(comparisons))) if len(comparisons) > 1 else "",  # noqa: S704
+            overview=Markup(plot_svg(comparison_plot(comparisons), is_inline=True)) if len(comparisons) > 1 else "",  # noqa: S704
             sections=sections,
         )
     )

@@ -16,9 +16,11 @@ from evonav.report.causes import WORDS, Cause
 from evonav.report.facts import failure_groups, reproduction, run_facts, task_digests
 from evonav.report.findings import latex_tables, markdown_tables, run_tables, statements
 from evonav.report.legend import legend
+from evonav.report.line_chart import PLOT_CSS
 from evonav.report.maps import VIEW_DIR, map_css, map_name, outcome_words, stage_svg
 from evonav.report.page import packed, page_environment, policy, text_of
 from evonav.report.run import Run, StageOutcome, Task, load_run
+from evonav.report.run_figures import run_figures
 from evonav.report.svg import slug
 from evonav.report.telling import telling_episodes
 from evonav.report.viewer import ListedPage, listed_pages, viewer_css, viewer_js
@@ -147,7 +149,7 @@ def _page_context(run: Run) -> dict[str, Any]:
     headline, *others = run_tables(run)
     used = {outcome.cause for outcome in run.outcomes.values()}
     columns = "".join(f".k{k}{{--k:{k}}}" for k in sorted(set(run.num_stages.values())))
-    css = text_of("report.css") + map_css() + columns
+    css = text_of("report.css") + map_css() + PLOT_CSS + columns
     js = text_of("report.js")
     return {
         "run": run,
@@ -155,6 +157,7 @@ def _page_context(run: Run) -> dict[str, Any]:
         "headline": headline,
         "bars": [_bars(summary) for summary in run.summaries],
         "others": [table for table in others if table.rows],
+        "figures": [(figure, Markup(figure.svg)) for figure in run_figures(run)],  # noqa: S704 - our own SVG
         "statements": statements(run),
         "overview": overview,
         "causes": [(cause.name, WORDS[cause]) for cause in Cause if cause in used],

@@ -22,7 +22,7 @@ class Line:
     """Of each y."""
 
 
-def line_chart(lines: Sequence[Line], heading: str, x_words: str, y_words: str) -> str:
+def line_chart(lines: Sequence[Line], heading: str, x_words: str, y_words: str, *, is_inline: bool = False) -> str:
     """An SVG file; y from 0 to the next ten above the largest value, whiskers a hair apart.
 
     Args:
@@ -30,6 +30,7 @@ def line_chart(lines: Sequence[Line], heading: str, x_words: str, y_words: str) 
         heading: Of the chart.
         x_words: Of the axis.
         y_words: Of the axis.
+        is_inline: For a page that has `PLOT_CSS`.
     """
     xs = sorted({x for line in lines for x, _ in line.points})
     highest = max([y for line in lines for _, y in line.points], default=0.0)
@@ -55,18 +56,35 @@ def line_chart(lines: Sequence[Line], heading: str, x_words: str, y_words: str) 
     labels = _spread([(y_of(line.points[-1][1]), i) for i, line in enumerate(lines)])
     for i, line in enumerate(lines):
         parts.append(_line(line, COLOURS[i % len(COLOURS)], 3.0 * (i - (len(lines) - 1) / 2), x_of, y_of, labels[i]))
+    return plot_file(WIDTH, HEIGHT, heading, parts, is_inline=is_inline)
+
+
+def plot_file(width: float, height: float, heading: str, parts: Sequence[str], *, is_inline: bool) -> str:
+    """Parts of a plot as an `svg` element, with its style unless the page has that.
+
+    Args:
+        width: Of the plot, in pixels.
+        height: Of the plot, in pixels.
+        heading: Read out in its place.
+        parts: Its elements.
+        is_inline: For a page that has `PLOT_CSS`, and whose policy forbids any other style.
+    """
+    style = "" if is_inline else f"<style>{PLOT_CSS}</style>"
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" role="img"'
-        f' aria-label="{escape(heading)}"><style>{_CSS}</style>'
-        f'<rect class="page" width="{WIDTH}" height="{HEIGHT}"/>{join(parts)}</svg>\n'
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox="0 0 {width:g} {height:g}" width="{width:g}"'
+        f' role="img" aria-label="{escape(heading)}">{style}'
+        f'<rect class="page" width="{width:g}" height="{height:g}"/>{join(parts)}</svg>\n'
     )
 
 
-_CSS = (
-    "text{font:12px system-ui,sans-serif;fill:#1f2530}.head{font-weight:600;font-size:14px}.page{fill:#fff}"
-    ".grid{stroke:#d5dae3;fill:none}"
-    "@media(prefers-color-scheme:dark){text{fill:#e6e9ef}.page{fill:#14171c}.grid{stroke:#333a45}}"
+PLOT_CSS = (
+    ".plot{font:12px system-ui,sans-serif;max-width:100%;height:auto}.plot text:not([fill]){fill:#1f2530}"
+    ".plot .soft:not([fill]){fill:#667085}.plot .head{font-weight:600;font-size:14px}.plot .page{fill:#fff}"
+    ".plot .grid{stroke:#e2e5ea;fill:none}.plot .zero{stroke:#667085;fill:none}"
+    "@media(prefers-color-scheme:dark){.plot text:not([fill]){fill:#e6e9ef}.plot .soft:not([fill]){fill:#98a1b3}"
+    ".plot .page{fill:#14171c}.plot .grid{stroke:#2a2f38}.plot .zero{stroke:#98a1b3}}"
 )
+"""Of all plots, on light and dark pages."""
 
 
 def _line(
@@ -89,7 +107,7 @@ def _line(
     end_x, end_y = places[-1]
     parts.append(f'<path d="M{end_x + 5:.1f} {end_y:.1f}L{WIDTH - RIGHT + 22} {label_y:.1f}" stroke="{colour}"/>')
     name_x = WIDTH - RIGHT + 26
-    parts.append(f'<text x="{name_x}" y="{label_y + 4:.1f}" style="fill:{colour}">{escape(line.name)}</text>')
+    parts.append(f'<text x="{name_x}" y="{label_y + 4:.1f}" fill="{colour}">{escape(line.name)}</text>')
     return join(parts)
 
 

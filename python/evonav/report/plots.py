@@ -6,7 +6,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from evonav.report.line_chart import COLOURS, Line, line_chart
+from evonav.report.line_chart import COLOURS, Line, line_chart, plot_file
 from evonav.report.svg import escape, join, title
 from evonav.significance import Interval
 
@@ -71,16 +71,23 @@ class GapPlot:
 Plot = GroupPlot | CurvePlot | GapPlot
 
 
-def plot_svg(plot: Plot) -> str:
-    """A plot as an SVG file, readable on light and dark pages."""
+def plot_svg(plot: Plot, *, is_inline: bool = False) -> str:
+    """A plot as an SVG file, readable on light and dark pages.
+
+    Args:
+        plot: What to draw.
+        is_inline: For a page that has `PLOT_CSS`.
+    """
     if isinstance(plot, CurvePlot):
-        return line_chart(plot.lines, plot.title, plot.x_words, plot.y_words)
-    return _gap_svg(plot) if isinstance(plot, GapPlot) else _group_svg(plot)
+        return line_chart(plot.lines, plot.title, plot.x_words, plot.y_words, is_inline=is_inline)
+    width, height, parts = _gap_parts(plot) if isinstance(plot, GapPlot) else _group_parts(plot)
+    return plot_file(width, height, plot.title, parts, is_inline=is_inline)
 
 
 def ticks(low: float, high: float, most: int = 8) -> list[float]:
     """Round numbers that span a range: 1, 2 or 5 times a power of ten apart."""
-    span = max(high - low, 1e-9)
+    high = high if high - low > 1e-9 else low + 1.0
+    span = high - low
     steps = [digit * 10.0**power for power in range(-3, 5) for digit in (1, 2, 5)]
     step = next((step for step in steps if span / step <= most - 1), steps[-1])
     first = int(low // step)
@@ -101,23 +108,7 @@ def group_range(plot: GroupPlot) -> list[float]:
     return ticks(0.0, max([1e-6, *ends, *values]), 7)
 
 
-def _svg(width: float, height: float, heading: str, parts: Sequence[str]) -> str:
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" width="{width:g}"'
-        f' style="max-width:100%;height:auto" role="img" aria-label="{escape(heading)}"><style>{_CSS}</style>'
-        f'<rect class="page" width="{width:g}" height="{height:g}"/>{join(parts)}</svg>\n'
-    )
-
-
-_CSS = (
-    ".plot{font:12px system-ui,sans-serif}.plot text{fill:#1f2530}.plot .soft{fill:#667085}.plot .head{font-weight:600;"
-    "font-size:14px}.page{fill:#fff}.plot .grid{stroke:#e2e5ea;fill:none}.plot .zero{stroke:#667085;fill:none}"
-    "@media(prefers-color-scheme:dark){.plot text{fill:#e6e9ef}.plot .soft{fill:#98a1b3}.page{fill:#14171c}"
-    ".plot .grid{stroke:#2a2f38}.plot .zero{stroke:#98a1b3}}"
-)
-
-
-def _gap_svg(plot: GapPlot) -> str:
+def _gap_parts(plot: GapPlot) -> tuple[float, float, list[str]]:
     label = 7.0 * max([len(gap.name) for gap in plot.gaps], default=0) + 28
     detail = 6.4 * max([len(gap.detail) for gap in plot.gaps], default=0) + 24
     width, height = label + 400 + detail, HEAD_PX + ROW_PX * len(plot.gaps) + FOOT_PX
@@ -128,7 +119,7 @@ def _gap_svg(plot: GapPlot) -> str:
         return label + 400 * (value - low) / (high - low)
 
     bottom = height - FOOT_PX
-    parts = [f'<g class="plot"><text class="head" x="14" y="22">{escape(plot.title)}</text>']
+    parts = [f'<text class="head" x="14" y="22">{escape(plot.title)}</text>']
     for mark in marks:
         css = "zero" if mark == 0 else "grid"
         parts.append(f'<path class="{css}" d="M{x_of(mark):.1f} {HEAD_PX - 10}V{bottom}"/>')
@@ -150,10 +141,10 @@ def _gap_svg(plot: GapPlot) -> str:
             parts.append(f'<path d="M{ends[0]:.1f} {y}H{ends[1]:.1f}" stroke="{colour}" stroke-width="2"/>')
         parts.append(f'<circle cx="{x_of(gap.value):.1f}" cy="{y}" r="4.5" fill="{colour}"/>')
         parts.append(f'<text class="soft" x="{label + 412}" y="{y + 4}">{escape(gap.detail)}</text></g>')
-    return _svg(width, height, plot.title, [*parts, "</g>"])
+    return width, height, parts
 
 
-def _group_svg(plot: GroupPlot) -> str:
+def _group_parts(plot: GroupPlot) -> tuple[float, float, list[str]]:
     num = max(1, len(plot.series))
     longest = max([len(line) for group in plot.groups for line in group.split("\n")], default=1)
     slot = max(DOT_PX * num + 26, 6.6 * longest + 12)
@@ -167,7 +158,7 @@ def _group_svg(plot: GroupPlot) -> str:
         return floor - GROUP_HEIGHT * (value - marks[0]) / (marks[-1] - marks[0])
 
     right = GROUP_LEFT + slot * len(plot.groups)
-    parts = [f'<g class="plot"><text class="head" x="14" y="20">{escape(plot.title)}</text>']
+    parts = [f'<text class="head" x="14" y="20">{escape(plot.title)}</text>']
     parts.append(f'<text class="soft" x="14" y="37">{escape(plot.y_words)}</text>')
     for mark in marks:
         parts.append(f'<path class="grid" d="M{GROUP_LEFT} {y_of(mark):.1f}H{right:.1f}"/>')
@@ -193,8 +184,8 @@ def _group_svg(plot: GroupPlot) -> str:
                     f'<path d="M{x:.1f} {ends[0]:.1f}V{ends[1]:.1f}" stroke="{colour}" stroke-width="2" opacity=".55"/>'
                 )
             parts.append(f'<circle cx="{x:.1f}" cy="{y_of(value):.1f}" r="4" fill="{colour}"/></g>')
-    parts.append(f'<g transform="translate({GROUP_LEFT} {height - 16})">{legend[0]}</g></g>')
-    return _svg(width, height, plot.title, parts)
+    parts.append(f'<g transform="translate({GROUP_LEFT} {height - 16})">{legend[0]}</g>')
+    return width, height, parts
 
 
 def _legend(names: Sequence[str]) -> tuple[str, float]:

@@ -28,6 +28,7 @@ class RunFigure:
     title: str
     words: str
     svg: str
+    """An element for a page that has `line_chart.PLOT_CSS`."""
     plot: Plot
     """The same as data, for `figures.write_plots`."""
 
@@ -53,11 +54,11 @@ def run_figures(run: Run) -> list[RunFigure]:
     if len(run.pairs) > 0:
         plot = _difference_plot(run)
         words = "On the stages that both scored; 95% intervals, bootstrap by task. Blue: beyond the interval."
-        figures.append(RunFigure(plot.title, words, plot_svg(plot), plot))
+        figures.append(RunFigure(plot.title, words, plot_svg(plot, is_inline=True), plot))
     for one in run_breakdowns(run, PLOTTED):
         drawn = breakdown_plot(one)
         words = f"{_WORDS[one.by]} 95% intervals, bootstrap by house."
-        figures.append(RunFigure(drawn.title, words, plot_svg(drawn), drawn))
+        figures.append(RunFigure(drawn.title, words, plot_svg(drawn, is_inline=True), drawn))
     return figures
 
 
