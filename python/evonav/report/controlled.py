@@ -68,6 +68,11 @@ class Analysis:
         """Their names, in order."""
         return tuple(arm.name for arm in self.record.arms)
 
+    @property
+    def paired_agents(self) -> tuple[str, ...]:
+        """Those with a stage that is scored in every arm."""
+        return tuple(agent for agent in self.agents if self.keys(agent))
+
     def keys(self, *agents: str) -> list[Key]:
         """Stages that all of some agents have scored in every arm."""
         scored = [set(self.outcomes[arm, agent]) for agent in agents for arm in self.arms]
@@ -120,8 +125,10 @@ def load_analysis(directory: Path) -> Analysis:
         if not run_dir.is_dir():
             raise StoreError(f"{run_dir}: no run here yet: `evonav controlled evaluate {directory}` first")
         with RunStore(run_dir) as store:
+            # In this order: the run may be going on.
+            rows = stage_rows(store)
             records = {(one.agent, one.task_id, one.stage): one for one in store.records(is_brief=True)}
-            for row in stage_rows(store):
+            for row in rows:
                 agents.add(row.agent)
                 found = outcomes.setdefault((arm.name, row.agent), {})
                 if row.is_scored:
@@ -156,7 +163,7 @@ def split_of(evolved: Outcome) -> str:
 def pair_tables(analysis: Analysis) -> list[Table]:
     """Fixed / Not Fixed in all, by what changed, against Stage-Reset, and how stages ended."""
     tables = [_drop_table(analysis), _split_table(analysis)]
-    if BASELINE in analysis.agents and len(analysis.agents) > 1:
+    if BASELINE in analysis.paired_agents and len(analysis.paired_agents) > 1:
         tables.append(_baseline_table(analysis))
     return [*tables, _ends_table(analysis)]
 
@@ -165,10 +172,10 @@ def _drop_table(analysis: Analysis) -> Table:
     fixed, evolved = analysis.arms
     rows = []
     for name, measure in MEASURES.items():
-        for agent in analysis.agents:
+        for agent in analysis.paired_agents:
             effect = analysis.effect((fixed, agent), (evolved, agent), measure)
             rows.append((f"{agent}, {name}", str(len(analysis.keys(agent))), *effect_cells(effect)))
-    keys = {(fixed, agent, key) for agent in analysis.agents for key in analysis.keys(agent)}
+    keys = {(fixed, agent, key) for agent in analysis.paired_agents for key in analysis.keys(agent)}
     num_houses = len({analysis.outcomes[arm, agent][key].row.house for arm, agent, key in keys})
     notes = (
         f"{num_houses} houses. Rates in %; changes in points, Not Fixed less Fixed, with 95% intervals (bootstrap by "
@@ -181,9 +188,13 @@ def _drop_table(analysis: Analysis) -> Table:
 def _caveats(analysis: Analysis) -> list[str]:
     """What a reader has to know of the pairs."""
     first = analysis.arms[0]
-    agent = analysis.agents[0]
     radius_m = 2.0
-    near = [key for key, one in analysis.outcomes[first, agent].items() if (one.row.start_distance_m or 0) < radius_m]
+    near = {
+        key
+        for agent in analysis.paired_agents
+        for key in analysis.keys(agent)
+        if (analysis.outcomes[first, agent][key].row.start_distance_m or 0.0) < radius_m
+    }
     found = []
     if near:
         found.append(f"In {len(near)} pairs the evaluated stage begins within {radius_m:g} m of the target.")
@@ -196,7 +207,7 @@ def _split_table(analysis: Analysis) -> Table:
     fixed, evolved = analysis.arms
     rows = []
     for split, words in SPLITS.items():
-        for agent in analysis.agents:
+        for agent in analysis.paired_agents:
             keys = analysis.keys(agent)
             part = [key for key in keys if split_of(analysis.outcomes[evolved, agent][key]) == split]
             effect = analysis.effect((fixed, agent), (evolved, agent), MEASURES["SR"], part)
@@ -207,7 +218,7 @@ def _split_table(analysis: Analysis) -> Table:
 
 def _baseline_table(analysis: Analysis) -> Table:
     rows = []
-    for agent in analysis.agents:
+    for agent in analysis.paired_agents:
         if agent == BASELINE:
             continue
         row = [agent, str(len(analysis.keys(agent, BASELINE)))]
@@ -222,12 +233,10 @@ def _baseline_table(analysis: Analysis) -> Table:
 
 def _ends_table(analysis: Analysis) -> Table:
     rows = []
-    for agent in analysis.agents:
+    for agent in analysis.paired_agents:
         keys = analysis.keys(agent)
         for arm, words in zip(analysis.arms, ("Fixed", "Not Fixed"), strict=True):
             found = [analysis.outcomes[arm, agent][key].row for key in keys]
-            if not found:
-                continue
             rows.append(
                 (
                     f"{agent}, {words}",

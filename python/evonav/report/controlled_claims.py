@@ -43,8 +43,8 @@ def claims(analysis: Analysis) -> list[Claim]:
         if effect is not None:
             found.append(Claim(paper, what, effect))
 
-    there = [agent for agent in MEMORY_AGENTS if agent in analysis.agents]
-    if BASELINE in analysis.agents:
+    there = [agent for agent in MEMORY_AGENTS if agent in analysis.paired_agents]
+    if BASELINE in analysis.paired_agents:
         for agent in there:
             effect = analysis.effect((fixed, BASELINE), (fixed, agent), MEASURES["SR"])
             add("Fixed: memory is ahead of Stage-Reset", f"{agent} less {BASELINE}, Fixed", effect)
@@ -64,7 +64,7 @@ def claims(analysis: Analysis) -> list[Claim]:
                 add("MSGNav and FTU drop less than 3D-Mem and FU", f"drop of {trusting} less that of {careful}", effect)
     if "ftu" in there:
         for agent in [*there, BASELINE]:
-            if agent != "ftu" and agent in analysis.agents:
+            if agent != "ftu" and agent in analysis.paired_agents:
                 effect = analysis.effect((evolved, agent), (evolved, "ftu"), MEASURES["SR"])
                 add("Not Fixed: FTU is best", f"ftu less {agent}, Not Fixed", effect)
     return found
