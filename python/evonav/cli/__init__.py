@@ -1,6 +1,8 @@
 """The `evonav` command. Exit codes: 0 done, 1 an error that is told, 2 wrong usage, 3 incomplete, 130 interrupted."""
 
+import os
 import sys
+from typing import Annotated
 
 import typer
 
@@ -10,6 +12,7 @@ from evonav.cli.compare import compare
 from evonav.cli.controlled import controlled_app
 from evonav.cli.doctor import doctor
 from evonav.cli.evaluate import demo, evaluate
+from evonav.cli.examples import add_examples
 from evonav.cli.export import export
 from evonav.cli.failures import failures
 from evonav.cli.generate import generate
@@ -23,12 +26,12 @@ from evonav.cli.tasks import tasks_app
 from evonav.cli.view import view
 
 EXIT_ERROR = 1
+DEBUG_VARIABLE = "EVONAV_DEBUG"
 
 app = typer.Typer(
     name="evonav",
     help="EvoNav-Bench: lifelong navigation in homes that change.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 COMMANDS = (
@@ -57,6 +60,17 @@ app.add_typer(tasks_app, name="tasks")
 app.add_typer(controlled_app, name="controlled")
 
 
+@app.callback()
+def options(
+    debug: Annotated[
+        bool, typer.Option("--debug", help=f"Show the traceback of an error; as {DEBUG_VARIABLE}=1 does.")
+    ] = False,
+) -> None:
+    """EvoNav-Bench: lifelong navigation in homes that change."""
+    if debug:
+        os.environ[DEBUG_VARIABLE] = "1"
+
+
 @app.command(name="agents")
 def list_agents() -> None:
     """Lists agents and yardsticks by name."""
@@ -78,12 +92,17 @@ def version() -> None:
     typer.echo(__version__)
 
 
+add_examples(app)
+
+
 def main() -> None:
-    """Runs the command; errors of evonav are one line, not a traceback."""
+    """Runs the command; errors of evonav, and of files, are one line, not a traceback."""
     from evonav.errors import EvonavError
 
     try:
         app()
-    except EvonavError as error:
+    except (EvonavError, OSError) as error:
+        if os.environ.get(DEBUG_VARIABLE, "0") not in ("", "0"):
+            raise
         typer.echo(f"error: {error}", err=True)
         sys.exit(EXIT_ERROR)

@@ -29,12 +29,7 @@ def compare(
     html: Annotated[Path | None, typer.Option(help="HTML page to write, with links to replays.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .svg, or .png or .pdf with `[viz]`.")] = None,
 ) -> None:
-    """Compares agents stage by stage: differences with 95% interval and p, by stratum and mode, and what flipped.
-
-    evonav compare out/run fu ftu
-    evonav compare out/gpt-4o out/rules --html out/compare.html
-    evonav compare out/run --baseline fu
-    """
+    """Compares agents stage by stage: differences with 95% interval and p, by stratum and mode, and what flipped."""
     from rich.console import Console
 
     from evonav.report import compare_words as words

@@ -9,9 +9,8 @@ import typer
 from evonav.cli.decision_options import DecisionOptions, decision_settings, with_decision_options, with_decisions
 from evonav.cli.display import interruptible, print_table, status
 from evonav.cli.options import (
-    HEURISTICS,
     HOUSES,
-    Agents,
+    AgentNames,
     AgentTimeout,
     AnyAsset,
     InProcess,
@@ -20,6 +19,7 @@ from evonav.cli.options import (
     Seed,
     Workers,
     count_of,
+    names_of,
 )
 
 if TYPE_CHECKING:  # the command must start fast
@@ -92,7 +92,7 @@ def generate(
 def evaluate(
     directory: Directory,
     decisions: DecisionOptions,
-    agents: Agents = HEURISTICS,
+    agents: AgentNames = None,
     agent: OneAgent = None,
     seed: Seed = 0,
     workers: Workers = None,
@@ -115,7 +115,7 @@ def evaluate(
     settings = decision_settings(decisions)
     hosting = AgentHosting(is_in_process=in_process, timeout_s=agent_timeout or settings.answer_timeout_s)
     config = RunConfig(seed=seed, backend=backend, stage_timeout_s=settings.stage_timeout_s, hosting=hosting)
-    names = [*(name.strip() for name in agents.split(",") if name.strip()), *(agent or ())]
+    names = names_of(agents, agent)
 
     def tell(arm: str, news: "Progress") -> None:
         latest = "" if news.latest is None else f" {news.latest.agent} {news.latest.task_id}/{news.latest.stage}"

@@ -19,10 +19,8 @@ from evonav.cli.decision_options import (
 from evonav.cli.display import generation_progress, interruptible, print_failures, print_table, progress, status
 from evonav.cli.options import (
     EXIT_INCOMPLETE,
-    HEURISTICS,
     AgentMemory,
     AgentNames,
-    Agents,
     AgentTimeout,
     AnyAsset,
     Engine,
@@ -49,6 +47,7 @@ from evonav.cli.options import (
     Workers,
     check_engine,
     count_of,
+    names_of,
 )
 from evonav.cli.view import make_pages
 
@@ -112,10 +111,10 @@ def evaluate(
     config = _config(seed, backend, decisions, out, num_workers)
     hosting = _hosting(in_process, agent_timeout or decision_settings(decisions).answer_timeout_s, agent_memory)
     config = replace(config, hosting=hosting)
-    names = agents if agents is not None else "" if agent else HEURISTICS
+    names = names_of(agents, agent)
     with _tasks(out, houses, tasks, limit, subset, seed, allow_unknown_assets, num_workers) as task_files:
         if decisions.dry_run:
-            print_estimate(decisions, _names(names, agent or ()), task_files, config, num_workers)
+            print_estimate(decisions, names, task_files, config, num_workers)
             return
         crew: dict[str, Any] = {
             "engine": engine.value,
@@ -124,7 +123,7 @@ def evaluate(
             "num_retries": retries,
             "retry_errored": retry_errored,
         }
-        summaries = _evaluate(out, _names(names, agent or ()), task_files, config, num_workers, **crew)
+        summaries = _evaluate(out, names, task_files, config, num_workers, **crew)
     print_table(summaries)
     print_failures(out)
     print_spending(out)
@@ -135,7 +134,7 @@ def evaluate(
 def demo(
     decisions: DecisionOptions,
     out: Out = Path("out/demo"),
-    agents: Agents = HEURISTICS,
+    agents: AgentNames = None,
     limit: Limit = None,
     seed: Seed = 0,
     workers: Workers = None,
@@ -145,9 +144,9 @@ def demo(
     with _tasks(out, None, None, limit, None, seed, False, num_workers) as task_files:
         config = _config(seed, _backend(SimulatorName.EMBEDDED), decisions, out, num_workers)
         if decisions.dry_run:
-            print_estimate(decisions, _names(agents, ()), task_files, config, num_workers)
+            print_estimate(decisions, names_of(agents), task_files, config, num_workers)
             return
-        summaries = _evaluate(out, _names(agents, ()), task_files, config, num_workers)
+        summaries = _evaluate(out, names_of(agents), task_files, config, num_workers)
     from evonav.report import write_report
 
     print_table(summaries)
@@ -195,10 +194,6 @@ def _tasks(
                 yield task_files(directory, limit)
             else:
                 yield [task_file(root) for root in subset_roots(directory, subset)]
-
-
-def _names(agents: str, more: "Sequence[str]") -> list[str]:
-    return [*(name.strip() for name in agents.split(",") if name.strip()), *more]
 
 
 def _evaluate(

@@ -1,13 +1,14 @@
 """What went wrong in a run: `failures`."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from evonav.cli.options import Run
+
 
 def failures(
-    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    run: Run,
     agent: Annotated[str | None, typer.Option(help="Only of this agent.")] = None,
     brief: Annotated[bool, typer.Option("--brief", help="Without tracebacks.")] = False,
 ) -> None:

@@ -7,17 +7,28 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli import completion
+
 EXIT_INCOMPLETE = 3
 HEURISTICS = "fu,stage-reset,ftu"
 
-Agents = Annotated[str, typer.Option(help="Names, comma-separated; see `evonav agents`.")]
 AgentNames = Annotated[
-    str | None, typer.Option("--agents", help=f"Names, comma-separated; see `evonav agents`. Default: {HEURISTICS}.")
+    list[str] | None,
+    typer.Option(
+        "--agents",
+        help=f"Names, comma-separated; see `evonav agents`. Default: {HEURISTICS}.",
+        autocompletion=completion.agents,
+    ),
 ]
 OneAgent = Annotated[
     list[str] | None,
-    typer.Option("--agent", help="A name, `module:Class` or `./file.py:Class`; repeat it for more."),
+    typer.Option(
+        "--agent",
+        help="A name, `module:Class` or `./file.py:Class`; repeat it for more.",
+        autocompletion=completion.agents,
+    ),
 ]
+Run = Annotated[Path, typer.Argument(help="Folder of a run.", autocompletion=completion.runs)]
 InProcess = Annotated[
     bool,
     typer.Option("--in-process", help="Agents in the evaluator's process, for debuggers: only exceptions are held."),
@@ -29,9 +40,15 @@ AgentTimeout = Annotated[
 AgentMemory = Annotated[int | None, typer.Option(min=256, help="MB of address space for an agent's process.")]
 HOUSES = "ProcTHOR JSON, JSONL, JSONL.gz, or procthor-10k:SPLIT"
 Houses = Annotated[Path | None, typer.Option(help=f"{HOUSES} to generate tasks from.")]
-Tasks = Annotated[Path | None, typer.Option(help="Folder of tasks; default: the bundled ones.")]
+Tasks = Annotated[
+    Path | None,
+    typer.Option(help="Folder of tasks; default: the bundled ones.", autocompletion=completion.task_folders),
+]
 Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-room) houses or tasks.")]
-Subset = Annotated[str | None, typer.Option(help="Named subset, SPLIT-N, such as test-90 (docs/tasks.md).")]
+Subset = Annotated[
+    str | None,
+    typer.Option(help="Named subset, SPLIT-N, such as test-90 (docs/tasks.md).", autocompletion=completion.subsets),
+]
 Seed = Annotated[int, typer.Option(min=0, help="Decides everything random.")]
 Workers = Annotated[int | None, typer.Option(min=0, help="Processes; default: one a core. 0: in this process.")]
 Retries = Annotated[
@@ -96,6 +113,12 @@ ThorTimeout = Annotated[
     typer.Option(min=1.0, help="AI2-THOR: seconds for an answer, three times that to start; then it is restarted."),
 ]
 Out = Annotated[Path, typer.Option(help="Folder of the run; an unfinished one is resumed.")]
+
+
+def names_of(agents: list[str] | None, agent: list[str] | None = None) -> list[str]:
+    """What `--agents` and `--agent` name, in that order; the heuristics where neither was given."""
+    lists = agents if agents is not None else [] if agent else [HEURISTICS]
+    return [*(name for text in lists for part in text.split(",") if (name := part.strip())), *(agent or ())]
 
 
 def count_of(workers: int | None) -> int:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from evonav.cli.options import RunFolder
+
 if TYPE_CHECKING:
     from evonav.report.paper import Perception
     from evonav.report.run import Run
@@ -19,7 +21,7 @@ class Half(str, Enum):
 
 
 def paper(
-    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    run: RunFolder,
     perception: Annotated[Half, typer.Option(help="Which half of the paper's tables.")] = Half.GT,
     out: Annotated[Path | None, typer.Option(help="Markdown file to write, too.")] = None,
     latex: Annotated[Path | None, typer.Option(help="LaTeX file: Tables 1 and 2 in the paper's layout.")] = None,
@@ -27,10 +29,7 @@ def paper(
         Path | None, typer.Option(help="Run with predicted perception, for the lower half of the LaTeX tables.")
     ] = None,
 ) -> None:
-    """Shows the paper's Tables 1 and 2 beside a run's, the order of agents, and what its differences could tell.
-
-    evonav paper out/six --latex out/tables.tex
-    """
+    """Shows the paper's Tables 1 and 2 beside a run's, the order of agents, and what its differences could tell."""
     from rich.console import Console
 
     from evonav.folders import write_atomically

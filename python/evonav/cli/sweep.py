@@ -35,6 +35,9 @@ def sweep(
     workers: Annotated[int | None, typer.Option(min=0, help="Processes; default: the file's, else one a core.")] = None,
     engine: Annotated[EngineOption | None, typer.Option(help="Processes here, or Ray. Default: the file's.")] = None,
     ray_address: Annotated[str | None, typer.Option(help="Of a Ray cluster that shares this file system.")] = None,
+    worker_gpus: Annotated[
+        float | None, typer.Option(min=0.0, help="Ray: GPUs set aside for each worker. Default: the file's.")
+    ] = None,
     retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="List cells, stages and what models would cost; run nothing.")
@@ -53,7 +56,12 @@ def sweep(
     from evonav.evaluation.sweep import cell_runs, cells_of, chosen, task_sets
     from evonav.evaluation.sweep_file import read_sweep
 
-    flags = {"workers": workers, "engine": None if engine is None else engine.value, "ray_address": ray_address}
+    flags = {
+        "workers": workers,
+        "engine": None if engine is None else engine.value,
+        "ray_address": ray_address,
+        "worker_gpus": worker_gpus,
+    }
     changes = [*(set_ or ()), *(f"{key}={value}" for key, value in flags.items() if value is not None)]
     asked = read_sweep(file, changes)
     folder = out or Path(asked.out or f"out/{file.stem}")

@@ -5,10 +5,12 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli import completion
+
 
 def subset(
     folder: Annotated[Path, typer.Argument(help="Folder of tasks with a dataset.json.")],
-    name: Annotated[str, typer.Argument(help="SPLIT-N, such as test-90.")],
+    name: Annotated[str, typer.Argument(help="SPLIT-N, such as test-90.", autocompletion=completion.subsets)],
     out: Annotated[Path | None, typer.Option(help="File for the task ids, one a line; default: print them.")] = None,
 ) -> None:
     """Lists the tasks of a named subset (docs/tasks.md): the same for everyone who has the same houses."""

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
+from difflib import get_close_matches
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from evonav.agents.agent import Agent
-from evonav.agents.registry import BUILT_IN, agent_factory, new_agent
+from evonav.agents.registry import BUILT_IN, agent_descriptions, agent_factory, new_agent
 from evonav.decision.questions.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.agent_process import DecisionSpec, check_importable
@@ -129,7 +130,9 @@ def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
         else:
             check_importable(name)
     except InvalidArgumentError as error:
-        raise InvalidArgumentError(f"{error}; yardsticks are {', '.join(sorted(YARDSTICKS))}") from error
+        near = get_close_matches(name, (*agent_descriptions(), *YARDSTICKS), 1)
+        hint = f"; did you mean `{near[0]}`?" if near else f"; yardsticks are {', '.join(sorted(YARDSTICKS))}"
+        raise InvalidArgumentError(f"{error}{hint}") from error
 
 
 def load_case(path: Path) -> EpisodeCase:

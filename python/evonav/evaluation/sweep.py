@@ -38,11 +38,12 @@ from evonav.evaluation.settings import Books, SpendingSettings, try_decisions
 from evonav.evaluation.store import FILE_NAME, RunStore
 from evonav.evaluation.sweep_file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
 from evonav.folders import write_atomically, writing
+from evonav.parallel import Resources
 from evonav.tasks.subsets import subset_roots
 
 SWEEP_NAME, RUNS_NAME = "sweep.json", "runs"
 SCHEMA_VERSION = 1
-_HOW = {"out", "workers", "engine", "ray_address", "num_retries", "stage_timeout_s", "agent_timeout_s"}
+_HOW = {"out", "workers", "engine", "ray_address", "worker_gpus", "num_retries", "stage_timeout_s", "agent_timeout_s"}
 """Of a file: how it is run, no part of what."""
 
 
@@ -294,6 +295,7 @@ def run_sweep(
             engine=sweep.engine,
             num_workers=num_workers,
             ray_address=sweep.ray_address,
+            resources=Resources(num_gpus=sweep.worker_gpus),
             num_retries=NUM_RETRIES if sweep.num_retries is None else sweep.num_retries,
             retry_errored=retry_errored,
             on_progress=lambda index, news: on_progress(todo[index].cell, news),

@@ -113,6 +113,8 @@ class SweepFile(Settings):
     """Processes of this machine, or Ray."""
     ray_address: str | None = None
     """Of a cluster that shares this file system; default: one on this machine."""
+    worker_gpus: float = Field(default=0.0, ge=0.0)
+    """Ray: GPUs set aside for each worker, such as 0.5; for perception that needs one."""
     num_retries: int | None = Field(default=None, ge=0)
     """Of a stage that lost its worker, its simulator or its agent's process."""
     stage_timeout_s: float | None = Field(default=None, gt=0.0)
@@ -246,8 +248,9 @@ def _check(sweep: SweepFile, path: Path) -> None:
                 parse_subset(tasks.subset)
             except SubsetError as error:
                 raise InvalidArgumentError(f"{path}: tasks.{name}.{error}") from None
-    if sweep.ray_address is not None and sweep.engine != "ray":
-        raise InvalidArgumentError(f"{path}: ray_address is for engine = 'ray'")
+    for key in ("ray_address", "worker_gpus"):
+        if getattr(sweep, key) and sweep.engine != "ray":
+            raise InvalidArgumentError(f"{path}: {key} is for engine = 'ray'")
     if sweep.max_cost is not None and sweep.prices is None:
         raise InvalidArgumentError(f"{path}: max_cost = {sweep.max_cost:g} needs prices, a table of what models cost")
     for which in ("include", "exclude"):

@@ -1,0 +1,51 @@
+"""What a shell offers at the tab key. Nothing is imported before it is asked for: commands are to start fast."""
+
+from pathlib import Path
+from typing import Any
+
+
+def agents(incomplete: str) -> list[str]:
+    """Names of agents; after a comma, further ones."""
+    from evonav.agents.registry import agent_descriptions
+    from evonav.evaluation.privileged import YARDSTICKS
+
+    before, comma, last = incomplete.rpartition(",")
+    taken = before.split(",")
+    names = [name for name in (*agent_descriptions(), *YARDSTICKS) if name.startswith(last) and name not in taken]
+    return [f"{before}{comma}{name}" for name in names]
+
+
+def runs(incomplete: str) -> list[str]:
+    """Folders of runs, and folders on the way to some."""
+    return _folders(incomplete, ("records.sqlite",))
+
+
+def task_folders(incomplete: str) -> list[str]:
+    """Folders of tasks, and folders on the way to some."""
+    return _folders(incomplete, ("dataset.json",))
+
+
+def subsets(ctx: Any, incomplete: str) -> list[str]:  # noqa: ANN401 - click's context, or typer's copy
+    """Named subsets of the tasks that the command line names before."""
+    import json
+
+    folder = ctx.params.get("tasks") or ctx.params.get("folder")
+    try:
+        dataset = json.loads((Path(folder) / "dataset.json").read_text(encoding="utf-8"))
+        split, num_tasks = str(dataset["split"]), int(dataset["num_tasks"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+    sizes = sorted({size for size in (10, 30, 90, 300, num_tasks) if size <= num_tasks})
+    return [name for size in sizes if (name := f"{split}-{size}").startswith(incomplete)]
+
+
+def _folders(incomplete: str, names: tuple[str, ...]) -> list[str]:
+    """Folders that begin as typed: with a slash to go on in, without where one of the files is in it."""
+    typed = Path(incomplete)
+    parent, start = (typed, "") if incomplete.endswith("/") or not incomplete else (typed.parent, typed.name)
+    try:
+        folders = sorted(path for path in parent.iterdir() if path.name.startswith(start) and path.is_dir())
+    except OSError:
+        return []
+    shown = [path for path in folders if start.startswith(".") or not path.name.startswith(".")]
+    return [str(path) if any((path / name).is_file() for name in names) else f"{path}/" for path in shown]
