@@ -40,7 +40,8 @@ def writing(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / LOCK_NAME).open("a+")
     except OSError as error:
-        raise StoreError(f"{folder}: {error}") from error
+        said = error.strerror or error
+        raise StoreError(f"{folder}: cannot be made or written: {said}; name another folder") from error
     with file:
         kind, options = _mount_of(folder)
         if kind in _NETWORK and any(option in _UNLOCKED for option in options.split(",")):

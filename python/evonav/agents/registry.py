@@ -48,6 +48,8 @@ def agent_factory(name: str) -> Callable[..., Agent]:
             return imported(entry.value)
     if ":" in name:
         return imported(name)
+    if name.endswith(".py"):
+        raise InvalidArgumentError(f"agent `{name}` is a file: name the class in it, too, such as `{name}:MyAgent`")
     known = ", ".join(sorted(agent_descriptions()))
     raise InvalidArgumentError(
         f"no agent `{name}`; there are {known}, or name a class as `package.module:Class` or `./file.py:Class`"

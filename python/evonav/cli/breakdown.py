@@ -23,12 +23,7 @@ def breakdown(
     csv: Annotated[Path | None, typer.Option(help="CSV file to write, unrounded.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .svg, or .png or .pdf with `[viz]`.")] = None,
 ) -> None:
-    """Shows rates by kind of stage, each with n and a 95% interval by house.
-
-    evonav breakdown out/run
-    evonav breakdown out/run fu ftu --by path-length --measure spl --figure out/length.pdf
-    evonav breakdown out/gpt-4o out/rules --by num_stale_at_start --csv out/stale.csv
-    """
+    """Shows rates by kind of stage, each with n and a 95% interval by house."""
     from rich.console import Console
 
     from evonav.folders import write_atomically

@@ -135,6 +135,7 @@ def decision_settings(options: DecisionOptions) -> "DecisionSettings":
     """
     from evonav.decision.noisy import NoiseRates
     from evonav.decision.rates import read_rates
+    from evonav.errors import InvalidArgumentError
     from evonav.evaluation.settings import DecisionSettings
 
     default = DecisionOptions()
@@ -143,7 +144,10 @@ def decision_settings(options: DecisionOptions) -> "DecisionSettings":
         for name in (field.name for field in fields(DecisionOptions) if field.name not in _NO_SETTINGS)
         if (value := getattr(options, name)) != getattr(default, name)
     }
-    noise = read_rates(options.noise, [field.name for field in fields(NoiseRates)])
+    try:
+        noise = read_rates(options.noise, [field.name for field in fields(NoiseRates)])
+    except InvalidArgumentError as error:
+        raise typer.BadParameter(f"--noise {error}") from None
     settings = DecisionSettings.model_validate({**given, "noise": noise})
     with spelled_as_options():
         settings.check()

@@ -19,13 +19,22 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "demo": ("evonav demo", "evonav demo --limit 4 --out out/short"),
     "failures": ("evonav failures out/run", "evonav failures out/run --agent fu --brief"),
-    "report": ("evonav report out/run",),
+    "report": ("evonav report out/run", "evonav report out/run --replays all"),
     "compare": (
         "evonav compare out/run fu ftu",
         "evonav compare out/gpt-4o out/rules --html out/compare.html",
         "evonav compare out/run --baseline fu",
     ),
-    "paper": ("evonav paper out/run", "evonav paper out/run --out out/run/paper.md"),
+    "breakdown": (
+        "evonav breakdown out/run",
+        "evonav breakdown out/run fu ftu --by path-length --measure spl --figure out/length.pdf",
+        "evonav breakdown out/gpt-4o out/rules --by num_stale_at_start --csv out/stale.csv",
+    ),
+    "export": (
+        "evonav export out/run --csv out/stages.csv --parquet out/stages.parquet",
+        "evonav export out/run --rounds --parquet out/rounds.parquet",
+    ),
+    "paper": ("evonav paper out/run", "evonav paper out/run --latex out/tables.tex"),
     "strip": ("evonav strip out/run --agents fu,ftu --out episode.svg",),
     "view": ("evonav view out/run --open", "evonav view out/run --agent ftu --stage 2"),
     "generate": (
@@ -51,6 +60,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "controlled generate": ("evonav controlled generate houses.jsonl.gz --out out/fixed --limit 60",),
     "controlled evaluate": ("evonav controlled evaluate out/fixed --agents fu,stage-reset,ftu",),
     "controlled report": ("evonav controlled report out/fixed",),
+    "controlled picture": ("evonav controlled picture out/fixed --agent fu --out pair.svg",),
 }
 """By the words of the command."""
 

@@ -5,20 +5,18 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli.options import RunFolder
+
 
 def export(
-    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    run: RunFolder,
     csv: Annotated[Path | None, typer.Option(help="CSV file to write.")] = None,
     jsonl: Annotated[Path | None, typer.Option(help="File of JSON lines to write.")] = None,
     parquet: Annotated[Path | None, typer.Option(help="Parquet file to write, with `[data]`.")] = None,
     rounds: Annotated[bool, typer.Option("--rounds", help="One row a decision round, not a stage.")] = False,
     agent: Annotated[list[str] | None, typer.Option(help="Only this agent; repeat it for more.")] = None,
 ) -> None:
-    """Writes one row a stage, or a decision round, with every measure (docs/measures.md).
-
-    evonav export out/run --csv out/stages.csv --parquet out/stages.parquet
-    evonav export out/run --rounds --parquet out/rounds.parquet
-    """
+    """Writes one row a stage, or a decision round, with every measure (docs/measures.md)."""
     from evonav.report import export as made
 
     asked = {".csv": csv, ".jsonl": jsonl, ".parquet": parquet}

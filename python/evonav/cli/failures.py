@@ -4,11 +4,11 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.options import Run
+from evonav.cli.options import RunFolder
 
 
 def failures(
-    run: Run,
+    run: RunFolder,
     agent: Annotated[str | None, typer.Option(help="Only of this agent.")] = None,
     brief: Annotated[bool, typer.Option("--brief", help="Without tracebacks.")] = False,
 ) -> None:

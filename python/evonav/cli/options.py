@@ -28,7 +28,7 @@ OneAgent = Annotated[
         autocompletion=completion.agents,
     ),
 ]
-Run = Annotated[Path, typer.Argument(help="Folder of a run.", autocompletion=completion.runs)]
+RunFolder = Annotated[Path, typer.Argument(help="Folder of a run.", autocompletion=completion.runs)]
 InProcess = Annotated[
     bool,
     typer.Option("--in-process", help="Agents in the evaluator's process, for debuggers: only exceptions are held."),

@@ -32,12 +32,15 @@ def paper(
     """Shows the paper's Tables 1 and 2 beside a run's, the order of agents, and what its differences could tell."""
     from rich.console import Console
 
+    from evonav.errors import StoreError
     from evonav.folders import write_atomically
     from evonav.report.paper import paper_markdown, paper_tables, power_table
     from evonav.report.paper_latex import paper_latex
     from evonav.report.run import load_run
 
     loaded = load_run(run)
+    if not any(summary.n for summary in loaded.summaries):
+        raise StoreError(f"{run}: no stage of it is scored yet: `evonav evaluate` goes on with it")
     console = Console()
     for table in (*paper_tables(loaded, perception.value), power_table(loaded.pairs, perception.value)):
         console.print(table.rich())

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import print_table
+from evonav.cli.options import RunFolder
 from evonav.cli.view import replay_pages
 
 if TYPE_CHECKING:
@@ -15,7 +16,7 @@ NUM_REPLAYS = 2
 
 
 def report(
-    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    run: RunFolder,
     out: Annotated[Path | None, typer.Option(help="Where to write; default: RUN.")] = None,
     replays: Annotated[
         str,
@@ -39,7 +40,7 @@ def report(
 
 
 def strip(
-    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    run: RunFolder,
     out: Annotated[Path, typer.Option(help="SVG file to write.")],
     task: Annotated[str | None, typer.Argument(help="Id of a task of the run; default: the most telling one.")] = None,
     agents: Annotated[str, typer.Option(help="Agents of the run, comma-separated: a row each.")] = "ftu",

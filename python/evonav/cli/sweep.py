@@ -52,7 +52,7 @@ def sweep(
         _print_schema()
         return
     if file is None:
-        raise typer.BadParameter("name a sweep file, such as examples/sweep.toml")
+        raise typer.BadParameter("name a sweep file, such as examples/sweeps/noise.toml")
     from evonav.evaluation.sweep import cell_runs, cells_of, chosen, task_sets
     from evonav.evaluation.sweep_file import read_sweep
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import status
-from evonav.cli.options import Run
+from evonav.cli.options import RunFolder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def view(
-    run: Run,
+    run: RunFolder,
     task: Annotated[str | None, typer.Option(help="Id of a task of the run; default: the most telling one.")] = None,
     agent: Annotated[str, typer.Option(help="Agents of the run, comma-separated; default: all.")] = "",
     stage: Annotated[int | None, typer.Option(min=1, help="Show this stage alone.")] = None,

@@ -130,6 +130,8 @@ def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
         else:
             check_importable(name)
     except InvalidArgumentError as error:
+        if ":" in name or name.endswith(".py"):
+            raise
         near = get_close_matches(name, (*agent_descriptions(), *YARDSTICKS), 1)
         hint = f"; did you mean `{near[0]}`?" if near else f"; yardsticks are {', '.join(sorted(YARDSTICKS))}"
         raise InvalidArgumentError(f"{error}{hint}") from error

@@ -10,6 +10,7 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 
 from evonav.agents.registry import imported
@@ -26,6 +27,14 @@ from evonav.evaluation.settings import EXCHANGES_NAME
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.traced import TracedRound, TracedStage
 from evonav.evaluation.tracer import Loss, Tracer
+
+
+def _near(run_dir: Path, task_id: str) -> str:
+    """Names a task of a run that may have been meant."""
+    with RunStore(run_dir) as store:
+        names = sorted(store.meta("num_stages") or {})
+    near = get_close_matches(task_id, names, 1, cutoff=0.0)
+    return f"; there is {near[0]}" if near else ""
 
 
 class RunReplay:
@@ -92,7 +101,9 @@ class RunReplay:
             stored = {k: record for k, record in stored.items() if last_stage is None or k <= last_stage}
             maps = {stage_map.stage: stage_map for stage_map in store.maps(task_id)}
         if not stored:
-            raise InvalidArgumentError(f"{self._run_dir}: no record of task {task_id!r} by agent {agent!r}")
+            raise InvalidArgumentError(
+                f"{self._run_dir}: no record of task {task_id!r} by agent {agent!r}{_near(self._run_dir, task_id)}"
+            )
         case = self.backend.load_case(self._task_path(task_id))
         for stage in self._stages(case, agent, stored, maps, on_round):
             yield replace(stage, differences=_differences(texts.get(stage.record.stage), stage))

@@ -33,7 +33,9 @@ def most_telling(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[
             if best is None or score > best[0]:
                 best = (score, task_id, shown)
     if best is None:
-        raise InvalidArgumentError(f"{run.run_dir}: no task has records of {', '.join(agents)}")
+        there = sorted({agent for agent, _, _ in run.outcomes})
+        hint = f"it has some of {', '.join(there)}" if there else "nothing was run yet: `evonav evaluate` goes on"
+        raise InvalidArgumentError(f"{run.run_dir}: no task has records of {', '.join(agents)}; {hint}")
     return best[1], best[2]
 
 

@@ -242,5 +242,16 @@ def task_roots(directory: Path) -> list[Path]:
     except OSError as error:
         raise TaskError(f"{directory}: cannot be read: {error.strerror or error}") from error
     if not roots:
-        raise TaskError(f"{directory}: holds no task (expected */task.json)")
+        raise TaskError(f"{directory}: {_why_no_task(directory)}")
     return roots
+
+
+def _why_no_task(directory: Path) -> str:
+    """What a folder is in which tasks were looked for, and what was perhaps meant."""
+    if (directory / "task.json").is_file():
+        return f"is a task itself: name the folder that holds it, {directory.parent}"
+    if not directory.exists():
+        return "holds no task, there is no such folder; `evonav generate` makes one, bundled tasks need none"
+    if not directory.is_dir():
+        return "holds no task, it is a file: name a folder of tasks"
+    return "holds no task (expected */task.json); `evonav generate` makes some"

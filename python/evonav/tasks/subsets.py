@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from evonav.errors import TaskError
-from evonav.tasks.dataset import DatasetRecord, TaskEntry, read_dataset
+from evonav.tasks.dataset import DATASET_NAME, DatasetRecord, TaskEntry, read_dataset
 from evonav.tasks.records import sha256_of
 
 _SALT = "evonav-subset-1:"
@@ -75,6 +75,12 @@ def subset_roots(folder: Path | str, name: str) -> list[Path]:
         SubsetError: As for `subset_of`, or a task of the subset is not there.
         TaskError: There is no `dataset.json`, or it is malformed.
     """
+    parse_subset(name)
+    if not (Path(folder) / DATASET_NAME).is_file():
+        raise SubsetError(
+            f"subset {name!r}: {folder} has no {DATASET_NAME}, which `evonav generate` writes and named subsets need; "
+            "a limit takes the first N of any folder"
+        )
     roots = [Path(folder) / entry.task_id for entry in subset_of(read_dataset(folder), name)]
     for root in roots:
         if not (root / "task.json").is_file():

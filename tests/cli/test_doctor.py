@@ -1,0 +1,130 @@
+"""`evonav doctor`: what it finds, what it tells, and with which exit code."""
+
+import json
+import re
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from threading import Thread
+
+import pytest
+from typer.testing import CliRunner
+
+from evonav.cli import app, doctor_checks
+from evonav.cli.doctor_checks import EXTRAS, Where, all_checks
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch):
+    monkeypatch.setattr(doctor_checks, "RENDER_S", 0.02)
+    for name in ("OPENAI_API_KEY", "OPENAI_BASE_URL"):
+        monkeypatch.delenv(name, raising=False)
+
+
+def found(tmp_path, **where):
+    return {check.name: check for check in all_checks(Where(tmp_path, **where))}
+
+
+def test_a_machine_on_which_evonav_works(tmp_path):
+    checks = found(tmp_path / "not" / "there")
+    assert [name for name, check in checks.items() if check.is_essential] == [
+        "evonav",
+        "python",
+        "bundled tasks",
+        "renderer",
+    ]
+    assert all(check.state == "ok" for check in checks.values() if check.is_essential)
+    assert re.search(r"[1-9]\d* views/s of 300x300", checks["renderer"].said)
+    assert checks["bundled tasks"].said.startswith("24,")
+    assert str(tmp_path) in checks["run folder"].said
+    assert "locks work" in checks["run folder"].said
+    assert list(tmp_path.iterdir()) == []
+    assert all(check.remedy for check in checks.values() if check.state == "failed")
+
+
+def test_the_command_prints_a_line_a_check_and_json(tmp_path):
+    done = CliRunner().invoke(app, ["doctor", "--out", str(tmp_path), "--no-network"])
+    assert done.exit_code == 0
+    names = list(found(tmp_path))
+    assert len(done.stdout.splitlines()) == len(names)
+    as_json = CliRunner().invoke(app, ["doctor", "--json", "--no-network"])
+    content = json.loads(as_json.stdout)
+    assert content["is_ok"]
+    assert [check["name"] for check in content["checks"]] == names
+
+
+def test_the_exit_code_is_of_what_is_essential(tmp_path, monkeypatch):
+    monkeypatch.setattr(doctor_checks, "_gpu", lambda: 1 / 0)
+    assert CliRunner().invoke(app, ["doctor", "--no-network"]).exit_code == 0
+    monkeypatch.setattr(doctor_checks, "_renderer", lambda: 1 / 0)
+    done = CliRunner().invoke(app, ["doctor", "--no-network"])
+    assert done.exit_code == 1
+    assert "ZeroDivisionError" in done.stdout
+    assert found(tmp_path)["renderer"].is_essential
+
+
+def test_every_extra_is_looked_for():
+    """As `pyproject.toml` has them."""
+    text = (ROOT / "pyproject.toml").read_text()
+    section = text.split("[project.optional-dependencies]")[1].split("\n[")[0]
+    declared = dict(re.findall(r"^(\w+) = \[(.*)\]$", section, re.MULTILINE))
+    packages = {
+        name: {re.split(r"[\[<>=]", word)[0] for word in re.findall(r'"([^"]+)"', part)}
+        for name, part in declared.items()
+    }
+    packages["video"] = {"imageio", "av"}  # imageio[pyav]
+    assert {extra: set(names) for extra, (names, _) in EXTRAS.items()} == packages
+
+
+def test_a_missing_extra_says_how_to_get_it(monkeypatch, tmp_path):
+    monkeypatch.setitem(EXTRAS, "viz", (("no-such-package",), "figures"))
+    check = found(tmp_path)["extra viz"]
+    assert (check.state, check.remedy) == ("missing", "pip install 'evonav[viz]'")
+    assert "no-such-package" in check.said
+
+
+def test_a_folder_that_cannot_be_written_or_locked(monkeypatch, tmp_path):
+    monkeypatch.setattr(doctor_checks, "_has_locks", lambda path: False)
+    assert found(tmp_path)["run folder"].state == "failed"
+    assert "local disk" in found(tmp_path)["run folder"].remedy
+
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(doctor_checks.tempfile, "TemporaryDirectory", refuse)
+    assert "Permission denied" in found(tmp_path)["run folder"].said
+
+
+@pytest.mark.parametrize(("status", "state", "words"), [(200, "ok", "answers"), (401, "failed", "OPENAI_API_KEY")])
+def test_an_endpoint_is_asked_only_where_it_may_be(monkeypatch, tmp_path, status, state, words):
+    asked = []
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self):
+            asked.append((self.path, self.headers["Authorization"]))
+            self.send_response(status)
+            self.send_header("Content-Length", "2")
+            self.end_headers()
+            self.wfile.write(b"{}")
+
+        def log_message(self, *_):
+            pass
+
+    monkeypatch.setenv("OPENAI_API_KEY", "sk-canary")
+    server = HTTPServer(("127.0.0.1", 0), Handler)
+    Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        url = f"http://127.0.0.1:{server.server_port}/v1"
+        assert found(tmp_path, base_url=url, uses_network=False)["model endpoint"].state == "ok"
+        assert asked == []
+        check = found(tmp_path, base_url=url)["model endpoint"]
+    finally:
+        server.shutdown()
+        server.server_close()
+    assert asked == [("/v1/models", "Bearer sk-canary")]
+    assert check.state == state
+    assert words in check.said + check.remedy
+    assert "canary" not in check.said + check.remedy
+    lost = found(tmp_path, base_url=url)["model endpoint"]
+    assert lost.state == "failed"
