@@ -52,7 +52,7 @@ def test_examples_are_shown_below_the_help():
 
 def test_agents_are_completed_also_after_a_comma():
     assert completion.agents("ft") == ["ftu"]
-    assert completion.agents("fu,sta") == ["fu,stage-reset"]
+    assert completion.agents("fu,stag") == ["fu,stage-reset"]
     assert "fu,fu" not in completion.agents("fu,")
     assert "shortest-path" in completion.agents("")
 
@@ -79,13 +79,14 @@ def test_runs_and_subsets_are_completed(tmp_path, monkeypatch):
 def test_the_shell_gets_its_answers():
     """As bash asks: the words so far in the environment."""
     code = "from evonav.cli import app; app(prog_name='evonav')"
-    asked = {"_EVONAV_COMPLETE": "complete_bash", "COMP_WORDS": "evonav evaluate --agents sta", "COMP_CWORD": "3"}
+    asked = {"_EVONAV_COMPLETE": "complete_bash", "COMP_WORDS": "evonav evaluate --agents stag", "COMP_CWORD": "3"}
     done = subprocess.run([sys.executable, "-c", code], env={"PATH": "", **asked}, capture_output=True, text=True)
     assert done.stdout.split() == ["stage-reset"], done.stderr
 
 
 def test_completion_does_not_slow_the_start():
     """Neither defining completions nor examples loads what they are about."""
-    code = "import sys, evonav.cli; print([m for m in sys.modules if m.startswith(('evonav.agents', 'rich.live', 'yaml'))])"
+    heavy = ("evonav.agents", "evonav.decision", "rich.live", "yaml")
+    code = f"import sys, evonav.cli; print([m for m in sys.modules if m.startswith({heavy})])"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed.strip() == "[]"
