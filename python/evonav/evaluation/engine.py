@@ -217,9 +217,7 @@ def _begun(request: RunRequest, num_workers: int, num_retries: int, retry_errore
     # An agent in a process of its own has a limit of its own, for every answer; what is left is for all the rest.
     limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
     with RunStore(request.run_dir, create=True) as store:
-        _claim(store, request.run_dir, request.tasks, config)
-        store.set_meta("agents", sorted({*(store.meta("agents") or []), *request.agents}))
-        store.set_meta("tasks_dir", str(request.tasks[0].path.absolute().parent))  # for `evonav view`
+        _claim(store, request)
         if retry_errored:
             _forget_errored(store, request)
         states = store.states()
@@ -316,13 +314,18 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
     }
 
 
-def _claim(store: RunStore, run_dir: Path, tasks: Sequence[TaskFile], config: RunConfig) -> None:
+def _claim(store: RunStore, request: RunRequest) -> None:
     """Makes the folder this run's, or checks that it is."""
-    asked = run_identity(tasks, config)
+    asked = run_identity(request.tasks, request.config)
     there = store.meta("config")
-    if there is None:
-        store.set_meta("config", asked)
-        store.set_meta("num_stages", {task.task_id: task.num_stages for task in tasks})
-    else:
-        check_same_run(there, asked, run_dir)
-    store.set_meta("task_digests", {task.task_id: task.digest for task in tasks})  # for `evonav pack`
+    if there is not None:
+        check_same_run(there, asked, request.run_dir)
+    store.set_header(
+        {
+            "config": asked,
+            "num_stages": {task.task_id: task.num_stages for task in request.tasks},
+            "agents": sorted({*(store.meta("agents") or []), *request.agents}),
+            "tasks_dir": str(request.tasks[0].path.absolute().parent),  # for `evonav view`
+            "task_digests": {task.task_id: task.digest for task in request.tasks},  # for `evonav pack`
+        }
+    )

@@ -7,10 +7,11 @@ its traceback, in `failures`.
 """
 
 import json
+import shutil
 import sqlite3
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
@@ -29,24 +30,24 @@ _ADD_FAILURE = (
     "INSERT INTO failures (agent, task_id, stage, kind, message, traceback, is_retried) VALUES (?, ?, ?, ?, ?, ?, ?)"
 )
 
-_SCHEMA = """
-CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS stages (
+_TABLES = {
+    "meta": "(key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID",
+    "stages": """(
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
     state TEXT NOT NULL CHECK (state IN ('success', 'failure', 'errored', 'not_run', 'forced')),
     record TEXT NOT NULL,
     PRIMARY KEY (agent, task_id, stage)
-) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS stage_maps (
+) WITHOUT ROWID""",
+    "stage_maps": """(
     task_id TEXT NOT NULL, stage INTEGER NOT NULL, map TEXT NOT NULL,
     PRIMARY KEY (task_id, stage)
-) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS timings (
+) WITHOUT ROWID""",
+    "timings": """(
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
     wall_s REAL NOT NULL, cpu_s REAL NOT NULL,
     PRIMARY KEY (agent, task_id, stage)
-) WITHOUT ROWID;
-"""
+) WITHOUT ROWID""",
+}
 
 # Later than the first runs of this schema version: a run without them is read as if they were empty.
 # Measures are derived from the record (`evonav.evaluation.measures`), so that tables need no traces.
@@ -101,22 +102,34 @@ class RunStore:
             if create:
                 run_dir.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(self.path, isolation_level=None, timeout=30.0)
-            self._db.execute("PRAGMA synchronous = FULL")
-            if create:
-                # A write-ahead log needs memory that all readers share, which a network file system does not give.
-                self._db.execute(f"PRAGMA journal_mode = {'DELETE' if is_on_network(run_dir) else 'WAL'}")
-                self._db.executescript(_SCHEMA)
-                sync_folder(run_dir.absolute().parent)
-            self._db.execute("PRAGMA temp_store = MEMORY")
-            there = {name for (name,) in self._db.execute("SELECT name FROM sqlite_master")}
-            for name in _LATER.keys() - there:
-                self._db.execute(f"CREATE {'' if create else 'TEMP '}TABLE {name} {_LATER[name]}")
-            version = self.meta("schema_version")
         except (sqlite3.Error, OSError) as error:
             raise StoreError(f"{self.path}: {error}") from error
-        if version is None and create:
-            self.set_meta("schema_version", SCHEMA_VERSION)
-        elif version != SCHEMA_VERSION:
+        try:
+            self._open(create)
+        except (sqlite3.Error, OSError) as error:
+            self._db.close()
+            raise StoreError(f"{self.path}: {error}") from error
+        except BaseException:
+            self._db.close()
+            raise
+
+    def _open(self, create: bool) -> None:
+        for pragma in ("synchronous = FULL", "temp_store = MEMORY"):
+            self._db.execute(f"PRAGMA {pragma}")
+        tables = _LATER
+        if create:
+            # A write-ahead log needs memory that all readers share, which a network file system does not give.
+            self._db.execute(f"PRAGMA journal_mode = {'DELETE' if is_on_network(self.path.parent) else 'WAL'}")
+            sync_folder(self.path.absolute().parent.parent)
+            tables = {**_TABLES, **_LATER}
+        with self._transaction() if create else nullcontext():
+            there = {name for (name,) in self._db.execute("SELECT name FROM sqlite_master")}
+            for name in tables.keys() - there:
+                self._db.execute(f"CREATE {'' if create else 'TEMP '}TABLE {name} {tables[name]}")
+            if create and "meta" not in there:
+                self._db.execute("INSERT INTO meta VALUES ('schema_version', ?)", (_json(SCHEMA_VERSION),))
+        version = self.meta("schema_version")
+        if version != SCHEMA_VERSION:
             raise StoreError(f"{self.path}: schema version {version}, this evonav reads {SCHEMA_VERSION}")
 
     def __enter__(self) -> "RunStore":
@@ -138,7 +151,13 @@ class RunStore:
 
     def set_meta(self, key: str, value: Any) -> None:  # noqa: ANN401 - JSON
         """Sets a JSON value of the run's header."""
-        self._execute("INSERT OR REPLACE INTO meta VALUES (?, ?)", (key, _json(value)))
+        self.set_header({key: value})
+
+    def set_header(self, values: Mapping[str, Any]) -> None:
+        """Sets JSON values of the run's header, all or none."""
+        with self._transaction():
+            rows = [(key, _json(value)) for key, value in values.items()]
+            self._db.executemany("INSERT OR REPLACE INTO meta VALUES (?, ?)", rows)
 
     def states(self) -> dict[tuple[str, str, int], EndState]:
         """End state of every recorded (agent, task, stage)."""
@@ -310,7 +329,11 @@ class RunStore:
             with suppress(sqlite3.Error):  # a disk that is full may have ended it already
                 if self._db.in_transaction:
                     self._db.execute("ROLLBACK")
-            raise StoreError(f"{self.path}: {what}{error}") from error
+            free_mb = shutil.disk_usage(self.path.parent).free >> 20
+            raise StoreError(
+                f"{self.path}: {what}{error} ({free_mb} MB are free there); "
+                "what is recorded is safe, and the same command goes on from it"
+            ) from error
 
 
 def _what_is_there(run_dir: Path) -> str:

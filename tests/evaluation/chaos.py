@@ -1,0 +1,130 @@
+"""Kills processes of a run at random instants, until it is done: `python tests/evaluation/chaos.py --help`.
+
+The same run is made twice, undisturbed and disturbed; their records must be the same. A killed driver is started again,
+as its user would; killed workers and agents are the driver's business.
+"""
+
+import argparse
+import json
+import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections import Counter
+from contextlib import closing, suppress
+from pathlib import Path
+
+from evonav.evaluation.store import FILE_NAME, RunStore
+
+VICTIMS = {"driver": None, "worker": "multiprocessing.spawn", "agent": "evonav.agents.serving"}
+
+
+def children(pid):
+    """Processes that descend from one, by their command lines."""
+    parents, lines = {}, {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with suppress(OSError, IndexError):
+                parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+                lines[int(entry.name)] = (entry / "cmdline").read_bytes().replace(b"\0", b" ").decode()
+    found, fresh = {}, {pid}
+    while fresh:
+        fresh = {child for child, parent in parents.items() if parent in fresh}
+        found |= {child: lines.get(child, "") for child in fresh}
+    return found
+
+
+def num_recorded(run_dir):
+    path = run_dir / FILE_NAME
+    if not path.exists():
+        return 0
+    with suppress(sqlite3.Error), closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=5.0)) as database:
+        return database.execute("SELECT count(*) FROM timings").fetchone()[0]
+    return 0
+
+
+def disturb(command, run_dir, num_stages, num_kills, seed, environment=None):
+    """Runs a command until it ends by itself, killing its processes meanwhile.
+
+    Returns:
+        Kills by victim.
+    """
+    draw = random.Random(seed)
+    moments = sorted(draw.sample(range(num_stages - 1), num_kills))
+    kills = Counter()
+
+    def start():
+        quiet = subprocess.DEVNULL
+        return subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet, env=environment)
+
+    driver = start()
+    try:
+        for moment in moments:
+            while num_recorded(run_dir) < moment:
+                assert driver.poll() is None, f"the run ended by itself with {driver.returncode}"
+                time.sleep(0.02)
+            time.sleep(draw.uniform(0.0, 1.0))
+            victim = draw.choice(sorted(VICTIMS))
+            part = VICTIMS[victim]
+            among = (
+                [driver.pid] if part is None else [pid for pid, line in children(driver.pid).items() if part in line]
+            )
+            if not among or driver.poll() is not None:
+                victim, among = "driver", [driver.pid]
+            with suppress(ProcessLookupError):
+                os.kill(draw.choice(among), signal.SIGKILL)
+            kills[victim] += 1
+            if victim == "driver":
+                driver.wait(timeout=60)
+                driver = start()
+        while driver.wait() not in (0, 3):  # 3: incomplete
+            driver = start()
+    finally:
+        driver.kill()
+        driver.wait()
+    return kills
+
+
+def texts(run_dir):
+    with RunStore(run_dir) as store:
+        return [*store.record_texts(), *(plan.model_dump_json() for plan in store.maps())]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--tasks", required=True)
+    parser.add_argument("--agents", default="fu")
+    parser.add_argument("--limit", type=int, default=60)
+    parser.add_argument("--workers", default="2")
+    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, required=True)
+    options = parser.parse_args()
+    evonav = str(Path(sys.executable).with_name("evonav"))
+    command = [evonav, "evaluate", "--agents", options.agents, "--tasks", options.tasks, "--limit", str(options.limit)]
+    command += ["--workers", options.workers, "--out"]
+    whole, disturbed = options.out / "whole", options.out / "disturbed"
+    began_s = time.monotonic()
+    subprocess.run([*command, str(whole)], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    whole_s = time.monotonic() - began_s
+    num_stages = num_recorded(whole)
+    began_s = time.monotonic()
+    kills = disturb([*command, str(disturbed)], disturbed, num_stages, options.kills, options.seed)
+    with RunStore(disturbed) as store:
+        retries = Counter(row.kind.value for row in store.failures() if row.is_retried)
+    told = {
+        "stages": num_stages,
+        "kills": kills,
+        "retries": retries,
+        "seconds": [round(whole_s, 1), round(time.monotonic() - began_s, 1)],
+        "records_equal": texts(whole) == texts(disturbed),
+        "summaries_equal": (whole / "summary.json").read_bytes() == (disturbed / "summary.json").read_bytes(),
+    }
+    sys.stdout.write(json.dumps(told) + "\n")
+
+
+if __name__ == "__main__":
+    main()

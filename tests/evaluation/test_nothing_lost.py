@@ -1,0 +1,255 @@
+"""A finished stage stays, whatever becomes of processes, disk and power."""
+
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from chaos import children, disturb, num_recorded, texts
+from power_loss import Disk, read_log
+from test_engine import CONFIG
+from toy_house import EPISODES, write_tasks
+
+from evonav import folders
+from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.store import RunStore
+from evonav.folders import write_atomically, writing
+
+HERE = Path(__file__).parent
+ONE_THREAD = dict.fromkeys(("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+
+
+@pytest.fixture(scope="module")
+def faults(tmp_path_factory):
+    """Runs a function of `fault_driver.py` with the library that makes faults."""
+    compiler = shutil.which("cc")
+    if compiler is None or sys.platform != "linux":
+        pytest.skip("needs a C compiler and Linux")
+    library = tmp_path_factory.mktemp("faults") / "faults.so"
+    subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", library, HERE / "faults.c", "-ldl"], check=True)
+
+    def run(call):
+        done = subprocess.run(
+            [sys.executable, "-c", f"import fault_driver; fault_driver.{call}"],
+            env={**os.environ, **ONE_THREAD, "LD_PRELOAD": str(library), "PYTHONPATH": str(HERE)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("how", "journal", "step"),
+    [("kill", "WAL", 1), ("kill", "DELETE", 8), ("full", "WAL", 3), ("full", "DELETE", 20), ("broken", "WAL", 4)],
+)
+def test_nothing_is_lost_at_any_call_that_changes_the_folder(faults, tmp_path, how, journal, step):
+    """Killed at it, or refused by a disk that is full from then on, or once by one that is broken.
+
+    Kills at every call; of the rest one in `step`, or every one with EVERY_FAULT set.
+    """
+    step = 1 if "EVERY_FAULT" in os.environ else step
+    write_tasks(tmp_path / "tasks")
+    said = faults(f"main({how!r}, {str(tmp_path)!r}, {journal!r}, {step})")
+    whole, attempts = said["whole"], said["attempts"]
+    assert len(whole) == 3
+    assert len(attempts) * step > 100, len(attempts)
+    for one in attempts:
+        if how == "kill":
+            assert one["code"] == -9, one
+        elif one["code"] != 0:  # of some calls a failure costs nothing
+            assert one["code"] == 7, one
+            assert str(tmp_path) in one["said"]
+        if one["told"]:
+            assert one["opens"] == 0, one
+        kept = one["kept"] or []
+        assert kept == whole[: len(kept)], one["number"]
+        assert len(kept) >= one["told"], one["number"]  # what the driver has said is finished is there
+        assert (one["again"], one["whole"]) == (0, whole), one
+    if how == "full":
+        assert all(one["code"] == 7 for one in attempts)
+    assert max(one["told"] for one in attempts) == 3
+
+
+def test_a_loss_of_power_loses_no_stage(faults, tmp_path):
+    """After every change of the folder, with all that was not synced lost, or a random half of it."""
+    write_tasks(tmp_path / "tasks")
+    whole = faults(f"log({str(tmp_path)!r}, {str(tmp_path / 'log')!r})")
+    disk, num_told, num_cuts = Disk(str(tmp_path / "run")), 0, 0
+    draw = random.Random(0)
+    for op, path, offset, data in read_log(tmp_path / "log"):
+        if op == "mark":
+            num_told = int(path)
+            continue
+        disk.do(op, path, offset, data)
+        for chance in (None, draw):
+            num_cuts += 1
+            after = tmp_path / "after" / "run"
+            shutil.rmtree(after, ignore_errors=True)
+            after.mkdir(parents=True)
+            disk.leave(after, chance)
+            try:
+                kept = texts_of_stages(after)
+            except StoreError:
+                assert num_told == 0
+                kept = []
+            assert kept == whole[: len(kept)]
+            assert len(kept) >= num_told, (num_cuts, op, path)
+            if num_cuts % 60 == 0:
+                evaluate(["random-walk"], task_files(tmp_path / "tasks", 1), after, config=CONFIG, num_workers=0)
+                assert texts_of_stages(after) == whole
+    assert (num_told, len(whole)) == (3, 3)
+    assert num_cuts > 200
+
+
+def texts_of_stages(run):
+    with RunStore(run) as store:
+        return list(store.record_texts())
+
+
+def many_tasks(folder, num):
+    """Tasks that differ in name alone."""
+    for number in range(num):
+        name = f"{list(EPISODES)[number % 2]}-{number:03}"
+        (folder / name).mkdir(parents=True)
+        (folder / name / "task.json").write_text(json.dumps({"task_id": name, "num_stages": 3}))
+    return task_files(folder)
+
+
+CHEAP = RunConfig(
+    backend=Backend(cases="chaos_house:load_case", simulator="chaos_house:make_simulator"),
+    protocol=ProtocolConfig(max_rounds=3),
+)
+DRIVER = """
+import sys
+from pathlib import Path
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
+
+config = RunConfig(
+    backend=Backend(cases="chaos_house:load_case", simulator="chaos_house:make_simulator"),
+    protocol=ProtocolConfig(max_rounds=3),
+)
+evaluate(["random-walk"], task_files(Path(sys.argv[1])), Path(sys.argv[2]), config=config, num_workers=2, num_retries=5)
+"""
+
+
+def resident_mb(pid):
+    fields = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines())
+    return int(fields["VmRSS"].split()[0]) / 1024.0
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs /proc")
+def test_random_kills_change_nothing_and_a_long_run_grows_nothing(tmp_path):
+    """Of the driver (a script without `if __name__ == "__main__"`), its workers and the agents, over 210 stages."""
+    tasks = many_tasks(tmp_path / "tasks", 70)
+    whole, run = tmp_path / "whole", tmp_path / "run"
+    seen = []
+
+    def look(news):
+        if news.num_done in (60, 209):
+            workers = [pid for pid, line in children(os.getpid()).items() if "multiprocessing.spawn" in line]
+            num_open = [len(list(Path(f"/proc/{pid}/fd").iterdir())) for pid in (os.getpid(), *workers)]
+            seen.append((num_open, sum(map(resident_mb, workers))))
+
+    evaluate(["random-walk"], tasks, whole, config=CHEAP, num_workers=1, on_progress=look)
+    (early_open, early_mb), (late_open, late_mb) = seen
+    assert early_open == late_open
+    assert late_mb < 1.05 * early_mb
+    script = tmp_path / "driver.py"
+    script.write_text(DRIVER)
+    command = [sys.executable, str(script), str(tmp_path / "tasks"), str(run)]
+    kills = disturb(command, run, 210, 10, seed=1, environment={**os.environ, "PYTHONPATH": str(HERE)})
+    assert kills.total() == 10
+    assert len(kills) >= 2
+    assert num_recorded(run) == 210
+    assert texts(run) == texts(whole)
+    assert (run / "summary.json").read_bytes() == (whole / "summary.json").read_bytes()
+    with RunStore(run) as store:
+        assert all(failure.is_retried for failure in store.failures())
+
+
+def test_a_full_disk_is_one_clear_error(tmp_path):
+    """On a file system of 300 kB, where one can be had."""
+    small = tmp_path / "small"
+    small.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=300k", "none", str(small)]
+    try:
+        subprocess.run(mount, check=True, capture_output=True)
+    except (OSError, subprocess.CalledProcessError):
+        pytest.skip("no file system can be mounted here")
+    try:
+        tasks = many_tasks(tmp_path / "tasks", 30)
+        with pytest.raises(StoreError, match="0 MB are free there"):
+            evaluate(["random-walk"], tasks, small / "run", config=CHEAP, num_workers=0)
+        kept = texts_of_stages(small / "run")
+        assert 0 < len(kept) < 90
+        subprocess.run(["mount", "-o", "remount,size=20m", str(small)], check=True)
+        evaluate(["random-walk"], tasks, small / "run", config=CHEAP, num_workers=0)
+        evaluate(["random-walk"], tasks, tmp_path / "whole", config=CHEAP, num_workers=0)
+        assert texts(small / "run") == texts(tmp_path / "whole")
+    finally:
+        subprocess.run(["umount", str(small)], check=True)
+
+
+def test_the_second_driver_is_told_of_the_first(tmp_path):
+    write_tasks(tmp_path / "tasks")
+    tasks = task_files(tmp_path / "tasks")
+    with (
+        writing(tmp_path / "run"),
+        pytest.raises(StoreError, match=rf"another evonav is writing here \(process {os.getpid()} on "),
+    ):
+        evaluate(["random-walk"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "is_refused"),
+    [("nfs4", "rw,vers=4.2", False), ("nfs", "rw,nolock", True), ("cifs", "rw,nobrl", True), ("ext4", "rw", False)],
+)
+def test_network_file_systems_have_no_shared_memory_and_some_no_locks(tmp_path, monkeypatch, kind, options, is_refused):
+    mounts = tmp_path / "mounts"
+    where = str(tmp_path).replace(" ", "\\040")
+    mounts.write_text(f"1 0 0:1 / / rw - ext4 /dev/a rw\n2 1 0:2 / {where} rw - {kind} server:/a {options}\n")
+    monkeypatch.setattr(folders, "_MOUNTS", mounts)
+    write_tasks(tmp_path / "tasks")
+    tasks = task_files(tmp_path / "tasks", 1)
+    if is_refused:
+        with pytest.raises(StoreError, match="without locks"):
+            evaluate(["random-walk"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+        return
+    evaluate(["random-walk"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+    with RunStore(tmp_path / "run") as store:
+        (mode,) = store._db.execute("PRAGMA journal_mode").fetchone()
+    assert mode == ("wal" if kind == "ext4" else "delete")
+
+
+def test_an_agent_of_the_running_script_is_refused_at_once(tmp_path):
+    write_tasks(tmp_path / "tasks")
+    with pytest.raises(InvalidArgumentError, match="a module of its own, or use num_workers=0"):
+        evaluate(["__main__:Mine"], task_files(tmp_path / "tasks"), tmp_path / "run", config=CONFIG, num_workers=1)
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_file_that_cannot_be_replaced_stays(tmp_path, monkeypatch):
+    path = tmp_path / "file"
+    write_atomically(path, "old")
+
+    def fail(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(StoreError, match="No space left"):
+        write_atomically(path, "new")
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
+    assert path.read_text() == "old"
