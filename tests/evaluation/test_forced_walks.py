@@ -117,8 +117,16 @@ def test_runs_are_the_same_again():
     assert [record.model_dump_json() for record in first] == [record.model_dump_json() for record in again]
 
 
-def test_a_walk_of_the_evaluators_blocks_nothing_on_the_agents_map(walked):
-    assert all(taken.counters["collisions"] == 0 for record in walked["unigoal"][:2] for taken in record.trace)
+def test_a_walk_of_the_evaluators_blocks_nothing_on_the_agents_map():
+    corners = [(1.0 + 0.05 * i, 3.0 - 0.1 * (i % 2)) for i in range(50)]  # a step of it is no step forward
+    zigzag = ForcedWalk(tuple(corners), Pose(*(corners[-1][0], 0.9, corners[-1][1]), 0.0))
+    case = pair_case(is_evolved=False)
+    case = replace(case, stages=(replace(case.stages[1], forced=zigzag), *case.stages[1:]))
+    walk = run("unigoal", case, ProtocolConfig(max_rounds=1, max_actions=1))[0]
+    steps = [taken.action.action for taken in walk.trace]
+    assert walk.state is EndState.FORCED
+    assert "MOVE_FORWARD" in steps[:-1]
+    assert all(taken.counters["collisions"] == 0 for taken in walk.trace)
 
 
 class Told:

@@ -8,6 +8,7 @@ import numpy as np
 
 from evonav.errors import StoreError
 from evonav.evaluation.measures import StageRow, stage_rows
+from evonav.evaluation.metrics import SUCCESS_RADIUS_M
 from evonav.evaluation.records import StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.paired import PairedEffect, paired_effect
@@ -188,7 +189,7 @@ def _drop_table(analysis: Analysis) -> Table:
 def _caveats(analysis: Analysis) -> list[str]:
     """What a reader has to know of the pairs."""
     first = analysis.arms[0]
-    radius_m = 2.0
+    radius_m = SUCCESS_RADIUS_M
     near = {
         key
         for agent in analysis.paired_agents

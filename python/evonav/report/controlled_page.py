@@ -104,6 +104,8 @@ def _write_telling(analysis: Analysis, out: Path) -> list[dict[str, str]]:
     others = [agent for agent in analysis.agents if agent != BASELINE]
     agent = TELLING_AGENT if TELLING_AGENT in others else next(iter(others), analysis.agents[0])
     found = []
+    for before in (out / PICTURES_DIR).glob("*.svg"):  # of an earlier report, when less was known
+        before.unlink()
     for reason, key in telling_pairs(analysis, agent, per_reason=2):
         name = f"{reason}_{slug(key[0])}_{slug(agent)}.svg"
         folder = out / PICTURES_DIR

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records import EndState, StageMap, StageRecord
+from evonav.evaluation.metrics import SUCCESS_RADIUS_M
+from evonav.evaluation.records import EndState, Point3, StageMap, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.report.causes import sentence
 from evonav.report.controlled import SPLITS, Analysis, Key, split_of
@@ -62,13 +63,16 @@ def load_rollouts(analysis: Analysis, agent: str, key: Key) -> list[Rollout]:
 def telling_pairs(analysis: Analysis, agent: str, per_reason: int = 1) -> list[tuple[str, Key]]:
     """Pairs that show what a moved target does to an agent, each with its reason, a key of `REASONS`.
 
-    Where it was misled, those on whose stale entries it walked farthest come first; else the shortest ways.
+    Of targets that moved by more than the success radius: nearer ones are found at their old places, too. Where it was
+    misled, those on whose stale entries it walked farthest come first; else the shortest ways.
     """
     fixed, evolved = analysis.arms
     ranked: dict[str, list[tuple[float, Key]]] = {reason: [] for reason in REASONS}
     for key in analysis.keys(agent):
         before, after = (analysis.outcomes[arm, agent][key] for arm in (fixed, evolved))
-        if not before.success or split_of(after) != "target":
+        target = after.record.target
+        is_far = target.first_position_m is not None and _is_far(target.first_position_m, target.position_m)
+        if not before.success or split_of(after) != "target" or not is_far:
             continue
         if after.row.num_stale_visits and not after.success:
             ranked["misled"].append((-after.row.stale_path_m, key))
@@ -77,6 +81,10 @@ def telling_pairs(analysis: Analysis, agent: str, per_reason: int = 1) -> list[t
         elif after.success:
             ranked["unharmed"].append((after.row.path_length_m or 0.0, key))
     return [(reason, key) for reason, found in ranked.items() for _, key in sorted(found)[:per_reason]]
+
+
+def _is_far(a: Point3, b: Point3) -> bool:
+    return math.dist((a[0], a[2]), (b[0], b[2])) > SUCCESS_RADIUS_M
 
 
 def write_pair(analysis: Analysis, agent: str, key: Key, path: Path) -> Path:
