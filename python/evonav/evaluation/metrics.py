@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.evaluation.records import EndState, StageRecord
-from evonav.significance import Interval, wilson
+from evonav.significance import Interval, percentile_interval, wilson
 
 SUCCESS_RADIUS_M = 2.0
 NUM_RESAMPLES = 10_000
@@ -96,7 +96,7 @@ class PairedDifference:
 
 
 def bootstrap_means(values: NDArray[np.float64], tasks: Sequence[str], *, seed: int = 0) -> NDArray[np.float64]:
-    """95% percentile intervals of column means, resampling tasks with replacement.
+    """95% intervals of column means, resampling tasks with replacement; widened for few (`percentile_interval`).
 
     Args:
         values: `(N, D)`, one row a stage.
@@ -119,7 +119,7 @@ def bootstrap_means(values: NDArray[np.float64], tasks: Sequence[str], *, seed: 
         count = min(chunk, NUM_RESAMPLES - start)
         drawn = generator.integers(0, len(names), size=(count, len(names)))
         means[start : start + count] = sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1)[:, None]
-    return np.quantile(means, [0.025, 0.975], axis=0).T
+    return percentile_interval(means, len(names))
 
 
 def rates(records: Sequence[StageRecord]) -> Rates:

@@ -79,7 +79,9 @@ def write_plots(plots: Sequence[Plot], path: Path) -> Path:
     figure_class, style = _matplotlib()
     heights = [0.9 + 0.2 * len(plot.gaps) if isinstance(plot, GapPlot) else 3.0 for plot in plots]
     with style.context(_STYLE):
-        figure = figure_class(figsize=(7, sum(heights)), layout="constrained")
+        # Ten names of categories need more room than the paper's column.
+        widest = max([len(plot.groups) for plot in plots if isinstance(plot, GroupPlot)], default=0)
+        figure = figure_class(figsize=(max(7.0, 0.95 * widest), sum(heights)), layout="constrained")
         every = figure.subplots(len(plots), 1, squeeze=False, gridspec_kw={"height_ratios": heights})
         for (axes,), plot in zip(every, plots, strict=True):
             if isinstance(plot, GapPlot):
@@ -131,7 +133,8 @@ def _draw_groups(axes: Any, plot: GroupPlot) -> None:  # noqa: ANN401
             if value is not None and interval is not None:
                 axes.plot((i + shift, i + shift), interval, color=colour, linewidth=1.4, alpha=0.55)
         there = [(i + shift, value) for i, value in enumerate(dots.values) if value is not None]
-        axes.plot([x for x, _ in there], [y for _, y in there], "o", color=colour, ms=3.5, label=dots.name)
+        xs, ys = [x for x, _ in there], [y for _, y in there]
+        axes.plot(xs, ys, "o", color=colour, ms=3.5, label=dots.name, clip_on=False)
     axes.set_xticks(range(len(plot.groups)), plot.groups)
     axes.set_xlim(-0.5, len(plot.groups) - 0.5)
     axes.set_yticks(marks)
