@@ -123,7 +123,7 @@ def _checkable(record: StageRecord) -> str:
     ).model_dump_json()
 
 
-def work(settings: str) -> Callable[[str], str]:
+def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """What a worker of `evonav.parallel` does: a job is a task's folder and records, its answer the differences.
 
     Args:
