@@ -109,8 +109,9 @@ def table(path):
                 values["all"].append(scores(record, radius_m))
                 values[stratum(record)].append(values["all"][-1])
         result[agent] = {
-            "states": Counter(record["state"] for record in records.values())
-            | {"not_run": len(expected - set(records))},
+            "states": Counter(
+                [record["state"] for record in records.values()] + ["not_run"] * len(expected - set(records))
+            ),
             "causes": Counter(cause(record, radius_m) for record in records.values()),
             "means": {
                 name: (len(rows), *(math.fsum(column) / len(rows) for column in zip(*rows, strict=True)))

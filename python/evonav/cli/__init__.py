@@ -17,6 +17,7 @@ from evonav.cli.export import export
 from evonav.cli.failures import failures
 from evonav.cli.generate import generate
 from evonav.cli.houses import houses_app
+from evonav.cli.measures import measures
 from evonav.cli.mock_vlm import mock_vlm
 from evonav.cli.paper import paper
 from evonav.cli.report import report, strip
@@ -43,6 +44,7 @@ COMMANDS = (
     compare,
     breakdown,
     export,
+    measures,
     paper,
     strip,
     view,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.errors import StoreError
 from evonav.evaluation.records import EndState, StageRecord
 from evonav.significance import Interval, percentile_interval, wilson
 
@@ -141,7 +142,13 @@ def rates(records: Sequence[StageRecord]) -> Rates:
 
 
 def summarise(agent: str, records: Sequence[StageRecord], num_stages: int) -> AgentSummary:
-    """One table row. Stages of the run without a record count as not run."""
+    """One table row. Stages of the run without a record count as not run.
+
+    Raises:
+        StoreError: There are more records than stages, or two of one stage: the states would not add up to the run.
+    """
+    if len({(record.task_id, record.stage) for record in records}) != len(records) or len(records) > num_stages:
+        raise StoreError(f"{agent}: {len(records)} records of {num_stages} stages, each at most once: not a run's")
     counts = Counter(record.state for record in records)
     counts[EndState.NOT_RUN] += num_stages - len(records)
     scored = [record for record in records if record.is_scored]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from evonav.agents.agent import Move, NavigateTo
 from evonav.world.pose import Pose
-from evonav.world.simulator import Action, Simulator
+from evonav.world.simulator import Action, OccupancyGrid, Simulator
 
 Point2 = tuple[float, float]
 
@@ -109,11 +109,18 @@ def legs(corners_m: Sequence[Point2], travel_m: float) -> list[tuple[Point2, ...
     return pieces
 
 
+FULL_REACH_M = 1.5
+"""Every target of a task has a free place this near that can be reached."""
+MAX_TRIES = 16
+"""Free cells that are tried for an agent that no path leads from."""
+
+
 class Planner:
     """The simulator's shortest paths, to the nearest reachable place where a point itself is cut off.
 
     The free point nearest to an object may lie in a pocket behind furniture; the paper's reading is the nearest
-    *reachable* one (docs/parity.md).
+    *reachable* one (docs/parity.md), of the grid that the agent's own steps reach. Off the house's grid, those may end
+    at a gap that a path leads through: where they reach nothing near, the occupancy's free cells are tried.
     """
 
     def __init__(self, simulator: Simulator) -> None:
@@ -126,14 +133,40 @@ class Planner:
         pose = self._simulator.pose
         corners = self._simulator.shortest_path(pose.position_m, (target_m[0], pose.y_m, target_m[1]))
         if len(corners) == 0:
-            if self._reachable_m is None:
-                self._reachable_m = self._simulator.reachable_positions()[:, [0, 2]]
-            if len(self._reachable_m) == 0:
-                return []
-            nearest = int(np.hypot(*(self._reachable_m - target_m).T).argmin())
-            x_m, z_m = self._reachable_m[nearest].tolist()
-            corners = self._simulator.shortest_path(pose.position_m, (x_m, pose.y_m, z_m))
+            corners = self._path_near(target_m)
         return [(float(x), float(z)) for x, _, z in corners]
+
+    def _path_near(self, target_m: Point2) -> NDArray[np.float64]:
+        """`(M, 3)` corners to the nearest place that can be reached; `(0, 3)` when there is none."""
+        pose = self._simulator.pose
+        if self._reachable_m is None:
+            self._reachable_m = self._simulator.reachable_positions()[:, [0, 2]]
+        places_m, gaps_m = _by_distance(self._reachable_m, target_m)
+        if not len(gaps_m) or gaps_m[0] > FULL_REACH_M:
+            free_m, free_gaps_m = _by_distance(_free_cells_m(self._simulator.occupancy()), target_m)
+            is_nearer = free_gaps_m[:MAX_TRIES] < (gaps_m[0] if len(gaps_m) else np.inf)
+            for x_m, z_m in free_m[:MAX_TRIES][is_nearer].tolist():
+                corners = self._simulator.shortest_path(pose.position_m, (x_m, pose.y_m, z_m))
+                if len(corners):
+                    return corners
+        if not len(places_m):
+            return np.empty((0, 3))
+        x_m, z_m = places_m[0].tolist()
+        return self._simulator.shortest_path(pose.position_m, (x_m, pose.y_m, z_m))
+
+
+def _by_distance(places_m: NDArray[np.float64], target_m: Point2) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places, the nearest to a point first, and how far they are from it."""
+    gaps_m = np.hypot(*(places_m - np.array(target_m)).T)
+    order = gaps_m.argsort(kind="stable")
+    return places_m[order], gaps_m[order]
+
+
+def _free_cells_m(grid: OccupancyGrid) -> NDArray[np.float64]:
+    """`(N, 2)` middles of the cells that the agent's body reaches from the house's start."""
+    rows, cols = np.nonzero(grid.cells == 0)
+    corner_m = np.array(grid.corner_m, dtype=np.float64)
+    return np.column_stack((cols, rows)) * float(grid.cell_m) + grid.cell_m / 2 + corner_m
 
 
 def navigate(

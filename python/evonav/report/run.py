@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from evonav.errors import StoreError
 from evonav.evaluation.metrics import AgentSummary, PairedDifference, paired_differences, summarise
-from evonav.evaluation.records import StageMap, StageRecord
+from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.evaluation.store import FailureRow, RunStore
 from evonav.report.causes import Cause, cause_of
 from evonav.report.maps import success_radius_of
@@ -128,25 +128,29 @@ def load_run(run_dir: Path) -> Run:
     """Reads a run, finished or not.
 
     Raises:
-        StoreError: There is no run, or it cannot be read.
+        StoreError: There is no run, it cannot be read, or its rows are not those of its stages, each once: no rate of
+            such a run would mean anything.
     """
     with RunStore(run_dir) as store:
         outcomes: dict[tuple[str, str, int], StageOutcome] = {}
         states = store.states()
+        asked_stages = store.meta("num_stages")
         agents = agents_in_order(store.meta("agents"), [agent for agent, _, _ in states])
         digests = {}
         episodes: dict[tuple[str, str], Any] = {}
         for agent in agents:
             digest = hashlib.sha256()
             failed_before: dict[str, int] = {}
-            for text in store.record_texts(agent):
+            keys = sorted(key for key in states if key[0] == agent)
+            for key, text in zip(keys, store.record_texts(agent), strict=True):
                 digest.update(text.encode())
                 digest.update(b"\n")
                 outcome = _outcome(text, run_dir, failed_before)
+                _check(run_dir, key, states[key], outcome.record, asked_stages)
                 outcomes[agent, outcome.record.task_id, outcome.record.stage] = outcome
                 episodes.setdefault((agent, outcome.record.task_id), hashlib.sha256()).update(text.encode())
             digests[agent] = digest.hexdigest()
-        num_stages = _num_stages(store.meta("num_stages"), outcomes)
+        num_stages = _num_stages(asked_stages, outcomes)
         config = store.meta("config") or {}
         notes = {key: value for key in NOTES if (value := store.meta(key)) is not None}
         timings = store.timings()
@@ -170,6 +174,24 @@ def load_run(run_dir: Path) -> Run:
         summaries=tuple(summarise(agent, records[agent], total) for agent in agents),
         pairs=tuple(paired_differences(records)),
     )
+
+
+def _check(
+    run_dir: Path,
+    key: tuple[str, str, int],
+    state: EndState,
+    record: StageRecord,
+    num_stages: Mapping[str, int] | None,
+) -> None:
+    """Refuses a row that is not the one of its stage, or of no stage of the run."""
+    (agent, task_id, stage), held = key, (record.agent, record.task_id, record.stage)
+    if held != key or record.state is not state:
+        what = f"{held[0]}, {held[1]}, stage {held[2]}, {record.state.value}"
+        raise StoreError(
+            f"{run_dir}: the row of {agent}, {task_id}, stage {stage}, {state.value} holds the record of {what}"
+        )
+    if num_stages is not None and not 1 <= stage <= num_stages.get(task_id, 0):
+        raise StoreError(f"{run_dir}: stage {stage} of {task_id} by {agent} is no stage of this run")
 
 
 def _outcome(text: str, run_dir: Path, failed_before: dict[str, int]) -> StageOutcome:

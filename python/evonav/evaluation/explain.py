@@ -1,0 +1,193 @@
+"""What explains a rate: means of `StageRow`'s measures for every agent, with intervals over houses.
+
+Every figure is a ratio of sums: of a share, what is counted over what could have been; of a mean, the sum over the
+stages that have a value. Intervals resample houses, which the stages of a task share.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from evonav.evaluation.measures import StageRow
+from evonav.significance import Interval
+
+NUM_RESAMPLES = 10_000
+RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
+"""Of the sweep over success radii."""
+
+Unit = Literal["%", "", "m", "rounds", "s", "$", "MB"]
+Part = tuple[float, float] | None
+"""What a stage adds to numerator and denominator; `None` where the measure does not apply."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """A column of a table."""
+
+    name: str
+    words: str
+    unit: Unit
+    part: Callable[[StageRow], Part]
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """A measure of one agent."""
+
+    measure: Measure
+    n: int
+    """Stages that have a value."""
+    num_houses: int
+    value: float | None
+    ci95: Interval | None
+    """Percentile bootstrap over houses; `None` with fewer than two."""
+
+
+def _mean(name: str) -> Callable[[StageRow], Part]:
+    def part(row: StageRow) -> Part:
+        value = getattr(row, name)
+        return None if value is None or not row.is_scored else (float(value), 1.0)
+
+    return part
+
+
+def _share(of: str, among: str) -> Callable[[StageRow], Part]:
+    def part(row: StageRow) -> Part:
+        num, den = getattr(row, of), getattr(row, among)
+        return None if num is None or not den or not row.is_scored else (float(num), float(den))
+
+    return part
+
+
+def _right(stale: str, entries: str) -> Callable[[StageRow], Part]:
+    def part(row: StageRow) -> Part:
+        num, den = getattr(row, stale), getattr(row, entries)
+        return None if num is None or not den or not row.is_scored else (float(den - num), float(den))
+
+    return part
+
+
+def _recall(name: str) -> Callable[[StageRow], Part]:
+    def part(row: StageRow) -> Part:
+        recall, num_seen = getattr(row, name), row.num_seen_objects
+        return None if recall is None or not num_seen or not row.is_scored else (recall, 1.0)
+
+    return part
+
+
+def _later(part: Callable[[StageRow], Part]) -> Callable[[StageRow], Part]:
+    return lambda row: part(row) if row.stage > 1 else None
+
+
+def _radius(radius_m: float) -> Callable[[StageRow], Part]:
+    def part(row: StageRow) -> Part:
+        is_success = row.is_success_at(radius_m)
+        return None if is_success is None else (float(is_success), 1.0)
+
+    return part
+
+
+def _clearing(name: str, count: str) -> Callable[[StageRow], Part]:
+    """A stage's mean over what it counted, weighted by the count."""
+
+    def part(row: StageRow) -> Part:
+        value, num = getattr(row, name), getattr(row, count)
+        return None if value is None or not num or not row.is_scored else (value * num, float(num))
+
+    return part
+
+
+SUCCESS = (
+    Measure("sr", "success (paper)", "%", _mean("success")),
+    Measure("strict_sr", "strict success", "%", _mean("is_strict_success")),
+    Measure("geodesic_sr", "geodesic success", "%", _mean("is_geodesic_success")),
+    Measure("spl", "SPL", "%", _mean("spl")),
+    Measure("ring_spl", "SPL to the radius", "%", _mean("ring_spl")),
+    Measure("soft_spl", "SoftSPL", "%", _mean("soft_spl")),
+    *(Measure(f"sr_{radius_m:g}m", f"success at {radius_m:g} m", "%", _radius(radius_m)) for radius_m in RADII_M),
+)
+STALENESS = (
+    Measure("stale_visits", "stale visits", "", _mean("num_stale_visits")),
+    Measure("stale_path_m", "walked for stale entries", "m", _mean("stale_path_m")),
+    Measure("stale_path_share", "of its way", "%", _share("stale_path_m", "path_length_m")),
+    Measure(
+        "stale_evident",
+        "stale entries whose empty place was seen",
+        "%",
+        _share("num_stale_evident", "num_stale_at_start"),
+    ),
+    Measure("stale_cleared", "of them cleared in the stage", "%", _share("num_stale_cleared", "num_stale_evident")),
+    Measure("rounds_to_clear", "rounds until cleared", "rounds", _clearing("rounds_to_clear", "num_stale_cleared")),
+    Measure("metres_to_clear", "metres until cleared", "m", _clearing("metres_to_clear", "num_stale_cleared")),
+    Measure(
+        "moved_found", "moved objects, of those seen, found anew", "%", _share("num_moved_found", "num_moved_seen")
+    ),
+    Measure("rounds_to_find", "rounds until found", "rounds", _clearing("rounds_to_find", "num_moved_found")),
+    Measure("forgotten", "objects forgotten", "", _later(_mean("num_forgotten"))),
+)
+MEMORY = (
+    Measure("entries", "entries at the end", "", _mean("num_entries")),
+    Measure("precision", "precision at the end", "%", _right("num_stale_entries", "num_entries")),
+    Measure("recall", "recall at the end", "%", _recall("recall")),
+    Measure("precision_before", "precision before a change", "%", _mean("precision_before")),
+    Measure("precision_at_start", "precision after it", "%", _later(_mean("precision_at_start"))),
+    Measure("recall_at_start", "recall after it", "%", _later(_recall("recall_at_start"))),
+    Measure("duplicates", "duplicates", "", _mean("num_duplicates")),
+    Measure("position_error_m", "position error", "m", _mean("position_error_m")),
+)
+COSTS = (
+    Measure("wall_s", "wall", "s", _mean("wall_s")),
+    Measure("cpu_s", "CPU", "s", _mean("cpu_s")),
+    Measure("simulation_cpu_s", "simulation", "s", _mean("simulation_cpu_s")),
+    Measure("perception_cpu_s", "perception", "s", _mean("perception_cpu_s")),
+    Measure("agent_cpu_s", "agent", "s", _mean("agent_cpu_s")),
+    Measure("decision_cpu_s", "of it decisions", "s", _mean("decision_cpu_s")),
+    Measure("evaluator_cpu_s", "evaluator", "s", _mean("evaluator_cpu_s")),
+    Measure("questions", "questions", "", _mean("num_questions")),
+    Measure("input_tokens", "tokens in", "", _mean("input_tokens")),
+    Measure("output_tokens", "tokens out", "", _mean("output_tokens")),
+    Measure("cost_usd", "money", "$", _mean("cost_usd")),
+    Measure("agent_peak_rss_mb", "agent's memory", "MB", _mean("agent_peak_rss_mb")),
+)
+MEASURES = {"success": SUCCESS, "staleness": STALENESS, "memory": MEMORY, "costs": COSTS}
+"""By kind. Those of `costs` are of the machine, not of the run's inputs."""
+
+
+def explain(rows: Sequence[StageRow], measures: Sequence[Measure]) -> dict[str, list[Explained]]:
+    """Measures by agent, in the order of the rows.
+
+    Args:
+        rows: Of a run, or of some of its stages.
+        measures: Of `MEASURES`.
+    """
+    agents = dict.fromkeys(row.agent for row in rows)
+    return {
+        agent: [_explained([row for row in rows if row.agent == agent], one) for one in measures] for agent in agents
+    }
+
+
+def _explained(rows: Sequence[StageRow], measure: Measure) -> Explained:
+    parts = [(row.house or row.task_id, part) for row in rows if (part := measure.part(row)) is not None]
+    houses = sorted({house for house, _ in parts})
+    if not parts:
+        return Explained(measure, 0, 0, None, None)
+    index = {house: i for i, house in enumerate(houses)}
+    sums = np.zeros((len(houses), 2))
+    for house, part in parts:
+        sums[index[house]] += part
+    value = float(sums[:, 0].sum() / sums[:, 1].sum())
+    return Explained(measure, len(parts), len(houses), value, _interval(sums) if len(houses) > 1 else None)
+
+
+def _interval(sums: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Interval:
+    generator = np.random.Generator(np.random.PCG64(0))
+    values = np.empty(NUM_RESAMPLES)
+    chunk = max(1, 4_000_000 // len(sums))
+    for start in range(0, NUM_RESAMPLES, chunk):
+        drawn = generator.integers(0, len(sums), size=(min(chunk, NUM_RESAMPLES - start), len(sums)))
+        totals = sums[drawn].sum(axis=1)
+        values[start : start + len(drawn)] = totals[:, 0] / totals[:, 1]
+    low, high = np.quantile(values, [0.025, 0.975])
+    return (float(low), float(high))

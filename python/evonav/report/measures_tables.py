@@ -1,0 +1,68 @@
+"""Tables of what explains the rates: see docs/measures.md."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from evonav.evaluation.explain import MEASURES, Explained, explain
+from evonav.evaluation.measures import StageRow, stage_rows
+from evonav.evaluation.store import RunStore
+from evonav.report.tables import NONE, Table
+
+TITLES = {
+    "success": "Success, by several definitions",
+    "staleness": "Believing what is no longer so",
+    "memory": "Memory against the objects seen so far",
+    "costs": "What a stage costs",
+}
+"""By the kind of measure."""
+_DIGITS = {"%": 1, "": 1, "m": 2, "rounds": 1, "s": 3, "$": 4, "MB": 0}
+
+
+def measures_tables(run_dir: Path, agents: Sequence[str] | None = None) -> list[Table]:
+    """One table a kind of measure; a row a measure, a column an agent.
+
+    Args:
+        run_dir: A run, finished or not.
+        agents: Only these, in this order.
+
+    Raises:
+        StoreError: There is no run, or it cannot be read.
+    """
+    with RunStore(run_dir) as store:
+        rows = stage_rows(store, agents)
+    if agents is not None:
+        rank = {agent: i for i, agent in enumerate(agents)}
+        rows.sort(key=lambda row: rank[row.agent])
+    return [measures_table(rows, kind) for kind in MEASURES]
+
+
+def measures_table(rows: Sequence[StageRow], kind: str) -> Table:
+    """A table of one kind.
+
+    Args:
+        rows: Of a run.
+        kind: Of `MEASURES`.
+    """
+    found = explain(rows, MEASURES[kind])
+    totals = {agent: sum(row.is_scored for row in rows if row.agent == agent) for agent in found}
+    lines = []
+    for index, measure in enumerate(MEASURES[kind]):
+        cells = {agent: explained[index] for agent, explained in found.items()}
+        if any(cell.value is not None for cell in cells.values()):
+            name = f"{measure.words}, {measure.unit}" if measure.unit else measure.words
+            lines.append((name, *(_cell(cell, totals[agent]) for agent, cell in cells.items())))
+    houses = {agent: len({row.house for row in rows if row.agent == agent and row.is_scored}) for agent in found}
+    sizes = "; ".join(f"{agent} {totals[agent]} stages of {houses[agent]} houses" for agent in found)
+    note = f"{sizes}. 95% bootstrap over houses. In parentheses: how many stages have a value, if not all."
+    return Table(TITLES[kind], ("Measure", *found), tuple(lines), (note,))
+
+
+def _cell(cell: Explained, num_stages: int) -> str:
+    if cell.value is None:
+        return NONE
+    scale = 100.0 if cell.measure.unit == "%" else 1.0
+    digits = _DIGITS[cell.measure.unit]
+    text = f"{cell.value * scale:.{digits}f}"
+    if cell.ci95 is not None:
+        text += " [" + ", ".join(f"{end * scale:.{digits}f}" for end in cell.ci95) + "]"
+    return text if cell.n == num_stages else f"{text} ({cell.n})"
