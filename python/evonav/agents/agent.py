@@ -117,7 +117,7 @@ class ExplainingAgent(Protocol):
         ...
 
     def entries(self) -> Sequence[EntryBelief]:
-        """The object memory; asked once, at the end of a stage."""
+        """The object memory; asked as a stage begins and ends, and between rounds when something has come to light."""
         ...
 
 
