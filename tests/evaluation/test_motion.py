@@ -13,11 +13,12 @@ from evonav.agents.agent import NavigateTo, Sensing, ViewSchedule
 from evonav.agents.viewpoint import observation_point
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.cases import _turned_corners, room_at, stage_map
-from evonav.evaluation.motion import Planner, navigate, polyline_length_m, waypoints
+from evonav.evaluation.motion import Planner, length_outside_m, navigate, polyline_length_m, waypoints
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.sensing import view_yaws_rad
 from evonav.sensors.observation import MapFrame
 from evonav.world.pose import Pose
+from evonav.world.simulator import OccupancyGrid
 
 POINTS = st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), min_size=1, max_size=6)
 
@@ -144,3 +145,53 @@ def test_a_pose_that_is_taken_is_snapped_and_recorded():
     assert record.effective_start != record.requested_start
     assert record.effective_start.yaw_rad == 1.25
     assert record.trace[0].pose == record.effective_start
+
+
+class Gap:
+    """A simulator whose steps end at a gap that its paths lead through; the target itself stands in a pocket."""
+
+    TARGET = (5.0, 0.9, 0.5)
+
+    def __init__(self, is_cut_off=False, steps_reach_m=1.0):
+        self.pose = Pose(0.5, 0.9, 0.5, 0.0)
+        self.is_cut_off = is_cut_off
+        self.steps_reach_m = steps_reach_m
+        self.num_asked = 0
+
+    def shortest_path(self, start, target):
+        self.num_asked += 1
+        is_step = target[0] <= self.steps_reach_m
+        if target == self.TARGET or (self.is_cut_off and not is_step):
+            return np.empty((0, 3))
+        return np.array([start, target])
+
+    def reachable_positions(self):
+        return np.array([[0.5, 0.9, 0.5], [self.steps_reach_m, 0.9, 0.5]])
+
+    def occupancy(self):
+        cells = np.zeros((1, 10), dtype=np.uint8)
+        cells[0, 9] = 1
+        return OccupancyGrid(cells=cells, cell_m=0.5, corner_m=(0.0, 0.25))
+
+
+@pytest.mark.parametrize(
+    ("simulator", "end_m"),
+    [
+        (Gap(), (4.25, 0.5)),  # the free cell nearest to the target
+        (Gap(steps_reach_m=3.75), (3.75, 0.5)),  # steps reach near enough: as ever
+        (Gap(is_cut_off=True), (1.0, 0.5)),  # no path anywhere: what steps reach
+    ],
+)
+def test_a_target_in_a_pocket_is_approached_through_gaps_that_steps_do_not_pass(simulator, end_m):
+    assert Planner(simulator).path_m((5.0, 0.5))[-1] == pytest.approx(end_m)
+    assert simulator.num_asked <= 20
+
+
+def test_the_way_to_a_radius_ends_where_the_path_first_enters_it():
+    corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 5.0)]
+    assert length_outside_m(corners, (4.0, 5.0), 2.0) == pytest.approx(7.0)
+    assert length_outside_m(corners, (3.0, 1.0), 1.0) == pytest.approx(3.0)  # touched on the way, at (3, 0)
+    assert length_outside_m(corners, (4.0, 9.0), 2.0) == pytest.approx(9.0)  # never reached
+    assert length_outside_m(corners, (0.5, 0.0), 2.0) == 0.0
+    assert length_outside_m([(0.0, 0.0)], (5.0, 0.0), 2.0) == 0.0
+    assert length_outside_m([], (5.0, 0.0), 2.0) == 0.0
