@@ -24,6 +24,7 @@ from evonav.cli.report import report, strip
 from evonav.cli.submission import pack, verify
 from evonav.cli.sweep import sweep
 from evonav.cli.tasks import tasks_app
+from evonav.cli.video import rerun, video
 from evonav.cli.view import view
 
 EXIT_ERROR = 1
@@ -48,6 +49,8 @@ COMMANDS = (
     paper,
     strip,
     view,
+    video,
+    rerun,
     generate,
     check_agent,
     pack,

@@ -40,19 +40,28 @@ def _near(run_dir: Path, task_id: str) -> str:
 class RunReplay:
     """The episodes of a run, by agent and task."""
 
-    def __init__(self, run_dir: Path, task_path: Callable[[str], Path], exchanges: Path | None = None) -> None:
+    def __init__(
+        self,
+        run_dir: Path,
+        task_path: Callable[[str], Path],
+        exchanges: Path | None = None,
+        *,
+        heading_px: int | None = None,
+    ) -> None:
         """Reads a run's header.
 
         Args:
             run_dir: A run.
             task_path: Folder of a task, by its id.
             exchanges: Answers of a model; default: those kept in the run's folder.
+            heading_px: Longer edge of the heading views; default: that of the pages of `evonav view`.
 
         Raises:
             StoreError: There is no run, or its header cannot be read.
         """
         self._run_dir = run_dir
         self._task_path = task_path
+        self._heading_px = heading_px
         with RunStore(run_dir) as store:
             config = store.meta("config") or {}
         try:
@@ -124,7 +133,8 @@ class RunReplay:
             with closing(self.backend.make_simulator()) as simulator:
                 seed = agent_seed(self.seed, agent_name, case.task_id)
                 agent = make_agent(agent_name, self.backend.make_decision(seed))
-                tracer = Tracer(agent, on_round, {stage: loss for stage in stored if (loss := _loss(stored[stage]))})
+                losses = {stage: loss for stage in stored if (loss := _loss(stored[stage]))}
+                tracer = Tracer(agent, on_round, losses, self._heading_px)
                 perception = self.backend.make_perception()
                 episode = Episode(case, agent_name, agent, simulator, perception, self.protocol, seed, tracer)
                 for outcome in episode.run():

@@ -61,6 +61,7 @@ class Tracer:
         agent: Agent,
         on_round: Callable[[int, int], None] = lambda _stage, _round: None,
         losses: Mapping[int, "Loss"] | None = None,
+        heading_px: int | None = None,
     ) -> None:
         """Looks on.
 
@@ -68,12 +69,15 @@ class Tracer:
             agent: The one that runs.
             on_round: Told the stage and the round, 0-based, as they begin.
             losses: Where the agent's process was lost, by stage: there it is not asked.
+            heading_px: Longer edge of the heading views, where pages' own size is too small.
         """
         self.agent = agent
         self._on_round = on_round
         self._losses = losses or {}
         is_small = agent.sensing.motion == "actions"
         self._sizes = (SMALL_HEADING_PX, SMALL_SIDE_PX, SMALL_QUALITY) if is_small else (HEADING_PX, SIDE_PX, QUALITY)
+        if heading_px is not None:
+            self._sizes = (heading_px, SIDE_PX, 90)
         self._places: list[dict[str, list[SceneObject]]] = []
         """Objects by category, of each stage so far."""
         self._now: dict[str, SceneObject] = {}

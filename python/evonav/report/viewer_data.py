@@ -141,7 +141,7 @@ class _Rounds:
         found["kind"] = _kind(record)
         if step.note:
             found["note"] = step.note
-        if (words := _evaluator_words(self._record, step)) != "":
+        if (words := evaluator_words(self._record, step)) != "":
             found["truth"] = words
         if step.map is not None:
             found |= self._map(step.map)
@@ -160,7 +160,7 @@ class _Rounds:
         words = {"navigate_to": "go to", "stop": "stop", "move": (action.action or "").lower().replace("_", " ")}
         found: dict[str, Any] = {
             "action": words[action.kind],
-            "choice": _choice(record),
+            "choice": choice_words(record),
             "path": polyline(simplified([cm(point) for point in record.path_m])),
             "len": round(sum(math.dist(a, b) for a, b in pairwise(record.path_m)), 3),
             "seen": record.is_target_visible,
@@ -277,7 +277,7 @@ def _frontier(frontier: TracedFrontier) -> list[Any]:
     return [frontier.frontier_id, *cm(frontier.position_m), round(math.degrees(frontier.direction_rad))]
 
 
-def _choice(record: RoundRecord) -> str:
+def choice_words(record: RoundRecord) -> str:
     """What was chosen, as the agent knows it."""
     words = record.choice or record.action.kind.replace("_", " ")
     if record.chosen_entry is not None:
@@ -296,7 +296,7 @@ def _kind(record: RoundRecord | None) -> str:
     return next((kind for prefix, kind in _KINDS.items() if record.choice.startswith(prefix)), "other")
 
 
-def _evaluator_words(stage: StageRecord, step: TracedRound) -> str:
+def evaluator_words(stage: StageRecord, step: TracedRound) -> str:
     """What the evaluator knows of the entry that a round chose."""
     chosen = None if step.record is None else step.record.chosen_entry
     if chosen is None:

@@ -1,0 +1,165 @@
+"""Videos: as many pictures as rounds, in the asked size, showing what the round holds."""
+
+import builtins
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.trace import RunReplay
+from evonav.evaluation.traced import TracedStage
+from evonav.report.canvas import MapCanvas, colour, font, plain, wrapped
+from evonav.report.plan import Frame
+from evonav.report.video import write_video
+from evonav.report.video_frames import LEFTS, MAP_SIZE, SIZE, TOP, episode_frame, stage_frames
+
+
+@pytest.fixture(scope="module")
+def stages(viewed_run: Path) -> list[TracedStage]:
+    with bundled_tasks() as tasks:
+        task_id = sorted(path.name for path in tasks.iterdir() if path.is_dir())[1]
+        return list(RunReplay(viewed_run, lambda name: tasks / name, heading_px=396).episode("fu", task_id))
+
+
+def pictures(stages: list[TracedStage], number: int) -> list[Image.Image]:
+    maps = {stage.record.stage: stage.stage_map for stage in stages if stage.stage_map is not None}
+    frame = episode_frame(stages, maps)
+    return list(stage_frames(stages[number - 1], maps, frame, budget=9, success_radius_m=2.0))
+
+
+def panel(picture: Image.Image, left: int) -> np.ndarray:
+    return np.asarray(picture)[TOP : TOP + MAP_SIZE[1], left : left + MAP_SIZE[0]].astype(int)
+
+
+def num_like(pixels: np.ndarray, wanted: tuple[int, int, int], tolerance: int = 40) -> int:
+    return int((np.abs(pixels - np.array(wanted)).sum(axis=2) < tolerance).sum())
+
+
+def test_there_is_a_picture_a_round_and_one_for_the_end(stages: list[TracedStage]) -> None:
+    for stage in stages:
+        drawn = pictures(stages, stage.record.stage)
+        assert len(drawn) == len(stage.rounds) + 1
+        assert {picture.size for picture in drawn} == {SIZE}
+        # Every round is another picture: the agent has moved, or has seen more.
+        assert len({picture.tobytes() for picture in drawn}) == len(drawn)
+
+
+def test_a_picture_holds_view_belief_and_truth(stages: list[TracedStage]) -> None:
+    drawn = pictures(stages, 2)[-2]
+    view, belief, truth = (panel(drawn, left) for left in LEFTS)
+    assert len(np.unique(view.reshape(-1, 3), axis=0)) > 1000  # a rendered view, not a plain field
+    assert num_like(truth, colour("gold")) > 30  # the target
+    assert num_like(belief, colour("gold")) < num_like(truth, colour("gold"))  # which no agent sees
+    assert num_like(truth, colour("orange"), 60) > 0  # what moved before stage 2
+    assert num_like(belief, (15, 118, 110), 60) > 30  # entries
+
+
+def test_stale_entries_are_red_in_the_agents_map_alone_where_there_are_any(stages: list[TracedStage]) -> None:
+    found = 0
+    for stage in stages:
+        for step, picture in zip(stage.rounds, pictures(stages, stage.record.stage), strict=False):
+            has_stale = any(entry.record.is_stale for entry in step.entries)
+            assert (num_like(panel(picture, LEFTS[1])[:-20], colour("red"), 60) > 0) == has_stale
+            found += has_stale
+    assert found > 0
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".webp", ".mp4"])
+def test_a_video_has_the_pictures_size_and_speed(stages: list[TracedStage], tmp_path: Path, suffix: str) -> None:
+    if suffix == ".mp4":
+        pytest.importorskip("av")
+    path = tmp_path / f"x{suffix}"
+    drawn = [pictures(stages, 1), pictures(stages, 2)]
+    assert write_video(drawn, path, fps=4.0, width_px=640) == sum(map(len, drawn))
+    assert [item.name for item in tmp_path.iterdir()] == [path.name]
+    if suffix == ".mp4":
+        import av
+
+        with av.open(path) as video:
+            (stream,) = video.streams
+            assert (stream.width, stream.height, stream.average_rate) == (640, 360, 4)
+            frames = [frame.to_ndarray(format="rgb24") for frame in video.decode(stream)]
+        # The end of a stage is held for two seconds.
+        assert len(frames) == sum(map(len, drawn)) + 2 * (8 - 1)
+        wanted = np.asarray(drawn[0][0].resize((640, 360), Image.Resampling.LANCZOS)).astype(int)
+        assert np.abs(frames[0] - wanted).mean() < 6
+    else:
+        with Image.open(path) as video:
+            assert video.size == (640, 360)
+            assert video.n_frames == sum(map(len, drawn))
+            video.seek(0)
+            assert video.info["duration"] == 250
+            video.seek(video.n_frames - 1)
+            video.load()
+            assert video.info["duration"] == 2000
+
+
+def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InvalidArgumentError, match=r"expected a file .mp4, .gif, .webp"):
+        write_video([], tmp_path / "x.avi")
+    with pytest.raises(InvalidArgumentError, match="even number"):
+        write_video([], tmp_path / "x.gif", width_px=641)
+    with pytest.raises(InvalidArgumentError, match="fps"):
+        write_video([], tmp_path / "x.gif", fps=float("nan"))
+    with pytest.raises(InvalidArgumentError, match="`stages` is empty"):
+        write_video([], tmp_path / "x.gif")
+    monkeypatch.setattr("evonav.report.video.MAX_ANIMATION_FRAMES", 2)
+    with pytest.raises(InvalidArgumentError, match="name fewer stages, or an .mp4 file"):
+        write_video([[Image.new("RGB", (640, 360))] * 3], tmp_path / "x.gif")
+    real = builtins.__import__
+
+    def without_av(name: str, *args: object, **kwargs: object) -> object:
+        if name == "av":
+            raise ImportError("No module named 'av'")
+        return real(name, *args, **kwargs)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(builtins, "__import__", without_av)
+    with pytest.raises(StoreError, match=r"pip install 'evonav\[video\]'"):
+        write_video([], tmp_path / "x.mp4")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_films_the_stages_asked_for(viewed_run: Path, tmp_path: Path) -> None:
+    path = tmp_path / "x.gif"
+    arguments = [
+        "video",
+        str(viewed_run),
+        "--agent",
+        "random-walk",
+        "--stage",
+        "2",
+        "--out",
+        str(path),
+        "--width",
+        "320",
+    ]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    assert "random-walk in bundled-" in result.output
+    with Image.open(path) as video:
+        assert video.n_frames == 10
+    missing = CliRunner().invoke(app, [*arguments[:3], "nobody", "--out", str(path)])
+    assert missing.exit_code == 1
+    assert "no record of task" in str(missing.exception)
+
+
+def test_words_are_in_letters_that_the_font_has() -> None:
+    assert plain("Zimmer größer → 3×2 “ok” 中") == "Zimmer gro?er -> 3x2 “ok” ?"
+    lines = wrapped("one two three four five six seven", 20, 100, 2)
+    assert len(lines) == 2
+    assert lines[-1].endswith("…")
+    assert all(font(20).getlength(line) <= 100 for line in lines)
+    assert wrapped("x" * 400, 20, 100, 1)[0].endswith("…")
+    assert wrapped("", 20, 100, 2) == [""]
+
+
+def test_a_map_fits_its_picture() -> None:
+    canvas = MapCanvas(Frame(-100, -300, 400, 200), (100, 100))
+    assert canvas.at((-100, -300)) == (0, 50)
+    assert canvas.at((300, -100)) == (200, 150)
+    assert canvas.small().size == (100, 100)
