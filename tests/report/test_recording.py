@@ -29,7 +29,9 @@ def rows(recording: Path) -> dict[str, list[dict]]:
     """Rows of every entity, by its path."""
     found: dict[str, list[dict]] = {}
     for chunk in rerun_chunk.RrdReader(recording).stream():
-        found.setdefault(str(chunk.entity_path), []).extend(chunk.to_record_batch().to_pylist())
+        batch = chunk.to_record_batch()
+        names = [name for name in batch.schema.names if name not in ("log_time", "log_tick")]
+        found.setdefault(str(chunk.entity_path), []).extend(batch.select(names).to_pylist())
     return found
 
 

@@ -199,17 +199,14 @@ class MapCanvas:
         for ends in (((x - arm, y - arm), (x + arm, y + arm)), ((x - arm, y + arm), (x + arm, y - arm))):
             self._draw.line(ends, fill=ink, width=thick)
 
-    def words(self, text: str, at_cm: Spot, size_px: int, ink: Colour, *, anchor: str = "mm") -> None:
-        """Words over the map, with a pale edge."""
-        face = font(size_px * SCALE)
+    def words(self, text: str, at_cm: Spot, size_px: int, ink: Colour) -> None:
+        """Words over the map, with a pale edge; they stay inside the picture."""
+        face, spot = font(size_px * SCALE), self.at(at_cm)
+        half = face.getlength(plain(text)) / 2 + SCALE
+        x = min(max(spot[0], half), max(half, self._size[0] - half))
+        edge = (*colour("paper"), 210)
         self._draw.text(
-            self.at(at_cm),
-            plain(text),
-            font=face,
-            fill=ink,
-            anchor=anchor,
-            stroke_width=SCALE,
-            stroke_fill=(*colour("paper"), 210),
+            (x, spot[1]), plain(text), font=face, fill=ink, anchor="mm", stroke_width=SCALE, stroke_fill=edge
         )
 
     def cells(self, cells: NDArray[np.uint8], cell_cm: float, corner_cm: Spot, colours: NDArray[np.uint8]) -> None:
