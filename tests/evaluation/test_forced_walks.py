@@ -199,3 +199,25 @@ def test_pieces_of_a_path_are_the_path(corners, travel_m):
     assert passed[0] == corners[0]
     assert passed[-1] == corners[-1]
     assert [point for point in corners if point not in passed] == []
+
+
+def test_runs_with_walks_are_handed_in_and_verified(tmp_path):
+    from typer.testing import CliRunner
+
+    from evonav.cli import app
+    from evonav.evaluation.engine import evaluate, task_files
+    from evonav.generation.controlled import ControlledOptions, generate_arms
+    from evonav.house import bundled_houses
+    from evonav.tasks import write_task
+    from evonav.tasks.manifest import GenerationParameters
+
+    options = ControlledOptions(parameters=GenerationParameters(reference_image_px=64, reference_min_visible_px=10))
+    house = min(bundled_houses(), key=lambda one: len(one.rooms) if len(one.rooms) > 1 else 99)
+    tasks = tmp_path / "tasks"
+    write_task(generate_arms(house, options, seed=0)["evolved"], tasks)
+    evaluate(["fu"], task_files(tasks), tmp_path / "run", num_workers=0)
+    packed = str(tmp_path / "run.zip")
+    runner = CliRunner()
+    assert runner.invoke(app, ["pack", str(tmp_path / "run"), "--out", packed], catch_exceptions=False).exit_code == 0
+    verdict = runner.invoke(app, ["verify", packed, "--tasks", str(tasks), "--workers", "0"])
+    assert verdict.exit_code == 0, verdict.output

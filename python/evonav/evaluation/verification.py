@@ -113,6 +113,8 @@ def score_findings(record: StageRecord, header: Submission) -> Iterator[str]:
 
     The formulas are those of the protocol (paper, Sec. C.2), from rounds, target and reference length.
     """
+    if record.state is EndState.FORCED:
+        return  # the evaluator walked: nothing was scored
     where = f"{record.agent} {record.task_id} stage {record.stage}"
     start, end, trace = record.effective_start, record.terminal, record.trace
     if start is None or end is None or record.reference_length_m is None or record.path_length_m is None or not trace:
