@@ -88,6 +88,10 @@ def test_sides_are_named_as_runs_agents_or_both(tmp_path: Path) -> None:
     assert pairs(a, b) == [(f"a:{name}", f"b:{name}") for name in outcomes]
     assert pairs(f"{a}:fu", f"{b}:ftu") == [("a:fu", "b:ftu")]
     assert pairs(a, baseline="ftu") == [("ftu", "fu"), ("ftu", "my_module:Agent")]
+    for cell in ("one", "two"):
+        lettered_run(tmp_path / "sweep" / "runs" / cell, outcomes)
+    assert pairs(tmp_path / "sweep", "ftu", "fu") == [("one:ftu", "two:ftu"), ("one:fu", "two:fu")]
+    assert pairs(f"{tmp_path / 'sweep'}:fu") == [("one:fu", "two:fu")]
     for asked, match in (
         ((a, "fu"), "two agents are needed"),
         ((a, "nobody"), "has no agent 'nobody'; it has fu, ftu"),

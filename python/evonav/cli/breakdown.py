@@ -8,7 +8,7 @@ import typer
 
 def breakdown(
     runs: Annotated[
-        list[str], typer.Argument(help="Runs (all their agents), RUN:AGENT, or a run and then names of its agents.")
+        list[str], typer.Argument(help="Runs or sweeps (all agents), RUN:AGENT, or a run and then names of its agents.")
     ],
     by: Annotated[
         list[str] | None,

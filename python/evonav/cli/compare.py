@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def compare(
     sides: Annotated[
-        list[str], typer.Argument(help="Runs (all their agents), RUN:AGENT, or a run and then names of its agents.")
+        list[str], typer.Argument(help="Runs or sweeps (all agents), RUN:AGENT, or a run and then names of its agents.")
     ],
     measure: Annotated[
         list[str] | None, typer.Option(help="Another numeric field of a stage's row; repeat it for more.")

@@ -7,7 +7,7 @@ from typing import Any
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.measures import StageRow, stage_rows
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.store import FILE_NAME, RunStore
 from evonav.report.run import agents_in_order
 
 
@@ -31,18 +31,18 @@ def read_sides(words: Sequence[str]) -> list[Side]:
 
     Args:
         words: Each a run's folder (all of its agents, unless names follow), `FOLDER:AGENT`, or the name of an agent of
-            the folder before it.
+            the folder before it. A sweep's folder stands for the runs of its cells.
 
     Raises:
         InvalidArgumentError: A word names nothing.
         StoreError: A run cannot be read.
     """
-    asked: list[tuple[Path, list[str]]] = []
+    asked: list[tuple[list[Path], list[str]]] = []
     before = ""
     for word in words:
         folder, agent = _split(word)
         if folder is not None:
-            asked.append((folder, [agent] if agent else []))
+            asked.append((_runs_of(folder), [agent] if agent else []))
             before = word if agent else ""
         elif not asked:
             raise InvalidArgumentError(f"{word!r} is no folder of a run: name a run first, then agents of it")
@@ -51,11 +51,19 @@ def read_sides(words: Sequence[str]) -> list[Side]:
         else:
             asked[-1][1].append(word)
     sides: list[Side] = []
-    for folder, agents in asked:
-        for side in _sides_of(folder, agents):
+    for run_dir, agents in ((run_dir, agents) for run_dirs, agents in asked for run_dir in run_dirs):
+        for side in _sides_of(run_dir, agents):
             if not any(side.run_dir == other.run_dir and side.agent == other.agent for other in sides):
                 sides.append(side)
     return _named(sides)
+
+
+def _runs_of(folder: Path) -> list[Path]:
+    """The folder itself, or the runs of a sweep."""
+    if (folder / FILE_NAME).is_file():
+        return [folder]
+    cells = sorted(path.parent for path in folder.glob(f"runs/*/{FILE_NAME}"))
+    return cells or [folder]
 
 
 def _sides_of(folder: Path, agents: Sequence[str]) -> list[Side]:
