@@ -110,6 +110,15 @@ def test_the_standard_error_is_that_of_cluster_sums() -> None:
     assert found.p == pytest.approx(sign_flip(gaps))
 
 
+def test_intervals_of_few_houses_are_widened() -> None:
+    (a, b), names = run(np.random.default_rng(8), 10, 0.5)
+    found = paired_effect(a, b, names)
+    assert found.ci95 is not None
+    assert found.standard_error is not None
+    widths = (found.ci95[1] - found.ci95[0]) / (2 * 1.96 * found.standard_error)
+    assert widths == pytest.approx(math.sqrt(10 / 9) * 2.262 / 1.96, rel=0.08)  # 1.22, not 1
+
+
 def test_several_measures_at_once_are_each_by_itself() -> None:
     (a, b), names = run(np.random.default_rng(6), 12, 0.5)
     both = paired_effects(np.column_stack([a, 0.7 * a]), np.column_stack([b, 0.4 * b]), names)

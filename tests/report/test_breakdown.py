@@ -4,12 +4,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from made_up_run import lettered_run, record_run
+from made_up_run import lettered_run, record_run, stage_record
 from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics import rates
+from evonav.evaluation.records import EndState
 from evonav.report.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
 from evonav.report.figures import write_plots
 from evonav.report.findings import run_tables
@@ -59,6 +60,18 @@ def test_any_field_groups_and_any_number_is_measured(run: Path) -> None:
         breakdown(sides, "weather")
     with pytest.raises(InvalidArgumentError, match="measure 'house' is none of"):
         breakdown(sides, "mode", "house")
+
+
+def test_a_length_on_a_border_is_in_the_upper_bin(tmp_path: Path) -> None:
+    lengths_m = {"a": 0.0, "b": 2.0, "c": 3.99, "d": 16.0, "e": 400.0}
+    records = [
+        stage_record("fu", task, 1, EndState.SUCCESS, num_stages=1).model_copy(update={"reference_length_m": length_m})
+        for task, length_m in lengths_m.items()
+    ]
+    run = record_run(tmp_path / "run", records, dict.fromkeys(lengths_m, 1), ["fu"])
+    found = breakdown(read_sides([str(run)]), "path-length")
+    sizes = {group: found.cells[group, "fu"].n for group in found.groups}
+    assert sizes == {"0-2 m": 1, "2-4 m": 2, "16 m and more": 2}
 
 
 def test_success_at_another_radius(run: Path) -> None:
