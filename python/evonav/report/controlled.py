@@ -1,5 +1,6 @@
 """A controlled analysis read back: outcomes by arm, and what the arms differ in (docs/controlled.md)."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -161,6 +162,15 @@ def split_of(evolved: Outcome) -> str:
     return "room" if record.transition.room_id == record.target.room_id else "other"
 
 
+def has_moved_far(evolved: Outcome) -> bool:
+    """Whether the target left the success radius around its old place: nearer ones are found there, too."""
+    target = evolved.record.target
+    if not target.is_relocated_now or target.first_position_m is None:
+        return False
+    (x0, _, z0), (x1, _, z1) = target.first_position_m, target.position_m
+    return math.dist((x0, z0), (x1, z1)) > SUCCESS_RADIUS_M
+
+
 def pair_tables(analysis: Analysis) -> list[Table]:
     """Fixed / Not Fixed in all, by what changed, against Stage-Reset, and how stages ended."""
     tables = [_drop_table(analysis), _split_table(analysis)]
@@ -207,10 +217,15 @@ def _caveats(analysis: Analysis) -> list[str]:
 def _split_table(analysis: Analysis) -> Table:
     fixed, evolved = analysis.arms
     rows = []
-    for split, words in SPLITS.items():
+    parts: list[tuple[str, Callable[[Outcome], bool]]] = [
+        (words, lambda one, split=split: split_of(one) == split)  # type: ignore[misc]
+        for split, words in SPLITS.items()
+    ]
+    parts.insert(1, (f"of these by more than {SUCCESS_RADIUS_M:g} m", has_moved_far))
+    for words, is_part in parts:
         for agent in analysis.paired_agents:
             keys = analysis.keys(agent)
-            part = [key for key in keys if split_of(analysis.outcomes[evolved, agent][key]) == split]
+            part = [key for key in keys if is_part(analysis.outcomes[evolved, agent][key])]
             effect = analysis.effect((fixed, agent), (evolved, agent), MEASURES["SR"], part)
             rows.append((f"{words}: {agent}", str(len(part)), *effect_cells(effect)))
     columns = ("what changed, agent", "pairs", "SR Fixed", "Not Fixed", "change", "p")

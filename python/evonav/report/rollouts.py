@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.metrics import SUCCESS_RADIUS_M
-from evonav.evaluation.records import EndState, Point3, StageMap, StageRecord
+from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.report.causes import sentence
-from evonav.report.controlled import SPLITS, Analysis, Key, split_of
+from evonav.report.controlled import SPLITS, Analysis, Key, has_moved_far, split_of
 from evonav.report.legend import legend_row
 from evonav.report.maps import change_words, file_css, outcome_words, success_radius_of, task_frame
 from evonav.report.overlay import change, course
@@ -70,9 +69,7 @@ def telling_pairs(analysis: Analysis, agent: str, per_reason: int = 1) -> list[t
     ranked: dict[str, list[tuple[float, Key]]] = {reason: [] for reason in REASONS}
     for key in analysis.keys(agent):
         before, after = (analysis.outcomes[arm, agent][key] for arm in (fixed, evolved))
-        target = after.record.target
-        is_far = target.first_position_m is not None and _is_far(target.first_position_m, target.position_m)
-        if not before.success or split_of(after) != "target" or not is_far:
+        if not before.success or not has_moved_far(after):
             continue
         if after.row.num_stale_visits and not after.success:
             ranked["misled"].append((-after.row.stale_path_m, key))
@@ -81,10 +78,6 @@ def telling_pairs(analysis: Analysis, agent: str, per_reason: int = 1) -> list[t
         elif after.success:
             ranked["unharmed"].append((after.row.path_length_m or 0.0, key))
     return [(reason, key) for reason, found in ranked.items() for _, key in sorted(found)[:per_reason]]
-
-
-def _is_far(a: Point3, b: Point3) -> bool:
-    return math.dist((a[0], a[2]), (b[0], b[2])) > SUCCESS_RADIUS_M
 
 
 def write_pair(analysis: Analysis, agent: str, key: Key, path: Path) -> Path:
