@@ -25,6 +25,7 @@ PARSED_ONLY = {
     "evonav demo": "what `make demo` does; tests/e2e",
     "evonav doctor": "depends on the machine; tests of its own",
     "evonav houses fetch": "network",
+    "evonav sweep": "minutes: tests/evaluation/test_sweep.py runs these files, smaller",
     "--houses procthor-10k": "needs what the network brings",
     "test-90": "needs a whole dataset",
     "--simulator ai2thor": "AI2-THOR: tests/world, tests/thor",
