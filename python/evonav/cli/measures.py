@@ -5,16 +5,15 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli.options import RunFolder
+
 
 def measures(
-    run: Annotated[Path, typer.Argument(help="Folder of a run.")],
+    run: RunFolder,
     agents: Annotated[str | None, typer.Option(help="Only these, comma-separated, in this order.")] = None,
     out: Annotated[Path | None, typer.Option(help="Markdown file to write, too.")] = None,
 ) -> None:
-    """Shows success by several definitions, stale entries believed, memory, and what a stage costs.
-
-    Example: evonav measures out/run --agents fu,ftu --out measures.md
-    """
+    """Shows success by several definitions, stale entries believed, memory, and what a stage costs."""
     from rich.console import Console
 
     from evonav.folders import write_atomically

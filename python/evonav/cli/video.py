@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import status
+from evonav.cli.options import RunFolder
 from evonav.cli.view import task_path
 
 if TYPE_CHECKING:
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     from evonav.evaluation.trace import RunReplay
     from evonav.evaluation.traced import TracedStage
 
-Run = Annotated[Path, typer.Argument(help="Folder of a run.")]
 Task = Annotated[str | None, typer.Argument(help="Id of a task of the run; default: the most telling one.")]
 Agent = Annotated[str | None, typer.Option(help="Agent of the run; default: of the most telling episode.")]
 Stages = Annotated[str, typer.Option("--stage", help="Stages, comma-separated; default: all.")]
@@ -30,7 +30,7 @@ MANY_ROUNDS = 100
 
 
 def video(
-    run: Run,
+    run: RunFolder,
     out: Out,
     task: Task = None,
     agent: Agent = None,
@@ -63,7 +63,7 @@ def video(
 
 
 def rerun(
-    run: Run,
+    run: RunFolder,
     out: Out,
     task: Task = None,
     agent: Agent = None,
