@@ -85,6 +85,7 @@ MISTAKES = {
     # a sweep
     "sweep": "name a sweep file, such as examples/sweeps/noise.toml",
     "sweep nowhere.toml": "nowhere.toml: cannot be read: No such file",
+    "sweep sweep.toml --set agents=ftuu --dry-run": "did you mean `ftu`?",
     "sweep typo.toml": "typo.toml: task: no such key; did you mean tasks?",
     "sweep sweep.toml --only nothing": "fits no cell; there are gt__text__bundled-1__s0",
     "sweep sweep.toml --out sweep --set seeds=4": "sweep holds another sweep",

@@ -149,9 +149,12 @@ def _print_plan(
     from rich.table import Table
 
     from evonav.cli.display import status
+    from evonav.evaluation.backend import check_agent_name
     from evonav.evaluation.sweep import cell_runs
     from evonav.evaluation.sweep_cost import cell_estimate
 
+    for agent in dict.fromkeys(agent for cell in cells for agent in cell.agents):
+        check_agent_name(agent, is_in_process=asked.in_process)
     has_models = any(asked.decisions[cell.decision].kind == "vlm" for cell in cells)
     table = Table(title=f"{len(cells)} cells into {out}", title_justify="left")
     table.add_column("cell", overflow="fold", min_width=20)
