@@ -25,6 +25,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav compare out/gpt-4o out/rules --html out/compare.html",
         "evonav compare out/run --baseline fu",
     ),
+    "measures": ("evonav measures out/run", "evonav measures out/run --agents fu,ftu --out out/measures.md"),
     "breakdown": (
         "evonav breakdown out/run",
         "evonav breakdown out/run fu ftu --by path-length --measure spl --figure out/length.pdf",
