@@ -9,6 +9,7 @@ use evonav_core::{
     house::House,
     sensors::{
         camera::{Camera, View},
+        ground_truth::instance_areas,
         raster::{FrameBuffer, Want, render},
         raster_count::visible_px,
         raycast3d::RayCaster,
@@ -63,6 +64,12 @@ fn bench_raster(c: &mut Criterion) {
         b.iter(|| {
             next.next().map(|(camera, body)| visible_px(&mesh, camera, body, 50, &mut frame))
         });
+    });
+    // What an evaluator takes from every view.
+    let want = Want { rgb: false, instances: true };
+    render(&mesh, &cameras_300[0], want, &mut frame);
+    c.bench_function("ground_truth/instance_areas_300x300", |b| {
+        b.iter(|| instance_areas(black_box(&frame.instances), scene.bodies.len()));
     });
     // The twin that shares no idea with it: a ray a pixel.
     let caster = RayCaster::build(&mesh);
