@@ -35,7 +35,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav export out/run --csv out/stages.csv --parquet out/stages.parquet",
         "evonav export out/run --rounds --parquet out/rounds.parquet",
     ),
-    "measures": ("evonav measures out/run", "evonav measures out/run --agents fu,ftu --out measures.md"),
     "video": ("evonav video out/run --out episode.mp4", "evonav video out/run --agent ftu --stage 2 --out stage.gif"),
     "rerun": ("evonav rerun out/run --agent ftu --out episode.rrd",),
     "paper": ("evonav paper out/run", "evonav paper out/run --latex out/tables.tex"),

@@ -67,7 +67,7 @@ fn bench_raster(c: &mut Criterion) {
     });
     // What an evaluator takes from every view.
     let want = Want { rgb: false, instances: true };
-    render(&mesh, &cameras_300[0], want, &mut frame);
+    render(&mesh, &cameras_300[0], want, &mut frame).expect("a camera in the house");
     c.bench_function("ground_truth/instance_areas_300x300", |b| {
         b.iter(|| instance_areas(black_box(&frame.instances), scene.bodies.len()));
     });
