@@ -1,14 +1,19 @@
-"""Runs the sections named on the command line, or all, and writes `benches/README.md`."""
+"""Runs the sections named on the command line, or all, and writes `benches/README.md`.
+
+What follows the names, from the first option on, is the sections' own (`configure`).
+"""
 
 import importlib
 import os
 import sys
+from itertools import takewhile
 
 from benches.table import write_section
 
 SECTIONS = {
     "agent_process": "Agents in processes of their own",
     "agents": "Agents",
+    "evaluation": "Evaluation",
     "generation": "Task generation",
     "gym": "Gymnasium",
     "memory": "Memory",
@@ -23,8 +28,11 @@ def main() -> None:
     """See the module."""
     if hasattr(os, "sched_setaffinity"):  # or peers with threads of their own would be charged for all of them
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    for name in sys.argv[1:] or SECTIONS:
+    names = list(takewhile(lambda argument: not argument.startswith("-"), sys.argv[1:]))
+    for name in names or SECTIONS:
         module = importlib.import_module(f"benches.{name}")
+        if sys.argv[len(names) + 1 :]:
+            module.configure(sys.argv[len(names) + 1 :])
         sys.stdout.write(write_section(SECTIONS[name], module.NOTES, module.run()) + "\n")
 
 

@@ -1,0 +1,146 @@
+"""Whole evaluations: stages a second with one and two workers, what two gain, and memory of workers and agents."""
+
+import argparse
+import os
+import resource
+import shutil
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import Progress, RunConfig, TaskFile, evaluate, task_files
+from evonav.evaluation.store import RunStore
+
+NOTES = """`evonav evaluate` as a user runs it: embedded simulator, ground-truth perception, text matcher, an agent in
+a process of its own beside each worker, every stage committed with fsync. Everything counts, starting and ending
+included. *Stages a CPU second*: over the driver, its workers and the agents together. *Efficiency*: stages a second of
+two workers over twice those of one, by the wall clock, which says something where the machine has nothing else to do; by
+CPU time (what a stage costs with one worker over what it costs with two) where it is shared, as the load named below
+says. Peak memory: resident, of one worker and of its agent's process. Records are checked to be the same, byte for byte,
+for one worker and two. Again: `python -m benches evaluation --tasks FOLDER [--limit N] [--agents fu,ftu,stage-reset]`.
+"""
+EVERY_S = 0.5
+"""Looks at memory."""
+
+
+@dataclass
+class Options:
+    """Of the command line."""
+
+    tasks: Path | None = None
+    limit: int | None = None
+    agents: tuple[str, ...] = ("fu", "ftu", "stage-reset")
+
+
+@dataclass
+class Measured:
+    """A run."""
+
+    num_stages: int = 0
+    wall_s: float = 0.0
+    cpu_s: float = 0.0
+    texts: list[str] = field(default_factory=list, repr=False)
+    worker_mb: float = 0.0
+    agent_mb: float = 0.0
+
+    @property
+    def per_s(self) -> float:
+        """Stages."""
+        return self.num_stages / self.wall_s
+
+    @property
+    def per_cpu_s(self) -> float:
+        """Stages."""
+        return self.num_stages / self.cpu_s
+
+
+options = Options()
+
+
+def configure(arguments: Sequence[str]) -> None:
+    """Takes the options of the command line."""
+    parser = argparse.ArgumentParser(prog="python -m benches evaluation")
+    parser.add_argument("--tasks", type=Path)
+    parser.add_argument("--limit", type=int)
+    parser.add_argument("--agents", type=lambda text: tuple(text.split(",")), default=options.agents)
+    parser.parse_args(arguments, namespace=options)  # type: ignore[type-var]
+
+
+def run() -> str:
+    """Measures every agent with one worker and with two."""
+    lines = [
+        "| agent | stages | 1 worker, stages/s | 2 workers, stages/s | efficiency, wall | efficiency, CPU "
+        "| stages a CPU second | peak of a worker | of an agent |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    load = os.getloadavg()[0]
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, range(os.cpu_count() or 1))
+    try:
+        with bundled_tasks() as bundled, tempfile.TemporaryDirectory() as folder:
+            tasks = task_files(options.tasks or bundled, options.limit)
+            for agent in options.agents:
+                one, two = (measured(agent, tasks, number, Path(folder)) for number in (1, 2))
+                if one.texts != two.texts:
+                    raise AssertionError(f"{agent}: records differ between one worker and two")
+                lines.append(
+                    f"| {agent} | {one.num_stages} | {one.per_s:.2f} | {two.per_s:.2f} "
+                    f"| {two.per_s / one.per_s / 2:.0%} | {two.per_cpu_s / one.per_cpu_s:.0%} | {one.per_cpu_s:.2f} "
+                    f"| {max(one.worker_mb, two.worker_mb):.0f} MB | {max(one.agent_mb, two.agent_mb):.0f} MB |"
+                )
+    finally:
+        os.sched_setaffinity(0, allowed)
+    lines += ["", f"{len(tasks)} houses; {os.cpu_count()} cores, load before it began: {load:.1f}."]
+    return "\n".join(lines)
+
+
+def measured(agent: str, tasks: Sequence[TaskFile], num_workers: int, folder: Path) -> Measured:
+    """A run into a fresh folder."""
+    done, run_dir, looked_s = Measured(), folder / "run", 0.0
+
+    def look(news: Progress) -> None:
+        nonlocal looked_s
+        if time.monotonic() - looked_s >= EVERY_S:
+            looked_s = time.monotonic()
+            for worker, grandchildren in descendants().items():
+                done.worker_mb = max(done.worker_mb, peak_mb(worker))
+                done.agent_mb = max(done.agent_mb, *map(peak_mb, grandchildren), 0.0)
+
+    began_s, cpu_s = time.monotonic(), _cpu_s()
+    evaluate([agent], tasks, run_dir, config=RunConfig(), num_workers=num_workers, on_progress=look)
+    done.wall_s, done.cpu_s = time.monotonic() - began_s, _cpu_s() - cpu_s
+    with RunStore(run_dir) as store:
+        done.texts = list(store.record_texts())
+    done.num_stages = len(done.texts)
+    shutil.rmtree(run_dir)
+    return done
+
+
+def descendants() -> dict[int, list[int]]:
+    """Children of this process that have children: workers and their agents."""
+    parents: dict[int, int] = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with suppress(OSError, IndexError):
+                parents[int(entry.name)] = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+    workers = [child for child, parent in parents.items() if parent == os.getpid()]
+    found = {worker: [child for child, parent in parents.items() if parent == worker] for worker in workers}
+    return {worker: agents for worker, agents in found.items() if agents}
+
+
+def peak_mb(pid: int) -> float:
+    """Resident memory of a process at its most so far; 0 of one that has ended."""
+    with suppress(OSError, StopIteration):
+        status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+        return int(next(line for line in status.splitlines() if line.startswith("VmHWM")).split()[1]) / 1024
+    return 0.0
+
+
+def _cpu_s() -> float:
+    """Of this process and of those that it has waited for, with theirs."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + usage.ru_utime + usage.ru_stime
