@@ -2,7 +2,6 @@
 
 import argparse
 import os
-import resource
 import shutil
 import tempfile
 import time
@@ -16,12 +15,13 @@ from evonav.evaluation.engine import Progress, RunConfig, TaskFile, evaluate, ta
 from evonav.evaluation.store import RunStore
 
 NOTES = """`evonav evaluate` as a user runs it: embedded simulator, ground-truth perception, text matcher, an agent in
-a process of its own beside each worker, every stage committed with fsync. Everything counts, starting and ending
-included. *Stages a CPU second*: over the driver, its workers and the agents together. *Efficiency*: stages a second of
-two workers over twice those of one, by the wall clock, which says something where the machine has nothing else to do; by
-CPU time (what a stage costs with one worker over what it costs with two) where it is shared, as the load named below
-says. Peak memory: resident, of one worker and of its agent's process. Records are checked to be the same, byte for byte,
-for one worker and two. Again: `python -m benches evaluation --tasks FOLDER [--limit N] [--agents fu,ftu,stage-reset]`.
+a process of its own beside each worker, every stage committed with fsync. Stages a second: by the wall clock, starting
+and ending included. *Stages a CPU second*: of the driver, and of workers and agents while they are at stages; one
+worker's. *Efficiency*: of two workers, stages a second over twice those of one. By the wall clock it says something
+where the machine has nothing else to do; where it is shared, as the load named below says, by CPU time: what a stage
+costs with one worker over what it costs with two. Peak memory: resident, of one worker and of its agent's process.
+Records are checked to be the same, byte for byte, for one worker and two.
+Again: `python -m benches evaluation --tasks FOLDER [--limit N] [--agents fu,ftu,stage-reset]`.
 """
 EVERY_S = 0.5
 """Looks at memory."""
@@ -110,11 +110,14 @@ def measured(agent: str, tasks: Sequence[TaskFile], num_workers: int, folder: Pa
                 done.worker_mb = max(done.worker_mb, peak_mb(worker))
                 done.agent_mb = max(done.agent_mb, *map(peak_mb, grandchildren), 0.0)
 
-    began_s, cpu_s = time.monotonic(), _cpu_s()
+    began_s, cpu_s = time.monotonic(), time.process_time()
     evaluate([agent], tasks, run_dir, config=RunConfig(), num_workers=num_workers, on_progress=look)
-    done.wall_s, done.cpu_s = time.monotonic() - began_s, _cpu_s() - cpu_s
+    done.wall_s, done.cpu_s = time.monotonic() - began_s, time.process_time() - cpu_s
     with RunStore(run_dir) as store:
         done.texts = list(store.record_texts())
+        done.cpu_s += sum(cpu_s for _, cpu_s in store.timings().values())
+        if failures := store.failures():
+            raise AssertionError(failures[0])
     done.num_stages = len(done.texts)
     shutil.rmtree(run_dir)
     return done
@@ -138,9 +141,3 @@ def peak_mb(pid: int) -> float:
         status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
         return int(next(line for line in status.splitlines() if line.startswith("VmHWM")).split()[1]) / 1024
     return 0.0
-
-
-def _cpu_s() -> float:
-    """Of this process and of those that it has waited for, with theirs."""
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return time.process_time() + usage.ru_utime + usage.ru_stime

@@ -13,6 +13,9 @@ from types import ModuleType
 
 from evonav.parallel import Pulse, Worker, WorkerLostError, end_work, load_work, steps
 
+END_TIMEOUT_S = 5.0
+"""For a worker to end what it has started, before it is killed."""
+
 
 class ProcessHost:
     """Processes of this machine."""
@@ -129,7 +132,7 @@ def end_process(process: multiprocessing.process.BaseProcess, connection: Connec
     connection.close()
     if process.is_alive():
         process.terminate()
-        process.join(timeout=2.0)
+        process.join(timeout=END_TIMEOUT_S)
         if process.is_alive():
             process.kill()
     process.join(timeout=5.0)

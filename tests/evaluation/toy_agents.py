@@ -2,6 +2,7 @@
 
 import os
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -87,3 +88,22 @@ class Undecided(Explorer):
         pose = observation.pose
         angle_rad = time.monotonic_ns() % 1000
         return NavigateTo((pose.x_m + np.sin(angle_rad), pose.z_m + np.cos(angle_rad)))
+
+
+class DyingAtFirst(Explorer):
+    """Dies in stage 2, and leaves the file named by TOY_DIED, after which it lives."""
+
+    def act(self, observation):
+        flag = Path(os.environ["TOY_DIED"])
+        if self.stage == 2 and not flag.exists():
+            flag.touch()
+            os._exit(3)
+        return super().act(observation)
+
+
+class Slow(Explorer):
+    """Takes TOY_PACE_S for an answer."""
+
+    def act(self, observation):
+        time.sleep(float(os.environ["TOY_PACE_S"]))
+        return super().act(observation)

@@ -73,3 +73,40 @@ def test_without_ray_the_error_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(EngineError, match=r"pip install 'evonav\[ray\]'"):
         open_pool("test_parallel:make_echo", "", engine="ray", num_workers=1, timeout_s=1.0)
+
+
+def make_broken(settings, alive):
+    """A worker that cannot be made."""
+    raise ImportError("no such thing")
+
+
+def make_teller(settings, alive):
+    """A worker that counts to a job, telling."""
+
+    def count(text):
+        for number in range(int(text)):
+            alive()
+            yield str(number)
+        if text == "3":
+            raise ValueError(text)
+        return "end"
+
+    return count
+
+
+def test_a_worker_that_cannot_be_made_is_an_error_at_once():
+    with open_pool("test_parallel:make_broken", "", num_workers=1, timeout_s=60.0) as pool:
+        pool.submit(Job(0, ""))
+        with pytest.raises(EngineError, match="workers do not start: ImportError: no such thing"):
+            pool.next_answer()
+
+
+@pytest.mark.parametrize("num_workers", [0, 1])
+def test_jobs_tell_news_in_order(num_workers):
+    with open_pool("test_parallel:make_teller", "", num_workers=num_workers, timeout_s=60.0) as pool:
+        for key, num, end in ((0, 2, "end"), (1, 3, "")):
+            pool.submit(Job(key, str(num)))
+            answers = [pool.next_answer() for _ in range(num + 1)]
+            assert [answer.text for answer in answers] == [*map(str, range(num)), end]
+            assert [answer.is_end for answer in answers] == [False] * num + [True]
+            assert (answers[-1].failure is None) == (end == "end")
