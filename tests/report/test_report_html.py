@@ -11,9 +11,13 @@ import pytest
 from made_up_run import WriteRun, record_run, stage_record
 
 from evonav.errors import StoreError
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind, StageError, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.report import findings, html, tables, write_report
+from evonav.report.facts import reproduction
 from evonav.report.run import load_run
 
 VOID = {"meta", "input", "br", "link", "img"}
@@ -280,3 +284,40 @@ def test_failures_of_agents_and_their_models_are_counted(tmp_path: Path) -> None
 def test_a_run_without_failures_does_not_speak_of_them(write_run: WriteRun) -> None:
     assert findings.failure_table(load_run(write_run())).rows == ()
     assert "What failed" not in write_report(write_run("again")).read_text()
+
+
+def test_a_report_tells_how_to_run_it_again_and_what_went_wrong(write_run: WriteRun, tmp_path: Path) -> None:
+    run_dir = write_run(is_complete=False)
+    command = "evonav evaluate --agents fu,ftu --tasks 'my <tasks>' --out out/run"
+    trace = 'Traceback (most recent call last):\n  File "agent.py", line 3\nValueError: <b>no</b>'
+    with RunStore(run_dir) as store:
+        store.set_meta("sessions", [{"command": command, "python": "3.11.2", "git": "abc123"}])
+        store.set_meta("task_digests", {"task-0": "f" * 64})
+        (errored,) = [record for record in store.records("ftu", "task-5") if record.state is EndState.ERRORED]
+        store.forget_episode("ftu", "task-5", 1)
+        store.add_stage(errored, wall_s=1.0, cpu_s=1.0, traceback=trace)
+    text = write_report(run_dir).read_text("utf-8")
+    assert "evonav evaluate --agents fu,ftu --tasks &#39;my &lt;tasks&gt;&#39; --out out/run</pre>" in text
+    assert "git: abc123" in text
+    assert "f" * 64 in text
+    assert "<b>1 × simulation</b> ftu: the floor &lt;gave&gt; way" in text
+    assert "<li>ftu, task-5, stage 1</li>" in text
+    assert "ValueError: &lt;b&gt;no&lt;/b&gt;</pre>" in text
+    # Without notes, the command is worked out from what the run is; of unknown parts it is not.
+    assert reproduction(load_run(write_run("other"))) == []
+
+
+def test_a_run_notes_its_command_and_versions(tmp_path: Path) -> None:
+    with bundled_tasks() as tasks:
+        for agents in (["random-walk"], ["random-walk"], ["stay-still"]):
+            evaluate(
+                agents,
+                task_files(tasks, 1),
+                tmp_path,
+                num_workers=0,
+                config=RunConfig(protocol=ProtocolConfig(max_rounds=1)),
+            )
+    with RunStore(tmp_path) as store:
+        sessions = store.meta("sessions")
+    assert len(sessions) == 2  # the second call had nothing to do
+    assert {"command", "began", "evonav", "git", "python", "platform", "cpus", "workers"} == set(sessions[0])

@@ -19,24 +19,57 @@ def report(
     run: RunFolder,
     out: Annotated[Path | None, typer.Option(help="Where to write; default: RUN.")] = None,
     replays: Annotated[
-        str,
-        typer.Option(metavar="all|N|none", help="Episodes to show round by round, the most telling first."),
-    ] = str(NUM_REPLAYS),
+        str | None,
+        typer.Option(
+            metavar="all|N|none",
+            help=f"Episodes to show round by round, the most telling first; default: {NUM_REPLAYS}, none of a sweep.",
+        ),
+    ] = None,
     tasks: Annotated[
         Path | None, typer.Option(help="Folder of the run's tasks; default: where the run had them.")
     ] = None,
     exchanges: Annotated[Path | None, typer.Option(help="File of a model's answers; default: the one in RUN.")] = None,
     maps: Annotated[bool, typer.Option("--maps", help="Write every stage's map as a file too, maps/*.svg.")] = False,
 ) -> None:
-    """Writes a run's report: one HTML file with tables, maps, and episodes round by round (docs/report.md)."""
+    """Writes a run's or a sweep's report: HTML with tables, maps, and episodes round by round (docs/report.md)."""
+    from evonav.evaluation.sweep import SWEEP_NAME
+
+    if (run / SWEEP_NAME).is_file():
+        typer.echo(f"report: {_report_sweep(run, out, _count(replays or 'none'), tasks, exchanges, maps)}")
+        return
     from evonav.evaluation.engine import write_summary
+
+    num_replays = _count(replays or str(NUM_REPLAYS))
+    print_table(write_summary(run))
+    typer.echo(f"report: {_report(run, out, num_replays, tasks, exchanges, maps)}")
+
+
+def _report(
+    run: Path, out: Path | None, num_replays: int | None, tasks: Path | None, exchanges: Path | None, has_maps: bool
+) -> Path:
     from evonav.report import load_run, write_report
 
-    num_replays = _count(replays)
-    print_table(write_summary(run))
     if num_replays != 0:
         _replay(load_run(run), num_replays, tasks, exchanges)
-    typer.echo(f"report: {write_report(run, out, has_maps=maps)}")
+    return write_report(run, out, has_maps=has_maps)
+
+
+def _report_sweep(
+    sweep: Path, out: Path | None, num_replays: int | None, tasks: Path | None, exchanges: Path | None, has_maps: bool
+) -> Path:
+    """A report a cell that has records, and a page that leads to them."""
+    from evonav.evaluation.store import FILE_NAME
+    from evonav.evaluation.sweep import RUNS_NAME
+    from evonav.report.sweep import sweep_tables, write_sweep_summary
+    from evonav.report.sweep_page import write_sweep_page
+
+    tables = sweep_tables(write_sweep_summary(sweep))
+    reports = []
+    for cell in sorted(path.parent for path in (sweep / RUNS_NAME).glob(f"*/{FILE_NAME}")):
+        to = None if out is None else out / RUNS_NAME / cell.name
+        reports.append((cell.name, _report(cell, to, num_replays, tasks, exchanges, has_maps)))
+        typer.echo(f"cell: {reports[-1][1]}")
+    return write_sweep_page(out or sweep, sweep.resolve().name, tables, reports)
 
 
 def strip(

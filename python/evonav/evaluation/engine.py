@@ -16,6 +16,7 @@ from evonav.evaluation.metrics import AgentSummary, paired_differences, summaris
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState
 from evonav.evaluation.running import Progress, Run, TaskFile, run_all
+from evonav.evaluation.sessions import note_session
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.workers import WORK, EpisodeJob, Setup
 from evonav.folders import check_same_run, write_atomically, writing
@@ -227,6 +228,9 @@ def _begun(request: RunRequest, num_workers: int, num_retries: int, retry_errore
         for agent in request.agents
         if any((agent, task.task_id, stage) not in states for stage in range(1, task.num_stages + 1))
     ]
+    if jobs:
+        with RunStore(request.run_dir) as store:
+            note_session(store, num_workers)
     return Run(request.run_dir, setup, limit_s, request.agents, request.tasks, jobs, states)
 
 
