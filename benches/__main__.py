@@ -26,13 +26,17 @@ SECTIONS = {
 
 def main() -> None:
     """See the module."""
+    names = list(takewhile(lambda argument: not argument.startswith("-"), sys.argv[1:]))
+    options = sys.argv[len(names) + 1 :]
+    if not set(names) <= SECTIONS.keys() or (options and not names):
+        known = "\n".join(f"  {name:14} {title}" for name, title in sorted(SECTIONS.items()))
+        sys.exit(f"usage: python -m benches [NAME ... [OPTION ...]]\n{known}")
     if hasattr(os, "sched_setaffinity"):  # or peers with threads of their own would be charged for all of them
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
-    names = list(takewhile(lambda argument: not argument.startswith("-"), sys.argv[1:]))
     for name in names or SECTIONS:
         module = importlib.import_module(f"benches.{name}")
-        if sys.argv[len(names) + 1 :]:
-            module.configure(sys.argv[len(names) + 1 :])
+        if options:
+            module.configure(options)
         sys.stdout.write(write_section(SECTIONS[name], module.NOTES, module.run()) + "\n")
 
 

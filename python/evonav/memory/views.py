@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from evonav import _core
 from evonav.sensors.observation import Detections, View
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
@@ -144,23 +145,8 @@ def crop_of(view: StoredView, box_px: Box, margin_px: int = 20) -> NDArray[np.ui
 
 def boxes_of(detections: Detections) -> list[tuple[int, Box]]:
     """Pixels and bounding box of each detection; `(0, (0, 0, 0, 0))` of one without pixels."""
-    masks = detections.masks
-    found: list[tuple[int, Box]] = [(0, (0, 0, 0, 0))] * len(detections.labels)
-    pixels = np.flatnonzero(masks.ravel() >= 0)
-    if len(pixels) == 0:
-        return found
-    owners = masks.ravel()[pixels]
-    # Sorting is linear for short integers, and stable: rows stay in order.
-    order = np.argsort(owners.astype(np.int16) if len(found) <= np.iinfo(np.int16).max else owners, kind="stable")
-    owners, rows, cols = owners[order], *np.divmod(pixels[order], masks.shape[1])
-    starts = np.flatnonzero(np.diff(owners, prepend=-1))
-    ends = np.append(starts[1:], len(owners))
-    edges = (np.minimum.reduceat(cols, starts), rows[starts], np.maximum.reduceat(cols, starts) + 1, rows[ends - 1] + 1)
-    for owner, area_px, box_px in zip(
-        owners[starts].tolist(), (ends - starts).tolist(), np.stack(edges, axis=1).tolist(), strict=True
-    ):
-        found[owner] = (area_px, (box_px[0], box_px[1], box_px[2], box_px[3]))
-    return found
+    extents = _core.mask_extents(detections.masks, num_masks=len(detections.labels))
+    return [(area_px, (left, top, right, bottom)) for area_px, left, top, right, bottom in extents.tolist()]
 
 
 def _jpeg(pixels: NDArray[np.uint8]) -> bytes:

@@ -47,7 +47,7 @@ class GroundTruthPerception:
             raise InvalidArgumentError("argument `frame` has no instances, expected a frame rendered with them")
         masks, instances = _core.number_instances(
             frame.instances,
-            np.fromiter((body.kind == "object" for body in objects), np.bool_, len(objects)),
+            np.array([body.kind == "object" for body in objects], np.bool_),
             min_area_px=max(self.min_area_px, round(self.min_area_fraction * frame.instances.size)),
             max_box_fraction=self.max_box_fraction,
         )

@@ -11,7 +11,7 @@ use evonav_core::{
         occupancy::{BLOCKED, FREE, OccupancyMap, UNKNOWN},
     },
     sensors::{
-        ground_truth::{MaskFilter, instance_areas, number_instances},
+        ground_truth::{MaskFilter, instance_areas, mask_extents, number_instances},
         raycast::{VisibleCells, visible_cells},
     },
 };
@@ -346,6 +346,25 @@ proptest! {
     }
 
     #[test]
+    fn masks_extend_from_their_first_to_their_last_pixels(
+        stretches in vec((-1..4_i32, 1..9_usize), 80),
+    ) {
+        let stretch = |&(mask, length): &(i32, usize)| std::iter::repeat_n(mask, length);
+        let image: Vec<i32> = stretches.iter().flat_map(stretch).take(80).collect();
+        let extents = mask_extents(&image, 10, 4).unwrap();
+        for (mask, extent) in extents.iter().enumerate() {
+            let pixels: Vec<usize> = (0..80).filter(|&i| image[i] == mask as i32).collect();
+            let range = |f: fn(usize) -> usize| {
+                let values = || pixels.iter().map(|&i| f(i));
+                [values().min().unwrap_or(0), values().max().map_or(0, |last| last + 1)]
+            };
+            prop_assert_eq!(extent.area_px, pixels.len());
+            prop_assert_eq!(extent.rows, range(|i| i / 10));
+            prop_assert_eq!(extent.cols, range(|i| i % 10));
+        }
+    }
+
+    #[test]
     fn detections_are_the_instances_that_pass_in_the_order_of_their_pixels(
         image in vec(0..6_i32, 8 * 10),
         is_detectable in vec(any::<bool>(), 5),
@@ -411,4 +430,6 @@ fn arguments_outside_their_domain_are_named() {
         names("instances", instance_areas(&image, 1).unwrap_err().to_string());
     }
     names("instances", number_instances(&[0, 0, 0], 2, &[], filter).unwrap_err().to_string());
+    names("masks", mask_extents(&[0, 1], 2, 1).unwrap_err().to_string());
+    names("masks", mask_extents(&[0, 0, 0], 2, 1).unwrap_err().to_string());
 }

@@ -65,9 +65,29 @@ fn instance_areas<'py>(
     Ok(PyArray1::from_vec(py, areas))
 }
 
+/// A row a mask: area, left, top, right, bottom.
+#[pyfunction]
+#[pyo3(signature = (masks, *, num_masks))]
+fn mask_extents<'py>(
+    py: Python<'py>,
+    masks: PyReadonlyArray2<'py, i32>,
+    num_masks: usize,
+) -> PyResult<Bound<'py, PyArray2<i64>>> {
+    let (image, shape) = arrays::row_major("masks", &masks)?;
+    let extents = py
+        .detach(|| ground_truth::mask_extents(image, shape[1], num_masks))
+        .map_err(error::to_py)?;
+    let row = |extent: ground_truth::Extent| {
+        let [[top, bottom], [left, right]] = [extent.rows, extent.cols];
+        [extent.area_px, left, top, right, bottom].map(|px| px as i64)
+    };
+    arrays::rows_of(py, extents.into_iter().map(row).collect())
+}
+
 /// Adds the functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(visible_cells, module)?)?;
     module.add_function(wrap_pyfunction!(number_instances, module)?)?;
-    module.add_function(wrap_pyfunction!(instance_areas, module)?)
+    module.add_function(wrap_pyfunction!(instance_areas, module)?)?;
+    module.add_function(wrap_pyfunction!(mask_extents, module)?)
 }

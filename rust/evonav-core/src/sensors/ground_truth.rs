@@ -47,7 +47,7 @@ pub fn number_instances(
     let mut extents = vec![Extent::EMPTY; is_detectable.len()];
     let mut order = Vec::new();
     for (row, pixels) in image.chunks_exact(width_px).enumerate() {
-        for (col, &value) in pixels.iter().enumerate() {
+        for (value, cols) in runs(pixels) {
             let Some(instance) = usize::try_from(value).ok().and_then(|v| v.checked_sub(1)) else {
                 Error::require("instances", value, "0 or 1 + an index of an object", |v| v == 0)?;
                 continue;
@@ -58,7 +58,7 @@ pub fn number_instances(
             if extent.area_px == 0 {
                 order.push(instance);
             }
-            extent.add(row, col);
+            extent.add(row, cols);
         }
     }
     let max_box_px = filter.max_box_fraction * image.len() as f64;
@@ -103,24 +103,76 @@ pub fn instance_areas(image: &[i32], num_instances: usize) -> Result<Vec<i64>, E
     Ok(areas)
 }
 
-/// Area and bounding box of one instance's pixels.
-#[derive(Debug, Clone, Copy)]
-struct Extent {
-    area_px: usize,
-    rows: [usize; 2],
-    cols: [usize; 2],
+/// Area and bounding box of each mask.
+///
+/// # Arguments
+/// * `masks` - row-major, `width_px` a row; negative where nothing is.
+/// * `num_masks` - masks count from 0 to one less.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] if the image is not whole rows, or holds a larger number.
+///
+/// # Complexity
+/// O(pixels + masks).
+pub fn mask_extents(
+    masks: &[i32],
+    width_px: usize,
+    num_masks: usize,
+) -> Result<Vec<Extent>, Error> {
+    if width_px == 0 || !masks.len().is_multiple_of(width_px) {
+        return Err(Error::invalid("masks", masks.len(), "whole rows of pixels"));
+    }
+    let mut extents = vec![Extent::EMPTY; num_masks];
+    for (row, pixels) in masks.chunks_exact(width_px).enumerate() {
+        for (mask, cols) in runs(pixels) {
+            let Ok(mask) = usize::try_from(mask) else { continue };
+            let extent = extents.get_mut(mask).ok_or_else(|| {
+                Error::invalid("masks", mask, "negative or the index of a detection")
+            })?;
+            extent.add(row, cols);
+        }
+    }
+    Ok(extents)
+}
+
+/// Stretches of equal pixels of a row, each with its first column and one past its last.
+fn runs(pixels: &[i32]) -> impl Iterator<Item = (i32, [usize; 2])> {
+    let mut end = 0;
+    pixels.chunk_by(|a, b| a == b).map(move |run| {
+        let start = end;
+        end += run.len();
+        (run[0], [start, end])
+    })
+}
+
+/// Area and bounding box of some pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Extent {
+    /// Number of pixels.
+    pub area_px: usize,
+    /// First row, and one past the last; both 0 without pixels.
+    pub rows: [usize; 2],
+    /// First column, and one past the last; both 0 without pixels.
+    pub cols: [usize; 2],
 }
 
 impl Extent {
-    const EMPTY: Self = Self { area_px: 0, rows: [usize::MAX, 0], cols: [usize::MAX, 0] };
+    const EMPTY: Self = Self { area_px: 0, rows: [0; 2], cols: [0; 2] };
 
-    fn add(&mut self, row: usize, col: usize) {
-        self.area_px += 1;
-        self.rows = [self.rows[0].min(row), self.rows[1].max(row)];
-        self.cols = [self.cols[0].min(col), self.cols[1].max(col)];
+    /// Adds part of a row that is no higher than those before.
+    fn add(&mut self, row: usize, cols: [usize; 2]) {
+        *self = if self.area_px == 0 {
+            Self { area_px: cols[1] - cols[0], rows: [row, row + 1], cols }
+        } else {
+            Self {
+                area_px: self.area_px + cols[1] - cols[0],
+                rows: [self.rows[0], row + 1],
+                cols: [self.cols[0].min(cols[0]), self.cols[1].max(cols[1])],
+            }
+        };
     }
 
     fn box_px(&self) -> usize {
-        (self.rows[1] - self.rows[0] + 1) * (self.cols[1] - self.cols[0] + 1)
+        (self.rows[1] - self.rows[0]) * (self.cols[1] - self.cols[0])
     }
 }
