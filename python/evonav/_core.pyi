@@ -161,6 +161,7 @@ def number_instances(
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]: ...
 def instance_areas(instances: NDArray[np.int32], num_instances: int) -> NDArray[np.int64]:
     """`(N,)` pixels of each instance of an `(H, W)` image: 0 where nothing is, else 1 + index."""
+
 def mask_extents(masks: NDArray[np.int32], *, num_masks: int) -> NDArray[np.int64]:
     """`(num_masks, 5)`: pixels, left, top, right, bottom of each mask, right and bottom one past the last."""
 
