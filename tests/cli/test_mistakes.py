@@ -69,7 +69,7 @@ MISTAKES = {
     f"evaluate {ONE} --out file": "File exists; name another folder",
     "report nowhere": "there is no such folder); `evonav evaluate --out nowhere` makes one",
     "report empty": "no run here (records.sqlite not found)",
-    "report sweep": "name one, such as sweep/runs/gt__text__bundled-1__s0",
+    "paper sweep": "name one, such as sweep/runs/gt__text__bundled-1__s0",
     "view begun": "nothing was run yet: `evonav evaluate` goes on",
     "view run --agent fu": "it has some of shortest-path",
     "view run --task bundled": "there is ONE",
