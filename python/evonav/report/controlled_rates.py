@@ -31,12 +31,15 @@ class Crossover:
         return 0.0 <= self.rate <= 1.0
 
     def words(self) -> str:
-        """`0.62 (0.31 to >1)`, or that there is none."""
-        interval = f"({_rate_words(self.ci95[0])} to {_rate_words(self.ci95[1])})"
-        if self.is_found:
-            return f"{self.rate:.2f} {interval}"
-        who = "memory is ahead at every rate" if self.rate > 1 else f"{BASELINE} is ahead at every rate"
-        return f"none found: {who} {interval}"
+        """`0.62 (0.31 to >1)`, that there is none, or that these houses cannot tell."""
+        low, high = self.ci95
+        interval = f"({_rate_words(low)} to {_rate_words(high)})"
+        if low > 1.0:
+            return f"none found: memory is ahead at every rate {interval}"
+        if high < 0.0:
+            return f"none found: {BASELINE} is ahead at every rate {interval}"
+        found = f"{self.rate:.2f}" if self.is_found else "none found"
+        return f"{found}, undetermined {interval}" if low < 0.0 and high > 1.0 else f"{found} {interval}"
 
 
 def rate_keys(analysis: Analysis, *agents: str) -> list[Key]:
