@@ -21,7 +21,7 @@ def breakdown(
     md: Annotated[Path | None, typer.Option(help="Markdown file to write.")] = None,
     latex: Annotated[Path | None, typer.Option(help="LaTeX file to write (booktabs).")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV file to write, unrounded.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Figure to write: .svg, or .png or .pdf with `[viz]`.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .svg, or .png or .pdf (extra `viz`).")] = None,
 ) -> None:
     """Shows rates by kind of stage, each with n and a 95% interval by house."""
     from rich.console import Console

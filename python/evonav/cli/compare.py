@@ -27,7 +27,7 @@ def compare(
     csv: Annotated[Path | None, typer.Option(help="CSV file to write, unrounded.")] = None,
     json: Annotated[Path | None, typer.Option(help="JSON file to write, with the stages that flipped.")] = None,
     html: Annotated[Path | None, typer.Option(help="HTML page to write, with links to replays.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Figure to write: .svg, or .png or .pdf with `[viz]`.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .svg, or .png or .pdf (extra `viz`).")] = None,
 ) -> None:
     """Compares agents stage by stage: differences with 95% interval and p, by stratum and mode, and what flipped."""
     from rich.console import Console

@@ -12,7 +12,7 @@ def export(
     run: RunFolder,
     csv: Annotated[Path | None, typer.Option(help="CSV file to write.")] = None,
     jsonl: Annotated[Path | None, typer.Option(help="File of JSON lines to write.")] = None,
-    parquet: Annotated[Path | None, typer.Option(help="Parquet file to write, with `[data]`.")] = None,
+    parquet: Annotated[Path | None, typer.Option(help="Parquet file to write (extra `data`).")] = None,
     rounds: Annotated[bool, typer.Option("--rounds", help="One row a decision round, not a stage.")] = False,
     agent: Annotated[list[str] | None, typer.Option(help="Only this agent; repeat it for more.")] = None,
 ) -> None:
