@@ -137,7 +137,7 @@ def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
     missing = [row for row in rows if row.is_incomplete and row.cell in selected]
     if any(row.counts["errored"] for row in missing):
         typer.echo(
-            f"some stages errored (`evonav report` of their run says why); to run them again: {again} --retry-errored"
+            f"some stages errored (`evonav failures` of their run says why); to run them again: {again} --retry-errored"
         )
     return bool(missing)
 
