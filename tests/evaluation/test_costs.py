@@ -1,0 +1,90 @@
+import pytest
+
+from evonav.agents import wire
+from evonav.decision.account import Account, Price, Usage
+from evonav.decision.metered import Metered
+from evonav.decision.questions.question import Reply
+from evonav.evaluation.costs import Stopwatch
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import evaluate, task_files
+from evonav.evaluation.measures import stage_rows
+from evonav.evaluation.store import RunStore
+
+
+class Client:
+    def __init__(self, account):
+        self.account = account
+
+
+class Model:
+    needs_images = True
+
+    def __init__(self, account=None):
+        if account is not None:
+            self.client = Client(account)
+
+    def answer(self, question, attempt=0):
+        if question is None:
+            raise ValueError("no question")
+        return Reply(question, "so")
+
+
+class Wrapped(Model):
+    """As `Noisy` wraps a model."""
+
+    def __init__(self, model):
+        self.model = model
+
+
+def test_a_metered_model_answers_the_same_and_counts_its_questions():
+    metered = Metered(Model())
+    assert metered.needs_images
+    assert metered.answer("q").text == "so"
+    with pytest.raises(ValueError, match="no question"):
+        metered.answer(None)
+    costs = metered.costs()
+    assert costs["num_questions"] == 2
+    assert set(costs) == {"decision_wall_s", "decision_cpu_s", "num_questions"}
+
+
+def test_tokens_and_money_are_the_accounts_even_of_a_wrapped_model():
+    account = Account(Price(2.0, 10.0), model="m")
+    account.settle(account.reserve(Usage(1, 1)), Usage(1_000_000, 500_000))
+    account.replayed()
+    costs = Metered(Wrapped(Model(account))).costs()
+    assert (costs["input_tokens"], costs["output_tokens"], costs["num_replayed"]) == (1_000_000, 500_000, 1)
+    assert costs["cost_usd"] == pytest.approx(7.0)
+
+
+def test_costs_that_are_no_numbers_are_dropped():
+    said = {"num_questions": 3, "cost_usd": float("nan"), "input_tokens": -1, "output_tokens": "9", "success": 1.0}
+    assert wire.costs_of({**said, "num_replayed": True}) == {"num_questions": 3}
+    assert wire.costs_of("much") == {}
+
+
+def test_a_stopwatch_books_by_component_and_leaves_the_rest_to_the_evaluator():
+    cpu_s = iter([0.0, 1.0, 3.0, 10.0, 14.0, 20.0])
+    stopwatch = Stopwatch(lambda: next(cpu_s))
+    with stopwatch.timing("simulation"):
+        pass
+    with pytest.raises(KeyError), stopwatch.timing("agent"):
+        raise KeyError
+    costs = stopwatch.costs({"num_questions": 4})
+    assert (costs.cpu_s, costs.simulation_cpu_s, costs.perception_cpu_s) == (20.0, 2.0, 0.0)
+    assert (costs.agent_cpu_s, costs.evaluator_cpu_s, costs.num_questions) == (4.0, 14.0, 4)
+
+
+def test_a_stage_of_an_agent_in_its_own_process_tells_what_it_cost(tmp_path):
+    with bundled_tasks() as folder:
+        evaluate(["fu"], task_files(folder, 1), tmp_path, num_workers=1)
+    with RunStore(tmp_path) as store:
+        rows = stage_rows(store)
+        assert not any("cpu_s" in text for text in store.record_texts())
+    for row in rows:
+        parts = (row.simulation_cpu_s, row.perception_cpu_s, row.agent_cpu_s, row.evaluator_cpu_s)
+        assert sum(parts) == pytest.approx(row.cpu_s)
+        assert 0.0 <= row.decision_cpu_s < row.agent_cpu_s
+        # Every question is a decision that the agent counts: a stage's own, not the sum so far.
+        assert row.num_questions == row.num_decisions
+        assert row.agent_peak_rss_mb is None or row.agent_peak_rss_mb > 1.0
+        assert row.input_tokens is None  # rules keep no account
