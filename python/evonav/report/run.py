@@ -190,7 +190,7 @@ def _check(
         raise StoreError(
             f"{run_dir}: the row of {agent}, {task_id}, stage {stage}, {state.value} holds the record of {what}"
         )
-    if num_stages is not None and not 1 <= stage <= num_stages.get(task_id, 0):
+    if num_stages and not 1 <= stage <= num_stages.get(task_id, 0):
         raise StoreError(f"{run_dir}: stage {stage} of {task_id} by {agent} is no stage of this run")
 
 
