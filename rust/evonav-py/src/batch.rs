@@ -70,7 +70,6 @@ impl PyBatchSimulator {
     }
 
     #[pyo3(signature = (slot, simulator, *, position_m, yaw_rad, horizon_rad, labels))]
-    #[expect(clippy::too_many_arguments, reason = "keyword-only in Python")]
     fn place(
         &mut self,
         slot: usize,
