@@ -61,9 +61,8 @@ def writing(folder: Path) -> Iterator[None]:
                     f"{folder}: its file system has no locks ({error.strerror}); choose a folder of this machine"
                 ) from error
             with suppress(OSError):  # a full disk: it is for people only
-                file.truncate(0)
-                file.write(f"process {os.getpid()} on {socket.gethostname()}\n")
-                file.flush()
+                os.ftruncate(file.fileno(), 0)  # not through a buffer, whose rest would be refused again on closing
+                os.write(file.fileno(), f"process {os.getpid()} on {socket.gethostname()}\n".encode())
         yield
 
 
