@@ -105,12 +105,16 @@ def filled(line: str, task_id: str) -> str:
 
 def parse(arguments: list[str]) -> None:
     """Has the command's parser read arguments, without running anything."""
+    if "--help" in arguments:
+        arguments = arguments[: arguments.index("--help")]
     command: Any = typer.main.get_command(app)
     context, rest = typer.Context(command), arguments
     while hasattr(command, "commands"):
         name, rest = rest[0], rest[1:]
         assert name in command.commands, f"no command {name}"
         command = command.commands[name]
+        if not rest:
+            return  # the help of a command
     command.make_context(command.name, list(rest), parent=context)
 
 
@@ -176,7 +180,7 @@ def made_small(words: list[str], place: Path) -> list[str]:
         names = words[at].split(",")
         for name in names:
             check_agent_name(name)
-        options["--agents"] = ",".join(names[-2:])
+        options["--agents"] = ",".join(names if len(names) <= 3 else names[-2:])
     for option, value in options.items():
         if option in words:
             words[words.index(option) + 1] = value

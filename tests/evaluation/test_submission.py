@@ -358,3 +358,10 @@ def test_run_of_another_protocol_packs_but_is_rejected(tasks: list[TaskFile], tm
     assert [check.name for check in failed] == ["protocol"]
     assert failed[0].said == "max_rounds is 3, the benchmark's is 50"
     assert asdict(ProtocolConfig())["max_rounds"] == 50
+
+
+def test_agent_that_says_nothing_of_itself_is_accepted(tasks: list[TaskFile], tmp_path: Path) -> None:
+    agent = f"{Path(__file__).parents[2] / 'examples' / 'own_agent.py'}:OwnAgent"
+    evaluate([agent], tasks, tmp_path / "silent", num_workers=0)
+    pack(tmp_path / "silent", tmp_path / "silent.zip")
+    assert verify(tmp_path / "silent.zip", tasks).is_accepted

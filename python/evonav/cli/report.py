@@ -7,6 +7,7 @@ import typer
 
 from evonav.cli.display import print_table
 from evonav.cli.options import RunFolder
+from evonav.cli.sweep import write_sweep_summary
 from evonav.cli.view import replay_pages
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def _report_sweep(
     """A report a cell that has records, and a page that leads to them."""
     from evonav.evaluation.store import FILE_NAME
     from evonav.evaluation.sweep import RUNS_NAME
-    from evonav.report.sweep import sweep_tables, write_sweep_summary
+    from evonav.report.sweep import sweep_tables
     from evonav.report.sweep_page import write_sweep_page
 
     tables = sweep_tables(write_sweep_summary(sweep))

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from evonav.evaluation.engine import TaskFile
     from evonav.evaluation.sweep import Cell, CellRun
     from evonav.evaluation.sweep_file import SweepFile
+    from evonav.evaluation.sweep_row import SweepRow
 
 
 def sweep(
@@ -92,7 +93,6 @@ def _run(
     """Runs what is missing; an interrupt leaves a summary of what there is."""
     from evonav.cli.sweep_display import SweepProgress, Teller, showing
     from evonav.evaluation.sweep import run_sweep
-    from evonav.report.sweep import write_sweep_summary
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
@@ -120,6 +120,23 @@ def _run(
         raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
+def write_sweep_summary(out: Path) -> "list[SweepRow]":
+    """Writes the summary files of a sweep as it stands.
+
+    Returns:
+        Its rows.
+
+    Raises:
+        StoreError: There is no sweep, or it cannot be read or written.
+    """
+    from evonav.evaluation.sweep_summary import sweep_json, sweep_rows
+    from evonav.report.sweep import write_sweep_files
+
+    rows = sweep_rows(out)
+    write_sweep_files(out, rows, sweep_json(out, rows))
+    return rows
+
+
 def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
     """Tables, files, and what to do about what is missing.
 
@@ -127,7 +144,7 @@ def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
         Whether a stage of the selected cells is.
     """
     from evonav.cli.decision_options import print_spending
-    from evonav.report.sweep import sweep_tables, write_sweep_summary
+    from evonav.report.sweep import sweep_tables
 
     rows = write_sweep_summary(out)
     for table in sweep_tables(rows):

@@ -62,6 +62,15 @@ class RecordedAgent:
         self._num_acted += 1
         return _action_of(trace[self._num_acted - 1].action)
 
+    @property
+    def _here(self) -> StageRecord:
+        assert self._record is not None  # the protocol begins with begin_stage
+        return self._record
+
+
+class ExplainingRecordedAgent(RecordedAgent):
+    """Says of itself, too, what the records say that the agent said."""
+
     def diagnostics(self) -> RoundDiagnostics:
         """What the agent said of the round."""
         told = self._here.trace[self._num_acted - 1]
@@ -77,11 +86,6 @@ class RecordedAgent:
     def entries(self) -> Sequence[EntryBelief]:
         """What the agent remembered at the end."""
         return [_belief_of(entry) for entry in self._here.entries]
-
-    @property
-    def _here(self) -> StageRecord:
-        assert self._record is not None  # the protocol begins with begin_stage
-        return self._record
 
 
 class _Blind:
@@ -107,7 +111,8 @@ def reenact(
     Yields:
         A stage, and where its record differs from what came of its actions: nothing, for a true record.
     """
-    agent = RecordedAgent(records)
+    says_nothing = all(record.memory_at_end is None for record in records.values())
+    agent = RecordedAgent(records) if says_nothing else ExplainingRecordedAgent(records)
     for outcome in Episode(case, records[1].agent, agent, simulator, _Blind(), protocol, seed=0).run():
         stage = outcome.record.stage
         yield (

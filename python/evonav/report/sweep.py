@@ -3,32 +3,32 @@
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from evonav.evaluation.sweep_summary import AXES, STATES, SweepRow, sweep_json, sweep_rows
+from evonav.evaluation.sweep_row import AXES, STATES, SweepRow
 from evonav.folders import write_atomically
 from evonav.report.tables import Table, percent
 
 
-def write_sweep_summary(out: Path) -> list[SweepRow]:
-    """Writes `summary.json`, `summary.csv` and `summary.md` of a sweep as it stands.
+def write_sweep_files(out: Path, rows: Sequence[SweepRow], content: Mapping[str, Any]) -> None:
+    """Writes `summary.json`, `summary.csv` and `summary.md` of a sweep.
 
-    Returns:
-        Its rows.
+    Args:
+        out: The sweep's folder.
+        rows: Its rows.
+        content: Of `summary.json`.
 
     Raises:
-        StoreError: There is no sweep, or it cannot be read or written.
+        StoreError: They cannot be written.
     """
-    rows = sweep_rows(out)
-    content = sweep_json(out, rows)
     write_atomically(out / "summary.json", json.dumps(content, indent=2, sort_keys=True) + "\n")
     write_atomically(out / "summary.csv", sweep_csv(rows))
     title = content["name"] or out.resolve().name
     parts = [f"# {title}\n"]
     parts += [f"## {table.title}\n\n{table.markdown()}" for table in sweep_tables(rows)]
     write_atomically(out / "summary.md", "\n".join(parts))
-    return rows
 
 
 def sweep_tables(rows: Sequence[SweepRow]) -> list[Table]:
