@@ -136,6 +136,7 @@ def test_the_traceback_is_there_when_it_is_asked_for(folder, monkeypatch, capsys
     monkeypatch.delenv("EVONAV_DEBUG", raising=False)
     from evonav.errors import StoreError
 
+    monkeypatch.setenv("EVONAV_DEBUG", "")  # so that what the option sets ends with the test
     monkeypatch.setattr(sys, "argv", ["evonav", "--debug", "report", "empty"])
     with pytest.raises(StoreError):
         main()
