@@ -49,7 +49,10 @@ def test_a_stage_is_tried_again_from_the_state_in_which_it_began(tasks, tmp_path
     assert texts(tmp_path / "run") == texts(tmp_path / "whole")
     assert retries(tmp_path / "run") == {(AGENT, tasks[0].task_id, stage): num_losses}
     assert retries(tmp_path / "whole") == {}
-    assert load_run(tmp_path / "run").retries == {"simulator_lost": num_losses}
+    failures = load_run(tmp_path / "run").failures
+    assert [(failure.kind, failure.is_retried) for failure in failures] == [
+        (ErrorKind.SIMULATOR_LOST, True)
+    ] * num_losses
     assert len((tmp_path / "starts" / "starts").read_text()) == 1 + num_losses
 
 
@@ -81,7 +84,7 @@ def test_runs_from_before_failures_were_kept_are_read(tasks, tmp_path):
     with sqlite3.connect(tmp_path / "run" / "records.sqlite") as database:
         database.execute("DROP TABLE failures")
     database.close()
-    assert load_run(tmp_path / "run").retries == {}
+    assert load_run(tmp_path / "run").failures == ()
 
 
 def test_means_of_the_machine_do_not_make_another_run(tasks, tmp_path):

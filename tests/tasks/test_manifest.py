@@ -47,7 +47,7 @@ def test_tasks_come_in_order_of_their_ids(task: Task, tmp_path: Path) -> None:
         write_task(dataclasses.replace(task, header=task.header.model_copy(update={"task_id": name})), tmp_path)
     assert [found.task_id for found in load_tasks(tmp_path)] == ["a", "b-0002", "b-0010"]
     assert [found.task_id for found in load_tasks(tmp_path, limit=1)] == ["a"]
-    with pytest.raises(TaskError, match="no task"):
+    with pytest.raises(TaskError, match="is a task itself: name the folder that holds it"):
         list(load_tasks(tmp_path / "a"))
 
 
