@@ -35,6 +35,8 @@ def main() -> None:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     for name in names or SECTIONS:
         module = importlib.import_module(f"benches.{name}")
+        if options and not hasattr(module, "configure"):
+            sys.exit(f"{name} takes no options")
         if options:
             module.configure(options)
         sys.stdout.write(write_section(SECTIONS[name], module.NOTES, module.run()) + "\n")

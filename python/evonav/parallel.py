@@ -10,9 +10,10 @@ import importlib
 import time
 import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from itertools import islice
 from types import TracebackType
 from typing import Literal, Protocol
 
@@ -132,6 +133,25 @@ def open_pool(
     from evonav.parallel_local import ProcessHost
 
     return WorkerPool(ProcessHost(work, settings), num_workers, timeout_s, max_losses)
+
+
+def answers(pool: Pool, jobs: Iterable[Job]) -> Iterator[Answer]:
+    """Has jobs done that say nothing before their end, in any order, and keeps the pool busy meanwhile.
+
+    Args:
+        pool: Who does it.
+        jobs: Taken as there is room for them.
+    """
+    left, num_open = iter(jobs), 0
+    while True:
+        for job in islice(left, max(0, pool.capacity - num_open)):
+            pool.submit(job)
+            num_open += 1
+        if num_open == 0:
+            return
+        answer = pool.next_answer()
+        num_open -= 1
+        yield answer
 
 
 class WorkerLostError(EngineError):

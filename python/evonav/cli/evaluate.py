@@ -172,7 +172,6 @@ def _tasks(
     """The tasks of a run: given, generated into the run's folder, or bundled."""
     from evonav.evaluation.datasets import bundled_tasks, make_tasks
     from evonav.evaluation.engine import task_file, task_files
-    from evonav.tasks.subsets import subset_roots
 
     with ExitStack() as stack:
         if houses is not None:
@@ -190,10 +189,7 @@ def _tasks(
             yield [task_file(root) for root in generated]
         else:
             directory = tasks if tasks is not None else stack.enter_context(bundled_tasks())
-            if subset is None:
-                yield task_files(directory, limit)
-            else:
-                yield [task_file(root) for root in subset_roots(directory, subset)]
+            yield task_files(directory, limit, subset)
 
 
 def _evaluate(

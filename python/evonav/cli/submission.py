@@ -55,21 +55,16 @@ def verify(
     from rich.progress import Progress
 
     from evonav.evaluation.datasets import bundled_tasks
-    from evonav.evaluation.engine import task_file, task_files
+    from evonav.evaluation.engine import task_files
     from evonav.evaluation.verification import verdict_json, verify
-    from evonav.tasks.subsets import subset_roots
 
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")
     with bundled_tasks() as bundled, Progress(console=Console(stderr=True), transient=True) as bar:
         line = bar.add_task("carrying actions out again", total=None)
-        folder = tasks or bundled
-        chosen = (
-            task_files(folder, limit) if subset is None else [task_file(root) for root in subset_roots(folder, subset)]
-        )
         verdict = verify(
             file,
-            chosen,
+            task_files(tasks or bundled, limit, subset),
             scores_only=scores_only,
             num_workers=count_of(workers),
             on_progress=lambda done, total: bar.update(line, completed=done, total=total),

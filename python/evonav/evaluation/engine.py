@@ -22,6 +22,7 @@ from evonav.evaluation.workers import WORK, EpisodeJob, Setup
 from evonav.folders import check_same_run, write_atomically, writing
 from evonav.parallel import EngineName, Resources, open_pool
 from evonav.tasks.files import task_roots
+from evonav.tasks.subsets import subset_roots
 
 __all__ = [
     "NUM_RETRIES",
@@ -67,13 +68,19 @@ class RunRequest:
     config: RunConfig = field(default_factory=RunConfig)
 
 
-def task_files(directory: Path, limit: int | None = None) -> list[TaskFile]:
+def task_files(directory: Path, limit: int | None = None, subset: str | None = None) -> list[TaskFile]:
     """The tasks of a directory, by task id; contents are checked when they are run.
 
+    Args:
+        directory: Holds tasks.
+        limit: Only the first.
+        subset: Only those of a named subset (`evonav.tasks.subsets`), in its order.
+
     Raises:
-        TaskError: There is no task, or a header is malformed.
+        TaskError: There is no task, or too few for the subset, or a header is malformed.
     """
-    return [task_file(root) for root in task_roots(directory)[:limit]]
+    roots = task_roots(directory) if subset is None else subset_roots(directory, subset)
+    return [task_file(root) for root in roots[:limit]]
 
 
 def task_file(root: Path) -> TaskFile:

@@ -31,7 +31,6 @@ from evonav.evaluation.engine import (
     TaskFile,
     evaluate_all,
     run_identity,
-    task_file,
     task_files,
 )
 from evonav.evaluation.settings import Books, SpendingSettings, try_decisions
@@ -39,7 +38,6 @@ from evonav.evaluation.store import FILE_NAME, RunStore
 from evonav.evaluation.sweep_file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
 from evonav.folders import write_atomically, writing
 from evonav.parallel import Resources
-from evonav.tasks.subsets import subset_roots
 
 SWEEP_NAME, RUNS_NAME = "sweep.json", "runs"
 SCHEMA_VERSION = 1
@@ -140,9 +138,7 @@ def tasks_of(tasks: TaskSet, stack: ExitStack) -> list[TaskFile]:
         TaskError: There are none, too few, or malformed ones.
     """
     folder = stack.enter_context(bundled_tasks()) if tasks.folder == BUNDLED else Path(tasks.folder)
-    if tasks.subset is None:
-        return task_files(folder, tasks.limit)
-    return [task_file(root) for root in subset_roots(folder, tasks.subset)]
+    return task_files(folder, tasks.limit, tasks.subset)
 
 
 def config_of(sweep: SweepFile, cell: Cell, books: Books | None) -> RunConfig:

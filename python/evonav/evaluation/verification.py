@@ -20,7 +20,7 @@ from evonav.evaluation.privileged import YARDSTICKS
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState, StageRecord
 from evonav.evaluation.submission import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
-from evonav.parallel import Job, open_pool
+from evonav.parallel import Job, answers, open_pool
 
 MAX_WORDS = 5
 """Findings told of one check; the others are counted."""
@@ -244,25 +244,25 @@ def _reenact(
     for agent, mine in records.items():
         for record in mine:
             episodes.setdefault((agent, record.task_id), []).append(record)
-    waiting = list(episodes)
+    names = list(episodes)
     work = "evonav.evaluation.reenactment:work"
     with open_pool(work, json.dumps(settings), num_workers=num_workers, timeout_s=EPISODE_TIMEOUT_S) as pool:
-        num_sent = num_done = 0
-        while num_done < len(waiting):
-            while num_sent < len(waiting) and num_sent - num_done < pool.capacity:
-                _, task_id = waiting[num_sent]
-                texts = [record.model_dump_json() for record in episodes[waiting[num_sent]]]
-                pool.submit(Job(num_sent, json.dumps({"path": str(known[task_id].path), "records": texts})))
-                num_sent += 1
-            answer = pool.next_answer()
-            num_done += 1
-            on_progress(num_done, len(waiting))
-            agent, task_id = waiting[answer.key]
+        jobs = (
+            Job(number, _episode_text(known[task_id].path, mine))
+            for number, ((_, task_id), mine) in enumerate(episodes.items())
+        )
+        for num_done, answer in enumerate(answers(pool, jobs), start=1):
+            on_progress(num_done, len(names))
+            agent, task_id = names[answer.key]
             if answer.failure is not None:
                 yield f"{agent} {task_id}: {answer.detail.strip().splitlines()[-1]}"
                 continue
             for stage, differences in json.loads(answer.text):
                 yield f"{agent} {task_id} stage {stage}: {'; '.join(differences)}"
+
+
+def _episode_text(path: Path, records: Sequence[StageRecord]) -> str:
+    return json.dumps({"path": str(path), "records": [record.model_dump_json() for record in records]})
 
 
 def _check(name: str, findings: Iterator[str], if_none: str) -> Check:

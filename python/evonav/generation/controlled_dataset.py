@@ -1,36 +1,32 @@
 """Controlled analyses from houses into a folder: parallel, resumable, the same bytes for any number of workers."""
 
 import json
-import os
 import shutil
-import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from pathlib import Path
 
 from evonav._core import __version__
-from evonav.errors import EvonavError, HouseError, InvalidArgumentError, SimulationError, StoreError, TaskError
+from evonav.errors import InvalidArgumentError, TaskError
 from evonav.folders import sha256_of_file, writing
 from evonav.generation.controlled import ControlledOptions, generate_arms
 from evonav.generation.engine import Workforce
 from evonav.generation.journal import Journal, Outcome
-from evonav.generation.pipeline import TaskRejectedError, short_name
-from evonav.generation.worker import MAX_DETAIL, PARTIAL_NAME, put
+from evonav.generation.worker import PARTIAL_NAME, is_whole, outcome_of, worker_of
 from evonav.house import House
 from evonav.house.files import HouseText, HouseTexts
-from evonav.parallel import Answer, Job, open_pool
+from evonav.parallel import Job, answers, open_pool
 from evonav.tasks.controlled import ControlledRecord, tasks_of, write_controlled
 from evonav.tasks.dataset import (
     DatasetRecord,
     HouseRejection,
-    RejectReason,
     SourceFile,
     TaskEntry,
     write_dataset,
 )
 from evonav.tasks.files import read_house, task_roots
-from evonav.tasks.manifest import TaskHeader
+from evonav.tasks.manifest import Task, TaskHeader
 from evonav.tasks.records import parse_record, read_file
 
 WORK = "evonav.generation.controlled_dataset:make_worker"
@@ -98,23 +94,21 @@ def generate_controlled(
                 timeout_s=workforce.house_timeout_s,
                 ray_address=workforce.ray_address,
             ) as pool:
-                left = (index for index in range(num_all) if index not in journal.outcomes)
-                num_open = 0
-                while len(journal.outcomes) < num_all:
-                    while num_open < pool.capacity and (index := next(left, None)) is not None:
-                        house = houses[index // options.per_house]
-                        head = json.dumps([index, house.name, options.seed + index % options.per_house])
-                        pool.submit(Job(index, f"{head}\n{house.text}"))
-                        num_open += 1
-                    answer = pool.next_answer()
-                    num_open -= 1
-                    journal.add(_outcome(answer, houses[answer.key // options.per_house].name))
+                left = [index for index in range(num_all) if index not in journal.outcomes]
+                for answer in answers(pool, (_job(index, houses, options) for index in left)):
+                    journal.add(outcome_of(answer, houses[answer.key // options.per_house].name))
                     on_progress(len(journal.outcomes), num_all)
             shutil.rmtree(out / PARTIAL_NAME, ignore_errors=True)
         journal.rewrite()
         outcomes = [journal.outcomes[index] for index in sorted(journal.outcomes)]
         record = _write(out, options, sources, limit, outcomes)
         return ControlledSummary(record, len(outcomes) - num_before)
+
+
+def _job(index: int, houses: Sequence[HouseText], options: ControlledOptions) -> Job:
+    house = houses[index // options.per_house]
+    head = json.dumps([index, house.name, options.seed + index % options.per_house])
+    return Job(index, f"{head}\n{house.text}")
 
 
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
@@ -124,74 +118,20 @@ def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], st
         settings: `{"out": ..., "options": ...}`.
 
     Returns:
-        It takes `[index, name, seed]` and, after a line feed, the house; and gives an `Outcome`, or `{"refused": ...}`
-        for bad options, or `{"stop": ...}` where nothing can be written.
+        See `worker_of`; a seed heads a house, beside the name.
     """
     values = json.loads(settings)
     options, out = ControlledOptions.from_json(values["options"]), Path(values["out"])
 
-    def work(text: str) -> str:
-        head, _, house = text.partition("\n")
-        index, name, seed = json.loads(head)
-        try:
-            return _do_house(index, name, seed, house, options, out).model_dump_json()
-        except InvalidArgumentError as error:
-            return json.dumps({"refused": str(error)})
-        except (TaskError, OSError) as error:
-            return json.dumps({"stop": str(error)})
+    def arms(house: House, seed: int) -> dict[Path, Task]:
+        return {tasks_of(out, arm): task for arm, task in generate_arms(house, options, seed=seed).items()}
 
-    return work
-
-
-def _do_house(index: int, name: str, seed: int, text: str, options: ControlledOptions, out: Path) -> Outcome:
-    def without_task(reason: RejectReason, error: EvonavError, stage: int = 0) -> Outcome:
-        detail = str(error)[:MAX_DETAIL]
-        return Outcome(index=index, house=short_name(name), reason=reason, stage=stage, detail=detail)
-
-    try:
-        house = House(text, name=name)
-    except HouseError as error:
-        return without_task("malformed_house", error)
-    try:
-        arms = generate_arms(house, options, seed=seed)
-    except TaskRejectedError as error:
-        return without_task(error.reason, error, error.stage)
-    except (HouseError, SimulationError) as error:
-        return without_task("unusable_house", error)
-    label = f"{socket.gethostname()}-{os.getpid()}"
-    roots = [put(task, tasks_of(out, arm), label) for arm, task in arms.items()]
-    task = next(iter(arms.values()))
-    return Outcome(
-        index=index,
-        house=short_name(name),
-        task_id=task.task_id,
-        house_sha256=task.header.house.sha256,
-        # The last arm is written last: if it is there, all are.
-        task_sha256=sha256_of_file(roots[-1] / "task.json"),
-    )
-
-
-def _outcome(answer: Answer, name: str) -> Outcome:
-    if answer.failure is not None:
-        detail = answer.detail[-MAX_DETAIL:]
-        return Outcome(index=answer.key, house=short_name(name), reason=answer.failure, detail=detail)
-    values = json.loads(answer.text)
-    if "refused" in values:
-        raise InvalidArgumentError(values["refused"])
-    if "stop" in values:
-        raise StoreError(values["stop"])
-    return Outcome.model_validate(values)
+    return worker_of(arms)
 
 
 def _is_whole(outcome: Outcome, out: Path, options: ControlledOptions) -> bool:
     """Whether what the journal says is still there."""
-    if outcome.task_id is None:
-        return True
-    try:
-        last = tasks_of(out, options.arms[-1].name) / outcome.task_id / "task.json"
-        return sha256_of_file(last) == outcome.task_sha256
-    except OSError:
-        return False
+    return outcome.task_id is None or is_whole(outcome, tasks_of(out, options.arms[-1].name))
 
 
 def _write(

@@ -15,12 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evonav._core import __version__
-from evonav.errors import HouseError, InvalidArgumentError, StoreError, TaskError
+from evonav.errors import HouseError, InvalidArgumentError, TaskError
 from evonav.folders import sha256_of_file, writing
 from evonav.generation.house_order import house_order, wanted_of
 from evonav.generation.journal import Journal, Outcome
-from evonav.generation.pipeline import short_name
-from evonav.generation.worker import MAX_DETAIL, PARTIAL_NAME, WORK, GenerationOptions
+from evonav.generation.worker import PARTIAL_NAME, WORK, GenerationOptions, is_whole, outcome_of
 from evonav.house.files import HouseTexts, named_set
 from evonav.parallel import Answer, EngineName, Job, Pool, open_pool
 from evonav.tasks.dataset import (
@@ -230,18 +229,7 @@ class _Run:
         return self._limit is None or self._num_tasks + len(self._names) < self._limit
 
     def _record(self, answer: Answer) -> None:
-        name = self._names.pop(answer.key)
-        if answer.failure is not None:
-            outcome = Outcome(
-                index=answer.key, house=short_name(name), reason=answer.failure, detail=answer.detail[-MAX_DETAIL:]
-            )
-        else:
-            values = json.loads(answer.text)
-            if "refused" in values:
-                raise InvalidArgumentError(values["refused"])
-            if "stop" in values:
-                raise StoreError(values["stop"])
-            outcome = Outcome.model_validate(values)
+        outcome = outcome_of(answer, self._names.pop(answer.key))
         self._journal.add(outcome)
         self._num_tasks += outcome.reason is None
         self._num_failed += outcome.is_failure
@@ -294,10 +282,7 @@ def _is_kept(outcome: Outcome, out: Path, retry_failed: bool) -> bool:
     """Whether what the journal says still holds, and is not to be done again."""
     if outcome.task_id is None:
         return not (retry_failed and outcome.is_failure)
-    try:
-        return sha256_of_file(out / outcome.task_id / "task.json") == outcome.task_sha256
-    except OSError:
-        return False
+    return is_whole(outcome, out)
 
 
 def _write_dataset(

@@ -4,16 +4,17 @@ import json
 import os
 import shutil
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from evonav.errors import EvonavError, HouseError, InvalidArgumentError, SimulationError, TaskError
+from evonav.errors import EvonavError, HouseError, InvalidArgumentError, SimulationError, StoreError, TaskError
 from evonav.folders import put_folder, sha256_of_file
 from evonav.generation.journal import Outcome
 from evonav.generation.pipeline import TaskRejectedError, generate_task, short_name
 from evonav.house import House
+from evonav.parallel import Answer
 from evonav.tasks import write_task
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import GenerationParameters, Task
@@ -68,17 +69,30 @@ def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], st
         settings: `{"out": ..., "options": ...}`.
 
     Returns:
-        It takes `[index, name]` and, after a line feed, the house; and gives an `Outcome`, or `{"refused": ...}` for
-        bad options, or `{"stop": ...}` where nothing can be written.
+        See `worker_of`; nothing beside the name heads a house.
     """
     values = json.loads(settings)
     options, out = GenerationOptions.from_json(values["options"]), Path(values["out"])
+    return worker_of(lambda house: {out: options.generate(house)})
+
+
+def worker_of(make: Callable[..., Mapping[Path, Task]]) -> Callable[[str], str]:
+    """What a worker does that makes tasks of houses and writes them.
+
+    Args:
+        make: From a house, and what else heads it, to its tasks by the folder that each goes to. The last is written
+            last: if it is there, all are.
+
+    Returns:
+        It takes `[index, name, ...]` and, after a line feed, the house; and gives an `Outcome`, or `{"refused": ...}`
+        for bad options, or `{"stop": ...}` where nothing can be written. `outcome_of` reads it.
+    """
 
     def work(text: str) -> str:
         head, _, house = text.partition("\n")
-        index, name = json.loads(head)
+        index, name, *more = json.loads(head)
         try:
-            return do_house(index, name, house, options, out).model_dump_json()
+            return _do_house(index, name, house, lambda found: make(found, *more)).model_dump_json()
         except InvalidArgumentError as error:
             return json.dumps({"refused": str(error)})
         except (TaskError, OSError) as error:
@@ -87,12 +101,42 @@ def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], st
     return work
 
 
-def do_house(index: int, name: str, text: str, options: GenerationOptions, out: Path) -> Outcome:
-    """Makes the task of a house and writes it.
+def outcome_of(answer: Answer, name: str) -> Outcome:
+    """What a worker said of a house.
+
+    Args:
+        answer: Of a worker that does what `worker_of` gave.
+        name: Of the house.
 
     Raises:
-        TaskError: It cannot be written.
-        OSError: It cannot be written.
+        InvalidArgumentError: An option is outside its domain.
+        StoreError: A task cannot be written.
+    """
+    if answer.failure is not None:
+        detail = answer.detail[-MAX_DETAIL:]
+        return Outcome(index=answer.key, house=short_name(name), reason=answer.failure, detail=detail)
+    values = json.loads(answer.text)
+    if "refused" in values:
+        raise InvalidArgumentError(values["refused"])
+    if "stop" in values:
+        raise StoreError(values["stop"])
+    return Outcome.model_validate(values)
+
+
+def is_whole(outcome: Outcome, folder: Path) -> bool:
+    """Whether a task that the journal tells of is in a folder, as it was written."""
+    try:
+        return sha256_of_file(folder / str(outcome.task_id) / "task.json") == outcome.task_sha256
+    except OSError:
+        return False
+
+
+def _do_house(index: int, name: str, text: str, make: Callable[[House], Mapping[Path, Task]]) -> Outcome:
+    """Makes the tasks of a house and writes them.
+
+    Raises:
+        TaskError: One cannot be written.
+        OSError: One cannot be written.
         InvalidArgumentError: A parameter is outside its domain.
     """
 
@@ -105,18 +149,20 @@ def do_house(index: int, name: str, text: str, options: GenerationOptions, out: 
     except HouseError as error:
         return without_task("malformed_house", error)
     try:
-        task = options.generate(house)
+        tasks = make(house)
     except TaskRejectedError as error:
         return without_task(error.reason, error, error.stage)
     except (HouseError, SimulationError) as error:
         return without_task("unusable_house", error)
-    root = put(task, out, f"{socket.gethostname()}-{os.getpid()}")
+    label = f"{socket.gethostname()}-{os.getpid()}"
+    roots = [put(task, folder, label) for folder, task in tasks.items()]
+    task = next(iter(tasks.values()))
     return Outcome(
         index=index,
         house=short_name(name),
         task_id=task.task_id,
         house_sha256=task.header.house.sha256,
-        task_sha256=sha256_of_file(root / "task.json"),
+        task_sha256=sha256_of_file(roots[-1] / "task.json"),
     )
 
 

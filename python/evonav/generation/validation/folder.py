@@ -4,13 +4,12 @@ import json
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 
 from evonav.errors import TaskError
 from evonav.generation.validation.problems import Problem, Report
 from evonav.generation.validation.task import validate_files
-from evonav.parallel import Answer, Job, open_pool
+from evonav.parallel import Answer, Job, answers, open_pool
 from evonav.tasks.dataset import DATASET_NAME, check_dataset, read_dataset
 from evonav.tasks.files import task_roots
 
@@ -77,13 +76,7 @@ def validate_folder(
     settings = json.dumps({"allow_unknown_assets": allow_unknown_assets})
     jobs = (Job(index, str(root)) for index, root in enumerate(roots))
     with open_pool(WORK, settings, num_workers=num_workers, timeout_s=TASK_TIMEOUT_S) as pool:
-        num_open = 0
-        while len(reports) < len(roots):
-            for job in islice(jobs, pool.capacity - num_open):
-                pool.submit(job)
-                num_open += 1
-            answer = pool.next_answer()
-            num_open -= 1
+        for answer in answers(pool, jobs):
             reports[answer.key] = _report_of(answer, roots[answer.key].name)
             on_progress(len(reports), len(roots))
     ordered = tuple(reports[index] for index in sorted(reports))
