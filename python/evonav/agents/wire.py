@@ -42,6 +42,7 @@ NUM_FRAMES = 3
 
 _OURS = ("evonav.evaluation.", "evonav.agents.wire", "evonav.agents.serving")
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")
+_CONTAINERS = (dict, list, tuple)
 _SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
 
 
@@ -281,12 +282,12 @@ def read_json(text: bytes) -> Any:  # noqa: ANN401 - JSON
 
 
 def _check_depth(said: object, depth: int) -> None:
-    if not isinstance(said, dict | list | tuple) or not said:
+    if not said or not isinstance(said, _CONTAINERS):
         return
     if depth == 0:
         raise ValueError(f"lists and dictionaries are deeper than {MAX_DEPTH}")
     for part in said.values() if isinstance(said, dict) else said:
-        if isinstance(part, dict | list | tuple):
+        if isinstance(part, _CONTAINERS):
             _check_depth(part, depth - 1)
 
 

@@ -23,8 +23,10 @@ def rank_entries(
         position_m: Of the agent.
     """
     parsed = matcher.parsed(goal)
+    scores = {label: matcher.label_score(parsed, label) for label in {entry.label for entry in entries}}
     keys = []
     for index, entry in enumerate(entries):
-        score = matcher.label_score(parsed, entry.label)
-        keys.append((-score, -entry.num_detections, math.dist(entry.ground_m, position_m), entry.entry_id, index))
+        keys.append(
+            (-scores[entry.label], -entry.num_detections, math.dist(entry.ground_m, position_m), entry.entry_id, index)
+        )
     return [key[-1] for key in sorted(keys)]

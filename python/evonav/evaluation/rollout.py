@@ -77,7 +77,7 @@ class Episode:
         self._observer = observer
         self._case = case
         self._agent_name = agent_name
-        self._agent = agent
+        self.replace_agent(agent)
         self._simulator = simulator
         self._perception = perception
         self._protocol = protocol
@@ -131,22 +131,24 @@ class Episode:
 
     def _new_costs(self, failure: ErrorKind | None) -> Mapping[str, float]:
         """What the agent's decision model has cost in the stage; empty where its process tells nothing."""
-        if not isinstance(self._agent, HasOwnProcess):
+        if self._process is None:
             return {}
         if failure in LOSSES:
             self._told_costs = {}
             return {}
-        told, before = self._agent.costs(), self._told_costs
+        told, before = self._process.costs(), self._told_costs
         self._told_costs = told
         return {name: value if name in LEVELS else value - before.get(name, 0) for name, value in told.items()}
 
     def replace_agent(self, agent: Agent) -> None:
         """Another agent from the next stage on, as after the loss of a process; for replays in one process."""
         self._agent = agent
+        # Asked once: the question costs ten times what looking at the clock does.
+        self._process = agent if isinstance(agent, HasOwnProcess) else None
 
     def _cpu_s(self) -> float:
         """Of this process, and of the agent's where it has one."""
-        return process_time() + (self._agent.cpu_s if isinstance(self._agent, HasOwnProcess) else 0.0)
+        return process_time() + (0.0 if self._process is None else self._process.cpu_s)
 
 
 class _StageRun:

@@ -1,10 +1,12 @@
 //! An object's point cloud, kept so that new points are matched and merged without a rebuild.
 
+use std::ops::Range;
+
 use crate::{
     geometry::Aabb,
     memory::{
         dbscan::distance2,
-        voxels::{VoxelSet, VoxelTable, voxel_of},
+        voxels::{Blocks, Voxel, VoxelSet, place, voxel_of},
     },
     sensors::unproject::Point,
 };
@@ -18,7 +20,7 @@ pub struct Cloud {
     voxels: VoxelSet,
     radius_m: f32,
     /// First point of each cell of edge `radius_m`; `next` leads to the others.
-    cells: VoxelTable,
+    cells: Blocks<[u32; 64]>,
     next: Vec<u32>,
 }
 
@@ -37,7 +39,7 @@ impl Cloud {
             inverse_edge: 1.0 / voxel_m,
             voxels: VoxelSet::with_capacity(points.len() / 8),
             radius_m,
-            cells: VoxelTable::with_capacity(points.len() / 4),
+            cells: Blocks::with_capacity(points.len() / 64),
             next: Vec::with_capacity(points.len()),
         };
         cloud.merge(points);
@@ -62,8 +64,8 @@ impl Cloud {
             if !self.voxels.insert(voxel_of(point, self.inverse_edge)) {
                 continue;
             }
-            let (first, is_new) = self.cells.entry(voxel_of(point, inverse_radius), index);
-            self.next.push(if is_new { END } else { std::mem::replace(first, index) });
+            let (firsts, place) = self.cells.entry(voxel_of(point, inverse_radius), [END; 64]);
+            self.next.push(std::mem::replace(&mut firsts[place], index));
             self.points.push(point);
             self.bounds_m = self.bounds_m.extended(point.map(f64::from));
         }
@@ -74,16 +76,18 @@ impl Cloud {
     /// # Complexity
     /// At most 27 cells a point; the boxes are compared first.
     pub fn overlap(&self, points: &[Point]) -> f64 {
-        let num = points.iter().filter(|&&point| self.has_near(point)).count();
+        let mut finder = Finder::new(self);
+        let num = points.iter().filter(|&&point| finder.has_near(point)).count();
         num as f64 / points.len().max(1) as f64
     }
 
     /// Whether [`Cloud::overlap`] is `enough`, which every larger overlap must be, too; looks at no more points than it takes.
     pub(crate) fn overlaps(&self, points: &[Point], enough: impl Fn(f64) -> bool) -> bool {
         let share = |num: usize| num as f64 / points.len().max(1) as f64;
+        let mut finder = Finder::new(self);
         let mut num = 0;
         for (index, &point) in points.iter().enumerate() {
-            num += usize::from(self.has_near(point));
+            num += usize::from(finder.has_near(point));
             if enough(share(num)) {
                 return true;
             }
@@ -94,47 +98,9 @@ impl Cloud {
         enough(share(num))
     }
 
-    fn has_near(&self, point: Point) -> bool {
-        let (low, high) = (self.bounds_m.min_m, self.bounds_m.max_m);
-        let radius = f64::from(self.radius_m);
-        let is_far = |i: usize| {
-            let value = f64::from(point[i]);
-            value < low[i] - radius || value > high[i] + radius
-        };
-        if (0..3).any(is_far) {
-            return false;
-        }
-        let inverse_radius = 1.0 / radius;
-        let cell = voxel_of(point, inverse_radius);
-        // The point's own cell first: nearly always it decides.
-        if self.cell_has_near(cell, point) {
-            return true;
-        }
-        // Where the point lies in its cell says how near the next ones are.
-        let inside = [0, 1, 2].map(|i| f64::from(point[i]) * inverse_radius - f64::from(cell[i]));
-        for x in -1..=1 {
-            for y in -1..=1 {
-                for z in -1..=1 {
-                    let step = [x, y, z];
-                    let gap2: f64 = (0..3)
-                        .map(|i| match step[i] {
-                            -1 => inside[i] * inside[i],
-                            1 => (1.0 - inside[i]) * (1.0 - inside[i]),
-                            _ => 0.0,
-                        })
-                        .sum();
-                    let beside = [0, 1, 2].map(|i| cell[i].saturating_add(step[i]));
-                    if gap2 < 1.0001 && step != [0; 3] && self.cell_has_near(beside, point) {
-                        return true;
-                    }
-                }
-            }
-        }
-        false
-    }
-
-    fn cell_has_near(&self, cell: [i32; 3], point: Point) -> bool {
-        let mut index = self.cells.get(cell).unwrap_or(END);
+    /// Whether one of a cell's points is nearer to a point than the radius.
+    fn has_near(&self, first: u32, point: Point) -> bool {
+        let mut index = first;
         while index != END {
             if distance2(self.points[index as usize], point) < self.radius_m * self.radius_m {
                 return true;
@@ -143,4 +109,100 @@ impl Cloud {
         }
         false
     }
+}
+
+/// Looks for a cloud's points near others that, one after the other, lie together.
+struct Finder<'a> {
+    cloud: &'a Cloud,
+    /// Bounds grown by the radius.
+    reach_m: Aabb,
+    inverse_radius: f64,
+    /// The cell that a point was in last, and the first of the cloud's points there.
+    last: (Voxel, u32),
+    /// The cell for which `beside` was filled.
+    known: Voxel,
+    /// Cells around it with points: where they are from it, and their first.
+    beside: Vec<(Voxel, u32)>,
+}
+
+impl<'a> Finder<'a> {
+    fn new(cloud: &'a Cloud) -> Self {
+        let (mut reach_m, radius) = (cloud.bounds_m, f64::from(cloud.radius_m));
+        reach_m.min_m = reach_m.min_m.map(|v| v - radius);
+        reach_m.max_m = reach_m.max_m.map(|v| v + radius);
+        let nowhere = [i32::MAX; 3];
+        let (inverse_radius, last) = (1.0 / radius, (nowhere, END));
+        Self { cloud, reach_m, inverse_radius, last, known: nowhere, beside: Vec::new() }
+    }
+
+    /// Whether a point of the cloud is nearer than the radius.
+    fn has_near(&mut self, point: Point) -> bool {
+        let is_far = |i: usize| {
+            let value = f64::from(point[i]);
+            value < self.reach_m.min_m[i] || value > self.reach_m.max_m[i]
+        };
+        if (0..3).any(is_far) {
+            return false;
+        }
+        let cell = voxel_of(point, self.inverse_radius);
+        if cell != self.last.0 {
+            let firsts = self.cloud.cells.get(cell);
+            self.last = (cell, firsts.map_or(END, |firsts| firsts[place(cell)]));
+        }
+        // The point's own cell first: nearly always it decides.
+        if self.cloud.has_near(self.last.1, point) {
+            return true;
+        }
+        if cell != self.known {
+            self.look_beside(cell);
+        }
+        // Where the point lies in its cell says how near the next ones are.
+        let inside =
+            [0, 1, 2].map(|i| f64::from(point[i]) * self.inverse_radius - f64::from(cell[i]));
+        self.beside.iter().any(|&(step, first)| {
+            let gap2: f64 = (0..3)
+                .map(|i| match step[i] {
+                    -1 => inside[i] * inside[i],
+                    1 => (1.0 - inside[i]) * (1.0 - inside[i]),
+                    _ => 0.0,
+                })
+                .sum();
+            gap2 < 1.0001 && self.cloud.has_near(first, point)
+        })
+    }
+
+    /// Finds the points around a cell, a block at a time.
+    fn look_beside(&mut self, cell: Voxel) {
+        self.known = cell;
+        self.beside.clear();
+        let moved = |step: Voxel| [0, 1, 2].map(|i| cell[i].saturating_add(step[i]));
+        for xs in within_blocks(cell[0]) {
+            for ys in within_blocks(cell[1]) {
+                for zs in within_blocks(cell[2]) {
+                    let corner = moved([xs.start, ys.start, zs.start]);
+                    let Some(firsts) = self.cloud.cells.get(corner) else { continue };
+                    for x in xs.clone() {
+                        for y in ys.clone() {
+                            for z in zs.clone() {
+                                let first = firsts[place(moved([x, y, z]))];
+                                if first != END && [x, y, z] != [0; 3] {
+                                    self.beside.push(([x, y, z], first));
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The steps -1, 0 and 1 from a coordinate, parted where a block ends.
+fn within_blocks(coordinate: i32) -> impl Iterator<Item = Range<i32>> {
+    let end = match coordinate & 3 {
+        0 => 0,
+        3 => 1,
+        _ => 2,
+    };
+    [-1..end, end..2].into_iter().filter(|steps| !steps.is_empty())
 }

@@ -63,6 +63,24 @@ struct Grid<'a> {
     starts: Vec<u32>,
     voxels: Vec<Voxel>,
     index: VoxelIndex,
+    /// Of each voxel in the index.
+    slots: Vec<usize>,
+    /// As [`HALF_STEPS`].
+    half_steps: Vec<Step>,
+}
+
+/// From one cell to another.
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    voxels: Voxel,
+    /// In the index.
+    stride: isize,
+}
+
+impl Step {
+    fn back(self) -> Self {
+        Self { voxels: self.voxels.map(|i| -i), stride: -self.stride }
+    }
 }
 
 impl<'a> Grid<'a> {
@@ -90,7 +108,11 @@ impl<'a> Grid<'a> {
             members[next[cell as usize] as usize] = point as u32;
             next[cell as usize] += 1;
         }
-        Self { points, radius2: radius_m * radius_m, cell_of, members, starts, voxels, index }
+        let slots = voxels.iter().map(|&voxel| index.slot(voxel)).collect();
+        let step = |&voxels: &Voxel| Step { voxels, stride: index.stride(voxels) };
+        let half_steps = HALF_STEPS.iter().map(step).collect();
+        let radius2 = radius_m * radius_m;
+        Self { points, radius2, cell_of, members, starts, voxels, index, slots, half_steps }
     }
 
     fn num_cells(&self) -> usize {
@@ -102,15 +124,15 @@ impl<'a> Grid<'a> {
     }
 
     /// The cell some steps away, if points lie there.
-    fn beside(&self, cell: usize, step: Voxel) -> Option<usize> {
-        let voxel = self.voxels[cell];
-        let beside = [0, 1, 2].map(|i| voxel[i].saturating_add(step[i]));
-        self.index.get(beside).map(|other| other as usize)
+    fn beside(&self, cell: usize, step: Step) -> Option<usize> {
+        let beside = || [0, 1, 2].map(|i| self.voxels[cell][i].saturating_add(step.voxels[i]));
+        let slot = self.slots[cell].wrapping_add_signed(step.stride);
+        self.index.at(slot, beside).map(|other| other as usize)
     }
 
     /// Cells that may hold neighbours of a cell's points, the nearest first.
     fn around(&self, cell: usize) -> impl Iterator<Item = usize> {
-        let steps = HALF_STEPS.iter().flat_map(|&step| [step, step.map(|i| -i)]);
+        let steps = self.half_steps.iter().flat_map(|&step| [step, step.back()]);
         steps.filter_map(move |step| self.beside(cell, step))
     }
 
@@ -151,24 +173,51 @@ impl<'a> Grid<'a> {
         };
         let has_core: Vec<bool> =
             (0..self.num_cells()).map(|cell| cores(cell).next().is_some()).collect();
-        let mut num_apart = has_core.iter().filter(|&&has| has).count();
-        // Near cells first: nearly always they join them all, or most of the pairs farther apart.
-        for &step in HALF_STEPS.iter() {
-            if num_apart < 2 {
+        // Whether two parts became one by a cell and what is a step from it.
+        let join = |parents: &mut [u32], cell: usize, step: Step| {
+            let Some(other) = self.beside(cell, step).filter(|&other| has_core[other]) else {
+                return false;
+            };
+            let (a, b) = (root(parents, cell as u32), root(parents, other as u32));
+            let is_joined = a != b && cores(cell).any(|a| cores(other).any(|b| self.is_near(a, b)));
+            if is_joined {
+                parents[a.max(b) as usize] = a.min(b);
+            }
+            is_joined
+        };
+        let with_core = || (0..self.num_cells()).filter(|&cell| has_core[cell]);
+        let mut num_parts = with_core().count();
+        for &step in &self.half_steps[..NUM_TOUCHING] {
+            if num_parts < 2 {
                 break;
             }
-            for cell in (0..self.num_cells()).filter(|&cell| has_core[cell]) {
-                let Some(other) = self.beside(cell, step).filter(|&other| has_core[other]) else {
-                    continue;
-                };
-                let (a, b) = (root(&mut parents, cell as u32), root(&mut parents, other as u32));
-                if a != b && cores(cell).any(|a| cores(other).any(|b| self.is_near(a, b))) {
-                    parents[a.max(b) as usize] = a.min(b);
-                    num_apart -= 1;
-                }
-            }
+            num_parts -= with_core().filter(|&cell| join(&mut parents, cell, step)).count();
+        }
+        if num_parts > 1 {
+            self.join_rest(&mut parents, &has_core, join);
         }
         (0..self.num_cells() as u32).map(|cell| root(&mut parents, cell)).collect()
+    }
+
+    /// Joins what touching cells leave apart: at every place, one of the two lies not in the largest part.
+    fn join_rest(
+        &self,
+        parents: &mut [u32],
+        has_core: &[bool],
+        join: impl Fn(&mut [u32], usize, Step) -> bool,
+    ) {
+        let with_core = || (0..self.num_cells()).filter(|&cell| has_core[cell]);
+        let mut sizes = vec![0_usize; self.num_cells()];
+        with_core().for_each(|cell| sizes[root(parents, cell as u32) as usize] += 1);
+        let largest = (0..sizes.len()).max_by_key(|&cell| sizes[cell]);
+        let mut left: Vec<usize> = with_core().collect();
+        left.retain(|&cell| Some(root(parents, cell as u32) as usize) != largest);
+        for &step in &self.half_steps[NUM_TOUCHING..] {
+            for &cell in &left {
+                join(parents, cell, step);
+                join(parents, cell, step.back());
+            }
+        }
     }
 
     fn label(&self, is_core: &[bool], cluster_of_cell: &[u32]) -> Vec<i32> {
@@ -211,6 +260,9 @@ fn root(parents: &mut [u32], mut cell: u32) -> u32 {
 
 /// Cells at most this many steps away an axis may hold neighbours.
 const REACH: i32 = 2;
+
+/// Of [`HALF_STEPS`], those to cells that touch: at most one step away an axis.
+const NUM_TOUCHING: usize = 13;
 
 /// One of every two opposite steps to such cells, the shortest first.
 static HALF_STEPS: LazyLock<Vec<Voxel>> = LazyLock::new(|| {

@@ -72,38 +72,62 @@ impl VoxelTable {
     }
 }
 
-/// A set of voxels: a word of bits for each block of 4 x 4 x 4, since those of a surface lie together.
+/// Something for each block of 4 x 4 x 4 voxels, since those of a surface lie together.
 #[derive(Debug, Clone)]
-pub(crate) struct VoxelSet {
-    /// Where the bits of a block are.
-    blocks: VoxelTable,
-    bits: Vec<u64>,
-    /// The block that was used last, and where its bits are.
+pub(crate) struct Blocks<T> {
+    /// Where that of a block is.
+    index: VoxelTable,
+    values: Vec<T>,
+    /// The block that was used last, and where its value is.
     last: (Voxel, usize),
 }
 
+impl<T> Blocks<T> {
+    pub(crate) fn with_capacity(num: usize) -> Self {
+        let (index, values) = (VoxelTable::with_capacity(num), Vec::with_capacity(num));
+        Self { index, values, last: ([i32::MAX; 3], 0) }
+    }
+
+    /// What belongs to the block of a voxel.
+    pub(crate) fn get(&self, voxel: Voxel) -> Option<&T> {
+        self.index.get(clamped(voxel).map(|i| i >> 2)).map(|index| &self.values[index as usize])
+    }
+
+    /// The same, `new` if there is nothing yet, and the voxel's [`place`].
+    pub(crate) fn entry(&mut self, voxel: Voxel, new: T) -> (&mut T, usize) {
+        let voxel = clamped(voxel);
+        let block = voxel.map(|i| i >> 2);
+        if block != self.last.0 {
+            let (&mut index, is_new) = self.index.entry(block, self.values.len() as u32);
+            if is_new {
+                self.values.push(new);
+            }
+            self.last = (block, index as usize);
+        }
+        (&mut self.values[self.last.1], place(voxel))
+    }
+}
+
+/// Where a voxel is in its block: 0 to 63.
+pub(crate) fn place(voxel: Voxel) -> usize {
+    let [x, y, z] = clamped(voxel).map(|i| (i & 3) as usize);
+    x << 4 | y << 2 | z
+}
+
+/// A set of voxels.
+#[derive(Debug, Clone)]
+pub(crate) struct VoxelSet(Blocks<u64>);
+
 impl VoxelSet {
     pub(crate) fn with_capacity(num_blocks: usize) -> Self {
-        let nowhere = ([i32::MAX; 3], 0);
-        Self { blocks: VoxelTable::with_capacity(num_blocks), bits: Vec::new(), last: nowhere }
+        Self(Blocks::with_capacity(num_blocks))
     }
 
     /// Enters a voxel; whether it was not there.
     pub(crate) fn insert(&mut self, voxel: Voxel) -> bool {
-        let voxel = clamped(voxel);
-        let block = voxel.map(|i| i >> 2);
-        if block != self.last.0 {
-            let (&mut index, is_new) = self.blocks.entry(block, self.bits.len() as u32);
-            if is_new {
-                self.bits.push(0);
-            }
-            self.last = (block, index as usize);
-        }
-        let [x, y, z] = voxel.map(|i| i & 3);
-        let bit = 1_u64 << (x << 4 | y << 2 | z);
-        let bits = &mut self.bits[self.last.1];
-        let is_new = *bits & bit == 0;
-        *bits |= bit;
+        let (bits, place) = self.0.entry(voxel, 0);
+        let is_new = *bits >> place & 1 == 0;
+        *bits |= 1 << place;
         is_new
     }
 }
@@ -140,13 +164,32 @@ impl VoxelIndex {
     }
 
     pub(crate) fn get(&self, voxel: Voxel) -> Option<u32> {
+        self.at(self.slot(voxel), || voxel)
+    }
+
+    /// What [`VoxelIndex::get`] says of a voxel whose slot is known.
+    pub(crate) fn at(&self, slot: usize, voxel: impl FnOnce() -> Voxel) -> Option<u32> {
         match self {
-            Self::Dense { corner, size, slots } => slots
-                .get(slot_of(voxel, corner, size))
-                .copied()
-                .filter(|&value| value != FREE_INDEX),
-            Self::Sparse(table) => table.get(voxel),
+            Self::Dense { slots, .. } => {
+                slots.get(slot).copied().filter(|&value| value != FREE_INDEX)
+            }
+            Self::Sparse(table) => table.get(voxel()),
         }
+    }
+
+    /// Place of a voxel in the array; 0 if there is no array.
+    pub(crate) fn slot(&self, voxel: Voxel) -> usize {
+        match self {
+            Self::Dense { corner, size, .. } => slot_of(voxel, corner, size),
+            Self::Sparse(_) => 0,
+        }
+    }
+
+    /// From a voxel's slot to that of the voxel a step away.
+    pub(crate) fn stride(&self, step: Voxel) -> isize {
+        let Self::Dense { size, .. } = self else { return 0 };
+        let [x, y, z] = step.map(|i| i as isize);
+        (x * size[1] as isize + y) * size[2] as isize + z
     }
 
     /// The value of a voxel; `value` is entered if there is none.
@@ -186,24 +229,16 @@ fn key_of(voxel: Voxel) -> u64 {
 /// (Open3D's `voxel_down_sample` with voxels aligned to the world instead of the cloud).
 pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
     let inverse_edge = 1.0 / edge_m;
-    let mut table = VoxelTable::with_capacity(points.len() / 2);
-    let mut sums: Vec<([f64; 3], f64)> = Vec::new();
-    // Neighbouring pixels often share a voxel.
-    let mut last = (Voxel::default(), None);
+    let mut blocks = Blocks::with_capacity(points.len() / 16);
+    let mut sums: Vec<([f64; 3], f64)> = Vec::with_capacity(points.len());
     for &point in points {
-        let voxel = voxel_of(point, inverse_edge);
-        let index = match last {
-            (before, Some(index)) if before == voxel => index,
-            _ => {
-                let (&mut index, is_new) = table.entry(voxel, sums.len() as u32);
-                if is_new {
-                    sums.push(([0.0; 3], 0.0));
-                }
-                index
-            }
-        };
-        last = (voxel, Some(index));
-        let (sum, count) = &mut sums[index as usize];
+        let (indices, place) = blocks.entry(voxel_of(point, inverse_edge), [FREE_INDEX; 64]);
+        let index = &mut indices[place];
+        if *index == FREE_INDEX {
+            *index = sums.len() as u32;
+            sums.push(([0.0; 3], 0.0));
+        }
+        let (sum, count) = &mut sums[*index as usize];
         for (sum, value) in sum.iter_mut().zip(point) {
             *sum += f64::from(value);
         }

@@ -46,8 +46,11 @@ pub fn number_instances(
     }
     let mut extents = vec![Extent::EMPTY; is_detectable.len()];
     let mut order = Vec::new();
+    // Value and length of every run.
+    let mut seen = Vec::new();
     for (row, pixels) in image.chunks_exact(width_px).enumerate() {
         for (value, cols) in runs(pixels) {
+            seen.push((value, cols[1] - cols[0]));
             let Some(instance) = usize::try_from(value).ok().and_then(|v| v.checked_sub(1)) else {
                 Error::require("instances", value, "0 or 1 + an index of an object", |v| v == 0)?;
                 continue;
@@ -72,7 +75,10 @@ pub fn number_instances(
     for (number, &instance) in order.iter().enumerate() {
         number_of[instance + 1] = number as i32;
     }
-    let labels = image.iter().map(|&value| number_of[value as usize]).collect();
+    let mut labels = Vec::with_capacity(image.len());
+    for (value, len) in seen {
+        labels.resize(labels.len() + len, number_of[value as usize]);
+    }
     Ok(Masks { labels, instances: order })
 }
 
@@ -135,8 +141,8 @@ pub fn mask_extents(
     Ok(extents)
 }
 
-/// Stretches of equal pixels of a row, each with its first column and one past its last.
-fn runs(pixels: &[i32]) -> impl Iterator<Item = (i32, [usize; 2])> {
+/// Stretches of equal pixels, each with the place of its first and one past its last.
+pub(crate) fn runs(pixels: &[i32]) -> impl Iterator<Item = (i32, [usize; 2])> {
     let mut end = 0;
     pixels.chunk_by(|a, b| a == b).map(move |run| {
         let start = end;

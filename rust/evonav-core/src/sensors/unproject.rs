@@ -1,6 +1,9 @@
 //! Depth images back to points.
 
-use crate::{Error, sensors::camera::Camera};
+use crate::{
+    Error,
+    sensors::{camera::Camera, ground_truth::runs},
+};
 
 /// A point in the world frame. Single precision: 8 micrometres at 100 m.
 pub type Point = [f32; 3];
@@ -44,14 +47,16 @@ pub fn unproject_masks(
     for (name, len) in [("depth_m", depth_m.len()), ("masks", masks.len())] {
         Error::require(name, len, "one value a pixel of the camera", |n| n == num_px)?;
     }
+    if let Some(depth) = depth_m.iter().find(|depth| depth.is_nan()) {
+        return Err(Error::invalid("depth_m", depth, "not NaN"));
+    }
     let mut num_px = vec![0; num_detections];
-    for (&mask, &depth) in masks.iter().zip(depth_m) {
-        Error::require("depth_m", depth, "not NaN", |d| !d.is_nan())?;
+    for (mask, [start, end]) in runs(masks) {
         let Ok(detection) = usize::try_from(mask) else { continue };
         let count = num_px
             .get_mut(detection)
             .ok_or_else(|| Error::invalid("masks", mask, "negative or the index of a detection"))?;
-        *count += usize::from(has_depth(depth));
+        *count += depth_m[start..end].iter().filter(|&&depth| has_depth(depth)).count();
     }
     let strides: Vec<usize> =
         num_px.iter().map(|n: &usize| n.div_ceil(max_points).max(1)).collect();
@@ -68,21 +73,24 @@ pub fn unproject_masks(
     let rows = masks.chunks_exact(camera.width_px).zip(depth_m.chunks_exact(camera.width_px));
     for (row, (masks, depth_m)) in rows.enumerate() {
         let start = [0, 1, 2].map(|i| first[i] + along_v[i] * row as f64);
-        for (col, (&mask, &depth)) in masks.iter().zip(depth_m).enumerate() {
-            if mask < 0 || !has_depth(depth) {
-                continue;
+        for (mask, [begin, end]) in runs(masks) {
+            let Ok(detection) = usize::try_from(mask) else { continue };
+            let (skip, cloud) = (&mut skips[detection], &mut clouds[detection]);
+            for (col, &depth) in (begin..end).zip(&depth_m[begin..end]) {
+                if !has_depth(depth) {
+                    continue;
+                }
+                if *skip > 0 {
+                    *skip -= 1;
+                    continue;
+                }
+                *skip = strides[detection] - 1;
+                let depth = f64::from(depth);
+                cloud.push([0, 1, 2].map(|i| {
+                    let ray = start[i] + along_u[i] * col as f64;
+                    (camera.position_m[i] + ray * depth) as f32
+                }));
             }
-            let detection = mask as usize;
-            if skips[detection] > 0 {
-                skips[detection] -= 1;
-                continue;
-            }
-            skips[detection] = strides[detection] - 1;
-            let depth = f64::from(depth);
-            clouds[detection].push([0, 1, 2].map(|i| {
-                let ray = start[i] + along_u[i] * col as f64;
-                (camera.position_m[i] + ray * depth) as f32
-            }));
         }
     }
     Ok(clouds)
