@@ -9,7 +9,7 @@ from markupsafe import Markup
 from evonav.report import compare_words as words
 from evonav.report.compare import Comparison, Flip
 from evonav.report.line_chart import PLOT_CSS
-from evonav.report.page import page_environment, text_of
+from evonav.report.page import page_environment, policy, text_of
 from evonav.report.plots import Gap, GapPlot, plot_svg
 
 
@@ -54,6 +54,7 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
         .render(
             title=f"{comparisons[0].b} and {comparisons[0].a}" if len(comparisons) == 1 else "agents",
             css=text_of("report.css") + PLOT_CSS,
+            policy=policy(None),
             statements=words.findings(comparisons),
             warnings=words.warnings(comparisons),
             pairs=words.pair_table(comparisons),

@@ -15,7 +15,7 @@ from evonav.report.controlled_rates import rate_tables
 from evonav.report.legend import legend
 from evonav.report.maps import map_css, outcome_words
 from evonav.report.overlay import change, rounds
-from evonav.report.page import page_environment, text_of
+from evonav.report.page import page_environment, picture_uri, policy, text_of
 from evonav.report.plan import furniture, ground, labels, moving_ids
 from evonav.report.rollouts import (
     REASONS,
@@ -78,6 +78,7 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
                 name=directory.resolve().name,
                 kind=analysis.record.kind,
                 record=analysis.record,
+                policy=policy(None),
                 css=text_of("report.css") + map_css(),
                 figures=[Markup(drawn) for drawn in figures.values()],  # noqa: S704 - our own SVG
                 tables=tables,
@@ -110,14 +111,15 @@ def _write_telling(analysis: Analysis, out: Path) -> list[dict[str, str]]:
         name = f"{reason}_{slug(key[0])}_{slug(agent)}.svg"
         folder = out / PICTURES_DIR
         folder.mkdir(exist_ok=True)
-        (folder / name).write_text(pair_svg(load_rollouts(analysis, agent, key)), encoding="utf-8")
+        picture = pair_svg(load_rollouts(analysis, agent, key))
+        (folder / name).write_text(picture, encoding="utf-8")
         found.append(
             {
                 "agent": agent,
                 "reason": REASONS[reason],
                 "task_id": key[0],
                 "page": f"{PAIRS_DIR}/{_page_name(key)}",
-                "picture": f"{PICTURES_DIR}/{name}",
+                "picture": picture_uri(picture),
             }
         )
     return found
@@ -190,6 +192,7 @@ def _pair_context(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[s
     first = told[0].record
     return {
         "css": text_of("report.css") + map_css(),
+        "policy": policy(None),
         "legend": legend(),
         "task_id": key[0],
         "change": split_words(analysis, agents[0], key),

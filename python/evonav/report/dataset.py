@@ -7,7 +7,7 @@ from markupsafe import Markup
 
 from evonav.errors import StoreError
 from evonav.report.charts import chart_css, figure_svg, legend_svg, panel_svg
-from evonav.report.page import page_environment, text_of
+from evonav.report.page import page_environment, policy, text_of
 from evonav.report.panels import other_panels, paper_panels
 from evonav.tasks.records import record_bytes
 from evonav.tasks.statistics import Estimate, Measure, TaskStatistics
@@ -45,6 +45,7 @@ def _context(found: TaskStatistics) -> dict[str, Any]:
             groups.setdefault(measure.group, []).append(_row(measure))
     return {
         "found": found,
+        "policy": policy(None),
         "css": text_of("report.css") + Markup(chart_css()),  # noqa: S704 - our own
         "legend": Markup(legend_svg(found.weighting is not None)),  # noqa: S704
         "figures": [Markup(panel_svg(panel)) for panel in paper_panels(found)],  # noqa: S704

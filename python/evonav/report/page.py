@@ -29,25 +29,31 @@ def page_environment() -> Environment:
     )
 
 
-def policy(styles: tuple[str, ...], scripts: tuple[str, ...] = ()) -> str:
+def policy(styles: tuple[str, ...] | None, scripts: tuple[str, ...] = ()) -> str:
     """The content security policy of a page: these styles and scripts, images in the page itself, nothing else.
 
     What a goal, a model or a task's name smuggles in can neither run nor load anything, even where it is not escaped.
 
     Args:
-        styles: Contents of the page's `style` elements, and of pages that it embeds: they inherit its policy.
+        styles: Contents of the page's `style` elements, and of pages that it embeds: they inherit its policy. `None`
+            for any in the page itself, where drawings carry their own.
         scripts: The same of `script` elements that run.
     """
     return "; ".join(
         (
             "default-src 'none'",
             f"script-src {_hashes(scripts)}",
-            f"style-src {_hashes(styles)}",
+            "style-src 'unsafe-inline'" if styles is None else f"style-src {_hashes(styles)}",
             "img-src data:",
             "base-uri 'none'",
             "form-action 'none'",
         )
     )
+
+
+def picture_uri(svg: str) -> str:
+    """A picture as the source of an `img`, in the page itself."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(clean(svg).encode()).decode()}"
 
 
 def packed(text: str) -> Markup:

@@ -8,7 +8,7 @@ from markupsafe import Markup
 
 from evonav.errors import StoreError
 from evonav.report.maps import file_css, map_css
-from evonav.report.page import page_environment, text_of
+from evonav.report.page import page_environment, policy, text_of
 from evonav.report.plan import Frame
 from evonav.report.svg import escape, join, slug
 from evonav.report.task_legend import task_legend
@@ -122,6 +122,8 @@ def write_gallery(
         "modes": sorted({mode for card in cards for mode in card.modes}),
         "rooms": sorted({card.num_rooms for card in cards}),
         "css": _css(),
+        "js": text_of("tasks.js"),
+        "policy": policy(None, (text_of("tasks.js"),)),
     }
     return _write(out_dir / INDEX_NAME, page_environment().get_template("tasks.html.j2").render(context))
 
@@ -155,6 +157,7 @@ def _task_page(drawing: TaskDrawing, stages: Iterable[int], index: str | None) -
             header=drawing.task.header,
             index=index,
             css=_css(),
+            policy=policy(None),
             legend=task_legend(),
             defs=Markup(definitions(drawing)),  # noqa: S704 - our own SVG
             view_box=drawing.frame.view_box,

@@ -1,0 +1,396 @@
+"""A stage of an episode: start, rounds, measures."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from evonav.agents import wire
+from evonav.agents.agent import (
+    Agent,
+    AgentAction,
+    EntryBelief,
+    ExplainingAgent,
+    Move,
+    NavigateTo,
+    RoundDiagnostics,
+    Sensing,
+    Stop,
+)
+from evonav.evaluation import motion
+from evonav.evaluation.cases import room_at, stage_map
+from evonav.evaluation.costs import Stopwatch
+from evonav.evaluation.episode_parts import (
+    EpisodeObserver,
+    HasOwnProcess,
+    StageFailedError,
+    blame,
+    traceback_of,
+)
+from evonav.evaluation.metrics import stage_soft_spl, stage_spl
+from evonav.evaluation.privileged import Sighting, privileges_of
+from evonav.evaluation.protocol import (
+    EpisodeCase,
+    ForcedWalk,
+    ProtocolConfig,
+    as_errored,
+)
+from evonav.evaluation.record_parts import action_record, entry_record, pose_record, sensing_record
+from evonav.evaluation.records import (
+    EndState,
+    EntryRecord,
+    ErrorKind,
+    MemoryRecord,
+    RoundRecord,
+    StageMap,
+    StageRecord,
+)
+from evonav.evaluation.sensing import Perception, Sensors, map_frame
+from evonav.evaluation.witness import Witness, Witnessed
+from evonav.sensors.observation import Observation
+from evonav.tasks.public import TaskInfo
+from evonav.world.pose import Pose
+from evonav.world.simulator import Simulator
+
+
+@dataclass(frozen=True, slots=True)
+class Participants:
+    """Who and what takes part in an episode."""
+
+    case: EpisodeCase
+    agent: Agent
+    simulator: Simulator
+    perception: Perception
+    protocol: ProtocolConfig
+    seed: int
+    observer: EpisodeObserver | None
+
+
+@dataclass(slots=True)
+class Carried:
+    """What lasts from one stage to the next."""
+
+    has_begun: bool = False
+    """The agent knows the task."""
+    witnessed: Witnessed = field(default_factory=Witnessed)
+
+
+class StageRun:
+    """One stage of an episode: start, rounds, measures."""
+
+    def __init__(
+        self, parts: Participants, carried: Carried, record: StageRecord, requested: Pose, stopwatch: Stopwatch
+    ) -> None:
+        """Runs nothing yet.
+
+        Args:
+            parts: Of the episode.
+            carried: Is brought up to date.
+            record: A blank one.
+            requested: Where the agent is to start.
+            stopwatch: Books what the stage takes.
+        """
+        self._carried = carried
+        self._case = parts.case
+        self._agent = parts.agent
+        self._simulator = parts.simulator
+        self._perception = parts.perception
+        self._protocol = parts.protocol
+        self._seed = parts.seed
+        self._observer = parts.observer
+        self._stage = self._case.stages[record.stage - 1]
+        self._record = record
+        self._requested = requested
+        self._sensing = Sensing()
+        self._planner = motion.Planner(self._simulator)
+        self._stopwatch = stopwatch
+        self._witness = Witness((), "", (), carried.witnessed, 1)
+        self._memory_at_start: MemoryRecord | None = None
+        self._beliefs: Sequence[EntryBelief] | None = None
+        """Of the last round, if they were asked for."""
+        self._trace: list[RoundRecord] = []
+        self._length_m = 0.0
+        self.plan: StageMap | None = None
+        self.failure: ErrorKind | None = None
+        """Why the stage could not be finished."""
+        self.traceback = ""
+
+    def run(self) -> StageRecord:
+        """The stage's record; where it fails, `failure` and `traceback` say why."""
+        try:
+            with blame(ErrorKind.HARNESS):
+                self._start()
+                if self._stage.forced is not None:
+                    return self._forced(self._stage.forced)
+                with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+                    reference_m = self._path_to_target_m()
+                stop_reason = self._rounds()
+                return self._measured(reference_m, stop_reason)
+        except StageFailedError as failure:
+            self.failure = failure.kind
+            self.traceback = traceback_of(failure)
+            self._witness.close(())
+            return as_errored(self._with_trace(self._record), failure.kind, str(failure))
+
+    def _start(self) -> None:
+        """Loads the stage's house, puts the agent where it ended, and tells it the goal."""
+        stage = self._record.stage
+        with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+            start = self._simulator.reset(self._stage.house_json, self._requested)
+            is_snapped = math.dist((start.x_m, start.z_m), (self._requested.x_m, self._requested.z_m)) > 1e-6
+        self._witness = Witness(
+            self._simulator.objects,
+            self._stage.target.object_id,
+            self._stage.transition.relocations,
+            self._carried.witnessed,
+            self._protocol.min_visible_px,
+        )
+        self.plan = stage_map(self._case, stage, self._simulator.objects)
+        room_id = room_at(self.plan, (self._requested.x_m, self._requested.z_m))
+        evolved_room_id = self._record.transition.room_id
+        self._record = self._record.model_copy(
+            update={
+                "requested_start": pose_record(self._requested),
+                "effective_start": pose_record(start),
+                "is_snapped": is_snapped,
+                "transition": self._record.transition.model_copy(
+                    update={"is_agent_in_room": evolved_room_id is not None and room_id == evolved_room_id}
+                ),
+            }
+        )
+        if self._observer is not None:
+            self._observer.stage_begins(stage, self._simulator)
+        with blame(ErrorKind.AGENT):
+            with self._stopwatch.timing("agent"):
+                self._tell_goal()
+            beliefs = self._told_entries()
+            if beliefs and (privileged := privileges_of(self._agent)) is not None:
+                privileged.reveal_stale(self._witness.stale_ids(beliefs))
+                beliefs = self._told_entries()
+        self._memory_at_start = None if beliefs is None else self._witness.begin(beliefs)
+        self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensing)})
+
+    def _tell_goal(self) -> None:
+        """Tells the agent of the task, if it does not know, and of the stage. Its sensing is held for the stage."""
+        self._sensing = self._granted()
+        if not self._carried.has_begun:
+            self._agent.begin_task(
+                TaskInfo(
+                    task_id=self._case.task_id,
+                    num_stages=len(self._case.stages),
+                    max_rounds=self._protocol.budget(self._sensing),
+                    map_frame=map_frame(self._simulator.occupancy()),
+                    seed=self._seed,
+                )
+            )
+            self._carried.has_begun = True
+        self._agent.begin_stage(self._stage.public)
+        self._sensing = self._granted()
+        if (privileged := privileges_of(self._agent)) is not None:
+            privileged.reveal_target(self._stage.target.position_m)
+
+    def _granted(self) -> Sensing:
+        """What the agent asks of its sensors, within the protocol."""
+        sensing = wire.sensing_of(wire.read_json(wire.sensing_json(self._agent.sensing).encode()))
+        self._protocol.check(sensing)
+        return sensing
+
+    def _path_to_target_m(self) -> list[motion.Point2]:
+        """The planner's path from where the agent stands to the target; empty when there is none."""
+        x_m, _, z_m = self._stage.target.position_m
+        return self._planner.path_m((x_m, z_m))
+
+    def _rounds(self) -> str | None:
+        """Decision rounds until the agent stops (returns why) or the budget ends (returns `None`)."""
+        sensors = self._sensors()
+        last = motion.Motion((), is_success=True)
+        budget = self._protocol.budget(self._sensing)
+        for number in range(budget):
+            self._witness.begin_round(number)
+            with blame(ErrorKind.SIMULATION):
+                observation = sensors.observe(
+                    is_first=number == 0,
+                    is_action_success=last.is_success,
+                    has_arrived=last.has_arrived,
+                    num_rounds_left=budget - number,
+                )
+            action = self._answer(observation)
+            with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+                last = self._carry_out(action)
+            self._end_round(number, observation, action, last)
+            if isinstance(action, Stop):
+                return action.reason
+        return None
+
+    def _forced(self, forced: ForcedWalk) -> StageRecord:
+        """Walks the reference trajectory; the agent is asked in every round as in any stage, and not heeded."""
+        sensors = self._sensors()
+        is_stepwise = self._sensing.motion == "actions"
+        travel_m = self._protocol.waypoint_m if is_stepwise else self._protocol.max_travel_m
+        legs = motion.legs(forced.path_m, travel_m)
+        for number in range(len(legs) + 1):
+            self._witness.begin_round(number)
+            with blame(ErrorKind.SIMULATION):
+                num_left = len(legs) + 1 - number
+                observation = sensors.observe(is_first=number == 0, num_rounds_left=num_left, is_guided=True)
+            action = self._answer(observation)
+            pose = self._simulator.pose
+            done = motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
+            if number < len(legs):
+                is_last = number + 1 == len(legs)
+                with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+                    done = motion.walk(self._simulator, legs[number], forced.end.yaw_rad if is_last else None)
+            self._end_round(number, observation, action, done)
+            if not done.is_success:
+                raise StageFailedError(
+                    ErrorKind.SIMULATION, f"the reference trajectory is blocked at {legs[number][-1]}"
+                )
+        end = self._simulator.pose
+        return self._with_memory(self._with_trace(self._record)).model_copy(
+            update={"state": EndState.FORCED, "terminal": pose_record(end), "path_length_m": self._length_m}
+        )
+
+    def _sensors(self) -> Sensors:
+        with blame(ErrorKind.SIMULATION):
+            return Sensors(self._simulator, self._perception, self._sensing, self._witness, self._stopwatch)
+
+    def _answer(self, observation: Observation) -> AgentAction:
+        """What the agent answers to what it is given."""
+        if self._observer is not None:
+            self._observer.round_begins(observation)
+        with blame(ErrorKind.AGENT), self._stopwatch.timing("agent"):
+            if (privileged := privileges_of(self._agent)) is not None:
+                privileged.reveal_sighting(Sighting(self._witness.is_target_visible, self._witness.is_target_seen))
+            return wire.checked_action(self._agent.act(observation), self._sensing)
+
+    def _end_round(self, number: int, observation: Observation, action: AgentAction, done: motion.Motion) -> None:
+        self._length_m += done.length_m
+        self._trace.append(self._round_record(number, observation, action, done))
+        self._beliefs = None
+        if self._memory_at_start is not None and self._witness.wants_entries:
+            with blame(ErrorKind.AGENT):
+                self._beliefs = self._told_entries()
+            self._witness.take_entries(self._beliefs or ())
+        if self._observer is not None:
+            self._observer.round_ends(self._trace[-1])
+
+    def _carry_out(self, action: AgentAction) -> motion.Motion:
+        if isinstance(action, NavigateTo):
+            return motion.navigate(
+                self._simulator,
+                self._planner,
+                action,
+                spacing_m=self._protocol.waypoint_m,
+                max_travel_m=self._sensing.max_travel_m,
+            )
+        if isinstance(action, Move):
+            return motion.move(self._simulator, action)
+        pose = self._simulator.pose
+        return motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
+
+    def _round_record(
+        self, number: int, observation: Observation, action: AgentAction, done: motion.Motion
+    ) -> RoundRecord:
+        with blame(ErrorKind.AGENT):
+            told = self._told()
+            return RoundRecord(
+                round=number,
+                pose=pose_record(observation.pose),
+                action=action_record(action),
+                path_m=done.path_m,
+                is_action_success=done.is_success,
+                is_target_visible=self._witness.is_target_visible,
+                choice=told.choice,
+                chosen_entry=None if told.chosen_entry is None else self._entry_record(told.chosen_entry),
+                num_entries=told.num_entries,
+                num_frontiers=told.num_frontiers,
+                counters=dict(told.counters),
+                details=dict(told.details),
+            )
+
+    def _told(self) -> RoundDiagnostics:
+        """The round in the agent's words, as JSON has them whatever process it is in."""
+        if not isinstance(self._agent, ExplainingAgent):
+            return RoundDiagnostics()
+        told = self._agent.diagnostics()
+        if isinstance(self._agent, HasOwnProcess):
+            return told
+        return wire.diagnostics_of(wire.read_json(wire.diagnostics_json(told).encode()))
+
+    def _measured(self, reference_m: list[motion.Point2], stop_reason: str | None) -> StageRecord:
+        start, end = self._record.effective_start, self._simulator.pose
+        assert start is not None  # set by _start
+        x_m, _, z_m = self._stage.target.position_m
+        radius_m = self._protocol.success_radius_m
+        start_distance_m = math.dist((start.x_m, start.z_m), (x_m, z_m))
+        distance_m = math.dist((end.x_m, end.z_m), (x_m, z_m))
+        is_success = distance_m < radius_m
+        with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+            left_m = self._path_to_target_m()
+        geodesic_m = motion.polyline_length_m(left_m) if left_m else None
+        record = self._with_memory(self._with_trace(self._record)).model_copy(
+            update={
+                "state": EndState.SUCCESS if is_success else EndState.FAILURE,
+                "terminal": pose_record(end),
+                "has_stopped": stop_reason is not None,
+                "stop_reason": stop_reason or "",
+                "start_distance_m": start_distance_m,
+                "terminal_distance_m": distance_m,
+                "terminal_box_distance_m": self._witness.target_box_distance_m((end.x_m, end.z_m)),
+                "terminal_geodesic_m": geodesic_m,
+                "is_geodesic_success": geodesic_m is not None and geodesic_m < radius_m,
+                "path_length_m": self._length_m,
+            }
+        )
+        if not reference_m:
+            # The agent's memory and pose are sound, so the episode goes on; only this stage has no measure.
+            return as_errored(record, ErrorKind.REFERENCE, "no path from the effective start to the target")
+        reference_length_m = motion.polyline_length_m(reference_m)
+        return record.model_copy(
+            update={
+                "reference_length_m": reference_length_m,
+                "reference_ring_m": motion.length_outside_m(reference_m, (x_m, z_m), radius_m),
+                "spl": stage_spl(is_success, self._length_m, reference_length_m),
+                "soft_spl": stage_soft_spl(start_distance_m, distance_m, self._length_m, reference_length_m),
+            }
+        )
+
+    def _with_memory(self, record: StageRecord) -> StageRecord:
+        """The record with what the agent holds at the end, judged."""
+        with blame(ErrorKind.AGENT):
+            beliefs = self._told_entries() if self._beliefs is None else self._beliefs
+        if beliefs is None:
+            self._witness.close(())
+            return record
+        memory, num_forgotten = self._witness.end(beliefs)
+        return record.model_copy(
+            update={
+                "entries": tuple(self._entry_record(belief) for belief in beliefs),
+                "memory_at_start": self._memory_at_start,
+                "memory_at_end": memory,
+                "num_forgotten": num_forgotten,
+                "stale_entries": self._witness.stale_entries(),
+                "moved_objects": self._witness.moved_objects(),
+            }
+        )
+
+    def _with_trace(self, record: StageRecord) -> StageRecord:
+        return record.model_copy(
+            update={
+                "num_rounds": len(self._trace),
+                "num_target_visible_rounds": sum(entry.is_target_visible for entry in self._trace),
+                "trace": tuple(self._trace),
+            }
+        )
+
+    def _told_entries(self) -> Sequence[EntryBelief] | None:
+        """The agent's object memory, the same whatever process it is in; `None` if it tells none."""
+        if not isinstance(self._agent, ExplainingAgent):
+            return None
+        with self._stopwatch.timing("agent"):
+            entries = self._agent.entries()
+            if isinstance(self._agent, HasOwnProcess):
+                return entries if self._agent.tells_entries else None
+            return wire.entries_of(wire.read_json(wire.entries_json(entries).encode()))
+
+    def _entry_record(self, belief: EntryBelief) -> EntryRecord:
+        return entry_record(belief, self._witness.bodies)
