@@ -21,7 +21,7 @@ worker's. *Efficiency*: of two workers, stages a second over twice those of one.
 where the machine has nothing else to do; where it is shared, as the load named below says, by CPU time: what a stage
 costs with one worker over what it costs with two. Peak memory: resident, of one worker and of its agent's process.
 Records are checked to be the same, byte for byte, for one worker and two.
-Again: `python -m benches evaluation --tasks FOLDER [--limit N] [--agents fu,ftu,stage-reset]`.
+Again: `python -m benches evaluation --tasks FOLDER [--limit N] [--agents fu,ftu,stage-reset] [--workers 1,2]`.
 """
 EVERY_S = 0.5
 """Looks at memory."""
@@ -34,6 +34,9 @@ class Options:
     tasks: Path | None = None
     limit: int | None = None
     agents: tuple[str, ...] = ("fu", "ftu", "stage-reset")
+    workers: tuple[int, ...] = (1, 2)
+    keep: Path | None = None
+    """Folder for the runs."""
 
 
 @dataclass
@@ -67,15 +70,17 @@ def configure(arguments: Sequence[str]) -> None:
     parser.add_argument("--tasks", type=Path)
     parser.add_argument("--limit", type=int)
     parser.add_argument("--agents", type=lambda text: tuple(text.split(",")), default=options.agents)
+    parser.add_argument("--workers", type=lambda text: tuple(map(int, text.split(","))), default=options.workers)
+    parser.add_argument("--keep", type=Path)
     parser.parse_args(arguments, namespace=options)  # type: ignore[type-var]
 
 
 def run() -> str:
     """Measures every agent with one worker and with two."""
     lines = [
-        "| agent | stages | 1 worker, stages/s | 2 workers, stages/s | efficiency, wall | efficiency, CPU "
-        "| stages a CPU second | peak of a worker | of an agent |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| agent | stages | workers | wall | stages/s | efficiency, wall | efficiency, CPU | stages a CPU second "
+        "| peak of a worker | of an agent |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     load = os.getloadavg()[0]
     allowed = os.sched_getaffinity(0)
@@ -84,23 +89,33 @@ def run() -> str:
         with bundled_tasks() as bundled, tempfile.TemporaryDirectory() as folder:
             tasks = task_files(options.tasks or bundled, options.limit)
             for agent in options.agents:
-                one, two = (measured(agent, tasks, number, Path(folder)) for number in (1, 2))
-                if one.texts != two.texts:
-                    raise AssertionError(f"{agent}: records differ between one worker and two")
-                lines.append(
-                    f"| {agent} | {one.num_stages} | {one.per_s:.2f} | {two.per_s:.2f} "
-                    f"| {two.per_s / one.per_s / 2:.0%} | {two.per_cpu_s / one.per_cpu_s:.0%} | {one.per_cpu_s:.2f} "
-                    f"| {max(one.worker_mb, two.worker_mb):.0f} MB | {max(one.agent_mb, two.agent_mb):.0f} MB |"
-                )
+                runs = {
+                    number: measured(agent, tasks, number, options.keep or Path(folder)) for number in options.workers
+                }
+                if len({tuple(one.texts) for one in runs.values()}) > 1:
+                    raise AssertionError(f"{agent}: records differ with the number of workers")
+                lines += [row(agent, number, one, runs.get(1)) for number, one in runs.items()]
     finally:
         os.sched_setaffinity(0, allowed)
     lines += ["", f"{len(tasks)} houses; {os.cpu_count()} cores, load before it began: {load:.1f}."]
     return "\n".join(lines)
 
 
+def row(agent: str, num_workers: int, done: Measured, alone: Measured | None) -> str:
+    """A run's line; efficiency is beside one worker's."""
+    if alone is None or alone is done:
+        shares = "|"
+    else:
+        shares = f"{done.per_s / alone.per_s / num_workers:.0%} | {done.per_cpu_s / alone.per_cpu_s:.0%}"
+    return (
+        f"| {agent} | {done.num_stages} | {num_workers} | {done.wall_s:.0f} s | {done.per_s:.2f} | {shares} "
+        f"| {done.per_cpu_s:.2f} | {done.worker_mb:.0f} MB | {done.agent_mb:.0f} MB |"
+    )
+
+
 def measured(agent: str, tasks: Sequence[TaskFile], num_workers: int, folder: Path) -> Measured:
     """A run into a fresh folder."""
-    done, run_dir, looked_s = Measured(), folder / "run", 0.0
+    done, run_dir, looked_s = Measured(), folder / f"{agent}-{num_workers}", 0.0
 
     def look(news: Progress) -> None:
         nonlocal looked_s
@@ -119,7 +134,8 @@ def measured(agent: str, tasks: Sequence[TaskFile], num_workers: int, folder: Pa
         if failures := store.failures():
             raise AssertionError(failures[0])
     done.num_stages = len(done.texts)
-    shutil.rmtree(run_dir)
+    if options.keep is None:
+        shutil.rmtree(run_dir)
     return done
 
 
