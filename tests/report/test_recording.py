@@ -10,8 +10,12 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.backend import load_case
+from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.store import RunStore
 from evonav.report.recording import check_recording
+from evonav.world.embedded import EmbeddedSimulator
+from evonav.world.pose import Pose
 
 rerun_chunk = pytest.importorskip("rerun.chunk", reason="rerun is not installed")
 
@@ -73,6 +77,23 @@ def test_entities_and_counts_are_the_records(recording: Path, viewed_run: Path) 
     for row, record in zip(targets, records, strict=True):
         x_m, y_m, z_m = record.target.position_m
         assert np.allclose(column(row, "positions"), [(x_m, z_m, y_m)], atol=1e-5)
+
+
+def test_depth_is_what_the_camera_measured(recording: Path, viewed_run: Path) -> None:
+    with RunStore(viewed_run) as store:
+        (record, *_) = store.records("fu")
+    with bundled_tasks() as tasks:
+        house_json = load_case(tasks / record.task_id).stages[0].house_json
+    simulator = EmbeddedSimulator()
+    simulator.reset(house_json)
+    pose = record.trace[0].pose
+    frame = simulator.render(Pose(pose.x_m, pose.y_m, pose.z_m, pose.yaw_rad, pose.horizon_rad), rgb=False)
+    found = [row for row in rows(recording)["/world/agent/heading/depth"] if row["step"] == 0]
+    row = {key.rpartition(":")[2]: value for row in found for key, value in row.items() if value}
+    shape = row["format"][0]["height"], row["format"][0]["width"]
+    depth_m = np.asarray(row["buffer"][0], np.uint8).view(np.uint16).reshape(shape) / row["meter"][0]
+    assert shape == frame.depth_m.shape
+    assert np.allclose(depth_m, frame.depth_m, atol=5.01e-4)
 
 
 def test_cameras_look_where_the_agent_looks(recording: Path, viewed_run: Path) -> None:

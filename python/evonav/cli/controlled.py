@@ -157,7 +157,7 @@ def report(
 @controlled_app.command()
 def picture(
     directory: Directory,
-    out: Annotated[Path, typer.Option(help="SVG file to write.")],
+    out: Annotated[Path, typer.Option(help="Picture to write: .svg, or .png or .pdf (extra `viz`).")],
     task: Annotated[str | None, typer.Argument(help="Id of a task; default: the most telling pair.")] = None,
     agent: Annotated[str, typer.Option(help="Whose rollouts.")] = "fu",
 ) -> None:

@@ -26,11 +26,11 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
     "thor": (("ai2thor", "msgpack", "prior"), "--simulator ai2thor, ProcTHOR-10k"),
     "video": (("imageio", "av"), "videos of episodes"),
-    "viz": (("matplotlib",), "figures as PNG and PDF"),
+    "viz": (("matplotlib", "resvg-py"), "figures as PNG and PDF"),
     "vlm": (("openai",), "--decision vlm: a model behind an endpoint"),
 }
 """Packages of each extra, and what it is for."""
-_MODULES = {"rerun-sdk": "rerun"}
+_MODULES = {"rerun-sdk": "rerun", "resvg-py": "resvg_py"}
 _X86_FEATURES = ("sse4_2", "avx", "avx2", "fma", "avx512f")
 _ARM_FEATURES = ("asimd", "neon", "sve")
 

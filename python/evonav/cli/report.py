@@ -75,7 +75,7 @@ def _report_sweep(
 
 def strip(
     run: RunFolder,
-    out: Annotated[Path, typer.Option(help="SVG file to write.")],
+    out: Annotated[Path, typer.Option(help="Picture to write: .svg, or .png or .pdf (extra `viz`).")],
     task: Annotated[str | None, typer.Argument(help="Id of a task of the run; default: the most telling one.")] = None,
     agents: Annotated[str, typer.Option(help="Agents of the run, comma-separated: a row each.")] = "ftu",
     stages: Annotated[str, typer.Option(help="Stages, comma-separated; default: all.")] = "",

@@ -15,23 +15,26 @@ def show(
     folder: Annotated[Path, typer.Argument(help="Folder of a task, or of a data set.")],
     task: Annotated[str | None, typer.Option(help="Of a data set: this task only.")] = None,
     stage: Annotated[int | None, typer.Option(help="This stage only.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Page (.html), picture (.svg, with --stage), or folder.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Page (.html), picture (.svg, .png or .pdf; of a --stage), or folder.")
+    ] = None,
     limit: Limit = None,
 ) -> None:
     """Draws tasks with their hidden changes: a page a task, or a gallery of a data set. It tells the answers."""
-    from evonav.report.task_pages import write_gallery, write_stage_svg, write_task_page
+    from evonav.report.pictures import SUFFIXES
+    from evonav.report.task_pages import write_gallery, write_stage_picture, write_task_page
     from evonav.tasks import load_tasks
 
     one = _one_task(folder, task, stage)
     if one is None:
-        if stage is not None or (out is not None and out.suffix in (".svg", ".html")):
+        if stage is not None or (out is not None and out.suffix in (*SUFFIXES, ".html")):
             raise typer.BadParameter("--stage and single files are for one task: give its folder, or --task")
         target = out or Path(f"{folder.resolve().name}-pictures")
         path = write_gallery(load_tasks(folder, limit), target, folder.resolve().name, on_task=typer.echo)
-    elif out is not None and out.suffix == ".svg":
+    elif out is not None and out.suffix in SUFFIXES:
         if stage is None:
             raise typer.BadParameter("a picture shows one stage: give --stage, too")
-        path = write_stage_svg(one, stage, out)
+        path = write_stage_picture(one, stage, out)
     else:
         name = f"{one.task_id}.html"
         target = Path(name) if out is None else out if out.suffix == ".html" else out / name

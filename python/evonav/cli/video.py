@@ -75,7 +75,9 @@ def rerun(
     from evonav.report.recording import check_recording, write_recording
 
     check_recording(out)
-    _, agent, (stages, shown), radius_m = _replayed(run, task, agent, stage, tasks, exchanges, VIEW_PX)
+    _, agent, (stages, shown), radius_m = _replayed(
+        run, task, agent, stage, tasks, exchanges, VIEW_PX, keeps_depth=True
+    )
     maps = {one.record.stage: one.stage_map for one in stages if one.stage_map is not None}
     write_recording(shown, maps, out, success_radius_m=radius_m)
     typer.echo(f"recording: {out} ({agent} in {stages[0].record.task_id}); open it with: rerun {out}")
@@ -89,6 +91,8 @@ def _replayed(
     tasks: Path | None,
     exchanges: Path | None,
     heading_px: int,
+    *,
+    keeps_depth: bool = False,
 ) -> "tuple[RunReplay, str, tuple[list[TracedStage], list[TracedStage]], float]":
     """An episode, run again: its replay, agent, stages up to the last one asked for and those asked for, radius."""
     from evonav.errors import InvalidArgumentError
@@ -104,7 +108,7 @@ def _replayed(
     episodes = telling_episodes(found)
     fitting = (one for one in episodes if one[0] == (agent or one[0]) and one[1] == (task or one[1]))
     name, task_id = next(fitting, (agent or "", task or ""))  # what there is no record of is told by the replay
-    replay = RunReplay(run, task_path(run, tasks), exchanges, heading_px=heading_px)
+    replay = RunReplay(run, task_path(run, tasks), exchanges, heading_px=heading_px, keeps_depth=keeps_depth)
     with status("Replaying") as tell:
         last = None if wanted is None else max(wanted)
         stages = list(replay.episode(name, task_id, _teller(tell), last_stage=last))

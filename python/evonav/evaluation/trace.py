@@ -47,6 +47,7 @@ class RunReplay:
         exchanges: Path | None = None,
         *,
         heading_px: int | None = None,
+        keeps_depth: bool = False,
     ) -> None:
         """Reads a run's header.
 
@@ -55,6 +56,7 @@ class RunReplay:
             task_path: Folder of a task, by its id.
             exchanges: Answers of a model; default: those kept in the run's folder.
             heading_px: Longer edge of the heading views; default: that of the pages of `evonav view`.
+            keeps_depth: Keep depth images, too.
 
         Raises:
             StoreError: There is no run, or its header cannot be read.
@@ -62,6 +64,7 @@ class RunReplay:
         self._run_dir = run_dir
         self._task_path = task_path
         self._heading_px = heading_px
+        self._keeps_depth = keeps_depth
         with RunStore(run_dir) as store:
             config = store.meta("config") or {}
         try:
@@ -134,7 +137,7 @@ class RunReplay:
                 seed = agent_seed(self.seed, agent_name, case.task_id)
                 agent = make_agent(agent_name, self.backend.make_decision(seed))
                 losses = {stage: loss for stage in stored if (loss := _loss(stored[stage]))}
-                tracer = Tracer(agent, on_round, losses, self._heading_px)
+                tracer = Tracer(agent, on_round, losses, self._heading_px, keeps_depth=self._keeps_depth)
                 perception = self.backend.make_perception()
                 episode = Episode(case, agent_name, agent, simulator, perception, self.protocol, seed, tracer)
                 for outcome in episode.run():

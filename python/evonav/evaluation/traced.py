@@ -50,6 +50,8 @@ class TracedView:
 
     yaw_rad: float
     jpeg: bytes
+    depth_png: bytes | None = None
+    """Planar depth in whole millimetres, 16 bits, 0 where there is none; only of a replay that keeps it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -62,6 +62,8 @@ class Tracer:
         on_round: Callable[[int, int], None] = lambda _stage, _round: None,
         losses: Mapping[int, "Loss"] | None = None,
         heading_px: int | None = None,
+        *,
+        keeps_depth: bool = False,
     ) -> None:
         """Looks on.
 
@@ -70,7 +72,9 @@ class Tracer:
             on_round: Told the stage and the round, 0-based, as they begin.
             losses: Where the agent's process was lost, by stage: there it is not asked.
             heading_px: Longer edge of the heading views, where pages' own size is too small.
+            keeps_depth: Keep depth images, too.
         """
+        self._keeps_depth = keeps_depth
         self.agent = agent
         self._on_round = on_round
         self._losses = losses or {}
@@ -112,7 +116,8 @@ class Tracer:
             if rgb is None:
                 rgb = self._simulator.render(replace(view.pose, y_m=observation.pose.y_m), instances=False).rgb
             assert rgb is not None
-            views.append(TracedView(view.pose.yaw_rad, jpeg_of(rgb, heading_px if is_heading else side_px, quality)))
+            jpeg = jpeg_of(rgb, heading_px if is_heading else side_px, quality)
+            views.append(TracedView(view.pose.yaw_rad, jpeg, depth_png(view.depth_m) if self._keeps_depth else None))
             width_px, height_px = view.intrinsics.width_px, view.intrinsics.height_px
             self._fov_rad = 2 * math.atan(math.tan(view.intrinsics.vertical_fov_rad / 2) * width_px / height_px)
         self._pending = TracedRound(None, pose_record(observation.pose), tuple(views))
@@ -207,6 +212,15 @@ def jpeg_of(pixels: NDArray[np.uint8], longest_px: int, quality: int) -> bytes:
         picture.thumbnail((longest_px, longest_px))
     buffer = BytesIO()
     picture.save(buffer, "JPEG", quality=quality, optimize=True)
+    return buffer.getvalue()
+
+
+def depth_png(depth_m: NDArray[np.float32]) -> bytes:
+    """Depth as a PNG of 16 bits in whole millimetres; 0 where there is none, or more than it holds (65.5 m)."""
+    depth_mm = np.round(np.where(np.isfinite(depth_m), depth_m, 0.0) * 1000.0)
+    held = np.where((depth_mm > 0) & (depth_mm < 2**16), depth_mm, 0).astype(np.uint16)
+    buffer = BytesIO()
+    Image.fromarray(held).save(buffer, "PNG")
     return buffer.getvalue()
 
 

@@ -176,6 +176,10 @@ class _Recorder:
         camera = rr.Pinhole(focal_length=focal, width=width, height=height, image_plane_distance=0.6)
         self._stream.log(path, camera)
         self._stream.log(f"{path}/rgb", rr.EncodedImage(contents=view.jpeg, media_type="image/jpeg"))
+        if view.depth_png is not None:
+            # As large as the camera's picture: rerun projects both by the same camera.
+            depth_mm = np.asarray(Image.open(BytesIO(view.depth_png)).resize((width, height), Image.Resampling.NEAREST))
+            self._stream.log(f"{path}/depth", rr.DepthImage(depth_mm.astype(np.uint16), meter=1000.0))
 
     def _map(self, belief: TracedMap) -> None:
         rr, log = self._rr, self._stream.log

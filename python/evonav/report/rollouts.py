@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.report.causes import sentence
@@ -13,6 +13,7 @@ from evonav.report.controlled import SPLITS, Analysis, Key, has_moved_far, split
 from evonav.report.legend import legend_row
 from evonav.report.maps import change_words, file_css, outcome_words, success_radius_of, task_frame
 from evonav.report.overlay import change, course
+from evonav.report.pictures import check_picture, write_picture
 from evonav.report.plan import Frame, ground, labels
 from evonav.report.svg import arrow_head, cm, escape, join, polyline, simplified, text_lines, title
 from evonav.tasks.controlled import run_of
@@ -81,19 +82,14 @@ def telling_pairs(analysis: Analysis, agent: str, per_reason: int = 1) -> list[t
 
 
 def write_pair(analysis: Analysis, agent: str, key: Key, path: Path) -> Path:
-    """Draws a pair into an SVG file.
+    """Draws a pair into a `.svg`, `.png` or `.pdf` file.
 
     Raises:
-        InvalidArgumentError: There is no such pair.
-        StoreError: A run cannot be read, or the file not written.
+        InvalidArgumentError: There is no such pair, or the file's suffix is of no format.
+        StoreError: A run cannot be read, or the file not written, or not without an extra.
     """
-    drawn = pair_svg(load_rollouts(analysis, agent, key))
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(drawn, encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error
-    return path
+    check_picture(path)
+    return write_picture(pair_svg(load_rollouts(analysis, agent, key)), path)
 
 
 def pair_svg(rollouts: Sequence[Rollout]) -> str:

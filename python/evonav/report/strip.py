@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.report.causes import sentence
@@ -16,6 +16,7 @@ from evonav.report.maps import (
     success_radius_of,
     task_frame,
 )
+from evonav.report.pictures import check_picture, write_picture
 from evonav.report.plan import Frame
 from evonav.report.run import load_run
 from evonav.report.svg import escape, join, text_lines
@@ -37,16 +38,17 @@ def write_strip(
         run_dir: A run.
         task_id: One of its tasks; `None` for the `most_telling` one.
         agents: One of its agents, or several: a row each.
-        path: The SVG file to write.
+        path: The `.svg`, `.png` or `.pdf` file to write.
         stages: Which stages; default all that have a record (of the most telling task, three).
 
     Returns:
         `path`.
 
     Raises:
-        InvalidArgumentError: The run has no such stage.
-        StoreError: There is no run, it cannot be read, or the file cannot be written.
+        InvalidArgumentError: The run has no such stage, or the file's suffix is of no format.
+        StoreError: There is no run, it cannot be read, or the file cannot be written, or not without an extra.
     """
+    check_picture(path)
     agents = [agents] if isinstance(agents, str) else list(agents)
     if task_id is None:
         task_id, telling = most_telling(load_run(run_dir), agents)
@@ -61,12 +63,7 @@ def write_strip(
     for agent, row in zip(agents, rows, strict=True):
         if not row:
             raise InvalidArgumentError(f"{run_dir}: no such stage of task {task_id!r} by agent {agent!r}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(strip_svg(rows, maps, success_radius_m=success_radius_of(config)), encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error
-    return path
+    return write_picture(strip_svg(rows, maps, success_radius_m=success_radius_of(config)), path)
 
 
 def strip_svg(rows: Sequence[Sequence[StageRecord]], maps: Mapping[int, StageMap], *, success_radius_m: float) -> str:

@@ -9,6 +9,7 @@ from markupsafe import Markup
 from evonav.errors import StoreError
 from evonav.report.maps import file_css, map_css
 from evonav.report.page import page_environment, policy, text_of
+from evonav.report.pictures import check_picture, write_picture
 from evonav.report.plan import Frame
 from evonav.report.svg import escape, join, slug
 from evonav.report.task_legend import task_legend
@@ -78,14 +79,16 @@ def write_task_page(task: Task, path: Path, *, stages: Sequence[int] | None = No
     return _write(path, _task_page(task_drawing(task), stages or range(1, task.num_stages + 1), index))
 
 
-def write_stage_svg(task: Task, stage: int, path: Path) -> Path:
-    """Writes a stage as an SVG file: the house before (if it changed) and after, side by side.
+def write_stage_picture(task: Task, stage: int, path: Path) -> Path:
+    """Writes a stage as a `.svg`, `.png` or `.pdf` file: the house before (if it changed) and after, side by side.
 
     Raises:
         HouseError: A stage house is malformed.
-        StoreError: The file cannot be written.
+        InvalidArgumentError: The file's suffix is of no format.
+        StoreError: The file cannot be written, or not without an extra.
     """
-    return _write(path, stage_svg(task_drawing(task), stage))
+    check_picture(path)
+    return write_picture(stage_svg(task_drawing(task), stage), path)
 
 
 def write_gallery(

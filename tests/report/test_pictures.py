@@ -1,0 +1,70 @@
+"""Drawings as PNG and PDF."""
+
+import builtins
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_up_run import WriteRun
+from PIL import Image
+from typer.testing import CliRunner
+
+from evonav.cli import app
+from evonav.errors import InvalidArgumentError, StoreError
+from evonav.report.pictures import ZOOM, write_picture
+
+SVG = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 20" width="40" height="20">'
+    "<style>.a{fill:#cc0000}</style>"
+    '<rect class="a" x="20" width="20" height="20"/><text x="1" y="14" font-size="14">ab</text></svg>'
+)
+
+
+def test_a_png_is_the_drawing(tmp_path: Path) -> None:
+    pytest.importorskip("resvg_py", reason="resvg is not installed")
+    with Image.open(write_picture(SVG, tmp_path / "new" / "x.png")) as picture:
+        pixels = np.asarray(picture.convert("RGB"))
+    assert pixels.shape == (20 * ZOOM, 40 * ZOOM, 3)
+    left, right = pixels[:, : 19 * ZOOM], pixels[:, 21 * ZOOM :]
+    assert (right == (0xCC, 0, 0)).all()
+    assert (left[0] == 255).all()
+    assert 0.02 < (left < 128).any(axis=2).mean() < 0.6  # letters are drawn, on white
+
+
+def test_a_pdf_is_one_page_of_the_drawings_size(tmp_path: Path) -> None:
+    pytest.importorskip("resvg_py", reason="resvg is not installed")
+    data = write_picture(SVG, tmp_path / "x.PDF").read_bytes()
+    assert data.startswith(b"%PDF-")
+    (box,) = re.findall(rb"/MediaBox \[ ?([\d. ]+?) ?\]", data)
+    # 96 units an inch in the drawing, 72 points an inch on the page.
+    assert [float(value) for value in box.split()] == pytest.approx([0, 0, 40 * 0.75, 20 * 0.75])
+
+
+def test_what_cannot_be_written_is_told_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(InvalidArgumentError, match=r"x\.jpg.*\.svg, \.png, \.pdf"):
+        write_picture(SVG, tmp_path / "x.jpg")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StoreError, match=re.escape(str(tmp_path / "file" / "x.svg"))):
+        write_picture(SVG, tmp_path / "file" / "x.svg")
+    real = builtins.__import__
+
+    def without_resvg(name: str, *args: object, **kwargs: object) -> object:
+        if name == "resvg_py":
+            raise ImportError("No module named 'resvg_py'")
+        return real(name, *args, **kwargs)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(builtins, "__import__", without_resvg)
+    with pytest.raises(StoreError, match=r"pip install 'evonav\[viz\]'"):
+        write_picture(SVG, tmp_path / "x.png")
+    assert write_picture(SVG, tmp_path / "x.svg").read_text("utf-8") == SVG
+
+
+def test_a_strip_for_a_paper(tmp_path: Path, write_run: WriteRun) -> None:
+    pytest.importorskip("resvg_py", reason="resvg is not installed")
+    for suffix in ("svg", "png", "pdf"):
+        result = CliRunner().invoke(app, ["strip", str(write_run(suffix)), "--out", str(tmp_path / f"x.{suffix}")])
+        assert result.exit_code == 0, result.output
+    (size,) = re.findall(r'viewBox="0 0 (\d+) (\d+)" width', (tmp_path / "x.svg").read_text("utf-8"))
+    with Image.open(tmp_path / "x.png") as picture:
+        assert picture.size == tuple(ZOOM * int(side) for side in size)
