@@ -10,9 +10,10 @@ use evonav_core::{
     sensors::ground_truth::MaskFilter,
     simulator::{
         EmbeddedSimulator, SimulatorConfig,
-        batch::{Batch, BatchConfig, Images, Slot},
+        batch::{Batch, BatchConfig, Images},
         field::GeodesicField,
         motion::Strides,
+        slot::Slot,
     },
     world::collision::AgentBody,
 };

@@ -7,7 +7,8 @@ use evonav_core::{
     grid::GridSpec,
     memory::{
         frontiers::{FrontierConfig, extract},
-        objects::{DetectedView, ObjectMap, ObjectMapConfig},
+        object_config::ObjectMapConfig,
+        objects::{DetectedView, ObjectMap},
         occupancy::OccupancyMap,
         sight_lines::SightConfig,
     },

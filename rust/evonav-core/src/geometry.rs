@@ -83,6 +83,11 @@ pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
+/// The inverse of a rotation.
+pub fn transposed(matrix: &Mat3) -> Mat3 {
+    std::array::from_fn(|i| std::array::from_fn(|j| matrix[j][i]))
+}
+
 /// `rotation * vector`.
 pub fn rotate(rotation: &Mat3, vector: Vec3) -> Vec3 {
     std::array::from_fn(|i| (0..3).map(|j| rotation[i][j] * vector[j]).sum())

@@ -3,6 +3,7 @@
 pub mod batch;
 pub mod field;
 pub mod motion;
+pub mod slot;
 
 use std::sync::OnceLock;
 

@@ -13,9 +13,10 @@ use evonav_core::{
     },
     simulator::{
         EmbeddedSimulator, SimulatorConfig,
-        batch::{Batch, BatchConfig, Images, Slot},
+        batch::{Batch, BatchConfig, Images},
         field::GeodesicField,
         motion::{Action, Strides, canonical_yaw_rad},
+        slot::Slot,
     },
     world::collision::AgentBody,
 };

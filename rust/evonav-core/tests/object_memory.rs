@@ -6,7 +6,8 @@ use evonav_core::{
     memory::{
         cloud::Cloud,
         dbscan::dbscan,
-        objects::{DetectedView, ObjectMap, ObjectMapConfig, Update},
+        object_config::ObjectMapConfig,
+        objects::{DetectedView, ObjectMap, Update},
         voxels::voxel_filter,
     },
     sensors::{

@@ -3,7 +3,8 @@
 use evonav_core::{
     geometry::Vec3,
     memory::{
-        objects::{DetectedView, ObjectMap, ObjectMapConfig},
+        object_config::ObjectMapConfig,
+        objects::{DetectedView, ObjectMap},
         sight_lines::{SightConfig, visible_shares},
     },
     sensors::{

@@ -6,9 +6,10 @@ use evonav_core::{
     geometry::{Pose, Vec2, Vec3},
     sensors::ground_truth::MaskFilter,
     simulator::{
-        batch::{Batch, BatchConfig, Images, Slot},
+        batch::{Batch, BatchConfig, Images},
         field::GeodesicField,
         motion::Strides,
+        slot::Slot,
     },
 };
 use numpy::{

@@ -5,7 +5,8 @@ use evonav_core::{
     geometry::Pose,
     memory::{
         entry::Entry,
-        objects::{self, DetectedView, ObjectMapConfig},
+        object_config::ObjectMapConfig,
+        objects::{self, DetectedView},
         sight_lines::SightConfig,
     },
     sensors::{camera::Camera, unproject::MaskedDepth},

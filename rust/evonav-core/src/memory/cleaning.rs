@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::{
     geometry::{Aabb, Vec3},
     memory::{
-        cloud::Cloud, dbscan::largest_cluster, objects::ObjectMapConfig, voxels::voxel_filter,
+        cloud::Cloud, dbscan::largest_cluster, object_config::ObjectMapConfig, voxels::voxel_filter,
     },
     sensors::unproject::Point,
 };

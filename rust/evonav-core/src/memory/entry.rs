@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::{Aabb, Vec3},
-    memory::{cloud::Cloud, objects::ObjectMapConfig},
+    memory::{cloud::Cloud, object_config::ObjectMapConfig},
     sensors::unproject::Point,
 };
 

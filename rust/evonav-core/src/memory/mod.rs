@@ -7,6 +7,7 @@ pub mod components;
 pub mod dbscan;
 pub mod entry;
 pub mod frontiers;
+pub mod object_config;
 pub mod objects;
 pub mod occupancy;
 mod regions;

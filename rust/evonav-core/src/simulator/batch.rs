@@ -9,29 +9,20 @@ use rayon::{ThreadPool, ThreadPoolBuilder, prelude::*};
 
 use crate::{
     Error,
-    geometry::{Pose, Vec2, distance_2d_m},
+    geometry::Vec2,
     sensors::{
         ground_truth::{MaskFilter, number_instances},
         raster::{FrameBuffer, Want},
     },
     simulator::{
-        EmbeddedSimulator,
         field::GeodesicField,
         motion::{Action, Strides, act, set_down},
+        slot::Slot,
     },
 };
 
 /// Most agents of a batch, and most threads.
 const MAX_SLOTS: usize = 1 << 16;
-
-/// Every target of a task has a free place this near that can be reached.
-const FULL_REACH_M: f64 = 1.5;
-
-/// Free cells that are tried for an agent that no path leads from.
-const MAX_TRIES: usize = 16;
-
-/// Of the occupancy whose free cells are tried: the simulators' default.
-const OCCUPANCY_CELL_M: f64 = 0.1;
 
 /// What all agents of a batch have in common.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,96 +39,6 @@ pub struct BatchConfig {
     pub mask_filter: MaskFilter,
     /// Threads that step and draw, 1 for the caller's own.
     pub num_threads: usize,
-}
-
-/// An agent, and where it is.
-#[derive(Debug, Clone)]
-pub struct Slot {
-    /// Its house.
-    pub world: Arc<EmbeddedSimulator>,
-    pose: Pose,
-    /// By body of the house, what its pixels get in images of labels; 0: nothing.
-    pub labels: Arc<[u8]>,
-    /// Distances to its goal; see [`Batch::aim`].
-    field: Option<Arc<GeodesicField>>,
-    /// The distance from where it stands, if it was asked for there.
-    known_m: Option<f64>,
-    /// Positions that could be reached when a target was first cut off; see [`Batch::plan`].
-    reachable_m: Option<Vec<Vec2>>,
-}
-
-impl Slot {
-    /// An agent in a house, without a goal.
-    pub fn new(world: Arc<EmbeddedSimulator>, pose: Pose, labels: Arc<[u8]>) -> Self {
-        Self { world, pose, labels, field: None, known_m: None, reachable_m: None }
-    }
-
-    /// Where it stands and looks.
-    pub fn pose(&self) -> Pose {
-        self.pose
-    }
-
-    fn point_m(&self) -> Vec2 {
-        let [x_m, _, z_m] = self.pose.position_m;
-        [x_m, z_m]
-    }
-
-    /// Length of the shortest path to the goal, infinite if there is none or no field.
-    pub fn distance_m(&self) -> f64 {
-        if let Some(known_m) = self.known_m {
-            return known_m;
-        }
-        self.field.as_ref().map_or(f64::INFINITY, |field| field.distance_m(self.point_m()))
-    }
-
-    /// Moves the agent.
-    fn go(&mut self, pose: Pose) {
-        if pose.position_m != self.pose.position_m {
-            self.known_m = None;
-        }
-        self.pose = pose;
-    }
-
-    /// Corners of the shortest path to a point, or to the reachable position nearest to it where it
-    /// is cut off; empty if there is none. Where steps of the grid reach nothing near, free cells
-    /// of the house's occupancy are tried, nearest first.
-    fn plan(&mut self, target_m: Vec2, grid_m: f64) -> Result<Vec<Vec2>, Error> {
-        let (navigation, here_m) = (self.world.navigation(), self.point_m());
-        if let Some(path_m) = navigation.shortest_path(here_m, target_m) {
-            return Ok(path_m);
-        }
-        let reachable_m = match self.reachable_m.take() {
-            Some(known) => known,
-            None => navigation.reachable_positions(here_m, grid_m)?,
-        };
-        let reachable_m = self.reachable_m.insert(reachable_m);
-        let gap_m = |place_m: &Vec2| distance_2d_m(*place_m, target_m);
-        let nearest = reachable_m.iter().copied().min_by(|a, b| gap_m(a).total_cmp(&gap_m(b)));
-        let nearest_gap_m = nearest.as_ref().map_or(f64::INFINITY, gap_m);
-        if nearest_gap_m > FULL_REACH_M {
-            let mut free_m = self.free_centres_m()?;
-            free_m.sort_by(|a, b| gap_m(a).total_cmp(&gap_m(b)));
-            let tried =
-                free_m.iter().take(MAX_TRIES).filter(|place_m| gap_m(place_m) < nearest_gap_m);
-            let found =
-                tried.copied().find_map(|place_m| navigation.shortest_path(here_m, place_m));
-            if let Some(path_m) = found {
-                return Ok(path_m);
-            }
-        }
-        let path_m = nearest.and_then(|nearest_m| navigation.shortest_path(here_m, nearest_m));
-        Ok(path_m.unwrap_or_default())
-    }
-
-    /// Middles of the cells that the agent's body reaches from the house's start, row-major.
-    fn free_centres_m(&self) -> Result<Vec<Vec2>, Error> {
-        let (spec, cells) = self.world.occupancy(OCCUPANCY_CELL_M)?;
-        let middle_m = |index: usize, axis: usize| {
-            index as f64 * spec.cell_m + spec.cell_m / 2.0 + spec.corner_m[axis]
-        };
-        let free = cells.iter().enumerate().filter(|&(_, &cell)| cell == 0);
-        Ok(free.map(|(i, _)| [middle_m(i % spec.cols, 0), middle_m(i / spec.cols, 1)]).collect())
-    }
 }
 
 /// What came of a step, by agent.

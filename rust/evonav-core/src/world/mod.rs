@@ -9,5 +9,6 @@ mod openings;
 pub mod paths;
 pub mod scene;
 mod settle;
+mod solid;
 mod structure;
 mod tangents;
