@@ -1,16 +1,18 @@
 """What statistics need of one task, read without pictures, later houses and checksums."""
 
+import json
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import ceil, comb, dist
-from multiprocessing import get_context
 from pathlib import Path
+
+from pydantic import TypeAdapter
 
 from evonav.errors import HouseError, TaskError
 from evonav.house import House
+from evonav.parallel import Answer, Job, answers, open_pool
 from evonav.tasks.manifest import PublicStage, Task, TaskHeader
 from evonav.tasks.oracle import Evolution, OracleStage
 from evonav.tasks.records import parse_record, read_file, read_gzip
@@ -20,6 +22,9 @@ RATIO_CLASSES = ("0%", *(f"{10 * i}-{10 * i + 10}%" for i in range(10)))
 """Of the relocated-object ratio, each up to and including its upper end."""
 CHUNK = 16
 """Tasks a worker process reads at a time."""
+CHUNK_TIMEOUT_S = 300.0
+"""For one task of them."""
+WORK = "evonav.generation.task_facts:make_reader"
 
 _PLAN = re.compile(r'"roomSpecId"\s*:\s*"([^"\\]{1,80})"')
 
@@ -59,6 +64,9 @@ class TaskFacts:
     def note(self, key: str, value: float) -> None:
         """Notes a quantity."""
         self.values.setdefault(key, []).append(value)
+
+
+_FACTS = TypeAdapter(list[TaskFacts])
 
 
 def expected_evolutions(num_stages: Sequence[int], probability: float) -> tuple[float, ...]:
@@ -238,9 +246,37 @@ def read_all_facts(roots: Sequence[Path], *, num_workers: int = 1) -> Iterator[T
     if num_workers <= 1 or len(roots) <= 2 * CHUNK:
         yield from map(read_facts, roots)
         return
-    with ProcessPoolExecutor(num_workers, mp_context=get_context("spawn")) as pool:
+    chunks = [[str(root) for root in roots[first : first + CHUNK]] for first in range(0, len(roots), CHUNK)]
+    jobs = (Job(number, json.dumps(chunk)) for number, chunk in enumerate(chunks))
+    waiting: dict[int, list[TaskFacts]] = {}
+    num_given = 0
+    with open_pool(WORK, "", num_workers=num_workers, timeout_s=CHUNK_TIMEOUT_S) as pool:
+        for answer in answers(pool, jobs):
+            waiting[answer.key] = _facts_in(answer, chunks[answer.key])
+            while num_given in waiting:
+                yield from waiting.pop(num_given)
+                num_given += 1
+
+
+def make_reader(_settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
+    """The function from a JSON list of folders to their facts, or `{"error": ...}`, as `evonav.parallel` calls it."""
+
+    def read(text: str) -> str:
+        found = []
         try:
-            yield from pool.map(read_facts, roots, chunksize=CHUNK)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+            for root in json.loads(text):
+                found.append(read_facts(Path(root)))
+                alive()
+        except (TaskError, OSError) as error:
+            return json.dumps({"error": str(error)})
+        return _FACTS.dump_json(found).decode()
+
+    return read
+
+
+def _facts_in(answer: Answer, chunk: Sequence[str]) -> list[TaskFacts]:
+    if answer.failure is not None:
+        raise TaskError(f"{chunk[0]} to {chunk[-1]}: {answer.detail.strip().splitlines()[-1]}")
+    if answer.text.startswith("{"):
+        raise TaskError(json.loads(answer.text)["error"])
+    return _FACTS.validate_json(answer.text)
