@@ -114,6 +114,15 @@ def test_a_sweep_that_was_interrupted_goes_on_to_the_same_records(whole, file, t
         assert (out / name).read_bytes() == (whole / name).read_bytes()
 
 
+@pytest.mark.slow
+def test_ray_leaves_the_same_records(whole, file, tmp_path):
+    pytest.importorskip("ray")
+    file.write_text(f'engine = "ray"\n{TWO_BY_TWO}')
+    done = run("sweep", file, "--out", tmp_path / "out")
+    assert done.exit_code == 0, done.output
+    assert texts(tmp_path / "out") == texts(whole)
+
+
 def test_a_finished_sweep_runs_nothing(whole, file):
     before = {path: path.stat().st_mtime_ns for path in whole.glob("runs/*/*")}
     done = run("sweep", file, "--out", whole)
