@@ -44,7 +44,10 @@ def main() -> None:
         for rate in RATES:
             _run(asked.out / f"wrong-{rate:g}", asked.sweep_agents.split(","), subset, noisy_backend(rate), asked)
     page = PAGE.read_text(encoding="utf-8")
-    for name, text in parts(asked.out, agents).items():
+    found = parts(asked.out, agents)
+    if asked.large is not None:
+        found |= large_parts(asked.large)
+    for name, text in found.items():
         page = with_part(page, name, text)
     PAGE.write_text(page, encoding="utf-8")
     sys.stdout.write(f"{PAGE}\n{FIGURE}\n")
@@ -92,6 +95,20 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
         "counters": counter_table(deeds).markdown(),
         "effort": effort_table(run).markdown(),
         "errors": errors,
+    }
+
+
+def large_parts(run_dir: Path) -> dict[str, str]:
+    """The marked parts on a run of the heuristics over all houses."""
+    run = load_run(run_dir)
+    main_table, relocation, first, _, differences = paper_tables(run)
+    return {
+        "large-setting": setting_table(run).markdown(),
+        "large-1": main_table.markdown(),
+        "large-2": relocation.markdown(),
+        "large-first": first.markdown(),
+        "large-differences": differences.markdown(),
+        "large-rooms": room_table(run).markdown(),
     }
 
 
@@ -218,6 +235,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--sweep", type=int, default=30, help="houses of the runs with wrong decisions")
     # UniGoal takes several times as long as the others: to be asked for.
     parser.add_argument("--sweep-agents", default=",".join(PAPER_ORDER[1:]), help="agents of those runs")
+    parser.add_argument("--large", type=Path, help="a run of the heuristics over all houses, made by `evonav evaluate`")
     parser.add_argument("--write-only", action="store_true", help="run nothing, write what is there")
     return parser.parse_args()
 
