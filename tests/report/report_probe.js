@@ -64,7 +64,8 @@
       found.place = place;
       const second = place.replace(/stage=.*/, "stage=2");
       location.hash = second;
-      await until(() => location.hash !== second);
+      // What the frame says of the first place may still be on its way.
+      await until(() => location.hash.startsWith(`${second}&`));
       found.replay = [player.open, location.hash, player.querySelector("iframe").getAttribute("sandbox"), player.querySelector("b").textContent];
       let seen = null;
       try { seen = player.querySelector("iframe").contentDocument; } catch (error) { seen = null; }

@@ -1,6 +1,7 @@
 """What a run shows: all its tables, and sentences that claim no more than the numbers allow."""
 
 from collections import Counter
+from collections.abc import Iterable
 
 from evonav.evaluation.records import EndState
 from evonav.report import tables
@@ -9,14 +10,14 @@ from evonav.report.run import Run
 from evonav.report.run_figures import run_breakdowns
 
 
-def markdown_tables(run: Run) -> str:
-    """All tables of a run as one Markdown text."""
-    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in run_tables(run) if table.rows)
+def markdown_tables(found: Iterable[tables.Table]) -> str:
+    """Tables as one Markdown text."""
+    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in found if table.rows)
 
 
-def latex_tables(run: Run) -> str:
-    """All tables of a run as LaTeX, for the package `booktabs`."""
-    return "\n".join(table.latex() for table in run_tables(run) if table.rows)
+def latex_tables(found: Iterable[tables.Table]) -> str:
+    """Tables as LaTeX, for the package `booktabs`."""
+    return "\n".join(table.latex() for table in found if table.rows)
 
 
 def run_tables(run: Run) -> list[tables.Table]:

@@ -1,7 +1,7 @@
 """The page of a run: one file with its tables, every stage's map, and episodes round by round."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,8 +69,9 @@ def write_report(
     run = load_run(run_dir)
     try:
         out_dir.mkdir(parents=True, exist_ok=True)
-        (out_dir / "table.md").write_text(markdown_tables(run), encoding="utf-8")
-        (out_dir / "table.tex").write_text(latex_tables(run), encoding="utf-8")
+        found = run_tables(run)
+        (out_dir / "table.md").write_text(markdown_tables(found), encoding="utf-8")
+        (out_dir / "table.tex").write_text(latex_tables(found), encoding="utf-8")
         (out_dir / "table.csv").write_text(tables.summary_csv(run.summaries), encoding="utf-8")
         replays = _replays(run, out_dir, max_replay_bytes)
         page = page_environment().get_template("report.html.j2")
@@ -78,7 +79,7 @@ def write_report(
         part = path.with_name(f".{REPORT_NAME}.part")
         with part.open("w", encoding="utf-8") as file:
             tasks = _tasks(run, replays, out_dir / MAP_DIR if has_maps else None)
-            for text in page.generate(**_page_context(run), tasks=tasks, replays=replays):
+            for text in page.generate(**_page_context(run, found), tasks=tasks, replays=replays):
                 file.write(text)
         part.replace(path)
     except OSError as error:
@@ -133,7 +134,7 @@ def _write_maps(run: Run, task: Task, map_dir: Path) -> None:
         (map_dir / map_name(record)).write_text(drawn, encoding="utf-8")
 
 
-def _page_context(run: Run) -> dict[str, Any]:
+def _page_context(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
     overview = [
         {
             "anchor": slug(task_id),
@@ -146,7 +147,7 @@ def _page_context(run: Run) -> dict[str, Any]:
         }
         for task_id, num_stages in run.num_stages.items()
     ]
-    headline, *others = run_tables(run)
+    headline, *others = found
     used = {outcome.cause for outcome in run.outcomes.values()}
     columns = "".join(f".k{k}{{--k:{k}}}" for k in sorted(set(run.num_stages.values())))
     css = text_of("report.css") + map_css() + PLOT_CSS + columns
