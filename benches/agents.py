@@ -23,7 +23,8 @@ from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import task_file
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.rollout import Episode
-from evonav.evaluation.sensing import Perception, Sensors
+from evonav.evaluation.sensing import Sensors
+from evonav.perception import Perception, StageScene
 from evonav.report.run import PAPER_ORDER
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
@@ -120,7 +121,7 @@ def timed(name: str) -> Led:
     simulator, perception = backend.make_simulator(), backend.make_perception()
     case = _case(backend)
     agent = make_agent(name, backend.make_decision(0))
-    led = Led(agent, lambda led: _tour(led, simulator, perception))
+    led = Led(agent, lambda led: _tour(led, case, simulator, perception))
     _play(case, name, led, simulator, perception)
     return led
 
@@ -139,7 +140,7 @@ def _measure_growth(name: str) -> None:
     case = _case(backend)
     agent: Any = make_agent(name, TextMatchWithImages())
     simulator.reset(case.stages[0].house_json, case.start)
-    sensors = Sensors(simulator, perception, agent.sensing)
+    sensors = Sensors(simulator, perception, agent.sensing, _scene(case, simulator))
     sensors.observe(is_first=True, is_action_success=True, has_arrived=False, num_rounds_left=1)
     before_mb = _peak_mb()
     led = Led(agent, lambda _: None, never_stops=agent.sensing.motion == "waypoints")
@@ -164,10 +165,14 @@ def _play(case: EpisodeCase, name: str, led: Led, simulator: Simulator, percepti
             raise AssertionError(outcome.record.error)
 
 
-def _tour(agent: Agent, simulator: Simulator, perception: Perception) -> None:
+def _scene(case: EpisodeCase, simulator: Simulator) -> StageScene:
+    return StageScene(case.task_id, case.stages[0].public, "", 0, simulator.objects)
+
+
+def _tour(agent: Agent, case: EpisodeCase, simulator: Simulator, perception: Perception) -> None:
     """Leads an agent through every room: it looks ahead and back from places about 1.5 m apart."""
     start = simulator.pose
-    sensors = Sensors(simulator, perception, agent.sensing)
+    sensors = Sensors(simulator, perception, agent.sensing, _scene(case, simulator))
     is_first = True
     for x_m, z_m in _places(simulator):
         for yaw_rad in (0.0, math.pi):

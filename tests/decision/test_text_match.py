@@ -9,7 +9,7 @@ from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.questions.frontier_update import ChooseQuestion, Sighting, VerifyQuestion
 from evonav.decision.questions.question import AnswerError
-from evonav.decision.ranking import rank_entries
+from evonav.decision.ranking import rank_by_feature, rank_entries
 from evonav.decision.text_match import TextMatch
 from evonav.tasks.public import StageInput
 
@@ -105,3 +105,9 @@ def test_verification_needs_the_label_at_the_place():
         assert model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [sighting], 0.01)).answer is is_present
     assert not model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], 0.01)).answer
     assert model.answer(VerifyQuestion(MUG_GOAL, MUG_ON_TABLE, [], 0.0005)).answer
+
+
+def test_entries_are_ranked_by_the_cosine_of_their_features_where_they_have_some() -> None:
+    goal = np.array([1.0, 0.0], np.float32)
+    features = [np.array(one, np.float32) for one in ((0.0, 1.0), (0.6, 0.8), (1.0, 0.0), (0.6, 0.8))]
+    assert rank_by_feature(goal, [*features, None], [1, 9, 3, 4, 0]) == [2, 3, 1, 0, 4]

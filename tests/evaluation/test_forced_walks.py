@@ -17,7 +17,7 @@ from evonav.evaluation.metrics import summarise
 from evonav.evaluation.protocol import EpisodeCase, ForcedWalk, ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind, StageRecord
 from evonav.evaluation.rollout import Episode
-from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.pose import Pose
 
 AGENTS = ("fu", "stage-reset", "ftu", "3d-mem", "msgnav", "unigoal")

@@ -132,7 +132,7 @@ def test_a_pose_that_is_taken_is_snapped_and_recorded():
     from evonav.evaluation.backend import make_agent
     from evonav.evaluation.protocol import EpisodeCase
     from evonav.evaluation.rollout import Episode
-    from evonav.sensors.ground_truth import GroundTruthPerception
+    from evonav.perception.ground_truth import GroundTruthPerception
 
     case = episode_case("toy-static")
     inside_table = EpisodeCase("t", "toy", Pose(2.0, 0.9, 1.2, 1.25), case.stages)

@@ -15,7 +15,7 @@ from evonav.evaluation.records import EndState
 from evonav.evaluation.rollout import Episode
 from evonav.memory import ObjectMap
 from evonav.memory.scene_graph import SceneGraph
-from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics

@@ -17,7 +17,7 @@ from evonav.evaluation.privileged import PrivilegedAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState
 from evonav.evaluation.rollout import Episode
-from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import GroundTruthPerception
 
 CODE = (type, types.ModuleType, types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.FrameType)
 

@@ -10,7 +10,7 @@ from evonav.evaluation.backend import make_agent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState, StageRecord
 from evonav.evaluation.rollout import Episode
-from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import GroundTruthPerception
 
 
 def run_episode(task_id, agent, protocol=None, simulator=None):

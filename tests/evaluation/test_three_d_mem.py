@@ -16,7 +16,7 @@ from evonav.evaluation.records import EndState
 from evonav.evaluation.rollout import Episode
 from evonav.memory import ObjectMap
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
-from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.pose import Pose
 
 START = Pose(1.0, 0.9, 3.0, 0.0)

@@ -24,7 +24,7 @@ from evonav.evaluation.records import EndState
 from evonav.evaluation.rollout import Episode
 from evonav.memory.goal_graph import GoalEdge, GoalGraph
 from evonav.memory.object_graph import SceneNode
-from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.pose import Pose
 
 START = Pose(1.0, 0.9, 3.0, 0.0)
@@ -87,11 +87,11 @@ def test_as_released_six_categories_are_known_as_published_all_that_are_mapped()
         assert agent.diagnostics().details["category"] == category
 
 
-class ShySight:
+class ShySight(GroundTruthPerception):
     """Ground truth that loses the bed as soon as the camera is within 1.5 m of its edge."""
 
     def detect(self, frame, objects):
-        found = GroundTruthPerception().detect(frame, objects)
+        found = GroundTruthPerception.detect(self, frame, objects)
         if "Bed" not in found.labels:
             return found
         near_m = frame.depth_m[found.masks == found.labels.index("Bed")].min()

@@ -20,7 +20,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.rollout import Episode
 from evonav.gym import ACTIONS, ENV_ID, OBSERVATIONS, LifelongNavEnv, NavConfig, vocabulary
 from evonav.gym.spaces import waypoint_m
-from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.tasks.files import load_task
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import Action

@@ -9,7 +9,7 @@ import pytest
 
 from evonav.house import bundled_houses
 from evonav.memory import ObjectMap, OccupancyMap
-from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import MapFrame, View
 from evonav.sensors.visibility import visible_occupancy
 from evonav.world.embedded import EmbeddedSimulator

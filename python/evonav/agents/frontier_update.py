@@ -13,7 +13,7 @@ from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
 from evonav.decision.questions.frontier_update import ChooseQuestion
 from evonav.decision.questions.question import DecisionModel
-from evonav.decision.ranking import rank_entries
+from evonav.decision.ranking import rank_by_feature, rank_entries
 from evonav.decision.text_match import TextMatch
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
@@ -101,11 +101,12 @@ class FrontierUpdate:
         here = (observation.pose.x_m, observation.pose.z_m)
         entries = navigator.objects.entries
         remembered = [navigator.candidate(entry) for entry in entries]
-        ranked = [
-            index
-            for index in rank_entries(self._matcher, self._goal, remembered, here)
-            if self._is_offered(entries[index])
-        ][: self.config.num_candidates]
+        goal_feature = observation.goal_feature
+        if goal_feature is None:
+            order = rank_entries(self._matcher, self._goal, remembered, here)
+        else:
+            order = rank_by_feature(goal_feature, [entry.feature for entry in entries], [entry.id for entry in entries])
+        ranked = [index for index in order if self._is_offered(entries[index])][: self.config.num_candidates]
         frontiers = navigator.explorer.frontiers
         if not ranked and not frontiers:
             return self._without_candidates(observation)

@@ -1,7 +1,10 @@
-"""Which remembered objects a decision model is shown, where no image-text features rank them."""
+"""Which remembered objects a decision model is shown first."""
 
 import math
 from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
@@ -30,3 +33,17 @@ def rank_entries(
             (-scores[entry.label], -entry.num_detections, math.dist(entry.ground_m, position_m), entry.entry_id, index)
         )
     return [key[-1] for key in sorted(keys)]
+
+
+def rank_by_feature(
+    goal: NDArray[np.float32], features: Sequence[NDArray[np.float32] | None], entry_ids: Sequence[int]
+) -> list[int]:
+    """Indices of all entries, those that look most like the instruction first (paper, Sec. C.4).
+
+    Args:
+        goal: `(D,)` unit feature of the instruction.
+        features: `(D,)` unit features of the entries; those without one come last.
+        entry_ids: Of the entries: of equals, the older comes first.
+    """
+    scores = [-math.inf if feature is None else float(goal @ feature) for feature in features]
+    return sorted(range(len(scores)), key=lambda index: (-scores[index], entry_ids[index]))

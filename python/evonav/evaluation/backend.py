@@ -14,7 +14,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.agent_process import DecisionSpec, check_importable
 from evonav.evaluation.privileged import YARDSTICKS, yardstick
 from evonav.evaluation.protocol import EpisodeCase
-from evonav.evaluation.sensing import Perception
+from evonav.perception import Perception
 from evonav.world.simulator import Simulator
 
 PERCEPTIONS: Mapping[str, str] = {"gt": "evonav.evaluation.backend:ground_truth"}
@@ -168,7 +168,7 @@ def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - of `Ai2Tho
 
 def ground_truth() -> Perception:
     """The simulator's masks and labels."""
-    from evonav.sensors.ground_truth import GroundTruthPerception
+    from evonav.perception.ground_truth import GroundTruthPerception
 
     return GroundTruthPerception()
 

@@ -26,9 +26,10 @@ from evonav.evaluation.differences import record_differences
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import ActionRecord, EntryRecord, StageRecord
 from evonav.evaluation.rollout import Episode
+from evonav.perception import Percept, StageScene
 from evonav.sensors.observation import Detections, Observation
 from evonav.tasks.public import StageInput, TaskInfo
-from evonav.world.simulator import Action, Frame, SceneObject, Simulator
+from evonav.world.simulator import Action, Frame, Simulator
 
 
 class RecordedAgent:
@@ -91,10 +92,22 @@ class ExplainingRecordedAgent(RecordedAgent):
 class _Blind:
     """Perception for one who does not look."""
 
-    def detect(self, frame: Frame, objects: Sequence[SceneObject]) -> Detections:
-        """Nothing."""
-        masks = np.full(frame.depth_m.shape, -1, dtype=np.int32)
-        return Detections(masks=masks, labels=(), confidences=np.zeros(0, np.float32))
+    needs_rgb = False
+
+    def begin_stage(self, scene: StageScene) -> None:
+        """Nothing to prepare."""
+
+    def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
+        """Nothing in any of them."""
+        return [Percept(_nothing(frame), frame.depth_m, frame.pose) for frame in frames]
+
+    def text_feature(self, text: str) -> None:
+        """Has none."""
+
+
+def _nothing(frame: Frame) -> Detections:
+    masks = np.full(frame.depth_m.shape, -1, dtype=np.int32)
+    return Detections(masks=masks, labels=(), confidences=np.zeros(0, np.float32))
 
 
 def reenact(

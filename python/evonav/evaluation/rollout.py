@@ -13,8 +13,8 @@ from evonav.evaluation.costs import LEVELS, Stopwatch
 from evonav.evaluation.episode_parts import LOSSES, EpisodeObserver, HasOwnProcess
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome, as_not_run
 from evonav.evaluation.records import ErrorKind, StageRecord
-from evonav.evaluation.sensing import Perception
 from evonav.evaluation.stage_run import Carried, Participants, StageRun
+from evonav.perception import Perception
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator
 

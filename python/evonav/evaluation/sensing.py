@@ -1,25 +1,16 @@
 """From the simulator to what an agent receives: views on its schedule, without ids and without the oracle."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
 
 from evonav.agents.agent import Sensing, ViewSchedule
 from evonav.evaluation.costs import Stopwatch
 from evonav.evaluation.witness import Witness
-from evonav.sensors.observation import Detections, MapFrame, Observation, View
+from evonav.perception import Percept, Perception, StageScene
+from evonav.sensors.observation import MapFrame, Observation, View
 from evonav.sensors.visibility import visible_occupancy
 from evonav.world.pose import Pose
-from evonav.world.simulator import Frame, OccupancyGrid, SceneObject, Simulator
-
-
-class Perception(Protocol):
-    """Turns a rendered frame into detections."""
-
-    def detect(self, frame: Frame, objects: Sequence[SceneObject]) -> Detections:
-        """Objects in the frame, without their ids."""
-        ...
+from evonav.world.simulator import Frame, OccupancyGrid, Simulator
 
 
 def view_yaws_rad(schedule: ViewSchedule, heading_rad: float) -> list[float]:
@@ -45,6 +36,7 @@ class Sensors:
         simulator: Simulator,
         perception: Perception,
         sensing: Sensing,
+        scene: StageScene,
         witness: Witness | None = None,
         stopwatch: Stopwatch | None = None,
     ) -> None:
@@ -54,16 +46,21 @@ class Sensors:
             simulator: With the stage's house.
             perception: Of the run.
             sensing: As granted.
+            scene: For the perception.
             witness: Is shown every frame.
             stopwatch: Books what rendering and perceiving take.
         """
         self._simulator = simulator
         self._perception = perception
         self._sensing = sensing
-        self._objects = simulator.objects
         self._grid = simulator.occupancy()
         self._witness = witness
         self._stopwatch = stopwatch or Stopwatch()
+        self.pose = simulator.pose
+        """Where the last observation was made, whatever the agent was told."""
+        with self._stopwatch.timing("perception"):
+            perception.begin_stage(scene)
+            self._goal_feature = perception.text_feature(scene.goal.unified_instruction)
 
     def observe(
         self,
@@ -75,30 +72,50 @@ class Sensors:
         is_guided: bool = False,
     ) -> Observation:
         """Looks around from the agent's pose."""
-        pose = self._simulator.pose
+        self.pose = pose = self._simulator.pose
         schedule = self._sensing.first_round if is_first else self._sensing.later_rounds
-        views = [self._look(replace(pose, yaw_rad=yaw_rad)) for yaw_rad in view_yaws_rad(schedule, pose.yaw_rad)]
+        yaws_rad = view_yaws_rad(schedule, pose.yaw_rad)
+        with self._stopwatch.timing("simulation"):
+            rgb = self._sensing.needs_rgb or self._perception.needs_rgb
+            frames = [
+                self._simulator.render(replace(pose, yaw_rad=yaw_rad), rgb=rgb, instances=True) for yaw_rad in yaws_rad
+            ]
+        with self._stopwatch.timing("perception"):
+            percepts = self._perception.perceive(frames)
+            views = tuple(self._view(frame, percept) for frame, percept in zip(frames, percepts, strict=True))
+        if self._witness is not None:
+            for frame in frames:
+                self._witness.look(frame)
         return Observation(
-            views=tuple(views),
-            pose=pose,
+            views=views,
+            pose=_believed(pose, frames[-1].pose, percepts[-1].pose),
             is_action_success=is_action_success,
             num_rounds_left=num_rounds_left,
             has_arrived=has_arrived,
             is_guided=is_guided,
+            goal_feature=self._goal_feature,
         )
 
-    def _look(self, pose: Pose) -> View:
-        with self._stopwatch.timing("simulation"):
-            frame = self._simulator.render(pose, rgb=self._sensing.needs_rgb, instances=True)
-        with self._stopwatch.timing("perception"):
-            view = View(
-                pose=frame.pose,
-                intrinsics=frame.intrinsics,
-                depth_m=frame.depth_m,
-                detections=self._perception.detect(frame, self._objects),
-                occupancy=visible_occupancy(self._grid, pose, frame.intrinsics, self._sensing.occupancy_range_m),
-                rgb=frame.rgb,
-            )
-        if self._witness is not None:
-            self._witness.look(frame)
-        return view
+    def _view(self, frame: Frame, percept: Percept) -> View:
+        # Cells are where the oracle occupancy has them, whatever the perception believes of the pose.
+        place = replace(self._simulator.pose, yaw_rad=frame.pose.yaw_rad)
+        return View(
+            pose=percept.pose,
+            intrinsics=frame.intrinsics,
+            depth_m=percept.depth_m,
+            detections=percept.detections,
+            occupancy=visible_occupancy(self._grid, place, frame.intrinsics, self._sensing.occupancy_range_m),
+            rgb=frame.rgb if self._sensing.needs_rgb else None,
+        )
+
+
+def _believed(body: Pose, camera: Pose, perceived: Pose) -> Pose:
+    """The agent's own pose with the error of its heading camera's."""
+    if perceived == camera:
+        return body
+    return replace(
+        body,
+        x_m=body.x_m + perceived.x_m - camera.x_m,
+        z_m=body.z_m + perceived.z_m - camera.z_m,
+        yaw_rad=body.yaw_rad + perceived.yaw_rad - camera.yaw_rad,
+    )

@@ -44,8 +44,9 @@ from evonav.evaluation.records import (
     StageMap,
     StageRecord,
 )
-from evonav.evaluation.sensing import Perception, Sensors, map_frame
+from evonav.evaluation.sensing import Sensors, map_frame
 from evonav.evaluation.witness import Witness, Witnessed
+from evonav.perception import Perception, StageScene
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo
 from evonav.world.pose import Pose
@@ -216,7 +217,7 @@ class StageRun:
             action = self._answer(observation)
             with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                 last = self._carry_out(action)
-            self._end_round(number, observation, action, last)
+            self._end_round(number, sensors.pose, action, last)
             if isinstance(action, Stop):
                 return action.reason
         return None
@@ -239,7 +240,7 @@ class StageRun:
                 is_last = number + 1 == len(legs)
                 with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     done = motion.walk(self._simulator, legs[number], forced.end.yaw_rad if is_last else None)
-            self._end_round(number, observation, action, done)
+            self._end_round(number, sensors.pose, action, done)
             if not done.is_success:
                 raise StageFailedError(
                     ErrorKind.SIMULATION, f"the reference trajectory is blocked at {legs[number][-1]}"
@@ -250,8 +251,15 @@ class StageRun:
         )
 
     def _sensors(self) -> Sensors:
+        scene = StageScene(
+            task_id=self._case.task_id,
+            goal=self._stage.public,
+            agent=self._record.agent,
+            seed=self._seed,
+            objects=self._simulator.objects,
+        )
         with blame(ErrorKind.SIMULATION):
-            return Sensors(self._simulator, self._perception, self._sensing, self._witness, self._stopwatch)
+            return Sensors(self._simulator, self._perception, self._sensing, scene, self._witness, self._stopwatch)
 
     def _answer(self, observation: Observation) -> AgentAction:
         """What the agent answers to what it is given."""
@@ -262,9 +270,9 @@ class StageRun:
                 privileged.reveal_sighting(Sighting(self._witness.is_target_visible, self._witness.is_target_seen))
             return wire.checked_action(self._agent.act(observation), self._sensing)
 
-    def _end_round(self, number: int, observation: Observation, action: AgentAction, done: motion.Motion) -> None:
+    def _end_round(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> None:
         self._length_m += done.length_m
-        self._trace.append(self._round_record(number, observation, action, done))
+        self._trace.append(self._round_record(number, pose, action, done))
         self._beliefs = None
         if self._memory_at_start is not None and self._witness.wants_entries:
             with blame(ErrorKind.AGENT):
@@ -287,14 +295,12 @@ class StageRun:
         pose = self._simulator.pose
         return motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
 
-    def _round_record(
-        self, number: int, observation: Observation, action: AgentAction, done: motion.Motion
-    ) -> RoundRecord:
+    def _round_record(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> RoundRecord:
         with blame(ErrorKind.AGENT):
             told = self._told()
             return RoundRecord(
                 round=number,
-                pose=pose_record(observation.pose),
+                pose=pose_record(pose),
                 action=action_record(action),
                 path_m=done.path_m,
                 is_action_success=done.is_success,

@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.simulator import Action, SimulatorConfig
 
 ActionMode = Literal["actions", "waypoints"]

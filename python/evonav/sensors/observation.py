@@ -77,3 +77,6 @@ class Observation:
     is_guided: bool = False
     """The evaluator walks in this stage and carries out no answer: look, remember, and draw no conclusion from where
     the last action should have led."""
+    goal_feature: NDArray[np.float32] | None = None
+    """`(D,)` unit text feature of the stage's instruction, comparable with `Detections.features`, when the perception
+    has such."""

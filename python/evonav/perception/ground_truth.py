@@ -1,17 +1,18 @@
 """Ground-truth perception: the simulator's masks and labels, without its ids."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
+from evonav.perception.perception import Percept, StageScene
 from evonav.sensors.observation import Detections
 from evonav.world.simulator import Frame, SceneObject
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class GroundTruthPerception:
     """Masks and labels of the objects in a frame (the paper's ground-truth setting).
 
@@ -25,6 +26,23 @@ class GroundTruthPerception:
     """Smallest part of the image that a mask covers."""
     max_box_fraction: float = 1.0
     """Largest part of the image that a mask's bounding box covers."""
+    _objects: Sequence[SceneObject] = field(default=(), init=False, repr=False)
+
+    @property
+    def needs_rgb(self) -> bool:
+        """No: instances say it all."""
+        return False
+
+    def begin_stage(self, scene: StageScene) -> None:
+        """Takes the stage's objects."""
+        self._objects = scene.objects
+
+    def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
+        """Each frame as it is."""
+        return [Percept(self.detect(frame, self._objects), frame.depth_m, frame.pose) for frame in frames]
+
+    def text_feature(self, text: str) -> None:
+        """Ground truth has no features."""
 
     def detect(self, frame: Frame, objects: Sequence[SceneObject]) -> Detections:
         """Objects in the frame; walls, floors, ceilings, doors and windows are background.

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
-from evonav.sensors.ground_truth import GroundTruthPerception
+from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics, SceneObject
 

@@ -1,0 +1,66 @@
+"""What a perception is: frames in, detections out, with the depth and the pose that the agent is to believe."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.sensors.observation import Detections
+from evonav.tasks.public import StageInput
+from evonav.world.pose import Pose
+from evonav.world.simulator import Frame, SceneObject
+
+
+@dataclass(frozen=True, slots=True)
+class StageScene:
+    """What a perception is told as a stage begins. It is on the evaluator's side: the objects are oracle data."""
+
+    task_id: str
+    goal: StageInput
+    agent: str
+    """Name of the agent that is given the percepts: published agents have detectors of their own."""
+    seed: int
+    """Of the agent's episode: with `task_id` and the stage, what random errors may depend on."""
+    objects: Sequence[SceneObject]
+    """Bodies in instance order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Percept:
+    """A frame as the agent is told of it."""
+
+    detections: Detections
+    depth_m: NDArray[np.float32]
+    """`(H, W)` planar z, `inf` where nothing is; the frame's own where the perception does not err about it."""
+    pose: Pose
+    """Of the camera, as in `Frame`; the frame's own where the perception does not err about it."""
+
+
+class Perception(Protocol):
+    """Turns rendered frames into percepts. One serves one episode; models behind it are loaded once a process."""
+
+    @property
+    def needs_rgb(self) -> bool:
+        """Whether frames must have colours, which cost more than the rest of them."""
+        ...
+
+    def begin_stage(self, scene: StageScene) -> None:
+        """A stage of the episode begins; stages come in order, each once."""
+        ...
+
+    def perceive(self, frames: Sequence[Frame]) -> Sequence[Percept]:
+        """The views of one round, as one batch.
+
+        Args:
+            frames: Rendered with instances; the heading view last.
+
+        Returns:
+            One percept a frame. Detections hold no ids, and neither numbers nor order tell which instance one is.
+        """
+        ...
+
+    def text_feature(self, text: str) -> NDArray[np.float32] | None:
+        """`(D,)` unit feature of a text, comparable with those of detections; `None` if they have none."""
+        ...
