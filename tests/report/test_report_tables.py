@@ -1,7 +1,11 @@
 import csv
 import io
+import shutil
+import subprocess
 from dataclasses import replace
+from pathlib import Path
 
+import pytest
 from made_up_run import WriteRun
 from rich.console import Console
 
@@ -76,11 +80,31 @@ def test_markup_of_every_format_is_escaped() -> None:
 
 def test_latex_is_a_booktabs_tabular(write_run: WriteRun) -> None:
     lines = tables.headline(load_run(write_run()).summaries).latex().splitlines()
-    assert lines[1] == r"\begin{tabular}{lrrrrrrrr}"
-    assert [lines[2], lines[4], lines[7], lines[8]] == [r"\toprule", r"\midrule", r"\bottomrule", r"\end{tabular}"]
-    assert lines[6].startswith(r"ftu & \textbf{91.7 [")
-    assert r"\textbf" not in lines[5]
-    assert all(line.count("&") == 8 for line in (lines[3], lines[5], lines[6]))
+    assert lines[1].startswith(r"\noindent\resizebox")
+    assert lines[2] == r"\begin{tabular}{lrrrrrrrr}"
+    assert [lines[3], lines[5], lines[8], lines[9]] == [r"\toprule", r"\midrule", r"\bottomrule", r"\end{tabular}}"]
+    assert lines[7].startswith(r"ftu & \textbf{91.7 [")
+    assert r"\textbf" not in lines[6]
+    assert all(line.count("&") == 8 for line in (lines[4], lines[6], lines[7]))
+
+
+def test_latex_compiles_and_shrinks_to_the_line(tmp_path: Path) -> None:
+    if (pdflatex := shutil.which("pdflatex")) is None:
+        pytest.skip("no pdflatex")
+    wide = tables.Table("t", tuple(f"column {i}" for i in range(14)), (("100_0 % & more",) * 14,), notes=("said",))
+    text = "\n".join(
+        (
+            r"\documentclass{article}\usepackage{booktabs,graphicx}\usepackage[utf8]{inputenc}\usepackage[T1]{fontenc}",
+            r"\begin{document}",
+            wide.latex(),
+            r"\end{document}",
+        )
+    )
+    (tmp_path / "t.tex").write_text(text, encoding="utf-8")
+    command = [pdflatex, "-interaction=nonstopmode", "-halt-on-error", "t.tex"]
+    told = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert told.returncode == 0, told.stdout[-2000:]
+    assert "Overfull" not in told.stdout
 
 
 def test_rates_without_spread_claim_no_interval() -> None:

@@ -19,7 +19,7 @@ def breakdown(
     ] = None,
     measure: Annotated[str, typer.Option(help="Any numeric field of a stage's row.")] = "success",
     md: Annotated[Path | None, typer.Option(help="Markdown file to write.")] = None,
-    latex: Annotated[Path | None, typer.Option(help="LaTeX file to write (booktabs).")] = None,
+    latex: Annotated[Path | None, typer.Option(help="LaTeX file to write (booktabs, graphicx).")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV file to write, unrounded.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .svg, or .png or .pdf (extra `viz`).")] = None,
 ) -> None:

@@ -23,7 +23,7 @@ def compare(
         bool, typer.Option("--allow-differences", help="Runs of other tasks or protocol: what they have in common.")
     ] = False,
     md: Annotated[Path | None, typer.Option(help="Markdown file to write.")] = None,
-    latex: Annotated[Path | None, typer.Option(help="LaTeX file to write (booktabs).")] = None,
+    latex: Annotated[Path | None, typer.Option(help="LaTeX file to write (booktabs, graphicx).")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV file to write, unrounded.")] = None,
     json: Annotated[Path | None, typer.Option(help="JSON file to write, with the stages that flipped.")] = None,
     html: Annotated[Path | None, typer.Option(help="HTML page to write, with links to replays.")] = None,

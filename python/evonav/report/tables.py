@@ -55,8 +55,9 @@ class Table:
         return "\n".join(lines + [f"\n{_markdown_text(note)}" for note in self.notes]) + "\n"
 
     def latex(self) -> str:
-        """A `tabular` for `booktabs`, best values in bold, notes as comments."""
-        lines = [f"% {_one_line(self.title)}", rf"\begin{{tabular}}{{l{'r' * (len(self.columns) - 1)}}}", r"\toprule"]
+        """A `tabular` for `booktabs`, best values in bold, notes as comments; no wider than the line (`graphicx`)."""
+        lines = [f"% {_one_line(self.title)}", _NO_WIDER_THAN_THE_LINE]
+        lines += [rf"\begin{{tabular}}{{l{'r' * (len(self.columns) - 1)}}}", r"\toprule"]
         lines += [" & ".join(map(latex_text, self.columns)) + r" \\", r"\midrule"]
         for i, row in enumerate(self.rows):
             cells = [
@@ -64,7 +65,7 @@ class Table:
                 for j, cell in enumerate(row)
             ]
             lines.append(" & ".join(cells) + r" \\")
-        lines += [r"\bottomrule", r"\end{tabular}", *(f"% {_one_line(note)}" for note in self.notes)]
+        lines += [r"\bottomrule", r"\end{tabular}}", "", *(f"% {_one_line(note)}" for note in self.notes)]
         return "\n".join(lines) + "\n"
 
     def rich(self) -> RichTable:
@@ -299,6 +300,7 @@ def _markdown_text(text: str) -> str:
     return re.sub(r"([\\|*_<\[\]])", r"\\\1", _one_line(text)).replace(r"\[", "[").replace(r"\]", "]")
 
 
+_NO_WIDER_THAN_THE_LINE = r"\noindent\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
 _LATEX = {
     "\\": r"\textbackslash{}",
     "~": r"\textasciitilde{}",
