@@ -223,6 +223,14 @@ def test_a_line_chart_draws_every_point_and_name_where_it_belongs() -> None:
     assert abs(names["fu"] - names["a<b"]) >= 14.0
 
 
+def test_a_line_chart_names_its_places_where_they_are_no_numbers() -> None:
+    points = [(0.0, 60.0), (1.0, 40.0), (2.0, 20.0)]
+    drawn = line_chart([Line("fu", points, [None] * 3)], "SR", "perception", "SR, %", x_names=["gt", "<b>", "poor"])
+    texts = [element.text for element in ElementTree.fromstring(drawn).iter() if element.tag.endswith("text")]
+    assert [text for text in texts if text in {"gt", "<b>", "poor"}] == ["gt", "<b>", "poor"]
+    assert "1" not in texts
+
+
 @pytest.fixture(scope="module")
 def script():
     path = Path(__file__).parents[2] / "scripts" / "results.py"

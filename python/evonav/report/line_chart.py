@@ -22,7 +22,15 @@ class Line:
     """Of each y."""
 
 
-def line_chart(lines: Sequence[Line], heading: str, x_words: str, y_words: str, *, is_inline: bool = False) -> str:
+def line_chart(
+    lines: Sequence[Line],
+    heading: str,
+    x_words: str,
+    y_words: str,
+    *,
+    x_names: Sequence[str] | None = None,
+    is_inline: bool = False,
+) -> str:
     """An SVG file; y from 0 to the next ten above the largest value, whiskers a hair apart.
 
     Args:
@@ -30,6 +38,7 @@ def line_chart(lines: Sequence[Line], heading: str, x_words: str, y_words: str, 
         heading: Of the chart.
         x_words: Of the axis.
         y_words: Of the axis.
+        x_names: What to write below x = 0, 1, ... instead of the numbers.
         is_inline: For a page that has `PLOT_CSS`.
     """
     xs = sorted({x for line in lines for x, _ in line.points})
@@ -49,7 +58,8 @@ def line_chart(lines: Sequence[Line], heading: str, x_words: str, y_words: str, 
         parts.append(f'<path class="grid" d="M{LEFT} {y_of(i):.1f}H{WIDTH - RIGHT}"/>')
         parts.append(f'<text x="{LEFT - 6}" y="{y_of(i) + 4:.1f}" text-anchor="end">{i}</text>')
     for x in xs:
-        parts.append(f'<text x="{x_of(x):.1f}" y="{HEIGHT - BOTTOM + 18}" text-anchor="middle">{x:g}</text>')
+        name = f"{x:g}" if x_names is None else escape(x_names[round(x)])
+        parts.append(f'<text x="{x_of(x):.1f}" y="{HEIGHT - BOTTOM + 18}" text-anchor="middle">{name}</text>')
     middle = (LEFT + WIDTH - RIGHT) / 2
     parts.append(f'<text x="{middle:.1f}" y="{HEIGHT - 8}" text-anchor="middle">{escape(x_words)}</text>')
     parts.append(f'<text x="10" y="{TOP - 8}">{escape(y_words)}</text>')
