@@ -1,0 +1,206 @@
+"""Which detections are believed, after 3D-Mem and UniGoal: pure functions on masks, boxes and confidences.
+
+Lengths and areas in pixels are meant for images of the size that the original looks at and are scaled with the image:
+3D-Mem renders 1280x1280, our protocol 300x300.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.errors import InvalidArgumentError
+from evonav.perception.detector import Found
+
+
+@dataclass(frozen=True, slots=True)
+class FilterConfig:
+    """3D-Mem's values."""
+
+    reference_px: tuple[int, int] = (1280, 1280)
+    """Height and width of the images for which the values in pixels are meant."""
+    background: tuple[str, ...] = ("wall", "floor", "ceiling", "carpet", "door", "rug", "bath mat")
+    """Labels that are no objects."""
+    min_area_fraction: float = 0.001
+    """Smallest part of the image that a mask covers."""
+    min_confidence: float = 0.4
+    max_mask_iou: float = 0.9
+    """Above it, of two masks the one with less confidence goes."""
+    min_centre_distance_px: float = 20.0
+    """Of two boxes with centres nearer than this, the smaller goes."""
+    min_area_px: float = 25.0
+    max_box_fraction: float = 0.5
+    """Largest part of the image that a box covers."""
+    max_share_of_outer: float = 0.7
+    min_share_of_inner: float = 0.8
+    """Boxes whose intersection is less than the first of the one and more than the second of the other: the other is
+    a thing on the one, whose mask loses it."""
+
+    def __post_init__(self) -> None:
+        """Refuses what makes no sense.
+
+        Raises:
+            InvalidArgumentError: A parameter is outside its domain; the message names it.
+        """
+        shares = ("min_area_fraction", "min_confidence", "max_mask_iou", "max_box_fraction")
+        for name in (*shares, "max_share_of_outer", "min_share_of_inner"):
+            value = getattr(self, name)
+            if not 0.0 <= value <= 1.0:
+                raise InvalidArgumentError(f"FilterConfig: {name} is {value}, expected 0..1")
+        for name in ("min_centre_distance_px", "min_area_px"):
+            value = getattr(self, name)
+            if not 0.0 <= value < math.inf:
+                raise InvalidArgumentError(f"FilterConfig: {name} is {value}, expected a number that is not negative")
+        if min(self.reference_px) <= 0:
+            raise InvalidArgumentError(f"FilterConfig: reference_px is {self.reference_px}, expected positive numbers")
+
+    def scale_of(self, shape: tuple[int, int]) -> float:
+        """How long a pixel of the original is in an image of `(H, W)`."""
+        return math.sqrt(shape[0] * shape[1] / (self.reference_px[0] * self.reference_px[1]))
+
+
+def filtered(found: Found, config: FilterConfig) -> Found:
+    """What is left of an image's detections, the most confident first; masks may still overlap.
+
+    Args:
+        found: Of one image.
+        config: Of the stack.
+    """
+    kept = without_small_and_doubtful(found, config)
+    kept = without_doubles(kept, config)
+    kept = without_specks_and_giants(kept, config)
+    return without_contained(kept, config)
+
+
+def without_small_and_doubtful(found: Found, config: FilterConfig) -> Found:
+    """Drops background, masks that are too small a part of the image and detections of little confidence.
+
+    Background goes first: a wall's box is no reason to drop the picture on it.
+    """
+    order = np.argsort(-found.confidences, kind="stable")
+    areas_px = mask_areas_px(found.masks)
+    min_area_px = config.min_area_fraction * found.masks.shape[1] * found.masks.shape[2]
+    return found.taken(
+        [
+            index
+            for index in order.tolist()
+            if found.labels[index] not in config.background
+            and areas_px[index] >= min_area_px
+            and areas_px[index] > 0
+            and found.confidences[index] >= config.min_confidence
+        ]
+    )
+
+
+def without_doubles(found: Found, config: FilterConfig) -> Found:
+    """Drops what is found twice: nearly the same mask, or boxes around one middle.
+
+    Args:
+        found: The most confident first.
+        config: Of the stack.
+    """
+    ious = mask_ious(found.masks)
+    areas_px = box_areas_px(found.boxes_px)
+    centres_px = (found.boxes_px[:, :2] + found.boxes_px[:, 2:]) / 2.0
+    near_px = config.min_centre_distance_px * config.scale_of(found.masks.shape[1:])
+    kept: list[int] = []
+    for index in range(len(found)):
+        if any(ious[index, other] > config.max_mask_iou for other in kept):
+            continue
+        apart_px = np.hypot(*(centres_px[kept] - centres_px[index]).T)
+        rivals = [other for other, px in zip(kept, apart_px.tolist(), strict=True) if px < near_px]
+        if all(areas_px[index] > areas_px[other] for other in rivals):
+            kept = [other for other in kept if other not in rivals] + [index]
+    return found.taken(sorted(kept))
+
+
+def without_specks_and_giants(found: Found, config: FilterConfig) -> Found:
+    """Drops masks of a few pixels and boxes over much of the image."""
+    height_px, width_px = found.masks.shape[1:]
+    min_area_px = config.min_area_px * config.scale_of((height_px, width_px)) ** 2
+    max_box_px = config.max_box_fraction * height_px * width_px
+    is_kept = (mask_areas_px(found.masks) >= min_area_px) & (box_areas_px(found.boxes_px) <= max_box_px)
+    return found.taken(np.flatnonzero(is_kept))
+
+
+def without_contained(found: Found, config: FilterConfig) -> Found:
+    """Takes the pillow's mask off the sofa's; a mask of which nothing is left goes."""
+    boxes = found.boxes_px.astype(np.float64)
+    low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
+    shared_px = np.clip(high - low, 0.0, None).prod(axis=2)
+    areas_px = np.maximum(box_areas_px(found.boxes_px), 1e-9)
+    is_on = (shared_px / areas_px[:, None] < config.max_share_of_outer) & (
+        shared_px / areas_px[None, :] > config.min_share_of_inner
+    )
+    if not is_on.any():
+        return found
+    masks = found.masks.copy()
+    for outer, inner in np.argwhere(is_on):
+        masks[outer] &= ~found.masks[inner]
+    left = Found(masks, found.boxes_px, found.labels, found.confidences, found.features)
+    return left.taken(np.flatnonzero(mask_areas_px(masks) > 0))
+
+
+def joined(first: Found, second: Found, max_iou: float) -> Found:
+    """What two detectors found in one image; what both found, as the first has it.
+
+    Args:
+        first: Of one.
+        second: Of the other; features are kept if both have some.
+        max_iou: Masks that overlap by more are the same thing.
+    """
+    ious = mask_ious(np.concatenate([first.masks, second.masks]))[len(first) :, : len(first)]
+    new = second.taken(np.flatnonzero(~(ious > max_iou).any(axis=1)))
+    features = None
+    if first.features is not None and new.features is not None:
+        features = np.concatenate([first.features, new.features])
+    return Found(
+        masks=np.concatenate([first.masks, new.masks]),
+        boxes_px=np.concatenate([first.boxes_px, new.boxes_px]),
+        labels=first.labels + new.labels,
+        confidences=np.concatenate([first.confidences, new.confidences]),
+        features=features,
+    )
+
+
+def one_label_a_pixel(masks: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """Which mask a pixel belongs to: of several, to the one with the fewest pixels.
+
+    What lies on or before something is smaller than that in most images, and a mask of the larger thing often covers
+    it; the other way round the small thing would vanish from every map. Among masks of equal size the first one wins.
+
+    Args:
+        masks: `(N, H, W)`.
+
+    Returns:
+        `(H, W)` index, -1 where no mask is.
+    """
+    image = np.full(masks.shape[1:], -1, np.int32)
+    for index in np.argsort(-mask_areas_px(masks)[::-1], kind="stable"):
+        mask = len(masks) - 1 - int(index)
+        image[masks[mask]] = mask
+    return image
+
+
+def mask_areas_px(masks: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """`(N,)` pixels of `(N, H, W)` masks."""
+    areas: NDArray[np.int64] = np.count_nonzero(masks.reshape(len(masks), masks.shape[1] * masks.shape[2]), axis=1)
+    return areas
+
+
+def mask_ious(masks: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """`(N, N)` intersection over union of `(N, H, W)` masks; 0 for two empty ones."""
+    flat = masks.reshape(len(masks), masks.shape[1] * masks.shape[2]).astype(np.float32)
+    shared_px = (flat @ flat.T).astype(np.float64)  # whole numbers below 2^24: exact
+    areas_px = mask_areas_px(masks).astype(np.float64)
+    union_px = areas_px[:, None] + areas_px[None, :] - shared_px
+    return np.divide(shared_px, union_px, out=np.zeros_like(shared_px), where=union_px > 0.0)
+
+
+def box_areas_px(boxes_px: NDArray[np.float32]) -> NDArray[np.float64]:
+    """`(N,)` areas of `(N, 4)` boxes, left, top, right, bottom."""
+    sides_px = np.clip(boxes_px[:, 2:].astype(np.float64) - boxes_px[:, :2], 0.0, None)
+    areas: NDArray[np.float64] = sides_px[:, 0] * sides_px[:, 1]
+    return areas

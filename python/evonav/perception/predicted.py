@@ -1,0 +1,98 @@
+"""Perception by models: a detector's findings, filtered, one label a pixel, called by ProcTHOR's types.
+
+Nothing of the simulator but colours and depth goes in: neither instances nor the scene's objects are looked at.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.errors import InvalidArgumentError
+from evonav.perception.detector import Detector, Embedder, Found
+from evonav.perception.filters import FilterConfig, filtered, mask_areas_px, one_label_a_pixel
+from evonav.perception.perception import Percept, StageScene
+from evonav.perception.vocabulary import TYPE_OF_WORD
+from evonav.sensors.observation import Detections
+from evonav.world.simulator import Frame
+
+__all__ = ["Detector", "Embedder", "Found", "PredictedPerception"]
+
+
+class PredictedPerception:
+    """What a detector sees, as percepts; depth and pose are the frame's own."""
+
+    needs_rgb = True
+
+    def __init__(
+        self,
+        detector: Detector,
+        filters: FilterConfig | None = None,
+        embedder: Embedder | None = None,
+        types: Mapping[str, str] = TYPE_OF_WORD,
+    ) -> None:
+        """A perception over models that may be shared.
+
+        Args:
+            detector: Finds.
+            filters: What is believed; default: 3D-Mem's values. `None` of a detector with filters of its own is not
+                told apart: give it a config that drops nothing.
+            embedder: Gives what is left features; without, they are the detector's, if it has some.
+            types: ProcTHOR's type by the detector's word; a word that is not in it stays as it is.
+        """
+        self._detector = detector
+        self._filters = filters or FilterConfig()
+        self._embedder = embedder
+        self._types = types
+
+    def begin_stage(self, scene: StageScene) -> None:
+        """Nothing of the scene is used."""
+
+    def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
+        """The views of a round, as one batch.
+
+        Raises:
+            InvalidArgumentError: A frame has no colours, or what the detector returns does not fit.
+        """
+        images = [_colours(frame) for frame in frames]
+        found = self._detector.detect(images, [frame.depth_m for frame in frames])
+        if len(found) != len(images):
+            raise InvalidArgumentError(f"a detector returned {len(found)} results for {len(images)} images")
+        kept = []
+        for one, image in zip(found, images, strict=True):
+            one.check((image.shape[0], image.shape[1]))
+            kept.append(filtered(one, self._filters))
+        features: Sequence[NDArray[np.float32] | None] = [one.features for one in kept]
+        if self._embedder is not None:
+            features = self._embedder.image_features(images, [one.boxes_px for one in kept])
+        return [
+            Percept(self._detections(one, feature), frame.depth_m, frame.pose)
+            for one, feature, frame in zip(kept, features, frames, strict=True)
+        ]
+
+    def text_feature(self, text: str) -> NDArray[np.float32] | None:
+        """Of the embedder, if there is one."""
+        return None if self._embedder is None else self._embedder.text_feature(text)
+
+    def _detections(self, found: Found, features: NDArray[np.float32] | None) -> Detections:
+        """One label a pixel; what smaller masks leave fewer pixels of than a mask must have goes."""
+        masks = one_label_a_pixel(found.masks)
+        num = len(found)
+        left_px = np.bincount(masks[masks >= 0], minlength=num)
+        min_area_px = self._filters.min_area_px * self._filters.scale_of(masks.shape) ** 2
+        is_kept = left_px >= np.minimum(np.maximum(min_area_px, 1.0), mask_areas_px(found.masks))
+        if not is_kept.all():
+            masks = one_label_a_pixel(found.masks[is_kept])
+        labels = [label for label, kept in zip(found.labels, is_kept.tolist(), strict=True) if kept]
+        return Detections(
+            masks=masks,
+            labels=tuple(self._types.get(label, label) for label in labels),
+            confidences=found.confidences[is_kept],
+            features=None if features is None else features[is_kept],
+        )
+
+
+def _colours(frame: Frame) -> NDArray[np.uint8]:
+    if frame.rgb is None:
+        raise InvalidArgumentError("argument `frames`: one has no colours, expected frames rendered with them")
+    return frame.rgb
