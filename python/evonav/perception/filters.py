@@ -186,17 +186,33 @@ def one_label_a_pixel(masks: NDArray[np.bool_]) -> NDArray[np.int32]:
 
 def mask_areas_px(masks: NDArray[np.bool_]) -> NDArray[np.int64]:
     """`(N,)` pixels of `(N, H, W)` masks."""
-    areas: NDArray[np.int64] = np.count_nonzero(masks.reshape(len(masks), masks.shape[1] * masks.shape[2]), axis=1)
-    return areas
+    return np.array([np.count_nonzero(mask) for mask in masks], np.int64)
 
 
 def mask_ious(masks: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """`(N, N)` intersection over union of `(N, H, W)` masks; 0 for two empty ones."""
-    flat = masks.reshape(len(masks), masks.shape[1] * masks.shape[2]).astype(np.float32)
-    shared_px = (flat @ flat.T).astype(np.float64)  # whole numbers below 2^24: exact
-    areas_px = mask_areas_px(masks).astype(np.float64)
-    union_px = areas_px[:, None] + areas_px[None, :] - shared_px
-    return np.divide(shared_px, union_px, out=np.zeros_like(shared_px), where=union_px > 0.0)
+    """`(N, N)` intersection over union of `(N, H, W)` masks; 0 for two empty ones.
+
+    Pixels are compared where the extents of two masks meet, which for most pairs is nowhere.
+    """
+    areas_px = mask_areas_px(masks)
+    ious = np.diag((areas_px > 0).astype(np.float64))
+    extents = [_extent(mask) for mask in masks]
+    for i, (top, left, bottom, right) in enumerate(extents):
+        for j in range(i):
+            other = extents[j]
+            rows = slice(max(top, other[0]), min(bottom, other[2]))
+            cols = slice(max(left, other[1]), min(right, other[3]))
+            if rows.start >= rows.stop or cols.start >= cols.stop:
+                continue
+            shared_px = np.count_nonzero(masks[i, rows, cols] & masks[j, rows, cols])
+            ious[i, j] = ious[j, i] = shared_px / (areas_px[i] + areas_px[j] - shared_px)
+    return ious
+
+
+def _extent(mask: NDArray[np.bool_]) -> tuple[int, int, int, int]:
+    """First row and column of a mask, and the ones after its last."""
+    rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    return (int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1) if len(rows) else (0, 0, 0, 0)
 
 
 def box_areas_px(boxes_px: NDArray[np.float32]) -> NDArray[np.float64]:
