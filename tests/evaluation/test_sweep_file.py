@@ -133,7 +133,7 @@ MISTAKES = {
     "bad simulator": (SMALL + 'simulators = "habitat"', "simulators.habitat.kind = 'habitat'"),
     "bad perception": (
         SMALL + 'perceptions = "yolo"',
-        "perceptions.yolo.make = 'yolo': expected gt or module:function",
+        "perceptions.yolo: perception 'yolo': expected gt, noisy[:PRESET]",
     ),
     "bad subset": ('agents = "fu"\ntasks = "x:test90"', "'x:test90': expected FOLDER, FOLDER:LIMIT or FOLDER:SUBSET"),
     "limit and subset": (

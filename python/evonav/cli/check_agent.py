@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from evonav.cli.decision_options import DecisionOptions, with_decision_options, with_decisions
-from evonav.cli.options import Seed
+from evonav.cli.options import PerceptionName, Seed, with_perception
 
 EXIT_BROKEN = 1
 _STYLES = {"pass": "green", "warn": "yellow", "fail": "bold red", "skip": "dim"}
@@ -18,6 +18,7 @@ def check_agent(
     agent: Annotated[str, typer.Argument(help="A name, `module:Class` or `./file.py:Class`.")],
     decisions: DecisionOptions,
     seed: Seed = 0,
+    perception: PerceptionName = "gt",
     timeout: Annotated[float, typer.Option(min=0.1, help="Seconds for an answer of the agent.")] = 60.0,
 ) -> None:
     """Runs an agent through the contract, on a bundled house that changes; exit code 1 if it breaks it."""
@@ -30,7 +31,9 @@ def check_agent(
     from evonav.evaluation.backend import Backend
 
     with TemporaryDirectory() as folder, status(f"Running {agent}"):  # a model's exchanges are kept between episodes
-        backend = with_decisions(Backend(), decisions, out=Path(folder), seed=seed, num_workers=1)
+        backend = with_decisions(
+            with_perception(Backend(), perception), decisions, out=Path(folder), seed=seed, num_workers=1
+        )
         report = check_agent(agent, backend=backend, seed=seed, timeout_s=timeout)
     table = Table(title=f"{agent}: {'keeps the contract' if report.is_ok else 'breaks the contract'}")
     for column in ("check", "", "what was found"):

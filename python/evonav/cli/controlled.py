@@ -16,10 +16,12 @@ from evonav.cli.options import (
     InProcess,
     Limit,
     OneAgent,
+    PerceptionName,
     Seed,
     Workers,
     count_of,
     names_of,
+    with_perception,
 )
 
 if TYPE_CHECKING:  # the command must start fast
@@ -95,6 +97,7 @@ def evaluate(
     agents: AgentNames = None,
     agent: OneAgent = None,
     seed: Seed = 0,
+    perception: PerceptionName = "gt",
     workers: Workers = None,
     retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
     in_process: InProcess = False,
@@ -111,6 +114,7 @@ def evaluate(
     num_workers = count_of(workers)
     module = "evonav.evaluation.backend"
     backend = Backend(simulator=f"{module}:lenient_simulator") if record.allow_unknown_assets else Backend()
+    backend = with_perception(backend, perception)
     backend = with_decisions(backend, decisions, out=directory, seed=seed, num_workers=num_workers)
     settings = decision_settings(decisions)
     hosting = AgentHosting(is_in_process=in_process, timeout_s=agent_timeout or settings.answer_timeout_s)

@@ -30,6 +30,7 @@ from evonav.cli.options import (
     Limit,
     OneAgent,
     Out,
+    PerceptionName,
     RayAddress,
     Retries,
     Seed,
@@ -48,6 +49,7 @@ from evonav.cli.options import (
     check_engine,
     count_of,
     names_of,
+    with_perception,
 )
 from evonav.cli.view import make_pages
 
@@ -73,6 +75,7 @@ def evaluate(
     limit: Limit = None,
     subset: Subset = None,
     seed: Seed = 0,
+    perception: PerceptionName = "gt",
     workers: Workers = None,
     engine: Engine = EngineOption.LOCAL,
     ray_address: RayAddress = None,
@@ -108,7 +111,7 @@ def evaluate(
         x_display=thor_display,
         timeout_s=thor_timeout if simulator is SimulatorName.AI2THOR else None,
     )
-    config = _config(seed, backend, decisions, out, num_workers)
+    config = _config(seed, with_perception(backend, perception), decisions, out, num_workers)
     hosting = _hosting(in_process, agent_timeout or decision_settings(decisions).answer_timeout_s, agent_memory)
     config = replace(config, hosting=hosting)
     names = names_of(agents, agent)

@@ -10,6 +10,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav evaluate --limit 5 --out out/first",
         "evonav evaluate --agents fu,ftu,msgnav --tasks tasks --subset test-90 --out out/run",
         "evonav evaluate --agent ./examples/own_agent.py:OwnAgent --agent fu --out out/mine",
+        "evonav evaluate --perception noisy:poor,miss_rate=0.3 --out out/poor",
         "evonav evaluate --decision vlm --model gpt-4o --dry-run --out out/gpt",
     ),
     "sweep": (

@@ -3,11 +3,14 @@
 import os
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from evonav.cli import completion
+
+if TYPE_CHECKING:  # the command must start fast
+    from evonav.evaluation.backend import Backend
 
 EXIT_INCOMPLETE = 3
 HEURISTICS = "fu,stage-reset,ftu"
@@ -43,6 +46,14 @@ Houses = Annotated[Path | None, typer.Option(help=f"{HOUSES} to generate tasks f
 Tasks = Annotated[
     Path | None,
     typer.Option(help="Folder of tasks; default: the bundled ones.", autocompletion=completion.task_folders),
+]
+PerceptionName = Annotated[
+    str,
+    typer.Option(
+        "--perception",
+        help="What agents see with: gt, noisy:PRESET, noisy:PRESET,KEY=VALUE, predicted:STACK or module:function "
+        "(docs/perception.md).",
+    ),
 ]
 Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-room) houses or tasks.")]
 Subset = Annotated[
@@ -126,3 +137,14 @@ def count_of(workers: int | None) -> int:
     if workers is not None:
         return workers
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def with_perception(backend: "Backend", word: str) -> "Backend":
+    """A backend whose agents see with what `--perception` names.
+
+    Raises:
+        InvalidArgumentError: There is no such perception, or one of its keys makes no sense.
+    """
+    from evonav.evaluation.settings import PerceptionSettings
+
+    return PerceptionSettings(make=word).backend(backend)

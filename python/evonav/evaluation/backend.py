@@ -17,9 +17,6 @@ from evonav.evaluation.protocol import EpisodeCase
 from evonav.perception import Perception
 from evonav.world.simulator import Simulator
 
-PERCEPTIONS: Mapping[str, str] = {"gt": "evonav.evaluation.backend:ground_truth"}
-"""Import path by name."""
-
 
 @runtime_checkable
 class Startable(Protocol):
@@ -70,12 +67,13 @@ class Backend:
         return simulator
 
     def check(self) -> None:
-        """Starts a simulator and ends it, where that is something that can fail.
+        """Starts a simulator and ends it, where that is something that can fail, and makes a perception.
 
         Raises:
-            InvalidArgumentError: Its options make no sense.
+            InvalidArgumentError: Their options make no sense.
             SimulationError: It does not start; the message says what to do.
         """
+        self.make_perception()
         simulator = self.make_simulator()
         try:
             if isinstance(simulator, Startable):

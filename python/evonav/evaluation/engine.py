@@ -21,6 +21,7 @@ from evonav.evaluation.store import RunStore
 from evonav.evaluation.workers import WORK, EpisodeJob, Setup
 from evonav.folders import check_same_run, write_atomically, writing
 from evonav.parallel import EngineName, Resources, open_pool
+from evonav.perception.words import word_of
 from evonav.tasks.files import task_roots
 from evonav.tasks.subsets import subset_roots
 
@@ -276,8 +277,11 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
         agents: list[str] = store.meta("agents") or []
         num_stages = sum(store.meta("num_stages").values())
         records = {agent: list(store.records(agent, is_brief=True)) for agent in agents}
+        backend = (store.meta("config") or {}).get("backend", {})
     summaries = {agent: summarise(agent, records[agent], num_stages) for agent in agents}
     content = summary_json(list(summaries.values()), paired_differences(records))
+    if make := backend.get("perception"):
+        content["perception"] = word_of(make, backend.get("perception_options", {}))
     write_atomically(run_dir / SUMMARY_NAME, json.dumps(content, indent=2, sort_keys=True) + "\n")
     return [summaries[agent] for agent in only or agents]
 

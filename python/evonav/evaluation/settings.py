@@ -15,6 +15,7 @@ from evonav.decision.ledger import LEDGER_NAME
 from evonav.decision.vlm import Mode
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend
+from evonav.perception.words import read_word
 from evonav.tasks.records import Record
 
 if TYPE_CHECKING:
@@ -88,6 +89,25 @@ class SimulatorSettings(Settings):
         if given:
             raise SettingError(next(iter(given)), "is for simulator ai2thor")
         return Backend(simulator=f"{_BACKENDS}:lenient_simulator") if self.allow_unknown_assets else Backend()
+
+
+class PerceptionSettings(Settings):
+    """What agents are given to see with (docs/perception.md)."""
+
+    make: str = "gt"
+    """gt (the simulator's masks and labels), noisy:PRESET (with errors), predicted:STACK (models), or
+    module:function that makes a `Perception`; each with keys, as in noisy:poor,miss_rate=0.3."""
+    options: dict[str, Any] = Field(default_factory=dict)
+    """Keywords for it, over those of the word."""
+
+    def backend(self, backend: Backend) -> Backend:
+        """A backend with this perception.
+
+        Raises:
+            InvalidArgumentError: There is no such perception, or a keyword makes no sense.
+        """
+        word = read_word(self.make, self.options)
+        return replace(backend, perception=word.make, perception_options=word.options)
 
 
 class DecisionSettings(Settings):

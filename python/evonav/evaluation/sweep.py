@@ -21,7 +21,7 @@ from evonav._core import __version__
 from evonav.decision.ledger import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.agent_process import AgentHosting
-from evonav.evaluation.backend import PERCEPTIONS, Backend
+from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import (
     NUM_RETRIES,
@@ -148,15 +148,13 @@ def config_of(sweep: SweepFile, cell: Cell, books: Books | None) -> RunConfig:
         EvonavError: A model's settings make no sense, or its exchanges cannot be opened.
     """
     decision = sweep.decisions[cell.decision]
-    perception = sweep.perceptions[cell.perception]
     simulated = sweep.simulators[cell.simulator].backend()
     backend = Backend(
         simulator=simulated.simulator,
         simulator_options=simulated.simulator_options,
         host_options=simulated.host_options,
-        perception=PERCEPTIONS.get(perception.make, perception.make),
-        perception_options=perception.options,
     )
+    backend = sweep.perceptions[cell.perception].backend(backend)
     return RunConfig(
         seed=cell.seed,
         protocol=sweep.protocol.config(),

@@ -13,9 +13,15 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.backend import PERCEPTIONS
+from evonav.evaluation.backend import Backend
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.settings import DecisionSettings, SettingError, Settings, SimulatorSettings
+from evonav.evaluation.settings import (
+    DecisionSettings,
+    PerceptionSettings,
+    SettingError,
+    Settings,
+    SimulatorSettings,
+)
 from evonav.evaluation.sweep_words import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed, loaded
 from evonav.parallel import EngineName
 from evonav.tasks.subsets import SubsetError, parse_subset
@@ -38,15 +44,6 @@ class TaskSet(Settings):
     """Take the first N."""
     subset: str | None = None
     """Named subset, SPLIT-N, such as test-90 (docs/tasks.md)."""
-
-
-class PerceptionSettings(Settings):
-    """What agents are given to see with."""
-
-    make: str = "gt"
-    """gt (the simulator's masks and labels), or module:function that makes a `Perception`."""
-    options: dict[str, Any] = Field(default_factory=dict)
-    """Keywords for it."""
 
 
 class ProtocolSettings(Settings):
@@ -93,7 +90,7 @@ class SweepFile(Settings):
     simulators: dict[Name, SimulatorSettings] = Field(default={"embedded": SimulatorSettings()}, min_length=1)
     """Short: a list of embedded, ai2thor."""
     perceptions: dict[Name, PerceptionSettings] = Field(default={"gt": PerceptionSettings()}, min_length=1)
-    """Short: a list of gt, module:function."""
+    """Short: a list of gt, noisy:PRESET, noisy:PRESET,miss_rate=0.3, predicted:STACK, module:function."""
     decisions: dict[Name, DecisionSettings] = Field(default={"text": DecisionSettings()}, min_length=1)
     """Short: a list of text, text:wrong=0.1 (with mistakes), vlm:MODEL, module:name."""
     seeds: tuple[Seed, ...] = Field(default=(0,), min_length=1)
@@ -235,11 +232,10 @@ def _check(sweep: SweepFile, path: Path) -> None:
                     f"{place}.mode = 'record': is for one run; auto keeps answers too, and a sweep goes on with them"
                 )
     for name, perception in sweep.perceptions.items():
-        if perception.make not in PERCEPTIONS and ":" not in perception.make:
-            known = ", ".join(PERCEPTIONS)
-            raise InvalidArgumentError(
-                f"{path}: perceptions.{name}.make = {perception.make!r}: expected {known} or module:function"
-            )
+        try:
+            perception.backend(Backend())
+        except InvalidArgumentError as error:
+            raise InvalidArgumentError(f"{path}: perceptions.{name}: {error}") from None
     for name, tasks in sweep.tasks.items():
         if tasks.limit is not None and tasks.subset is not None:
             raise InvalidArgumentError(f"{path}: tasks.{name}: give limit or subset, not both")

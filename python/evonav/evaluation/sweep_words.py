@@ -172,7 +172,8 @@ def _axis(read: Any) -> Any:  # noqa: ANN401 - a function of (word, place)
     """Spells out a list of short forms, each under a name made from it; tables stay as they are."""
 
     def spell(value: Any, place: str) -> Any:  # noqa: ANN401 - as read
-        words = _words(value) if read is not _decision else [value] if isinstance(value, str) else value
+        has_commas = read in (_decision, _perception)  # within a word
+        words = _words(value) if not has_commas else [value] if isinstance(value, str) else value
         if isinstance(words, dict):
             return {
                 name: read(entry, f"{place}.{name}")[1] if isinstance(entry, str) else entry

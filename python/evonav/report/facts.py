@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from evonav.evaluation.records import EndState
+from evonav.perception.words import word_of
 from evonav.report.run import Run
 
 MAX_LISTED = 12
 """Stages named of each kind of failure."""
-_DEFAULT_PARTS = {"decision": "text_match", "perception": "ground_truth", "simulator": "embedded_simulator"}
+_DEFAULT_PARTS = {"decision": "text_match", "simulator": "embedded_simulator"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,15 +62,26 @@ def reproduction(run: Run) -> list[str]:
     parts = backend if isinstance(backend, dict) else {}
     if any(str(parts.get(name, "")).rpartition(":")[2] != part for name, part in _DEFAULT_PARTS.items()):
         return []
+    perception = perception_of(run)
     words = ["evonav", "evaluate", "--agents", ",".join(run.agents), "--seed", str(run.config.get("seed", 0))]
     if isinstance(run.notes.get("tasks_dir"), str):
         words += ["--tasks", run.notes["tasks_dir"]]
+    words += ["--perception", perception] if perception not in ("gt", "") else []
     return [shlex.join([*words, "--out", "out/again"])]
+
+
+def perception_of(run: Run) -> str:
+    """What the agents saw with, as `--perception` names it; empty where the run does not tell."""
+    backend = run.config.get("backend")
+    parts = backend if isinstance(backend, dict) else {}
+    make, options = parts.get("perception"), parts.get("perception_options", {})
+    return word_of(make, options) if isinstance(make, str) and isinstance(options, dict) else ""
 
 
 def run_facts(run: Run) -> list[tuple[str, str]]:
     """Name and value of what makes the run reproducible, and of what its figures hang on."""
     facts = [(key, _json(value)) for key, value in sorted(run.config.items())]
+    facts += [("perception", perception)] if (perception := perception_of(run)) else []
     facts += [("tasks recorded", str(len(run.num_stages))), ("agents", ", ".join(run.agents))]
     facts += [(f"sha256 of the records, {agent}", digest) for agent, digest in run.rows_sha256.items()]
     facts += [(f"mean wall time a stage, {agent}", f"{wall_s:.2f} s") for agent, wall_s in run.wall_s.items()]

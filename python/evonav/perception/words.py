@@ -1,0 +1,94 @@
+"""Perceptions as people name them on the command line and in sweep files: a word to an import path and its keywords.
+
+gt                               the simulator's masks and labels
+noisy[:PRESET][,KEY=VALUE...]    ground truth with simulated errors: `noisy:poor,miss_rate=0.3`
+predicted[:STACK][,KEY=VALUE...] models: `predicted`, `predicted:unigoal`
+MODULE:FUNCTION[,KEY=VALUE...]   one's own
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any
+
+from evonav.errors import InvalidArgumentError
+
+GROUND_TRUTH = "evonav.evaluation.backend:ground_truth"
+NOISY = "evonav.perception.simulated:noisy_perception"
+PREDICTED = "evonav.perception.predicted:predicted_perception"
+STACKS = ("auto", "3d-mem", "unigoal", "transformers", "mini")
+"""Of models; `auto`: UniGoal its own, all others 3D-Mem's."""
+NAMES = ("gt", "noisy", "predicted")
+GRAMMAR = "gt, noisy[:PRESET][,KEY=VALUE...], predicted[:STACK][,KEY=VALUE...] or module:function"
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptionWord:
+    """What a word stands for."""
+
+    make: str
+    """Import path of a function that makes a `Perception`."""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """Keywords for it, as JSON."""
+
+
+def read_word(word: str, options: Mapping[str, Any] | None = None) -> PerceptionWord:
+    """What a word stands for.
+
+    Args:
+        word: See above. A value is JSON or plain words.
+        options: More keywords, as a sweep file's table gives them; they go before the word's own.
+
+    Raises:
+        InvalidArgumentError: There is no such perception, preset, stack or key, or a value is outside its domain.
+    """
+    head, *parts = word.strip().split(",")
+    kind, colon, variant = (text.strip() for text in head.partition(":"))
+    given = {**_keywords(word, parts), **(options or {})}
+    if kind == "gt":
+        if colon or given:
+            raise InvalidArgumentError(f"perception {word!r}: gt has no variants and no keys")
+        return PerceptionWord(GROUND_TRUTH)
+    if colon and not variant:
+        raise InvalidArgumentError(f"perception {word!r}: nothing after the colon; expected {GRAMMAR}")
+    if kind == "noisy":
+        return PerceptionWord(NOISY, {"preset": variant, **given} if variant else given)
+    if kind == "predicted":
+        if variant and variant not in STACKS:
+            raise InvalidArgumentError(f"perception {word!r}: {_unknown('stack', variant, STACKS)}")
+        return PerceptionWord(PREDICTED, {"stack": variant or "auto", **given})
+    if not colon:
+        near = get_close_matches(kind, NAMES, 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise InvalidArgumentError(f"perception {word!r}: expected {GRAMMAR}{hint}")
+    return PerceptionWord(f"{kind}:{variant}", given)
+
+
+def word_of(make: str, options: Mapping[str, Any]) -> str:
+    """The word for a perception of a run's records: the reverse of `read_word`."""
+    left = dict(options)
+    head = {GROUND_TRUTH: "gt", NOISY: "noisy", PREDICTED: "predicted"}.get(make, make)
+    variant = left.pop("preset", None) if make == NOISY else left.pop("stack", None) if make == PREDICTED else None
+    head = head if variant in (None, "auto") else f"{head}:{variant}"
+    values = ((key, value if isinstance(value, str) else json.dumps(value)) for key, value in left.items())
+    return ",".join([head, *(f"{key}={value}" for key, value in values)])
+
+
+def _keywords(word: str, parts: list[str]) -> dict[str, Any]:
+    keywords: dict[str, Any] = {}
+    for part in parts:
+        key, equals, text = (side.strip() for side in part.partition("="))
+        if not equals or not key.isidentifier() or not text or key in keywords:
+            raise InvalidArgumentError(f"perception {word!r}: {part.strip()!r}: expected each KEY=VALUE once")
+        try:
+            keywords[key] = json.loads(text)
+        except ValueError:
+            keywords[key] = text
+    return keywords
+
+
+def _unknown(what: str, name: str, known: tuple[str, ...]) -> str:
+    near = get_close_matches(name, known, 1)
+    hint = f"; did you mean {near[0]}?" if near else ""
+    return f"no {what} {name!r}; there are {', '.join(known)}{hint}"
