@@ -1,0 +1,93 @@
+"""`evonav perception`: how good perceptions are, against the truth."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from evonav.cli import completion
+from evonav.cli.display import interruptible, show
+from evonav.cli.options import EXIT_INCOMPLETE, AnyAsset, Limit, Seed, Subset, Workers, count_of
+
+
+def perception(
+    tasks: Annotated[
+        Path | None,
+        typer.Argument(help="Folder of tasks; default: the bundled ones.", autocompletion=completion.task_folders),
+    ] = None,
+    perceptions: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--perception", metavar="WORD", help="As for evaluate (docs/perception.md); repeat it. Default: gt."
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder of records and report; what it has is not done again.")] = Path(
+        "out/perception"
+    ),
+    limit: Limit = None,
+    subset: Subset = None,
+    views_per_room: Annotated[
+        int, typer.Option(min=1, help="Views of a room, at most: places of 6, as far apart as they can be.")
+    ] = 12,
+    houses: Annotated[
+        int,
+        typer.Option(
+            min=1, help="Different houses of a task to tour: stage 1's, then those it becomes. 1: no staleness."
+        ),
+    ] = 2,
+    seed: Seed = 0,
+    allow_unknown_assets: AnyAsset = False,
+    workers: Workers = None,
+) -> None:
+    """Measures perceptions against the truth: what they find, and the memory that comes of it.
+
+    Every perception sees the same views. Leaves OUT/report.html, summary.json, .csv and .md.
+    """
+    from rich import progress as bars
+    from rich.console import Console
+
+    from evonav.evaluation.datasets import bundled_tasks
+    from evonav.evaluation.engine import task_files
+    from evonav.evaluation.perception_quality import PerceptionSpec, TourConfig, measure
+    from evonav.perception.words import read_word
+    from evonav.report.perception_page import write_perception_report
+    from evonav.report.perception_tables import perception_tables
+
+    if limit is not None and subset is not None:
+        raise typer.BadParameter("give --limit or --subset, not both")
+    specs = []
+    for word in perceptions or ["gt"]:
+        found = read_word(word)
+        specs.append(PerceptionSpec(word, found.make, found.options))
+    name = "lenient_simulator" if allow_unknown_assets else "embedded_simulator"
+    columns = (
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(),
+        bars.MofNCompleteColumn(),
+        bars.TimeElapsedColumn(),
+        bars.TimeRemainingColumn(),
+    )
+    with interruptible(out), bundled_tasks() as bundled:
+        with bars.Progress(*columns, console=Console(stderr=True)) as bar:
+            line = bar.add_task("tours")
+            measured = measure(
+                specs,
+                task_files(tasks or bundled, limit, subset),
+                out,
+                config=TourConfig(views_per_room, houses, seed),
+                simulator=f"evonav.evaluation.backend:{name}",
+                num_workers=count_of(workers),
+                on_progress=lambda done, num, latest: bar.update(
+                    line, completed=done, total=num, description=latest or "tours"
+                ),
+            )
+        for word, task_id, why in measured.failures:
+            typer.echo(f"failed: {word} {task_id}: {why}", err=True)
+        if measured.tasks:
+            page, shown = write_perception_report(out)
+            for table in perception_tables(shown, is_brief=True):
+                show(table.rich())
+            typer.echo(f"page: {page}; tables: {out / 'summary.md'}, .csv, .json")
+    if measured.failures:
+        typer.echo(f"incomplete: {len(measured.tasks)} tasks have every perception; the same command goes on", err=True)
+        raise typer.Exit(EXIT_INCOMPLETE)

@@ -1,0 +1,158 @@
+"""Figures of a perception beside its detections: confidence, depth, pose, features, and the memory made from it."""
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.evaluation.perception_estimates import Estimate, Group, Houses
+from evonav.evaluation.perception_records import DISTANCE_BINS_M, NUM_COSINE_BINS, MemoryState, TaskRecord
+
+NUM_CONFIDENCE_BINS = 10
+_STARTS = tuple(f"{low:g}" for low in DISTANCE_BINS_M)
+DISTANCES = (*(f"{a}-{b} m" for a, b in pairwise(_STARTS)), f"over {_STARTS[-1]} m")
+COSINES = ("same_object", "same_category", "other", "text_own", "text_other")
+
+
+def calibration(
+    houses: Houses, confidences: NDArray[np.float64], is_right: NDArray[np.bool_], of: NDArray[np.int64]
+) -> tuple[dict[str, Estimate], list[tuple[float, Estimate]]]:
+    """Expected calibration error, and mean confidence and precision by tenths of confidence.
+
+    Args:
+        houses: Of the detections.
+        confidences: `(D,)` of detections that count.
+        is_right: `(D,)`.
+        of: `(D,)` house of each.
+    """
+    bins = np.minimum((confidences * NUM_CONFIDENCE_BINS).astype(np.int64), NUM_CONFIDENCE_BINS - 1)
+    tops, sums, counts = np.zeros((3, NUM_CONFIDENCE_BINS, houses.num))
+    rows: list[tuple[float, Estimate]] = []
+    for i in range(NUM_CONFIDENCE_BINS):
+        mine = bins == i
+        tops[i], sums[i] = houses.sums(of[mine], is_right[mine]), houses.sums(of[mine], confidences[mine])
+        counts[i] = houses.sums(of[mine])
+        if mine.any():
+            rows.append((float(confidences[mine].mean()), houses.ratio(tops[i], counts[i], int(mine.sum()))))
+    num = len(confidences)
+    if num == 0:
+        return {"ece": Estimate(None, None, 0)}, rows
+    value = float(np.abs(tops.sum(axis=1) - sums.sum(axis=1)).sum() / num)
+    drawn = np.abs(houses.draws @ (tops - sums).T).sum(axis=1) / np.maximum(houses.draws @ counts.sum(axis=0), 1.0)
+    return {"ece": Estimate(value, houses.interval(drawn), num)}, rows
+
+
+def depth_groups(houses: Houses, records: Sequence[TaskRecord]) -> list[Group]:
+    """Depth errors over all pixels, then by their true depth."""
+    num, lost, relative, square = (
+        np.array([getattr(record.depth, name) for record in records], np.float64).reshape(len(records), -1)
+        for name in ("num", "num_lost", "relative", "square_m2")
+    )
+
+    def group(name: str, columns: Sequence[int]) -> Group:
+        all_px, lost_px, relatives, squares = (
+            houses.task_sums(table[:, columns].sum(axis=1).tolist()) for table in (num, lost, relative, square)
+        )
+        told = all_px - lost_px
+        measures = {
+            "depth_relative": houses.ratio(relatives, told, int(told.sum())),
+            "depth_rmse_m": houses.ratio(squares, told, int(told.sum()), np.sqrt),
+            "depth_lost": houses.ratio(lost_px, all_px, int(all_px.sum())),
+        }
+        return Group(name, measures)
+
+    every = list(range(len(DISTANCES)))
+    return [group("all", every), *(group(name, [i]) for i, name in enumerate(DISTANCES))]
+
+
+def pose(houses: Houses, records: Sequence[TaskRecord]) -> dict[str, Estimate]:
+    """Mean errors of the believed pose."""
+    nums = houses.task_sums([len(record.pose.offset_m) for record in records])
+    offsets = houses.task_sums([sum(record.pose.offset_m) for record in records])
+    turns = houses.task_sums([float(np.degrees(sum(record.pose.turn_rad))) for record in records])
+    num = int(nums.sum())
+    return {"pose_offset_m": houses.ratio(offsets, nums, num), "pose_turn_deg": houses.ratio(turns, nums, num)}
+
+
+def cosines(houses: Houses, records: Sequence[TaskRecord]) -> tuple[dict[str, list[int]], dict[str, Estimate]]:
+    """Histograms of cosines, and their means; nothing without features."""
+    middles = (np.arange(NUM_COSINE_BINS) + 0.5) / NUM_COSINE_BINS * 2.0 - 1.0
+    counts: dict[str, list[int]] = {}
+    means: dict[str, Estimate] = {}
+    for name in COSINES:
+        table = np.zeros((len(records), NUM_COSINE_BINS))
+        for i, record in enumerate(records):
+            table[i] = getattr(record.features, name) or 0
+        if table.any():
+            counts[name] = table.sum(axis=0).astype(np.int64).tolist()
+            nums = houses.task_sums(table.sum(axis=1).tolist())
+            means[f"cosine_{name}"] = houses.ratio(houses.task_sums((table @ middles).tolist()), nums, int(nums.sum()))
+    nums = houses.task_sums([record.features.num_texts for record in records])
+    if nums.any():
+        rights = houses.task_sums([record.features.num_right for record in records])
+        means["text_right"] = houses.ratio(rights, nums, int(nums.sum()))
+    return counts, means
+
+
+def memory(houses: Houses, records: Sequence[TaskRecord]) -> dict[str, Estimate]:
+    """The object map after the first house's tour, and what became of it in the next house."""
+    first = [_states(record, 0, 1.0) for record in records]
+    begun, toured = ([_states(record, 1, share) for record in records] for share in (0.0, 1.0))
+    return {
+        **memory_measures(houses, first),
+        "stale_at_start": _share(houses, begun, "num_stale", lambda state: state.num_entries),
+        "stale_after_tour": _share(houses, toured, "num_stale", lambda state: state.num_entries),
+    }
+
+
+def memory_curve(houses: Houses, records: Sequence[TaskRecord]) -> list[tuple[float, dict[str, Estimate]]]:
+    """The same by share of the first house's tour, where all tasks were looked at."""
+    shares = sorted({state.share for record in records for state in record.memory if state.stage == record.stages[0]})
+    found = []
+    for share in shares:
+        states = [_states(record, 0, share) for record in records]
+        if all(states):
+            found.append((share, memory_measures(houses, states)))
+    return found
+
+
+def memory_measures(houses: Houses, states: Sequence[MemoryState | None]) -> dict[str, Estimate]:
+    """Of the memory at one time, one state a task."""
+    one = houses.task_sums([float(state is not None) for state in states])
+    num_tasks = int(one.sum())
+
+    def per_task(name: str) -> Estimate:
+        return houses.ratio(houses.task_sums([getattr(s, name) if s else 0.0 for s in states]), one, num_tasks)
+
+    return {
+        "entries": per_task("num_entries"),
+        "seen": per_task("num_seen"),
+        "memory_precision": _share(houses, states, "num_right", lambda state: state.num_entries),
+        "memory_recall": _share(houses, states, "num_seen_held", lambda state: state.num_seen),
+        "position_error_m": _share(houses, states, "error_m", lambda state: state.num_error),
+        "surplus": _share(houses, states, "num_surplus", lambda state: state.num_objects),
+        "wrong_label": _share(houses, states, "num_wrong_label", lambda state: state.num_entries - state.num_phantoms),
+        "phantoms": _share(houses, states, "num_phantoms", lambda state: state.num_entries),
+    }
+
+
+def _share(
+    houses: Houses, states: Sequence[MemoryState | None], name: str, of: Callable[[MemoryState], float]
+) -> Estimate:
+    bottoms = houses.task_sums([of(state) if state else 0.0 for state in states])
+    tops = houses.task_sums([getattr(state, name) if state else 0.0 for state in states])
+    return houses.ratio(tops, bottoms, int(bottoms.sum()))
+
+
+def _states(record: TaskRecord, house: int, share: float) -> MemoryState | None:
+    """The memory in a house of the tour, after a share of it."""
+    if house >= len(record.stages):
+        return None
+    stage = record.stages[house]
+    return next((state for state in record.memory if state.stage == stage and state.share == share), None)
+
+
+def measure_values(measures: Mapping[str, Estimate]) -> dict[str, dict[str, object]]:
+    """Estimates as JSON."""
+    return {name: {"value": found.value, "interval": found.interval, "n": found.n} for name, found in measures.items()}

@@ -1,0 +1,304 @@
+"""Perceptions against the truth: every one sees the same views of the same houses; what it tells is written down.
+
+One job is one perception on one task; what it leaves does not depend on the others, nor on the number of workers.
+"""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from evonav._core import __version__
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.perception_matching import TrueObjects, true_objects
+from evonav.evaluation.perception_memory import JudgedMemory
+from evonav.evaluation.perception_picture import side_by_side
+from evonav.evaluation.perception_records import (
+    NUM_CHECKPOINTS,
+    Header,
+    MemoryState,
+    TaskRecord,
+    complete_tasks,
+    read_header,
+    record_path,
+    write_header,
+    write_record,
+)
+from evonav.evaluation.perception_rows import Matched, Rows
+from evonav.evaluation.perception_tour import tour
+from evonav.evaluation.protocol import EpisodeCase
+from evonav.evaluation.running import TaskFile
+from evonav.folders import check_same_run, writing
+from evonav.parallel import Job, answers, open_pool
+from evonav.perception import Percept, Perception, StageScene
+from evonav.sensors.observation import Detections
+from evonav.world.pose import Pose
+from evonav.world.simulator import Frame, Simulator
+
+WORK = "evonav.evaluation.perception_quality:make_worker"
+TASK_TIMEOUT_S = 3600.0
+"""Without a sign of life; a place of a tour is one."""
+NUM_PICTURES = 4
+"""Tasks that have a picture."""
+
+
+@dataclass(frozen=True, slots=True)
+class PerceptionSpec:
+    """How a perception is made."""
+
+    word: str
+    """What it is called."""
+    make: str
+    """Import path."""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """Keywords."""
+
+
+@dataclass(frozen=True, slots=True)
+class TourConfig:
+    """What decides the views."""
+
+    views_per_room: int = 12
+    """At most, rounded up to whole places."""
+    num_houses: int = 2
+    """Different houses of a task that are toured, its first stage's first: the memory is carried from one to the next.
+    """
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Checks.
+
+        Raises:
+            InvalidArgumentError: A value is outside its domain.
+        """
+        for name, value in (("views_per_room", self.views_per_room), ("num_houses", self.num_houses)):
+            if value < 1:
+                raise InvalidArgumentError(f"{name} = {value}: must be >= 1")
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """What a command has done."""
+
+    tasks: tuple[str, ...]
+    """That have a record of every perception of the folder."""
+    failures: tuple[tuple[str, str, str], ...]
+    """Word, task and last line of what went wrong."""
+
+
+def measure(
+    specs: Sequence[PerceptionSpec],
+    tasks: Sequence[TaskFile],
+    out: Path,
+    *,
+    config: TourConfig | None = None,
+    simulator: str = "evonav.evaluation.backend:embedded_simulator",
+    num_workers: int = 1,
+    on_progress: Callable[[int, int, str], None] = lambda *_: None,
+) -> Measured:
+    """Tours the houses with every perception; called again on the same folder, does what is left.
+
+    Args:
+        specs: Perceptions; those of earlier commands stay in the folder.
+        tasks: Of `engine.task_files`.
+        out: Holds `perception.json` and `records/`.
+        config: Must be the folder's own if it holds records.
+        simulator: Import path.
+        num_workers: 0 runs everything in this process.
+        on_progress: Called with records there are, records asked for, and the name of the latest.
+
+    Raises:
+        InvalidArgumentError: There is no perception or task, or a perception is named twice.
+        StoreError: The folder holds another configuration, or cannot be written.
+        EngineError: Workers cannot be had.
+    """
+    config = config or TourConfig()
+    words = [spec.word for spec in specs]
+    if not specs or not tasks:
+        raise InvalidArgumentError(f"no {'task' if specs else 'perception'} to measure")
+    if len(set(words)) != len(words):
+        raise InvalidArgumentError(f"a perception is named twice: {', '.join(words)}")
+    for spec in specs:
+        Backend(perception=spec.make, perception_options=spec.options).make_perception()
+    with writing(out):
+        header = _begun(specs, tasks, out, config, simulator)
+        jobs: list[tuple[PerceptionSpec, TaskFile, bool]] = [
+            (spec, task, number < NUM_PICTURES)
+            for number, task in enumerate(tasks)
+            for spec in specs
+            if not record_path(out, spec.word, task.task_id).exists()
+        ]
+        num_all = len(tasks) * len(specs)
+        num_done, failures = num_all - len(jobs), []
+        on_progress(num_done, num_all, "")
+        settings = json.dumps({"config": asdict(config), "simulator": simulator})
+        if jobs:
+            with open_pool(WORK, settings, num_workers=min(num_workers, len(jobs)), timeout_s=TASK_TIMEOUT_S) as pool:
+                texts = (
+                    Job(key, json.dumps([asdict(spec), str(task.path), task.digest, has_picture]))
+                    for key, (spec, task, has_picture) in enumerate(jobs)
+                )
+                for answer in answers(pool, texts):
+                    spec, task, _ = jobs[answer.key]
+                    if answer.failure is None:
+                        write_record(out, spec.word, task.task_id, answer.text)
+                    else:
+                        last = (answer.detail.strip().splitlines() or [answer.failure])[-1]
+                        failures.append((spec.word, task.task_id, last))
+                    num_done += 1
+                    on_progress(num_done, num_all, f"{spec.word} {task.task_id}")
+        return Measured(tuple(complete_tasks(out, header)), tuple(sorted(failures)))
+
+
+def _begun(
+    specs: Sequence[PerceptionSpec], tasks: Sequence[TaskFile], out: Path, config: TourConfig, simulator: str
+) -> Header:
+    """Claims the folder; records of tasks that are others now are dropped."""
+    identity = {"evonav": __version__, "tour": asdict(config), "simulator": simulator}
+    there = read_header(out)
+    options = {spec.word: {"make": spec.make, "options": dict(spec.options)} for spec in specs}
+    digests = {task.task_id: task.digest for task in tasks}
+    words = [spec.word for spec in specs]
+    if there is not None:
+        check_same_run(there.identity, identity, out)
+        for word, known in there.options.items():
+            check_same_run({word: known}, {word: options.get(word, known)}, out)
+        words = [*there.words, *(word for word in words if word not in there.words)]
+        options = {**there.options, **options}
+        for task_id, digest in digests.items():
+            if there.digests.get(task_id, digest) != digest:
+                for word in there.words:
+                    record_path(out, word, task_id).unlink(missing_ok=True)
+        digests = {**there.digests, **digests}
+    header = Header(
+        identity=identity, words=words, options=options, tasks=[task.task_id for task in tasks], digests=digests
+    )
+    write_header(out, header)
+    return header
+
+
+def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
+    """The function from a job to its record, as `evonav.parallel` calls it."""
+    values = json.loads(settings)
+    config = TourConfig(**values["config"])
+    backend = Backend(simulator=values["simulator"])
+    simulator = backend.make_simulator()
+
+    def work(text: str) -> str:
+        spec, path, digest, has_picture = json.loads(text)
+        case = backend.load_case(Path(path))
+        perception = Backend(perception=spec["make"], perception_options=spec["options"]).make_perception()
+        record = measure_task(
+            case, perception, simulator, config, word=spec["word"], has_picture=has_picture, alive=alive
+        )
+        record.digest = digest
+        return record.model_dump_json()
+
+    return work
+
+
+def measure_task(
+    case: EpisodeCase,
+    perception: Perception,
+    simulator: Simulator,
+    config: TourConfig,
+    *,
+    word: str,
+    has_picture: bool = False,
+    alive: Callable[[], None] = lambda: None,
+) -> TaskRecord:
+    """One perception on the houses of one task.
+
+    Args:
+        case: The task.
+        perception: A fresh one.
+        simulator: Is reset to each house.
+        config: Of the tour.
+        word: What the perception is called.
+        has_picture: Draw the view of the first house that shows the most objects.
+        alive: Called after every place.
+
+    Raises:
+        EvonavError: As the simulator, the perception and the object map tell.
+    """
+    rows, memory, best = Rows(), JudgedMemory(), _BestView()
+    states: list[MemoryState] = []
+    stages, num_views, image_px = _houses(case, config.num_houses), [], 1
+    for stage in stages:
+        simulator.reset(case.stages[stage - 1].house_json, case.start)
+        objects = list(simulator.objects)
+        places = tour(case, stage, simulator, views_per_room=config.views_per_room, seed=config.seed)
+        goal = case.stages[stage - 1].public
+        perception.begin_stage(StageScene(case.task_id, goal, "", config.seed, objects))
+        memory.begin_stage(stage, objects)
+        if states:
+            states.append(memory.state(0.0))
+        looks = _checkpoints(len(places))
+        for number, poses in enumerate(places, start=1):
+            frames = [simulator.render(pose, rgb=perception.needs_rgb, instances=True) for pose in poses]
+            image_px = frames[0].depth_m.size
+            for frame, percept, pose in zip(frames, perception.perceive(frames), poses, strict=True):
+                truth = true_objects(frame, objects)
+                matched = rows.add(stage, frame, percept, truth, objects)
+                memory.look(frame, percept, truth)
+                if has_picture and stage == 1:
+                    best.offer(pose, truth, percept, matched, frame)
+            if number in looks:
+                states.append(memory.state(looks[number]))
+            alive()
+        num_views.append(sum(map(len, places)))
+    return TaskRecord(
+        task_id=case.task_id,
+        digest="",
+        house=case.house,
+        word=word,
+        image_px=image_px,
+        stages=stages,
+        num_views=num_views,
+        truths=rows.truths,
+        detections=rows.detections,
+        depth=rows.depth,
+        pose=rows.pose,
+        features=rows.features(perception.text_feature),
+        memory=states,
+        picture=best.drawn(case, simulator),
+    )
+
+
+@dataclass(slots=True)
+class _BestView:
+    """The view that shows the most objects."""
+
+    pose: Pose | None = None
+    parts: tuple[TrueObjects, Detections, Matched] | None = None
+    rgb: Any = None
+
+    def offer(self, pose: Pose, truth: TrueObjects, percept: Percept, matched: Matched, frame: Frame) -> None:
+        if self.parts is None or truth.num_wanted > self.parts[0].num_wanted:
+            self.pose, self.parts, self.rgb = pose, (truth, percept.detections, matched), frame.rgb
+
+    def drawn(self, case: EpisodeCase, simulator: Simulator) -> str | None:
+        if self.pose is None or self.parts is None:
+            return None
+        if self.rgb is None:
+            simulator.reset(case.stages[0].house_json, case.start)
+            self.rgb = simulator.render(self.pose, rgb=True, instances=False).rgb
+        return side_by_side(self.rgb, *self.parts)
+
+
+def _houses(case: EpisodeCase, count: int) -> list[int]:
+    """The first stage and those after it whose house is another than the one before."""
+    found, house = [1], case.stages[0].house_json
+    for number, stage in enumerate(case.stages[1:], start=2):
+        if stage.house_json != house:
+            found.append(number)
+            house = stage.house_json
+    return found[:count]
+
+
+def _checkpoints(num_places: int) -> dict[int, float]:
+    """Places after which the memory is looked at, with the share of the tour; each share belongs to one place."""
+    shares = [i / NUM_CHECKPOINTS for i in range(1, NUM_CHECKPOINTS + 1)]
+    return {max(1, round(share * num_places)): share for share in shares}

@@ -1,0 +1,258 @@
+"""What is kept of one perception on one task: a row an object in view, a row a detection, and sums of the rest.
+
+A folder of `evonav perception` holds `perception.json`, what was asked for, and `records/NAME/TASK.json.gz`.
+"""
+
+import gzip
+import hashlib
+import json
+import re
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from evonav.errors import StoreError
+from evonav.folders import write_atomically
+
+HEADER_NAME = "perception.json"
+RECORD_DIR = "records"
+
+DISTANCE_BINS_M = (0.0, 1.0, 2.0, 3.5, 6.0)
+"""Where each begins; the last has no end. 3.5 m is as far as the paper's object memory takes detections."""
+NUM_COSINE_BINS = 80
+"""Of -1..1."""
+NUM_CHECKPOINTS = 8
+"""Of a tour, evenly spaced: when the memory is looked at."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class TrueRows(_Part):
+    """Wanted objects, one a view that shows it; all columns are as long."""
+
+    stage: list[int] = []
+    view: list[int] = []
+    category: list[str] = []
+    area_px: list[int] = []
+    distance_m: list[float] = []
+    is_cut: list[bool] = []
+    found: list[int] = []
+    """Row of the detection with the right label, -1 without."""
+    located: list[int] = []
+    """Row of the detection at its place, whatever its label, -1 without."""
+
+
+class DetectionRows(_Part):
+    """Detections; all columns are as long."""
+
+    stage: list[int] = []
+    view: list[int] = []
+    label: list[str] = []
+    confidence: list[float] = []
+    area_px: list[int] = []
+    distance_m: list[float | None] = []
+    """Median depth in the mask, as perceived; `None` where it has none."""
+    found: list[int] = []
+    """Row of the object of its label, -1 without, -2 for an ignored one."""
+    found_iou: list[float] = []
+    """With that object, also an ignored one."""
+    located: list[int] = []
+    """Row of the object at its place, whatever its label, -1 without, -2 for an ignored one."""
+    located_iou: list[float] = []
+
+
+class DepthSums(_Part):
+    """Of pixels by their true depth, in `DISTANCE_BINS_M`."""
+
+    num: list[int] = [0] * len(DISTANCE_BINS_M)
+    """With a depth in truth."""
+    num_lost: list[int] = [0] * len(DISTANCE_BINS_M)
+    """Of those, without one as perceived."""
+    relative: list[float] = [0.0] * len(DISTANCE_BINS_M)
+    """Sum of |error| over the true depth."""
+    square_m2: list[float] = [0.0] * len(DISTANCE_BINS_M)
+    """Sum of squared errors."""
+
+
+class PoseRows(_Part):
+    """Errors of the believed pose, one a view."""
+
+    offset_m: list[float] = []
+    """On the ground plane."""
+    turn_rad: list[float] = []
+    """Of the yaw, without its sign."""
+
+
+class FeatureSums(_Part):
+    """Counts of cosines, in `NUM_COSINE_BINS` of -1..1; empty where the perception has no features."""
+
+    same_object: list[int] = []
+    """Of two detections of an object, from two views."""
+    same_category: list[int] = []
+    """Of two objects of a category."""
+    other: list[int] = []
+    """Of objects of two categories."""
+    text_own: list[int] = []
+    """Of a detection and the word for its object's category."""
+    text_other: list[int] = []
+    """Of a detection and the word for another category."""
+    num_right: int = 0
+    """Detections whose nearest word, of all categories seen, is their object's."""
+    num_texts: int = 0
+    """Detections compared with words."""
+
+
+class MemoryState(_Part):
+    """The object map at one time, judged by the house of then (definitions: docs/perception.md)."""
+
+    stage: int
+    num_views: int
+    """In this stage so far; 0: as the stage begins."""
+    share: float
+    """Of the stage's tour."""
+    num_entries: int
+    num_right: int
+    """An object of the entry's label stands within 0.3 m of its centre."""
+    num_wrong_label: int
+    """Of the entries with an object: its category is not their label."""
+    num_phantoms: int
+    """Most of the entry's detections were of no object."""
+    num_objects: int
+    """Different objects that entries were made of."""
+    num_surplus: int
+    """Entries beyond the first of each object."""
+    num_seen: int
+    """Objects that were in reach of the memory: wanted in a view, at most 3.5 m from the camera."""
+    num_seen_held: int
+    """Of those, with a right entry."""
+    num_stale: int = 0
+    """Entries that were right at the end of the stage before and are not in this house."""
+    error_m: float = 0.0
+    """Sum over entries with an object of their label that stands where it was seen, from middle to middle."""
+    num_error: int = 0
+
+
+class TaskRecord(_Part):
+    """One perception on one task."""
+
+    task_id: str
+    digest: str
+    """Of `task.json`."""
+    house: str
+    word: str
+    """The perception."""
+    image_px: int
+    """Pixels of an image."""
+    stages: list[int]
+    """Toured."""
+    num_views: list[int]
+    """Of each of them."""
+    truths: TrueRows
+    detections: DetectionRows
+    depth: DepthSums
+    pose: PoseRows
+    features: FeatureSums
+    memory: list[MemoryState]
+    picture: str | None = None
+    """JPEG in base64: truth and detections of one view, side by side."""
+
+
+class Header(_Part):
+    """What was asked for."""
+
+    identity: dict[str, Any]
+    """What makes records go together."""
+    words: list[str]
+    """Perceptions, in the order in which they were first asked for."""
+    options: dict[str, dict[str, Any]]
+    """By word: import path and keywords."""
+    tasks: list[str]
+    """Of the last command."""
+    digests: dict[str, str]
+    """By task."""
+
+
+def slug_of(word: str) -> str:
+    """A folder's name for a perception: different for different words."""
+    plain = re.sub(r"[^A-Za-z0-9.-]+", "_", word)[:60]
+    return plain if plain == word else f"{plain}-{hashlib.sha256(word.encode()).hexdigest()[:6]}"
+
+
+def record_path(folder: Path, word: str, task_id: str) -> Path:
+    """Where the record of a perception on a task is."""
+    return folder / RECORD_DIR / slug_of(word) / f"{task_id}.json.gz"
+
+
+def write_record(folder: Path, word: str, task_id: str, text: str) -> None:
+    """Writes a record.
+
+    Raises:
+        StoreError: It cannot be written.
+    """
+    path = record_path(folder, word, task_id)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(path, gzip.compress(text.encode(), compresslevel=6, mtime=0))
+
+
+def read_record(path: Path) -> TaskRecord:
+    """Reads a record.
+
+    Raises:
+        StoreError: It is missing, damaged or of another kind.
+    """
+    try:
+        return TaskRecord.model_validate_json(gzip.decompress(path.read_bytes()))
+    except (OSError, EOFError, zlib.error) as error:
+        raise StoreError(f"{path}: cannot be read ({error}); delete it and run the command again") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise StoreError(f"{path}: field `{place}`: {first['msg']}; delete it and run the command again") from error
+
+
+def read_header(folder: Path) -> Header | None:
+    """What a folder was asked for, `None` for a new one.
+
+    Raises:
+        StoreError: It cannot be read.
+    """
+    path = folder / HEADER_NAME
+    if not path.exists():
+        return None
+    try:
+        return Header.model_validate_json(path.read_bytes())
+    except (OSError, ValidationError) as error:
+        raise StoreError(f"{path}: no header of `evonav perception` ({str(error).splitlines()[0]})") from error
+
+
+def write_header(folder: Path, header: Header) -> None:
+    """Writes what was asked for.
+
+    Raises:
+        StoreError: It cannot be written.
+    """
+    write_atomically(folder / HEADER_NAME, json.dumps(header.model_dump(), indent=2) + "\n")
+
+
+def read_records(folder: Path) -> dict[str, list[TaskRecord]]:
+    """Records by perception, of the tasks last asked for that all of them have.
+
+    Raises:
+        StoreError: There is nothing, or a record cannot be read.
+    """
+    header = read_header(folder)
+    if header is None:
+        raise StoreError(f"{folder}: holds no {HEADER_NAME}; `evonav perception` makes one")
+    tasks = complete_tasks(folder, header)
+    return {word: [read_record(record_path(folder, word, task)) for task in tasks] for word in header.words}
+
+
+def complete_tasks(folder: Path, header: Header, words: Sequence[str] | None = None) -> list[str]:
+    """Tasks last asked for that have a record of every perception."""
+    asked = header.words if words is None else words
+    return [task for task in header.tasks if all(record_path(folder, word, task).exists() for word in asked)]

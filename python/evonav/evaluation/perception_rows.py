@@ -1,0 +1,184 @@
+"""Gathers rows and sums of one perception on one task, view by view."""
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.evaluation.perception_matching import (
+    IGNORED,
+    NONE,
+    Matches,
+    TrueObjects,
+    intersections_over_union,
+    main_objects,
+    match,
+    median_depths_m,
+    same_labels,
+)
+from evonav.evaluation.perception_records import (
+    DISTANCE_BINS_M,
+    NUM_COSINE_BINS,
+    DepthSums,
+    DetectionRows,
+    FeatureSums,
+    PoseRows,
+    TrueRows,
+)
+from evonav.perception import Percept
+from evonav.world.simulator import Frame, SceneObject
+
+MAX_FEATURES = 400
+"""Of a task that are compared, spread evenly over its detections."""
+
+
+@dataclass(frozen=True, slots=True)
+class Matched:
+    """A view's matchings: by label, and by place alone."""
+
+    found: Matches
+    located: Matches
+
+
+@dataclass(slots=True)
+class Rows:
+    """Of one perception on one task."""
+
+    truths: TrueRows = field(default_factory=TrueRows)
+    detections: DetectionRows = field(default_factory=DetectionRows)
+    depth: DepthSums = field(default_factory=DepthSums)
+    pose: PoseRows = field(default_factory=PoseRows)
+    _features: list[NDArray[np.float32]] = field(default_factory=list)
+    _of: list[tuple[int, str, str]] = field(default_factory=list)
+    """View, id and category of the object that each feature is of."""
+    _num_views: int = 0
+
+    def add(
+        self, stage: int, frame: Frame, percept: Percept, truth: TrueObjects, objects: "list[SceneObject]"
+    ) -> Matched:
+        """Takes a view.
+
+        Args:
+            stage: Of the house.
+            frame: As it is.
+            percept: As it is perceived.
+            truth: Of `true_objects`.
+            objects: The simulator's bodies, in instance order.
+        """
+        found = percept.detections
+        ious = intersections_over_union(truth, found)
+        matched = Matched(
+            match(ious, found.confidences, truth.num_wanted, is_allowed=same_labels(truth, found)),
+            match(ious, found.confidences, truth.num_wanted),
+        )
+        self._add_rows(stage, percept, truth, matched)
+        self._add_depth(frame, percept)
+        self.pose.offset_m.append(
+            round(math.hypot(percept.pose.x_m - frame.pose.x_m, percept.pose.z_m - frame.pose.z_m), 5)
+        )
+        turn_rad = percept.pose.yaw_rad - frame.pose.yaw_rad
+        self.pose.turn_rad.append(round(abs(math.remainder(turn_rad, 2 * math.pi)), 6))
+        if found.features is not None:
+            for d, index in enumerate(main_objects(truth, found).tolist()):
+                if index != NONE and objects[index].kind == "object":
+                    self._features.append(found.features[d])
+                    self._of.append((self._num_views, objects[index].id, objects[index].category))
+        self._num_views += 1
+        return matched
+
+    def features(self, text_feature: Callable[[str], NDArray[np.float32] | None]) -> FeatureSums:
+        """How alike the features of the same and of different things are, and those of things and their names."""
+        if not self._features:
+            return FeatureSums()
+        kept = np.unique(np.linspace(0, len(self._features) - 1, MAX_FEATURES).astype(np.int64)).tolist()
+        matrix = np.stack([self._features[i] for i in kept]).astype(np.float64)
+        of = [self._of[i] for i in kept]
+        views, names, categories = (np.array(column, dtype=object) for column in zip(*of, strict=True))
+        cosines = matrix @ matrix.T
+        is_pair = np.triu(np.ones(cosines.shape, np.bool_), 1)
+        is_same = (names[:, None] == names[None, :]).astype(np.bool_)
+        is_alike = (categories[:, None] == categories[None, :]).astype(np.bool_)
+        is_other_view = (views[:, None] != views[None, :]).astype(np.bool_)
+        sums = FeatureSums(
+            same_object=_counts(cosines[is_pair & is_same & is_other_view]),
+            same_category=_counts(cosines[is_pair & ~is_same & is_alike]),
+            other=_counts(cosines[is_pair & ~is_alike]),
+        )
+        words = sorted(set(categories.tolist()))
+        texts = [text_feature(_words_of(word)) for word in words]
+        known = [text for text in texts if text is not None]
+        if len(known) == len(words) and all(text.shape == matrix.shape[1:] for text in known):
+            said = matrix @ np.stack(known).astype(np.float64).T
+            own = np.array([words.index(word) for word in categories.tolist()])
+            is_own = own[:, None] == np.arange(len(words))[None, :]
+            sums.text_own, sums.text_other = _counts(said[is_own]), _counts(said[~is_own])
+            sums.num_right, sums.num_texts = int((said.argmax(axis=1) == own).sum()), len(own)
+        return sums
+
+    def _add_rows(self, stage: int, percept: Percept, truth: TrueObjects, matched: Matched) -> None:
+        found, truths, rows = percept.detections, self.truths, self.detections
+        num, wanted = len(found.labels), truth.num_wanted
+        first_truth, first_row = len(truths.view), len(rows.view)
+        truths.stage += [stage] * wanted
+        truths.view += [self._num_views] * wanted
+        truths.category += truth.labels[:wanted]
+        truths.area_px += truth.areas_px[:wanted].tolist()
+        truths.distance_m += [round(value, 3) for value in truth.distances_m[:wanted].tolist()]
+        truths.is_cut += truth.is_cut[:wanted].tolist()
+        truths.found += _shifted(matched.found.detection_of[:wanted], first_row)
+        truths.located += _shifted(matched.located.detection_of[:wanted], first_row)
+        areas = np.bincount(found.masks[found.masks >= 0], minlength=num)
+        distances_m = median_depths_m(percept.depth_m, found.masks, num).tolist()
+        rows.stage += [stage] * num
+        rows.view += [self._num_views] * num
+        rows.label += found.labels
+        rows.confidence += [round(value, 6) for value in found.confidences.tolist()]
+        rows.area_px += areas.tolist()
+        rows.distance_m += [round(value, 3) if math.isfinite(value) else None for value in distances_m]
+        for pairs, partners, ious in (
+            (matched.found, rows.found, rows.found_iou),
+            (matched.located, rows.located, rows.located_iou),
+        ):
+            partners += _shifted(pairs.object_of, first_truth)
+            ious += [round(value, 6) for value in pairs.ious.tolist()]
+
+    def _add_depth(self, frame: Frame, percept: Percept) -> None:
+        is_true = np.isfinite(frame.depth_m)
+        true_m = frame.depth_m[is_true].astype(np.float64)
+        bins = np.digitize(true_m, DISTANCE_BINS_M[1:])
+        num_bins, sums = len(DISTANCE_BINS_M), self.depth
+        sums.num = _added(sums.num, np.bincount(bins, minlength=num_bins))
+        if percept.depth_m is frame.depth_m:
+            return
+        told_m = percept.depth_m[is_true].astype(np.float64)
+        is_told = np.isfinite(told_m)
+        sums.num_lost = _added(sums.num_lost, np.bincount(bins[~is_told], minlength=num_bins))
+        bins, true_m = bins[is_told], true_m[is_told]
+        errors_m = told_m[is_told] - true_m
+        weights = np.abs(errors_m) / true_m
+        for name, values in (("relative", weights), ("square_m2", np.square(errors_m))):
+            totals = np.bincount(bins, values, minlength=num_bins).tolist()
+            setattr(sums, name, [a + b for a, b in zip(getattr(sums, name), totals, strict=True)])
+
+
+def _shifted(partners: NDArray[np.int64], first: int) -> list[int]:
+    """Partners in a view as rows of all views."""
+    return [value if value in (NONE, IGNORED) else value + first for value in partners.tolist()]
+
+
+def _added(counts: list[int], more: NDArray[np.int64]) -> list[int]:
+    return [a + b for a, b in zip(counts, more.tolist(), strict=True)]
+
+
+def _counts(cosines: NDArray[np.float64]) -> list[int]:
+    bins = np.floor((np.clip(cosines, -1.0, 1.0) + 1.0) / 2.0 * NUM_COSINE_BINS).astype(np.int64)
+    counts: list[int] = np.bincount(np.minimum(bins, NUM_COSINE_BINS - 1), minlength=NUM_COSINE_BINS).tolist()
+    return counts
+
+
+def _words_of(category: str) -> str:
+    """`DiningTable` as people write it."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", category).lower()

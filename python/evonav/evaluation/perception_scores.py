@@ -1,0 +1,254 @@
+"""From records of perceptions to figures, each with its n and a 95% interval by house."""
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.errors import StoreError
+from evonav.evaluation import perception_other_scores as other
+from evonav.evaluation.perception_estimates import Estimate, Group, Houses
+from evonav.evaluation.perception_matching import IGNORED, IOU_LIMIT, NONE
+from evonav.evaluation.perception_precision import interpolated, resampled
+from evonav.evaluation.perception_records import DISTANCE_BINS_M, TaskRecord
+
+NUM_AP_RESAMPLES = 300
+SIZE_LIMITS = (32 * 32 / (640 * 480), 96 * 96 / (640 * 480))
+"""COCO's small and medium objects end here, as parts of an image: its images are mostly of 640 x 480 pixels."""
+SIZES = ("small", "medium", "large")
+AP_LIMITS = tuple(round(IOU_LIMIT + 0.05 * i, 2) for i in range(10))
+"""COCO's, from the one that pairs are made by."""
+DISTANCES = other.DISTANCES
+EDGES = ("whole", "cut off")
+
+
+@dataclass(frozen=True, slots=True)
+class Confusion:
+    """Objects of a category that were told by another label."""
+
+    category: str
+    label: str
+    num: int
+    share: Estimate
+    """Of the category's objects."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """Of one perception."""
+
+    word: str
+    num_tasks: int
+    num_houses: int
+    num_views: int
+    overall: Mapping[str, Estimate]
+    groups: Mapping[str, Sequence[Group]]
+    """By `category`, `distance`, `size` and `edge`."""
+    confusions: Sequence[Confusion]
+    """The most frequent first."""
+    unexplained: Sequence[tuple[str, int]]
+    """Labels of detections where no object is, the most frequent first."""
+    precision_curve: Sequence[float]
+    """Mean over categories of the interpolated precision at recalls 0, 0.01, .. 1."""
+    calibration: Sequence[tuple[float, Estimate]]
+    """Mean confidence and precision of detections, by tenths of confidence; empty ones are left out."""
+    depth: Sequence[Group]
+    cosines: Mapping[str, Sequence[int]]
+    """Counts in bins of -1..1; none without features."""
+    memory: Mapping[str, Estimate]
+    memory_curve: Sequence[tuple[float, Mapping[str, Estimate]]]
+    """By share of the first house's tour."""
+    pictures: Sequence[tuple[str, str]] = field(default=(), repr=False)
+    """Task and JPEG in base64."""
+
+
+def scores(records: Mapping[str, Sequence[TaskRecord]], *, seed: int = 0) -> list[Scores]:
+    """Figures of every perception.
+
+    Args:
+        records: By perception, of the same tasks.
+        seed: Of the bootstrap.
+
+    Raises:
+        StoreError: There is no record.
+    """
+    if not records or not all(records.values()):
+        raise StoreError("no task has a record of every perception yet: run the command again")
+    return [_Scorer(word, mine, seed).scores() for word, mine in records.items()]
+
+
+class _Scorer:
+    """One perception's objects and detections as arrays."""
+
+    def __init__(self, word: str, records: Sequence[TaskRecord], seed: int) -> None:
+        self.word, self.records = word, records
+        self.houses = Houses(records, seed)
+        truths, found = [r.truths for r in records], [r.detections for r in records]
+        self.truth_house = np.repeat(self.houses.of_task, [len(t.view) for t in truths])
+        self.house = np.repeat(self.houses.of_task, [len(d.view) for d in found])
+        self.truth_category = np.array([c for t in truths for c in t.category], dtype=object)
+        self.is_found = np.array([i >= 0 for t in truths for i in t.found], np.bool_)
+        self.is_located = np.array([i >= 0 for t in truths for i in t.located], np.bool_)
+        self.label = np.array([label for d in found for label in d.label], dtype=object)
+        self.confidence = np.array([c for d in found for c in d.confidence], np.float64)
+        self.partner = np.array([i for d in found for i in d.found], np.int64)
+        self.iou = np.array([i for d in found for i in d.found_iou], np.float64)
+        self.place = np.array([i for d in found for i in d.located], np.int64)
+        self.place_iou = np.array([i for d in found for i in d.located_iou], np.float64)
+        # What the object at a detection's place is; "" where there is none.
+        self.place_category = np.array(
+            [t.category[i] if i >= 0 else "" for t, d in zip(truths, found, strict=True) for i in d.located],
+            dtype=object,
+        )
+        self.truth_group = {
+            "distance": _distance_bins([v for t in truths for v in t.distance_m]),
+            "size": _size_bins([v / r.image_px for r in records for v in r.truths.area_px]),
+            "edge": np.array([int(v) for t in truths for v in t.is_cut], np.int64),
+        }
+        self.group = {
+            "distance": _distance_bins([math.inf if v is None else v for d in found for v in d.distance_m]),
+            "size": _size_bins([v / r.image_px for r in records for v in r.detections.area_px]),
+        }
+
+    def scores(self) -> Scores:
+        records, houses = self.records, self.houses
+        curve, precisions = self._average_precisions()
+        everything = np.ones(len(self.truth_house), np.bool_), np.ones(len(self.house), np.bool_)
+        overall = {**self._measures(*everything), **precisions.pop("")}
+        groups = {"category": self._categories(precisions)}
+        for by, names in (("distance", DISTANCES), ("size", SIZES), ("edge", EDGES)):
+            found = self.group.get(by)
+            groups[by] = [
+                Group(name, self._measures(self.truth_group[by] == i, None if found is None else found == i))
+                for i, name in enumerate(names)
+            ]
+        counted = self.partner != IGNORED
+        told = (self.confidence[counted], self.partner[counted] >= 0, self.house[counted])
+        error, calibration = other.calibration(houses, *told)
+        depth = other.depth_groups(houses, records)
+        cosines, texts = other.cosines(houses, records)
+        return Scores(
+            word=self.word,
+            num_tasks=len(records),
+            num_houses=houses.num,
+            num_views=sum(sum(record.num_views) for record in records),
+            overall={**overall, **error, **depth[0].measures, **other.pose(houses, records), **texts},
+            groups=groups,
+            confusions=self._confusions(),
+            unexplained=Counter(self.label[self.place == NONE].tolist()).most_common(),
+            precision_curve=curve,
+            calibration=calibration,
+            depth=depth[1:],
+            cosines=cosines,
+            memory=other.memory(houses, records),
+            memory_curve=other.memory_curve(houses, records),
+            pictures=[(record.task_id, record.picture) for record in records if record.picture is not None],
+        )
+
+    def _measures(self, truths: NDArray[np.bool_], found: NDArray[np.bool_] | None) -> dict[str, Estimate]:
+        """Rates among some objects and some detections.
+
+        Args:
+            truths: `(T,)` which objects.
+            found: `(D,)` which detections; `None` where detections have no such property, and thus no precision.
+        """
+        houses = self.houses
+        of = self.truth_house[truths]
+        wanted, right = houses.sums(of), houses.sums(of, self.is_found[truths])
+        located = houses.sums(of, self.is_located[truths])
+        both = houses.sums(of, self.is_found[truths] & self.is_located[truths])
+        num = int(wanted.sum())
+        measures = {
+            "recall": houses.ratio(right, wanted, num),
+            "located": houses.ratio(located, wanted, num),
+            "labelled": houses.ratio(both, located, int(located.sum())),
+        }
+        if found is None:
+            return measures
+        counted = found & (self.partner != IGNORED)
+        claims = houses.sums(self.house[counted])
+        hits = houses.sums(self.house[counted], self.partner[counted] >= 0)
+        placed = found & (self.place >= 0)
+        num_placed = houses.sums(self.house[placed])
+        measures["precision"] = houses.ratio(hits, claims, int(claims.sum()))
+        # Objects of a kind and detections of a kind need not be partners (a distance may be wrong): each counts half.
+        measures["f1"] = houses.ratio(right + hits, wanted + claims, num)
+        ious = houses.sums(self.house[placed], self.place_iou[placed])
+        measures["iou"] = houses.ratio(ious, num_placed, int(num_placed.sum()))
+        return measures
+
+    def _categories(self, precisions: Mapping[str, Mapping[str, Estimate]]) -> list[Group]:
+        counts = Counter(self.truth_category.tolist())
+        return [
+            Group(name, {**self._measures(self.truth_category == name, self.label == name), **precisions[name]})
+            for name in sorted(counts, key=lambda name: (-counts[name], name))
+        ]
+
+    def _average_precisions(self) -> tuple[list[float], dict[str, dict[str, Estimate]]]:
+        """The mean curve, and AP by category; "" is their mean, beside AP of places alone."""
+        houses, draws = self.houses, self.houses.draws[:NUM_AP_RESAMPLES]
+        names = sorted(set(self.truth_category.tolist()))
+        if not names:
+            return [], {"": {}}
+        values = np.zeros((len(names), len(AP_LIMITS)))
+        drawn = np.zeros((len(names), len(AP_LIMITS), len(draws)))
+        curves, found = [], {}
+        for i, name in enumerate(names):
+            mine = self.label == name
+            wanted = houses.sums(self.truth_house[self.truth_category == name])
+            for j, limit in enumerate(AP_LIMITS):
+                curve, drawn[i, j] = self._precision_curve(mine, self.partner, self.iou, wanted, limit, draws)
+                values[i, j] = curve.mean()
+                if j == 0:
+                    curves.append(curve)
+            interval = houses.interval(drawn[i, 0])
+            found[name] = {"ap50": Estimate(float(values[i, 0]), interval, int(wanted.sum()))}
+        num, every = len(self.truth_house), np.ones(len(self.house), np.bool_)
+        wanted = houses.sums(self.truth_house)
+        curve, of_places = self._precision_curve(every, self.place, self.place_iou, wanted, AP_LIMITS[0], draws)
+        # A resample may lack a category; then the mean is over the others.
+        means = np.nanmean(drawn, axis=0)
+        found[""] = {
+            "ap50": Estimate(float(values[:, 0].mean()), houses.interval(means[0]), num),
+            "ap": Estimate(float(values.mean()), houses.interval(means.mean(axis=0)), num),
+            "ap50_located": Estimate(float(curve.mean()), houses.interval(of_places), num),
+        }
+        return np.mean(curves, axis=0).tolist(), found
+
+    def _precision_curve(
+        self,
+        mine: NDArray[np.bool_],
+        partner: NDArray[np.int64],
+        iou: NDArray[np.float64],
+        wanted: NDArray[np.float64],
+        limit: float,
+        draws: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The curve at an IoU limit, and AP in resamples. Pairs at a higher limit are some of those at 0.5."""
+        is_pair = iou >= limit - 1e-6  # rounded in records
+        counted = mine & ~((partner == IGNORED) & is_pair)
+        told = (self.confidence[counted], ((partner >= 0) & is_pair)[counted])
+        return interpolated(*told, int(wanted.sum())), resampled(*told, self.house[counted], wanted, draws)
+
+    def _confusions(self) -> list[Confusion]:
+        """Of objects at whose place something is told by another label."""
+        wrong = (self.place >= 0) & (self.place_category != self.label)
+        pairs = Counter(zip(self.place_category[wrong].tolist(), self.label[wrong].tolist(), strict=True))
+        found = []
+        for (category, label), num in sorted(pairs.items(), key=lambda pair: (-pair[1], pair[0])):
+            mine = wrong & (self.place_category == category) & (self.label == label)
+            of = self.truth_house[self.truth_category == category]
+            share = self.houses.ratio(self.houses.sums(self.house, mine), self.houses.sums(of), len(of))
+            found.append(Confusion(category, label, num, share))
+        return found
+
+
+def _distance_bins(distances_m: Sequence[float]) -> NDArray[np.int64]:
+    return np.digitize(np.array(distances_m, np.float64), DISTANCE_BINS_M[1:])
+
+
+def _size_bins(shares: Sequence[float]) -> NDArray[np.int64]:
+    return np.digitize(np.array(shares, np.float64), SIZE_LIMITS)

@@ -1,0 +1,92 @@
+"""The files of a perception report: `report.html`, `summary.json`, `summary.csv`, `summary.md`."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from evonav.evaluation.perception_other_scores import measure_values
+from evonav.evaluation.perception_records import read_header, read_records
+from evonav.evaluation.perception_scores import Scores, scores
+from evonav.folders import write_atomically
+from evonav.report.line_chart import PLOT_CSS
+from evonav.report.page import page_environment, policy, text_of
+from evonav.report.perception_figures import confusion_figures, feature_figures, perception_figures
+from evonav.report.perception_tables import perception_csv, perception_tables
+
+REPORT_NAME = "report.html"
+
+
+def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
+    """Makes the files from a folder's records.
+
+    Returns:
+        The page, and what it tells.
+
+    Raises:
+        StoreError: There are no records, or a file cannot be read or written.
+    """
+    header = read_header(folder)
+    found = scores(read_records(folder))
+    tables = perception_tables(found)
+    write_atomically(folder / "summary.json", json.dumps(perception_json(found), indent=2) + "\n")
+    write_atomically(folder / "summary.csv", perception_csv(found))
+    markdown = "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables)
+    write_atomically(folder / "summary.md", markdown)
+    css = text_of("report.css") + PLOT_CSS + text_of("perception.css")
+    page = page_environment().get_template("perception.html.j2")
+    tasks = [task for task, _ in found[0].pictures]
+    text = page.render(
+        css=css,
+        policy=policy((css,)),
+        name=folder.resolve().name,
+        found=found,
+        missing=0 if header is None else len(header.tasks) - found[0].num_tasks,
+        tables=tables,
+        figures=_trusted(perception_figures(found)),
+        confusions=_trusted(confusion_figures(found)),
+        features=_trusted(feature_figures(found)),
+        tasks=tasks,
+        pictures={(one.word, task): picture for one in found for task, picture in one.pictures},
+    )
+    path = folder / REPORT_NAME
+    write_atomically(path, text)
+    return path, found
+
+
+def perception_json(found: Sequence[Scores]) -> dict[str, Any]:
+    """The content of `summary.json`."""
+    return {"schema_version": 1, "perceptions": [_values(one) for one in found]}
+
+
+def _values(one: Scores) -> dict[str, Any]:
+    groups: Mapping[str, Any] = {
+        by: [{"name": group.name, **measure_values(group.measures)} for group in rows]
+        for by, rows in {**one.groups, "depth": one.depth}.items()
+    }
+    return {
+        "perception": one.word,
+        "num_tasks": one.num_tasks,
+        "num_houses": one.num_houses,
+        "num_views": one.num_views,
+        "overall": measure_values(one.overall),
+        "groups": groups,
+        "confusions": [
+            {"category": each.category, "label": each.label, "num": each.num, **measure_values({"share": each.share})}
+            for each in one.confusions
+        ],
+        "unexplained": [{"label": label, "num": num} for label, num in one.unexplained],
+        "precision_at_recall": list(one.precision_curve),
+        "calibration": [
+            {"confidence": confidence, **measure_values({"precision": each})} for confidence, each in one.calibration
+        ],
+        "cosines": {name: list(counts) for name, counts in one.cosines.items()},
+        "memory": measure_values(one.memory),
+        "memory_by_share": [{"share": share, **measure_values(measures)} for share, measures in one.memory_curve],
+    }
+
+
+def _trusted(drawn: Sequence[str]) -> list[Markup]:
+    return [Markup(svg) for svg in drawn]  # noqa: S704 - our own SVG

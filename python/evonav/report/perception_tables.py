@@ -1,0 +1,223 @@
+"""Tables of perceptions: what they find, what they take it for, and the memory that comes of it."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+
+from evonav.evaluation.perception_estimates import Estimate, Group
+from evonav.evaluation.perception_scores import Scores
+from evonav.report.tables import NONE, Table
+
+MAX_CATEGORIES, MAX_CONFUSIONS = 12, 6
+INTERVALS = "[..]: 95% interval, bootstrap by house."
+
+
+def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> list[Table]:
+    """All tables, in reading order.
+
+    Args:
+        found: A perception each.
+        is_brief: For a terminal: of categories, the most frequent alone.
+    """
+    tables = [
+        _headline(found),
+        *(_by_group(found, by, words) for by, words in (("distance", "distance"), ("size", "size in the image"))),
+        _by_edge(found),
+        _categories(found, MAX_CATEGORIES if is_brief else None),
+        _confusions(found, MAX_CONFUSIONS if is_brief else 4 * MAX_CONFUSIONS),
+        _memory(found),
+        _staleness(found),
+        _beliefs(found),
+        _features(found),
+    ]
+    return [table for table in tables if table.rows]
+
+
+def percent(estimate: Estimate | None, *, has_n: bool = False) -> str:
+    """A share in percent with its interval."""
+    if estimate is None or estimate.value is None:
+        return NONE
+    told = f"{100 * estimate.value:.1f}"
+    if estimate.interval is not None:
+        told += " [{:.1f}, {:.1f}]".format(*(100 * end for end in estimate.interval))
+    return f"{told} ({estimate.n})" if has_n else told
+
+
+def number(estimate: Estimate | None, decimals: int = 2) -> str:
+    """A figure with its interval."""
+    if estimate is None or estimate.value is None:
+        return NONE
+    told = f"{estimate.value:.{decimals}f}"
+    if estimate.interval is not None:
+        told += f" [{estimate.interval[0]:.{decimals}f}, {estimate.interval[1]:.{decimals}f}]"
+    return told
+
+
+def _headline(found: Sequence[Scores]) -> Table:
+    names = ("ap50", "ap", "precision", "recall", "f1", "located", "labelled", "iou")
+    heads = ("AP50", "AP", "precision", "recall", "F1", "located", "label right", "mean IoU", "objects", "detections")
+    rows = tuple(
+        (
+            one.word,
+            *(percent(one.overall.get(name)) for name in names),
+            str(one.overall["recall"].n),
+            str(one.overall["precision"].n),
+        )
+        for one in found
+    )
+    first = found[0]
+    notes = (
+        f"{first.num_tasks} tasks in {first.num_houses} houses, {first.num_views} views each perception. {INTERVALS}",
+        "In %, at IoU 0.5 and with the right label; AP: mean over IoU 0.5 to 0.95. Located: something is told at IoU "
+        "0.5, whatever its label; label right: of those.",
+    )
+    return Table("What perceptions find", ("perception", *heads), rows, notes)
+
+
+def _by_group(found: Sequence[Scores], by: str, words: str) -> Table:
+    names = [group.name for group in found[0].groups[by]]
+    rows = tuple(
+        (one.word, measure, *(percent(group.measures.get(measure), has_n=True) for group in one.groups[by]))
+        for one in found
+        for measure in ("recall", "precision")
+    )
+    note = (
+        f"In % (n). {INTERVALS} Recall: by the true object's {words}; precision: by the detection's own, as perceived."
+    )
+    return Table(f"By {words}", ("perception", "", *names), rows, (note,))
+
+
+def _by_edge(found: Sequence[Scores]) -> Table:
+    rows = tuple(
+        (one.word, *(percent(group.measures.get("recall"), has_n=True) for group in one.groups["edge"]))
+        for one in found
+    )
+    return Table("Recall by whether the image's edge cuts the object off", ("perception", "whole", "cut off"), rows)
+
+
+def _categories(found: Sequence[Scores], most: int | None) -> Table:
+    by_word = [{group.name: group.measures for group in one.groups["category"]} for one in found]
+    names = [group.name for group in found[0].groups["category"]]
+    rows = []
+    for name in names[:most]:
+        cells = [name, str(found[0].groups["category"][names.index(name)].measures["recall"].n)]
+        for measures in by_word:
+            mine = measures.get(name, {})
+            cells += [percent(mine.get(measure)) for measure in ("recall", "precision", "ap50")]
+        rows.append(tuple(cells))
+    heads = [f"{one.word}: {what}" for one in found for what in ("recall", "precision", "AP50")]
+    left = "" if most is None or len(names) <= most else f" The {most} most frequent of {len(names)}."
+    return Table("By category", ("category", "objects", *heads), tuple(rows), (f"In %. {INTERVALS}{left}",))
+
+
+def _confusions(found: Sequence[Scores], most: int) -> Table:
+    rows = tuple(
+        (one.word, each.category, each.label, str(each.num), percent(each.share, has_n=True))
+        for one in found
+        for each in one.confusions[:most]
+    )
+    return Table("What is taken for what", ("perception", "object", "told as", "times", "of the objects %"), rows)
+
+
+def _memory(found: Sequence[Scores]) -> Table:
+    shares = ("surplus", "wrong_label", "phantoms")
+    heads = (
+        "entries",
+        "objects seen",
+        "precision %",
+        "recall %",
+        "error m",
+        "surplus %",
+        "wrong label %",
+        "phantoms %",
+    )
+    rows = tuple(
+        (
+            one.word,
+            number(one.memory["entries"], 1),
+            number(one.memory["seen"], 1),
+            percent(one.memory["memory_precision"]),
+            percent(one.memory["memory_recall"]),
+            number(one.memory["position_error_m"]),
+            *(percent(one.memory[name]) for name in shares),
+        )
+        for one in found
+    )
+    notes = (
+        "After the first house's tour, a house. Precision: an object of the entry's label stands within 0.3 m of it; "
+        "recall: of objects seen from at most 3.5 m. Error: middle to middle, of entries with their object's label.",
+        "Surplus: entries beyond an object's first, per object; wrong label: of entries with an object; phantoms: most "
+        "of the entry's detections were of no object.",
+    )
+    return Table("The memory of objects that comes of it", ("perception", *heads), rows, notes)
+
+
+def _staleness(found: Sequence[Scores]) -> Table:
+    rows = tuple(
+        (one.word, *(percent(one.memory[name], has_n=True) for name in ("stale_at_start", "stale_after_tour")))
+        for one in found
+        if one.memory["stale_at_start"].n
+    )
+    note = "Entries that were right in the house before and are not in this one; in % of all entries (n)."
+    return Table("Stale entries in the next house", ("perception", "as it begins", "after its tour"), rows, (note,))
+
+
+def _beliefs(found: Sequence[Scores]) -> Table:
+    columns = ("perception", "ECE %", "depth error %", "depth RMSE m", "depth lost %", "offset m", "turn °")
+    rows = tuple(
+        (
+            one.word,
+            percent(one.overall["ece"]),
+            percent(one.overall["depth_relative"]),
+            number(one.overall["depth_rmse_m"], 3),
+            percent(one.overall["depth_lost"]),
+            number(one.overall["pose_offset_m"], 3),
+            number(one.overall["pose_turn_deg"]),
+        )
+        for one in found
+    )
+    note = (
+        "ECE: mean gap between confidence and precision, in tenths of confidence. Depth error: mean of |error| / depth."
+    )
+    return Table("Confidence, depth and pose", columns, rows, (note,))
+
+
+def _features(found: Sequence[Scores]) -> Table:
+    names = ("same_object", "same_category", "other", "text_own", "text_other")
+    rows = tuple(
+        (
+            one.word,
+            *(number(one.overall.get(f"cosine_{name}"), 3) for name in names),
+            percent(one.overall.get("text_right"), has_n=True),
+        )
+        for one in found
+        if one.cosines
+    )
+    columns = ("perception", "same object", "same category", "other", "its word", "other words", "nearest word right %")
+    return Table("Cosines of features", columns, rows)
+
+
+def perception_csv(found: Sequence[Scores]) -> str:
+    """Every figure as a row, unrounded."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("perception", "by", "group", "measure", "value", "low", "high", "n", "num_houses"))
+
+    def write(one: Scores, by: str, group: str, measures: Mapping[str, Estimate]) -> None:
+        for name, each in measures.items():
+            low, high = each.interval or ("", "")
+            value = "" if each.value is None else each.value
+            writer.writerow((one.word, by, group, name, value, low, high, each.n, one.num_houses))
+
+    for one in found:
+        write(one, "", "", one.overall)
+        write(one, "memory", "", one.memory)
+        for share, measures in one.memory_curve:
+            write(one, "memory by share of the tour", f"{share:g}", measures)
+        groups: dict[str, Sequence[Group]] = {**one.groups, "depth": one.depth}
+        for by, rows in groups.items():
+            for group in rows:
+                write(one, by, group.name, group.measures)
+        for each in one.confusions:
+            write(one, "confusion", f"{each.category} as {each.label}", {"share": each.share})
+    return text.getvalue()
