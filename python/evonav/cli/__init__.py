@@ -20,6 +20,7 @@ from evonav.cli.houses import houses_app
 from evonav.cli.measures import measures
 from evonav.cli.mock_vlm import mock_vlm
 from evonav.cli.paper import paper
+from evonav.cli.perception import perception
 from evonav.cli.report import report, strip
 from evonav.cli.submission import pack, verify
 from evonav.cli.sweep import sweep
@@ -47,6 +48,7 @@ COMMANDS = (
     export,
     measures,
     paper,
+    perception,
     strip,
     view,
     video,

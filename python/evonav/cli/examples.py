@@ -39,6 +39,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "video": ("evonav video out/run --out episode.mp4", "evonav video out/run --agent ftu --stage 2 --out stage.gif"),
     "rerun": ("evonav rerun out/run --agent ftu --out episode.rrd",),
     "paper": ("evonav paper out/run", "evonav paper out/run --latex out/tables.tex"),
+    "perception": (
+        "evonav perception --perception gt --perception noisy:poor --limit 10 --out out/perception",
+        "evonav perception tasks --perception predicted:mini --views-per-room 24 --workers 4 --out out/mini",
+    ),
     "strip": ("evonav strip out/run --agents fu,ftu --out episode.svg",),
     "view": ("evonav view out/run --open", "evonav view out/run --agent ftu --stage 2"),
     "generate": (

@@ -18,6 +18,8 @@ _PLAIN = (150, 150, 150)
 _SHARE = 0.42
 """Of the colour in a mask."""
 _FONT_PX = 11
+_LEAST_TOLD_PX = 200
+"""Masks of fewer pixels have no room for their label."""
 GAP_PX = 6
 QUALITY = 82
 
@@ -66,7 +68,7 @@ def _drawn(
     font = ImageFont.load_default(_FONT_PX)
     for i, label in enumerate(labels):
         rows, columns = np.nonzero(masks == i)
-        if rows.size == 0:
+        if rows.size < _LEAST_TOLD_PX:
             continue
         length = draw.textlength(label, font=font)
         x = min(max(1.0, float(np.median(columns)) - length / 2), masks.shape[1] - length - 1)

@@ -8,7 +8,7 @@ from evonav.report.svg import escape, title
 from evonav.significance import Interval
 
 SIDE_PX = 300
-LEFT, RIGHT, TOP, BOTTOM = 48, 16, 36, 46
+LEFT, RIGHT, TOP, BOTTOM = 48, 16, 48, 46
 LEGEND_PX = 16
 CELL_PX, ROW_PX = 46, 22
 _MAX_WORDS = 22
@@ -61,7 +61,7 @@ def square_chart(axes: Axes, curves: Sequence[Curve]) -> str:
     if axes.has_diagonal:
         ends = f"M{x_of(low):.1f} {y_of(low):.1f}L{x_of(high):.1f} {y_of(high):.1f}"
         parts.append(f'<path class="zero" stroke-dasharray="4 4" d="{ends}"/>')
-    parts.append(f'<text class="soft" x="{LEFT}" y="30">{escape(axes.y_words)}</text>')
+    parts.append(f'<text class="soft" x="{LEFT}" y="35">{escape(axes.y_words)}</text>')
     middle = LEFT + SIDE_PX / 2
     parts.append(f'<text x="{middle}" y="{TOP + SIDE_PX + 36}" text-anchor="middle">{escape(axes.x_words)}</text>')
     for i, curve in enumerate(curves):
@@ -95,15 +95,18 @@ class ConfusionRow:
 
 def confusion_chart(heading: str, columns: Sequence[str], rows: Sequence[ConfusionRow]) -> str:
     """A table in shades, for a page that has `PLOT_CSS`: the first column is right, the second nothing."""
-    label_px, head_px = 8 + 6.6 * max(len(_short(row.category)) + 8 for row in rows), 130
-    width, height = label_px + CELL_PX * len(columns) + 60, head_px + ROW_PX * len(rows) + 10
+    label_px = 8 + 6.6 * max(len(_short(row.category)) + 8 for row in rows)
+    slant_px = 4.8 * max(len(_short(column)) for column in columns)
+    head_px = 40 + slant_px
+    width = max(label_px + CELL_PX * len(columns) + slant_px, 16 + 8.0 * len(heading))
+    height = head_px + ROW_PX * len(rows) + 10
     parts = [f'<text class="head" x="8" y="16">{escape(heading)}</text>']
     for j, column in enumerate(columns):
         x, y = label_px + CELL_PX * (j + 0.5), head_px - 8
-        turn = f'transform="rotate(-45 {x:.1f} {y})"'
-        parts.append(f'<text x="{x:.1f}" y="{y}" {turn}>{escape(_short(column))}</text>')
+        turn = f'transform="rotate(-45 {x:.1f} {y:.1f})"'
+        parts.append(f'<text x="{x:.1f}" y="{y:.1f}" {turn}>{escape(_short(column))}</text>')
     for i, row in enumerate(rows):
-        y = head_px + ROW_PX * i
+        y = round(head_px + ROW_PX * i, 1)
         name = f"{_short(row.category)} ({row.num})"
         parts.append(f'<text x="{label_px - 8:.1f}" y="{y + 15}" text-anchor="end">{escape(name)}</text>')
         for j, share in enumerate(row.shares):

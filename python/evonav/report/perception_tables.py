@@ -21,6 +21,7 @@ def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> lis
     """
     tables = [
         _headline(found),
+        _parts(found),
         *(_by_group(found, by, words) for by, words in (("distance", "distance"), ("size", "size in the image"))),
         _by_edge(found),
         _categories(found, MAX_CATEGORIES if is_brief else None),
@@ -54,8 +55,8 @@ def number(estimate: Estimate | None, decimals: int = 2) -> str:
 
 
 def _headline(found: Sequence[Scores]) -> Table:
-    names = ("ap50", "ap", "precision", "recall", "f1", "located", "labelled", "iou")
-    heads = ("AP50", "AP", "precision", "recall", "F1", "located", "label right", "mean IoU", "objects", "detections")
+    names = ("ap50", "ap", "precision", "recall", "f1")
+    heads = ("AP50", "AP", "precision", "recall", "F1", "objects", "detections")
     rows = tuple(
         (
             one.word,
@@ -68,10 +69,21 @@ def _headline(found: Sequence[Scores]) -> Table:
     first = found[0]
     notes = (
         f"{first.num_tasks} tasks in {first.num_houses} houses, {first.num_views} views each perception. {INTERVALS}",
-        "In %, at IoU 0.5 and with the right label; AP: mean over IoU 0.5 to 0.95. Located: something is told at IoU "
-        "0.5, whatever its label; label right: of those.",
+        "In %, at IoU 0.5 and with the right label; AP: mean over IoU 0.5 to 0.95.",
     )
     return Table("What perceptions find", ("perception", *heads), rows, notes)
+
+
+def _parts(found: Sequence[Scores]) -> Table:
+    names = ("located", "labelled", "iou", "ap50_located")
+    rows = tuple((one.word, *(percent(one.overall.get(name)) for name in names)) for one in found)
+    note = (
+        "In %. Located: objects at whose place something is told (IoU 0.5), whatever its label. Label right, mean IoU: "
+        "of those. Places alone: AP50 if all labels were right."
+    )
+    return Table(
+        "Places and labels apart", ("perception", "located", "label right", "mean IoU", "places alone"), rows, (note,)
+    )
 
 
 def _by_group(found: Sequence[Scores], by: str, words: str) -> Table:
