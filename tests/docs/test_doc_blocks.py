@@ -37,7 +37,7 @@ PARSED_ONLY = {
     "delay=": "waits",
 }
 """Commands with these words are not run here, only parsed."""
-LIMITED = ("evaluate", "generate")
+LIMITED = ("evaluate", "generate", "perception")
 """Commands that get one task and this process: the words are tested, not the machine."""
 
 
