@@ -1,6 +1,7 @@
 """Which detection is which object: cases worked out by hand, and average precision against a plain second version."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,6 +21,8 @@ from evonav.evaluation.perception_matching import (
     true_objects,
 )
 from evonav.evaluation.perception_precision import interpolated, resampled
+from evonav.evaluation.perception_rows import check_percept
+from evonav.perception import Percept
 from evonav.sensors.observation import Detections
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics, SceneObject
@@ -122,6 +125,23 @@ def test_views_without_objects_or_detections():
         assert (pairs.object_of == NONE).all()
         assert (pairs.detection_of == NONE).all()
         assert (main_objects(truth, told) == NONE).all()
+
+
+def test_what_a_perception_may_not_tell_is_named():
+    there, good = frame(scene()), detections(("Sofa", 0.9, slice(0, 5), slice(0, 5)))
+    percept = Percept(good, there.depth_m, there.pose)
+    check_percept(there, percept)
+    cases = {
+        "masks": (good.masks[:9], good.masks + 1, good.masks - 1, good.masks.astype(np.float32)),
+        "confidences": (np.array([1.1], np.float32), np.array([np.nan], np.float32), np.zeros(2, np.float32)),
+        "features": (np.zeros((2, 4), np.float32), np.zeros(4, np.float32)),
+    }
+    for name, values in cases.items():
+        for value in values:
+            with pytest.raises(InvalidArgumentError, match=f"`{name}`"):
+                check_percept(there, replace(percept, detections=replace(good, **{name: value})))
+    with pytest.raises(InvalidArgumentError, match="`depth_m`"):
+        check_percept(there, replace(percept, depth_m=there.depth_m[:5]))
 
 
 @given(st.integers(0, 2**32 - 1))

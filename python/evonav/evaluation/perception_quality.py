@@ -228,7 +228,7 @@ def measure_task(
     stages, num_views, image_px = _houses(case, config.num_houses), [], 1
     for stage in stages:
         simulator.reset(case.stages[stage - 1].house_json, case.start)
-        objects = list(simulator.objects)
+        objects = simulator.objects
         places = tour(case, stage, simulator, views_per_room=config.views_per_room, seed=config.seed)
         goal = case.stages[stage - 1].public
         perception.begin_stage(StageScene(case.task_id, goal, "", config.seed, objects))

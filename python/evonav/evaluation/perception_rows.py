@@ -2,12 +2,13 @@
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.perception_matching import (
     IGNORED,
     NONE,
@@ -43,6 +44,26 @@ class Matched:
     located: Matches
 
 
+def check_percept(frame: Frame, percept: Percept) -> None:
+    """Refuses what a perception may not tell, before it is counted.
+
+    Raises:
+        InvalidArgumentError: The message names the array and what is wrong with it.
+    """
+    found, shape = percept.detections, frame.depth_m.shape
+    num = len(found.labels)
+    for name, array in (("masks", found.masks), ("depth_m", percept.depth_m)):
+        if array.shape != shape:
+            raise InvalidArgumentError(f"a percept's `{name}` has shape {array.shape}, expected the frame's, {shape}")
+    if found.masks.dtype.kind != "i" or found.masks.min(initial=-1) < -1 or found.masks.max(initial=-1) >= num:
+        raise InvalidArgumentError(f"a percept's `masks` have other values than whole numbers of -1 to {num - 1}")
+    confidences = found.confidences
+    if confidences.shape != (num,) or not ((confidences >= 0.0) & (confidences <= 1.0)).all():
+        raise InvalidArgumentError(f"a percept's `confidences` are not {num} numbers of 0 to 1")
+    if found.features is not None and (found.features.ndim != 2 or len(found.features) != num):
+        raise InvalidArgumentError(f"a percept's `features` have shape {found.features.shape}, expected ({num}, D)")
+
+
 @dataclass(slots=True)
 class Rows:
     """Of one perception on one task."""
@@ -57,7 +78,7 @@ class Rows:
     _num_views: int = 0
 
     def add(
-        self, stage: int, frame: Frame, percept: Percept, truth: TrueObjects, objects: "list[SceneObject]"
+        self, stage: int, frame: Frame, percept: Percept, truth: TrueObjects, objects: Sequence[SceneObject]
     ) -> Matched:
         """Takes a view.
 
@@ -67,7 +88,11 @@ class Rows:
             percept: As it is perceived.
             truth: Of `true_objects`.
             objects: The simulator's bodies, in instance order.
+
+        Raises:
+            InvalidArgumentError: See `check_percept`.
         """
+        check_percept(frame, percept)
         found = percept.detections
         ious = intersections_over_union(truth, found)
         matched = Matched(

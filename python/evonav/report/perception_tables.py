@@ -123,12 +123,16 @@ def _categories(found: Sequence[Scores], most: int | None) -> Table:
 
 
 def _confusions(found: Sequence[Scores], most: int) -> Table:
-    rows = tuple(
-        (one.word, each.category, each.label, str(each.num), percent(each.share, has_n=True))
-        for one in found
-        for each in one.confusions[:most]
-    )
-    return Table("What is taken for what", ("perception", "object", "told as", "times", "of the objects %"), rows)
+    rows: list[tuple[str, ...]] = []
+    for one in found:
+        rows += [
+            (one.word, each.category, each.label, str(each.num), percent(each.share, has_n=True))
+            for each in one.confusions[:most]
+        ]
+        rows += [(one.word, "(nothing)", label, str(num), NONE) for label, num in one.unexplained[: most // 2]]
+    note = f"The most frequent. {INTERVALS}"
+    columns = ("perception", "object", "told as", "times", "of the objects %")
+    return Table("What is taken for what", columns, tuple(rows), (note,))
 
 
 def _memory(found: Sequence[Scores]) -> Table:
