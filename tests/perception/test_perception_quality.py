@@ -122,7 +122,7 @@ def test_errors_of_depth_and_pose_are_told(found):
 def test_features_are_compared_by_what_they_are_of(found):
     assert found["gt"].cosines == {}
     erring = found["deep"]
-    assert values(erring.overall, "cosine_same_object", "cosine_text_own") == pytest.approx([1.0, 1.0], abs=0.03)
+    assert values(erring.overall, "cosine_same_object", "cosine_text_own") == pytest.approx([1.0, 1.0])
     assert erring.overall["cosine_other"].value < 0.5
     assert erring.overall["cosine_text_other"].value < 0.5
 

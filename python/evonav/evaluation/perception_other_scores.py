@@ -77,7 +77,6 @@ def pose(houses: Houses, records: Sequence[TaskRecord]) -> dict[str, Estimate]:
 
 def cosines(houses: Houses, records: Sequence[TaskRecord]) -> tuple[dict[str, list[int]], dict[str, Estimate]]:
     """Histograms of cosines, and their means; nothing without features."""
-    middles = (np.arange(NUM_COSINE_BINS) + 0.5) / NUM_COSINE_BINS * 2.0 - 1.0
     counts: dict[str, list[int]] = {}
     means: dict[str, Estimate] = {}
     for name in COSINES:
@@ -87,7 +86,8 @@ def cosines(houses: Houses, records: Sequence[TaskRecord]) -> tuple[dict[str, li
         if table.any():
             counts[name] = table.sum(axis=0).astype(np.int64).tolist()
             nums = houses.task_sums(table.sum(axis=1).tolist())
-            means[f"cosine_{name}"] = houses.ratio(houses.task_sums((table @ middles).tolist()), nums, int(nums.sum()))
+            totals = houses.task_sums([record.features.totals.get(name, 0.0) for record in records])
+            means[f"cosine_{name}"] = houses.ratio(totals, nums, int(nums.sum()))
     nums = houses.task_sums([record.features.num_texts for record in records])
     if nums.any():
         rights = houses.task_sums([record.features.num_right for record in records])

@@ -101,6 +101,8 @@ class FeatureSums(_Part):
     """Of a detection and the word for its object's category."""
     text_other: list[int] = []
     """Of a detection and the word for another category."""
+    totals: dict[str, float] = {}
+    """Sums of the same cosines, by name of the counts."""
     num_right: int = 0
     """Detections whose nearest word, of all categories seen, is their object's."""
     num_texts: int = 0

@@ -127,21 +127,24 @@ class Rows:
         is_same = (names[:, None] == names[None, :]).astype(np.bool_)
         is_alike = (categories[:, None] == categories[None, :]).astype(np.bool_)
         is_other_view = (views[:, None] != views[None, :]).astype(np.bool_)
-        sums = FeatureSums(
-            same_object=_counts(cosines[is_pair & is_same & is_other_view]),
-            same_category=_counts(cosines[is_pair & ~is_same & is_alike]),
-            other=_counts(cosines[is_pair & ~is_alike]),
-        )
+        compared = {
+            "same_object": cosines[is_pair & is_same & is_other_view],
+            "same_category": cosines[is_pair & ~is_same & is_alike],
+            "other": cosines[is_pair & ~is_alike],
+        }
         words = sorted(set(categories.tolist()))
         texts = [text_feature(_words_of(word)) for word in words]
         known = [text for text in texts if text is not None]
+        right = 0, 0
         if len(known) == len(words) and all(text.shape == matrix.shape[1:] for text in known):
             said = matrix @ np.stack(known).astype(np.float64).T
             own = np.array([words.index(word) for word in categories.tolist()])
             is_own = own[:, None] == np.arange(len(words))[None, :]
-            sums.text_own, sums.text_other = _counts(said[is_own]), _counts(said[~is_own])
-            sums.num_right, sums.num_texts = int((said.argmax(axis=1) == own).sum()), len(own)
-        return sums
+            compared |= {"text_own": said[is_own], "text_other": said[~is_own]}
+            right = int((said.argmax(axis=1) == own).sum()), len(own)
+        counts = {name: _counts(values) for name, values in compared.items()}
+        totals = {name: round(float(values.sum()), 6) for name, values in compared.items()}
+        return FeatureSums.model_validate({**counts, "totals": totals, "num_right": right[0], "num_texts": right[1]})
 
     def _add_rows(self, stage: int, percept: Percept, truth: TrueObjects, matched: Matched) -> None:
         found, truths, rows = percept.detections, self.truths, self.detections

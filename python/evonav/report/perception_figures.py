@@ -9,9 +9,8 @@ from evonav.evaluation.perception_estimates import Estimate
 from evonav.evaluation.perception_precision import RECALLS
 from evonav.evaluation.perception_records import NUM_COSINE_BINS
 from evonav.evaluation.perception_scores import Scores
-from evonav.report.line_chart import Line
 from evonav.report.perception_charts import Axes, ConfusionRow, Curve, confusion_chart, square_chart
-from evonav.report.plots import CurvePlot, Dots, GroupPlot, plot_svg
+from evonav.report.plots import Dots, GroupPlot, plot_svg
 from evonav.significance import Interval
 
 MAX_CONFUSED = 12
@@ -103,18 +102,18 @@ def _group_plot(found: Sequence[Scores], by: str, words: str, measure: str) -> G
 def _memory_figures(found: Sequence[Scores]) -> list[str]:
     drawn = []
     for name, heading in _MEMORY:
-        lines = tuple(
-            Line(
+        curves = [
+            Curve(
                 one.word,
-                [(100 * share, _percent(measures[name]) or 0.0) for share, measures in one.memory_curve],
-                [_interval(measures[name]) for _, measures in one.memory_curve],
+                [(share, measures[name].value or 0.0) for share, measures in one.memory_curve],
+                [measures[name].interval for _, measures in one.memory_curve],
+                has_dots=True,
             )
             for one in found
             if one.memory_curve
-        )
-        if lines:
-            plot = CurvePlot(heading, lines, "% of the first house's tour", "%")
-            drawn.append(plot_svg(plot, is_inline=True))
+        ]
+        if curves:
+            drawn.append(square_chart(Axes(heading, "share of the first house's tour", ""), curves))
     return drawn
 
 
