@@ -15,6 +15,7 @@ __all__ = [
     "EvonavError",
     "HouseError",
     "InvalidArgumentError",
+    "PerceptionError",
     "SimulationError",
     "SimulatorLostError",
     "StoreError",
@@ -24,3 +25,7 @@ __all__ = [
 
 class SimulatorLostError(SimulationError):
     """The simulator's process has ended or hangs; the simulator's next `reset` starts another."""
+
+
+class PerceptionError(EvonavError):
+    """A perception's library, weights or device cannot be had."""

@@ -4,6 +4,8 @@ Nothing of the simulator but colours and depth goes in: neither instances nor th
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +13,13 @@ from numpy.typing import NDArray
 from evonav.errors import InvalidArgumentError
 from evonav.perception.detector import Detector, Embedder, Found
 from evonav.perception.filters import FilterConfig, filtered, mask_areas_px, one_label_a_pixel
-from evonav.perception.perception import Percept, StageScene
+from evonav.perception.perception import Percept, Perception, StageScene
+from evonav.perception.stacks import STACKS, StackConfig, StackName, facts_of, load_stack, stack_of
 from evonav.perception.vocabulary import TYPE_OF_WORD
 from evonav.sensors.observation import Detections
 from evonav.world.simulator import Frame
 
-__all__ = ["Detector", "Embedder", "Found", "PredictedPerception"]
+__all__ = ["Detector", "Embedder", "Found", "PredictedPerception", "StackPerception", "predicted_perception"]
 
 
 class PredictedPerception:
@@ -35,8 +38,7 @@ class PredictedPerception:
 
         Args:
             detector: Finds.
-            filters: What is believed; default: 3D-Mem's values. `None` of a detector with filters of its own is not
-                told apart: give it a config that drops nothing.
+            filters: What is believed; default: 3D-Mem's values.
             embedder: Gives what is left features; without, they are the detector's, if it has some.
             types: ProcTHOR's type by the detector's word; a word that is not in it stays as it is.
         """
@@ -96,3 +98,78 @@ def _colours(frame: Frame) -> NDArray[np.uint8]:
     if frame.rgb is None:
         raise InvalidArgumentError("argument `frames`: one has no colours, expected frames rendered with them")
     return frame.rgb
+
+
+@dataclass(slots=True)
+class StackPerception:
+    """A stack by its name; its models are loaded at the first stage, once a process."""
+
+    stack: str
+    config: StackConfig
+    models: str | None
+    device: str
+    needs_rgb: bool = field(default=True, init=False)
+    _perception: PredictedPerception | None = field(default=None, init=False, repr=False)
+
+    def check(self, agents: Sequence[str]) -> dict[str, Any]:
+        """Whether all is there that will be needed, without loading it; files that are missing are fetched.
+
+        Args:
+            agents: That will look with it.
+
+        Returns:
+            What decides results beside options: by stack, hashes of weights and versions of libraries.
+
+        Raises:
+            PerceptionError: Something is missing; the message says what to do.
+            InvalidArgumentError: An option makes no sense.
+        """
+        from evonav.perception.models.libraries import device_of
+
+        stacks = sorted({self._stack_for(agent) for agent in agents})
+        facts: dict[str, Any] = {stack: facts_of(stack, self.config, self.models) for stack in stacks}
+        device_of(self.device)
+        return facts
+
+    def begin_stage(self, scene: StageScene) -> None:
+        """Loads the models of the agent's stack; of the scene, the agent's name alone is used."""
+        parts = load_stack(self._stack_for(scene.agent), self.config, self.models, self.device)
+        self._perception = PredictedPerception(parts.detector, parts.filters, parts.embedder)
+
+    def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
+        """The views of a round, as one batch."""
+        return self._begun().perceive(frames)
+
+    def text_feature(self, text: str) -> NDArray[np.float32] | None:
+        """Of the stack's CLIP, if it has one."""
+        return self._begun().text_feature(text)
+
+    def _begun(self) -> PredictedPerception:
+        if self._perception is None:
+            raise InvalidArgumentError("a stack of models is told of a stage (`begin_stage`) before it looks")
+        return self._perception
+
+    def _stack_for(self, agent: str) -> StackName:
+        return next((name for name in STACKS if name == self.stack), None) or stack_of(agent)
+
+
+def predicted_perception(
+    stack: str = "auto",
+    models: str | None = None,
+    device: str = "auto",
+    **options: Any,  # noqa: ANN401 - of `StackConfig`
+) -> Perception:
+    """What `predicted[:STACK]` stands for.
+
+    Args:
+        stack: Of `evonav.perception.words.STACKS`; `auto`: UniGoal its own, all others 3D-Mem's.
+        models: Folder of weights; default: `EVONAV_MODELS`, else the libraries' own hubs.
+        device: `auto`, `cpu`, `cuda` or `cuda:N`.
+        options: See `evonav.perception.stacks.StackConfig`.
+
+    Raises:
+        InvalidArgumentError: There is no such stack or option.
+    """
+    if stack != "auto" and stack not in STACKS:
+        raise InvalidArgumentError(f"no stack {stack!r}; there are auto, {', '.join(STACKS)}")
+    return StackPerception(stack, StackConfig.from_options(options), models, device)

@@ -1,0 +1,35 @@
+"""Parts of images that features are computed of."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+PADDING_PX = 20.0
+"""Around a box, in 3D-Mem's images of 1280x1280; it is scaled with the image."""
+_REFERENCE_PX = 1280.0
+
+
+def padded_crops(image: NDArray[np.uint8], boxes_px: NDArray[np.float32]) -> list[NDArray[np.uint8]]:
+    """What is in boxes and a little around them, never less than a pixel.
+
+    Args:
+        image: `(H, W, 3)`.
+        boxes_px: `(N, 4)` left, top, right, bottom.
+    """
+    height_px, width_px = image.shape[:2]
+    padding_px = PADDING_PX * math.sqrt(height_px * width_px) / _REFERENCE_PX
+    crops = []
+    for left, top, right, bottom in boxes_px.tolist():
+        first_row = min(max(math.floor(top - padding_px), 0), height_px - 1)
+        first_col = min(max(math.floor(left - padding_px), 0), width_px - 1)
+        end_row = max(min(math.ceil(bottom + padding_px), height_px), first_row + 1)
+        end_col = max(min(math.ceil(right + padding_px), width_px), first_col + 1)
+        crops.append(image[first_row:end_row, first_col:end_col])
+    return crops
+
+
+def unit(features: NDArray[np.float32]) -> NDArray[np.float32]:
+    """`(N, D)` features brought to length 1."""
+    lengths = np.linalg.norm(features, axis=1, keepdims=True)
+    return np.ascontiguousarray(features / np.maximum(lengths, 1e-12), np.float32)

@@ -1,0 +1,89 @@
+"""Libraries that come with extras, and the device that they compute on."""
+
+import os
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from evonav.errors import PerceptionError
+from evonav.perception.weights import own_folder
+
+EXTRA_OF = {
+    "open_clip": "torch",
+    "torch": "torch",
+    "torchvision": "torch",
+    "transformers": "torch",
+    "ultralytics": "yolo",
+}
+"""The extra that brings a module."""
+_PACKAGES = {"open_clip": "open_clip_torch"}
+
+
+def library(module: str) -> Any:  # noqa: ANN401 - a module
+    """A module of an extra.
+
+    Raises:
+        PerceptionError: It is not installed, or does not import.
+    """
+    if module == "ultralytics":
+        # It would install what it lacks and look for updates; we fetch weights ourselves.
+        for name, value in (("YOLO_OFFLINE", "True"), ("YOLO_AUTOINSTALL", "False"), ("YOLO_VERBOSE", "False")):
+            os.environ.setdefault(name, value)
+        settings = own_folder() / "ultralytics"
+        if "YOLO_CONFIG_DIR" not in os.environ:
+            settings.mkdir(parents=True, exist_ok=True)
+            os.environ["YOLO_CONFIG_DIR"] = str(settings)
+    try:
+        return import_module(module)
+    except (ImportError, OSError, RuntimeError) as error:  # a library of CUDA's or an operator may be what is missing
+        extra = EXTRA_OF[module.partition(".")[0]]
+        said = " ".join(str(error).split())[:200]
+        raise PerceptionError(f"predicted perception needs {module}: pip install 'evonav[{extra}]' ({said})") from None
+
+
+def library_versions(modules: tuple[str, ...]) -> dict[str, str]:
+    """Version by package, without importing any.
+
+    Args:
+        modules: Of `EXTRA_OF`.
+
+    Raises:
+        PerceptionError: One is not installed.
+    """
+    found = {}
+    for module in modules:
+        package = _PACKAGES.get(module, module)
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            raise PerceptionError(
+                f"predicted perception needs {package}: pip install 'evonav[{EXTRA_OF[module]}]'"
+            ) from None
+    return found
+
+
+def device_of(word: str) -> str:
+    """The device that a word names: `cpu`, `cuda`, `cuda:1`; `auto` is the GPU, if there is one.
+
+    Raises:
+        PerceptionError: There is no such device.
+    """
+    torch = library("torch")
+    has_gpu = bool(torch.cuda.is_available())
+    if word == "auto":
+        return "cuda" if has_gpu else "cpu"
+    kind, _, index = word.partition(":")
+    if kind not in ("cpu", "cuda") or (index and not index.isdigit()):
+        raise PerceptionError(f"device {word!r}: expected auto, cpu, cuda or cuda:N")
+    if kind == "cuda" and not (has_gpu and int(index or 0) < torch.cuda.device_count()):
+        raise PerceptionError(f"device {word!r}: PyTorch {torch.__version__} finds no such GPU; use auto or cpu")
+    return word
+
+
+def make_repeatable() -> None:
+    """The same input, the same output, as far as PyTorch can: no choice of kernels by speed, no rounding to 19 bits."""
+    torch = library("torch")
+    torch.backends.cudnn.benchmark = False
+    torch.backends.cudnn.deterministic = True
+    torch.backends.cudnn.allow_tf32 = False
+    torch.backends.cuda.matmul.allow_tf32 = False

@@ -1,0 +1,89 @@
+"""Boxes from words, then masks from boxes: how open-vocabulary detectors and SAM are put together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.perception.detector import Found, nothing_found
+
+
+@dataclass(frozen=True, slots=True)
+class Boxes:
+    """What was found in one image, without masks."""
+
+    boxes_px: NDArray[np.float32]
+    """`(N, 4)` left, top, right, bottom."""
+    labels: tuple[str, ...]
+    confidences: NDArray[np.float32]
+    """`(N,)`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Masks:
+    """A mask for each box of an image."""
+
+    masks: NDArray[np.bool_]
+    """`(N, H, W)`."""
+    scores: NDArray[np.float32]
+    """`(N,)` how good the model takes its mask to be."""
+
+
+class BoxFinder(Protocol):
+    """Finds what words name."""
+
+    def find(self, images: Sequence[NDArray[np.uint8]], words: tuple[str, ...], min_confidence: float) -> list[Boxes]:
+        """Boxes of each `(H, W, 3)` RGB image; labels are among `words`, or phrases of them."""
+        ...
+
+
+class MaskMaker(Protocol):
+    """Outlines what is in boxes."""
+
+    def outline(self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]) -> list[Masks]:
+        """As many masks as boxes `(N, 4)`, in their order, for each `(H, W, 3)` RGB image."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class PromptedDetector:
+    """A `Detector` of two models."""
+
+    finder: BoxFinder
+    masker: MaskMaker
+    words: tuple[str, ...]
+    min_confidence: float
+    """Boxes below it get no mask."""
+    min_mask_score: float = 0.0
+    """Masks below it are dropped."""
+
+    def detect(self, images: Sequence[NDArray[np.uint8]], depths_m: Sequence[NDArray[np.float32]]) -> list[Found]:
+        """Boxes and masks of all images as one batch; depth is not looked at."""
+        boxes = self.finder.find(images, self.words, self.min_confidence)
+        masks = self.masker.outline(images, [one.boxes_px for one in boxes])
+        return [
+            self._found(some, outlined, (image.shape[0], image.shape[1]))
+            for some, outlined, image in zip(boxes, masks, images, strict=True)
+        ]
+
+    def _found(self, boxes: Boxes, masks: Masks, shape: tuple[int, int]) -> Found:
+        if not boxes.labels:
+            return nothing_found(shape)
+        found = Found(masks.masks, boxes.boxes_px, boxes.labels, boxes.confidences)
+        return found.taken(np.flatnonzero(masks.scores >= self.min_mask_score))
+
+
+def box_masks(boxes_px: NDArray[np.float32], shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """`(N, H, W)` boxes filled, for those of which a model makes no mask.
+
+    Args:
+        boxes_px: `(N, 4)` left, top, right, bottom.
+        shape: `(H, W)` of the image.
+    """
+    masks = np.zeros((len(boxes_px), *shape), np.bool_)
+    for mask, box in zip(masks, boxes_px, strict=True):
+        left, top, right, bottom = np.clip(np.round(box), 0, [shape[1], shape[0], shape[1], shape[0]]).astype(int)
+        mask[top:bottom, left:right] = True
+    return masks

@@ -1,0 +1,88 @@
+"""Torchvision (BSD-3-Clause): boxes and masks by Mask R-CNN."""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.errors import PerceptionError
+from evonav.perception.detector import Found
+from evonav.perception.models.libraries import library, make_repeatable
+
+_MIN_MASK = 0.5
+"""Probability from which a pixel belongs to a mask."""
+
+
+class MaskRcnn:
+    """A network for COCO's categories."""
+
+    def __init__(self, model: Any, categories: Sequence[str], device: str) -> None:  # noqa: ANN401 - of torchvision
+        """A network.
+
+        Args:
+            model: Of torchvision.
+            categories: Of its labels, by number.
+            device: To compute on.
+        """
+        self._model = model
+        self._categories = tuple(categories)
+        self._device = device
+
+    def detect(
+        self, images: Sequence[NDArray[np.uint8]], words: Mapping[str, str], min_confidence: float
+    ) -> list[Found]:
+        """Objects of some categories, all images as one batch.
+
+        Args:
+            images: Each `(H, W, 3)` RGB.
+            words: What each category of interest is called.
+            min_confidence: Of a detection.
+        """
+        torch = library("torch")
+        batch = [
+            torch.from_numpy(np.ascontiguousarray(image)).permute(2, 0, 1).float().div(255.0).to(self._device)
+            for image in images
+        ]
+        with torch.inference_mode():
+            results = self._model(batch)
+        return [self._found(result, words, min_confidence) for result in results]
+
+    def _found(self, result: Mapping[str, Any], words: Mapping[str, str], min_confidence: float) -> Found:
+        names = [self._categories[int(index)] for index in result["labels"].cpu()]
+        scores = result["scores"].float().cpu().numpy()
+        kept = [index for index, name in enumerate(names) if name in words and scores[index] >= min_confidence]
+        return Found(
+            masks=(result["masks"][kept, 0].cpu().numpy() >= _MIN_MASK),
+            boxes_px=result["boxes"][kept].float().cpu().numpy().astype(np.float32).reshape(-1, 4),
+            labels=tuple(words[names[index]] for index in kept),
+            confidences=np.clip(scores[kept], 0.0, 1.0).astype(np.float32),
+        )
+
+
+@cache
+def load_mask_rcnn(path: str, device: str, min_score: float = 0.05) -> MaskRcnn:
+    """The network of a file, once a process.
+
+    Args:
+        path: Of its weights; empty: random ones.
+        device: To compute on.
+        min_score: Below it the network itself drops what it finds.
+
+    Raises:
+        PerceptionError: The library is not installed, or the file is no such model.
+    """
+    detection, torch = library("torchvision.models.detection"), library("torch")
+    make_repeatable()
+    model = detection.maskrcnn_resnet50_fpn(weights=None, weights_backbone=None, box_score_thresh=min_score)
+    if path:
+        try:
+            model.load_state_dict(torch.load(path, map_location="cpu", weights_only=True))
+        except Exception as error:  # of pickle, of zip files, of shapes
+            said = " ".join(str(error).split())[:200]
+            raise PerceptionError(
+                f"{path}: cannot be loaded as Mask R-CNN ({type(error).__name__}: {said}); get the file again"
+            ) from error
+    categories = detection.MaskRCNN_ResNet50_FPN_Weights.COCO_V1.meta["categories"]
+    return MaskRcnn(model.eval().to(device), categories, device)

@@ -1,0 +1,310 @@
+"""Transformers (Apache-2.0): boxes by Grounding DINO or OWLv2, masks by SAM, features by CLIP."""
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.errors import PerceptionError
+from evonav.perception.models.crops import padded_crops, unit
+from evonav.perception.models.libraries import library, make_repeatable
+from evonav.perception.models.prompted import Boxes, Masks, box_masks
+
+_Model = TypeVar("_Model")
+_BATCH = 64
+_MAX_BOXES = 100
+_NMS_IOU = 0.7
+"""As in YOLO-World: OWLv2 has a box for every patch of the image and drops none."""
+
+
+class GroundingDino:
+    """Boxes for phrases, all of which go into one text: it is for short lists."""
+
+    def __init__(self, model: Any, processor: Any, device: str, min_text: float = 0.25) -> None:  # noqa: ANN401
+        """A detector.
+
+        Args:
+            model: `GroundingDinoForObjectDetection`.
+            processor: Its own.
+            device: To compute on.
+            min_text: Score from which a word of the text belongs to a box.
+        """
+        self._model = model
+        self._processor = processor
+        self._device = device
+        self._min_text = min_text
+
+    def find(self, images: Sequence[NDArray[np.uint8]], words: tuple[str, ...], min_confidence: float) -> list[Boxes]:
+        """Boxes of all images, as one batch. A box whose phrase holds none of the words is dropped."""
+        torch = library("torch")
+        text = " ".join(f"{word.lower()}." for word in words)
+        inputs = self._processor(images=list(images), text=[text] * len(images), return_tensors="pt").to(self._device)
+        with torch.inference_mode():
+            outputs = self._model(**inputs)
+        results = self._processor.post_process_grounded_object_detection(
+            outputs,
+            inputs["input_ids"],
+            threshold=min_confidence,
+            text_threshold=self._min_text,
+            target_sizes=[image.shape[:2] for image in images],
+        )
+        return [
+            _boxes(result["boxes"], [_word_in(phrase, words) for phrase in result["text_labels"]], result["scores"])
+            for result in results
+        ]
+
+
+class Owlv2:
+    """Boxes for any number of words."""
+
+    def __init__(self, model: Any, processor: Any, device: str) -> None:  # noqa: ANN401 - of transformers
+        """A detector.
+
+        Args:
+            model: `Owlv2ForObjectDetection`.
+            processor: Its own.
+            device: To compute on.
+        """
+        self._model = model
+        self._processor = processor
+        self._device = device
+        self._queries: dict[tuple[str, ...], Any] = {}
+
+    def find(self, images: Sequence[NDArray[np.uint8]], words: tuple[str, ...], min_confidence: float) -> list[Boxes]:
+        """Boxes of all images, as one batch: the best 100 of each, none of them on a better one of its word."""
+        torch, ops = library("torch"), library("torchvision.ops")
+        pixels = self._processor(images=list(images), return_tensors="pt")["pixel_values"].to(self._device)
+        with torch.inference_mode():
+            queries = self._queries_of(words).expand(len(images), -1, -1)
+            feature_map, _ = self._model.image_embedder(pixels)
+            features = feature_map.flatten(1, 2)
+            logits, _ = self._model.class_predictor(features, queries)
+            outputs = SimpleNamespace(logits=logits, pred_boxes=self._model.box_predictor(features, feature_map))
+            results = self._processor.post_process_grounded_object_detection(
+                outputs, threshold=min_confidence, target_sizes=[image.shape[:2] for image in images]
+            )
+            kept = [
+                ops.batched_nms(result["boxes"].float(), result["scores"].float(), result["labels"], _NMS_IOU)
+                for result in results
+            ]
+        return [
+            _boxes(
+                result["boxes"][rows[:_MAX_BOXES]],
+                [words[int(index)] for index in result["labels"][rows[:_MAX_BOXES]]],
+                result["scores"][rows[:_MAX_BOXES]],
+                image.shape[:2],
+            )
+            for result, rows, image in zip(results, kept, images, strict=True)
+        ]
+
+    def _queries_of(self, words: tuple[str, ...]) -> Any:  # noqa: ANN401 - a tensor
+        """`(1, N, D)` embedded words; the same words are embedded once."""
+        if words not in self._queries:
+            prompts = [f"a photo of a {word}" for word in words]
+            tokens = self._processor.tokenizer(
+                prompts, padding="max_length", max_length=16, truncation=True, return_tensors="pt"
+            ).to(self._device)
+            features = self._model.owlv2.get_text_features(tokens["input_ids"], tokens["attention_mask"])
+            self._queries[words] = _pooled(features)[None]
+        return self._queries[words]
+
+
+class Sam:
+    """Masks from boxes."""
+
+    def __init__(self, model: Any, processor: Any, device: str) -> None:  # noqa: ANN401 - of transformers
+        """A segmenter.
+
+        Args:
+            model: `SamModel`.
+            processor: `SamImageProcessor`.
+            device: To compute on.
+        """
+        self._model = model
+        self._processor = processor
+        self._device = device
+
+    def outline(self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]) -> list[Masks]:
+        """Images with boxes are encoded as one batch, then masks are made; an empty one is the box itself."""
+        torch = library("torch")
+        busy = [index for index, boxes in enumerate(boxes_px) if len(boxes)]
+        made = [
+            Masks(np.zeros((0, *image.shape[:2]), np.bool_), np.zeros(0, np.float32)) for image in images
+        ]  # of images without boxes
+        if not busy:
+            return made
+        inputs = self._processor(images=[images[index] for index in busy], return_tensors="pt").to(self._device)
+        with torch.inference_mode():
+            embedded = self._model.get_image_embeddings(inputs["pixel_values"])
+            for row, index in enumerate(busy):
+                original, seen = inputs["original_sizes"][row], inputs["reshaped_input_sizes"][row]
+                scale = torch.as_tensor(
+                    [seen[1] / original[1], seen[0] / original[0]] * 2, dtype=torch.float32, device=self._device
+                )
+                boxes = torch.from_numpy(np.ascontiguousarray(boxes_px[index])).to(self._device) * scale
+                outputs = self._model(
+                    image_embeddings=embedded[row : row + 1], input_boxes=boxes[None], multimask_output=False
+                )
+                (masks,) = self._processor.post_process_masks(
+                    outputs.pred_masks.cpu(), [original.tolist()], [seen.tolist()]
+                )
+                found = masks[:, 0].numpy().astype(np.bool_)
+                is_empty = ~found.any(axis=(1, 2))
+                found[is_empty] = box_masks(boxes_px[index][is_empty], found.shape[1:])
+                made[index] = Masks(found, outputs.iou_scores[0, :, 0].float().cpu().numpy())
+        return made
+
+
+class Clip:
+    """An `Embedder`."""
+
+    def __init__(self, model: Any, processor: Any, tokenizer: Any, device: str) -> None:  # noqa: ANN401
+        """An embedder.
+
+        Args:
+            model: `CLIPModel`.
+            processor: `CLIPImageProcessor`.
+            tokenizer: Of the model.
+            device: To compute on.
+        """
+        self._model = model
+        self._processor = processor
+        self._tokenizer = tokenizer
+        self._device = device
+
+    def image_features(
+        self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]
+    ) -> list[NDArray[np.float32]]:
+        """Unit features of padded crops, all images' in batches of 64."""
+        torch = library("torch")
+        crops = [
+            np.ascontiguousarray(crop)
+            for image, boxes in zip(images, boxes_px, strict=True)
+            for crop in padded_crops(image, boxes)
+        ]
+        rows = [np.zeros((0, self._model.config.projection_dim), np.float32)]
+        with torch.inference_mode():
+            for start in range(0, len(crops), _BATCH):
+                # A crop of a few pixels' width is not to be taken for one with channels first.
+                inputs = self._processor(
+                    images=crops[start : start + _BATCH], input_data_format="channels_last", return_tensors="pt"
+                )
+                pixels = inputs["pixel_values"].to(self._device)
+                rows.append(_pooled(self._model.get_image_features(pixels)).float().cpu().numpy())
+        features = unit(np.concatenate(rows))
+        ends = np.cumsum([0, *(len(boxes) for boxes in boxes_px)]).tolist()
+        return [features[start:end] for start, end in pairwise(ends)]
+
+    def text_feature(self, text: str) -> NDArray[np.float32]:
+        """`(D,)` of unit length; what is longer than the model reads is cut off."""
+        torch = library("torch")
+        tokens = self._tokenizer([text], truncation=True, return_tensors="pt").to(self._device)
+        with torch.inference_mode():
+            features = _pooled(self._model.get_text_features(tokens["input_ids"], tokens["attention_mask"]))
+        feature: NDArray[np.float32] = unit(features.float().cpu().numpy())[0]
+        return feature
+
+
+@cache
+def load_grounding_dino(path: str, device: str) -> GroundingDino:
+    """The detector of a folder, once a process.
+
+    Raises:
+        PerceptionError: The library is not installed, or the folder holds no such model.
+    """
+
+    def load(transformers: Any) -> GroundingDino:  # noqa: ANN401 - a module
+        model = transformers.GroundingDinoForObjectDetection.from_pretrained(path, local_files_only=True)
+        processor = transformers.AutoProcessor.from_pretrained(path, local_files_only=True)
+        return GroundingDino(model.eval().to(device), processor, device)
+
+    return _loaded(path, "Grounding DINO", load)
+
+
+@cache
+def load_owlv2(path: str, device: str) -> Owlv2:
+    """The detector of a folder, once a process.
+
+    Raises:
+        PerceptionError: The library is not installed, or the folder holds no such model.
+    """
+
+    def load(transformers: Any) -> Owlv2:  # noqa: ANN401 - a module
+        model = transformers.Owlv2ForObjectDetection.from_pretrained(path, local_files_only=True)
+        processor = transformers.Owlv2Processor.from_pretrained(path, local_files_only=True)
+        return Owlv2(model.eval().to(device), processor, device)
+
+    return _loaded(path, "OWLv2", load)
+
+
+@cache
+def load_sam(path: str, device: str) -> Sam:
+    """The segmenter of a folder, once a process.
+
+    Raises:
+        PerceptionError: The library is not installed, or the folder holds no such model.
+    """
+
+    def load(transformers: Any) -> Sam:  # noqa: ANN401 - a module
+        model = transformers.SamModel.from_pretrained(path, local_files_only=True)
+        processor = transformers.AutoImageProcessor.from_pretrained(path, local_files_only=True)
+        return Sam(model.eval().to(device), processor, device)
+
+    return _loaded(path, "SAM", load)
+
+
+@cache
+def load_clip(path: str, device: str) -> Clip:
+    """The embedder of a folder, once a process.
+
+    Raises:
+        PerceptionError: The library is not installed, or the folder holds no such model.
+    """
+
+    def load(transformers: Any) -> Clip:  # noqa: ANN401 - a module
+        model = transformers.CLIPModel.from_pretrained(path, local_files_only=True)
+        processor = transformers.AutoImageProcessor.from_pretrained(path, local_files_only=True)
+        tokenizer = transformers.AutoTokenizer.from_pretrained(path, local_files_only=True)
+        return Clip(model.eval().to(device), processor, tokenizer, device)
+
+    return _loaded(path, "CLIP", load)
+
+
+def _loaded(path: str, kind: str, load: Callable[[Any], _Model]) -> _Model:
+    transformers = library("transformers")
+    make_repeatable()
+    transformers.utils.logging.disable_progress_bar()
+    try:
+        return load(transformers)
+    except Exception as error:  # of safetensors, of JSON, of the library
+        said = " ".join(str(error).split())[:200]
+        raise PerceptionError(
+            f"{path}: cannot be loaded as {kind} ({type(error).__name__}: {said}); get its files again"
+        ) from error
+
+
+def _pooled(features: Any) -> Any:  # noqa: ANN401 - a tensor, which the library wraps since version 5
+    return getattr(features, "pooler_output", features)
+
+
+def _word_in(phrase: str, words: tuple[str, ...]) -> str | None:
+    """The word that a phrase is or holds, the longest of several."""
+    said = phrase.lower().strip()
+    held = [word for word in words if f" {word.lower()} " in f" {said} "]
+    return said if said in words else max(held, key=len, default=None)
+
+
+def _boxes(boxes: Any, labels: Sequence[str | None], scores: Any, shape: Sequence[int] | None = None) -> Boxes:  # noqa: ANN401 - tensors
+    kept = [index for index, label in enumerate(labels) if label is not None]
+    boxes_px = boxes.float().cpu().numpy().reshape(-1, 4)[kept]
+    if shape is not None:
+        boxes_px = np.clip(boxes_px, 0.0, np.array([shape[1], shape[0]] * 2, np.float32))
+    return Boxes(
+        boxes_px=boxes_px.astype(np.float32),
+        labels=tuple(label for label in labels if label is not None),
+        confidences=scores.float().cpu().numpy().astype(np.float32)[kept],
+    )

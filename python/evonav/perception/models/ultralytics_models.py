@@ -1,0 +1,169 @@
+"""Ultralytics (AGPL-3.0): boxes by YOLO-World, masks by SAM."""
+
+import threading
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.errors import PerceptionError
+from evonav.perception.models.libraries import library, make_repeatable
+from evonav.perception.models.open_clip_models import OpenClip, load_open_clip
+from evonav.perception.models.prompted import Boxes, Masks, box_masks
+
+_IMAGE_PX = 640
+"""Side that YOLO-World looks at: the library's default, whatever the size of the views."""
+
+
+class YoloWorld:
+    """Boxes for any words. Their text features come from the CLIP it was trained with, through open_clip.
+
+    The library itself would fetch a package from a git repository for that.
+    """
+
+    def __init__(self, model: Any, encoder: OpenClip, device: str) -> None:  # noqa: ANN401 - of ultralytics
+        """A detector.
+
+        Args:
+            model: `ultralytics.YOLOWorld`.
+            encoder: OpenAI's ViT-B/32.
+            device: To compute on.
+        """
+        self._model = model
+        self._encoder = encoder
+        self._device = device
+        self._words: tuple[str, ...] | None = None
+        self._features: dict[tuple[str, ...], Any] = {}
+        self._lock = threading.Lock()
+
+    def find(
+        self,
+        images: Sequence[NDArray[np.uint8]],
+        words: tuple[str, ...],
+        min_confidence: float,
+    ) -> list[Boxes]:
+        """Boxes of all images, as one batch."""
+        with self._lock:  # words and images go in by two calls
+            self._speak(words)
+            results = self._model.predict(
+                [_bgr(image) for image in images],
+                conf=min_confidence,
+                imgsz=_IMAGE_PX,
+                device=self._device,
+                verbose=False,
+            )
+        return [_boxes(result.boxes, words) for result in results]
+
+    def _speak(self, words: tuple[str, ...]) -> None:
+        """Makes the model look for other words."""
+        if words == self._words:
+            return
+        if words not in self._features:
+            torch = library("torch")
+            features = np.array(self._encoder.text_features(words))
+            self._features[words] = torch.from_numpy(features)[None].to(self._device)
+        network = self._model.model
+        network.txt_feats = self._features[words]
+        network.model[-1].nc = len(words)
+        network.names = list(words)
+        self._model.predictor = None  # it has the old names
+        self._words = words
+
+
+class UltralyticsSam:
+    """Masks from boxes."""
+
+    def __init__(self, model: Any, device: str) -> None:  # noqa: ANN401 - of ultralytics
+        """A segmenter.
+
+        Args:
+            model: `ultralytics.SAM`.
+            device: To compute on.
+        """
+        self._model = model
+        self._device = device
+
+    def outline(self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]) -> list[Masks]:
+        """One image after another: the library takes one set of boxes a call."""
+        return [self._outline(image, boxes) for image, boxes in zip(images, boxes_px, strict=True)]
+
+    def _outline(self, image: NDArray[np.uint8], boxes_px: NDArray[np.float32]) -> Masks:
+        """The box itself where the model makes no mask or an empty one: it drops those that it scores 0."""
+        masks = box_masks(boxes_px, (image.shape[0], image.shape[1]))
+        scores = np.zeros(len(boxes_px), np.float32)
+        if len(boxes_px) == 0:
+            return Masks(masks, scores)
+        (result,) = self._model.predict(_bgr(image), bboxes=boxes_px, conf=0.0, device=self._device, verbose=False)
+        if result.masks is not None and result.boxes is not None:
+            rows = result.boxes.cls.cpu().numpy().astype(np.int64)  # which box a mask is of
+            for row, mask, score in zip(
+                rows, result.masks.data.cpu().numpy().astype(np.bool_), result.boxes.conf.cpu().numpy(), strict=True
+            ):
+                scores[row] = score
+                if mask.any():
+                    masks[row] = mask
+        return Masks(masks, scores)
+
+
+@cache
+def load_yolo_world(path: str, text_path: str, device: str) -> YoloWorld:
+    """The detector of a file, once a process.
+
+    Args:
+        path: `.pt`, or a `.yaml` of the library for random weights.
+        text_path: Weights of OpenAI's ViT-B/32; empty: random ones.
+        device: To compute on.
+
+    Raises:
+        PerceptionError: The library is not installed, or the file is no such model.
+    """
+    ultralytics = library("ultralytics")
+    make_repeatable()
+    encoder = load_open_clip("ViT-B-32-quickgelu", text_path, device)
+    try:
+        model = ultralytics.YOLOWorld(path)
+        model.to(device)
+    except Exception as error:  # of pickle, of zip files, of the library
+        raise _unreadable(path, "YOLO-World", error) from error
+    return YoloWorld(model, encoder, device)
+
+
+@cache
+def load_ultralytics_sam(path: str, device: str) -> UltralyticsSam:
+    """The segmenter of a file, once a process.
+
+    Args:
+        path: Its name says which SAM it is: `sam_l.pt`, `sam_b.pt`, `mobile_sam.pt`.
+        device: To compute on.
+
+    Raises:
+        PerceptionError: The library is not installed, or the file is no such model.
+    """
+    ultralytics = library("ultralytics")
+    make_repeatable()
+    try:
+        model = ultralytics.SAM(path)
+        model.to(device)
+    except Exception as error:
+        raise _unreadable(path, "SAM", error) from error
+    return UltralyticsSam(model, device)
+
+
+def _unreadable(path: str, kind: str, error: Exception) -> PerceptionError:
+    said = " ".join(str(error).split())[:200]
+    return PerceptionError(f"{path}: cannot be loaded as {kind} ({type(error).__name__}: {said}); get the file again")
+
+
+def _bgr(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """As the library takes arrays."""
+    return np.ascontiguousarray(image[..., ::-1])
+
+
+def _boxes(found: Any, words: tuple[str, ...]) -> Boxes:  # noqa: ANN401 - of ultralytics
+    return Boxes(
+        boxes_px=found.xyxy.cpu().numpy().astype(np.float32).reshape(-1, 4),
+        labels=tuple(words[int(index)] for index in found.cls.cpu().numpy()),
+        confidences=found.conf.cpu().numpy().astype(np.float32),
+    )

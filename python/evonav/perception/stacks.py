@@ -1,0 +1,257 @@
+"""Which models, filters and words make up each stack of predicted perception."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.errors import InvalidArgumentError
+from evonav.perception.detector import Detector, Embedder, Found
+from evonav.perception.filters import FilterConfig, filtered, joined
+from evonav.perception.models import libraries
+from evonav.perception.models.prompted import PromptedDetector
+from evonav.perception.models.torchvision_models import MaskRcnn
+from evonav.perception.vocabulary import COCO_UNIGOAL, DINO_UNIGOAL, VOCABULARIES
+from evonav.perception.weights import Weights, fingerprint, known, located, models_folder
+
+StackName = Literal["3d-mem", "unigoal", "transformers"]
+STACKS: tuple[StackName, ...] = get_args(StackName)
+DEVICES = ("auto", "cpu", "cuda")
+
+EVERYTHING = FilterConfig(
+    background=(),
+    min_area_fraction=0.0,
+    min_confidence=0.0,
+    max_mask_iou=1.0,
+    min_centre_distance_px=0.0,
+    min_area_px=0.0,
+    max_box_fraction=1.0,
+    min_share_of_inner=1.0,
+)
+"""Filters that drop empty masks alone."""
+UNIGOAL_GRAPH = replace(EVERYTHING, reference_px=(480, 640), min_area_px=25.0, max_box_fraction=0.5)
+"""UniGoal's, of its scene graph; it looks at 640x480."""
+_SAME_IOU = 0.5
+"""UniGoal's two detectors: masks that overlap by more are one object, and the map's detector names it."""
+_MIN_MASK_SCORE = 0.95
+"""UniGoal's, of SAM's masks."""
+_COCO = {{"plant": "potted plant"}.get(word, word): word for word in COCO_UNIGOAL}
+"""UniGoal's word by COCO's category."""
+
+
+@dataclass(frozen=True, slots=True)
+class StackConfig:
+    """Options of the stacks; each takes those that it has models for, and `None` is the published value."""
+
+    vocabulary: str | None = None
+    """`procthor` (default), `scannet200`, or words with semicolons between them; unigoal has its own."""
+    min_confidence: float | None = None
+    """Of detections that are kept; 3d-mem 0.4, transformers 0.3, unigoal 0.5 (Mask R-CNN) and 0.3 (Grounding DINO)."""
+    detector: str | None = None
+    """Weights of the detector: 3d-mem yolov8x-world.pt, transformers google/owlv2-base-patch16-ensemble."""
+    sam: str | None = None
+    """Weights of SAM: 3d-mem sam_l.pt, transformers facebook/sam-vit-large, unigoal facebook/sam-vit-huge."""
+    min_mask_score: float | None = None
+    """Of SAM's masks that are kept; unigoal 0.95, the others keep all."""
+
+    def __post_init__(self) -> None:
+        """Refuses what makes no sense.
+
+        Raises:
+            InvalidArgumentError: An option is outside its domain; the message names it.
+        """
+        for name in ("min_confidence", "min_mask_score"):
+            value = getattr(self, name)
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if value is not None and not (is_number and 0.0 <= value <= 1.0):
+                raise InvalidArgumentError(f"predicted perception: {name} is {value!r}, expected 0..1")
+        for name in ("vocabulary", "detector", "sam"):
+            value = getattr(self, name)
+            if value is not None and not (isinstance(value, str) and value.strip()):
+                raise InvalidArgumentError(f"predicted perception: {name} is {value!r}, expected words")
+
+    @classmethod
+    def from_options(cls, options: Mapping[str, Any]) -> "StackConfig":
+        """Options as people write them.
+
+        Raises:
+            InvalidArgumentError: There is no such option, or it is outside its domain.
+        """
+        names = [field.name for field in fields(cls)]
+        for name in options:
+            if name not in names:
+                raise InvalidArgumentError(f"predicted perception has no option {name!r}; there are {', '.join(names)}")
+        return cls(**options)
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What an open-vocabulary detector looks for."""
+        name = self.vocabulary or "procthor"
+        for known_name, words in VOCABULARIES.items():
+            if name == known_name:
+                return words
+        words = tuple(dict.fromkeys(word.strip().lower() for word in name.split(";") if word.strip()))
+        if not words or (len(words) == 1 and name in (*STACKS, "coco", "scannet")):
+            raise InvalidArgumentError(
+                f"predicted perception: no vocabulary {name!r}; there are {', '.join(VOCABULARIES)}, or words with "
+                "semicolons between them"
+            )
+        return words
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """What a stack is made of, loaded."""
+
+    detector: Detector
+    filters: FilterConfig
+    embedder: Embedder | None
+
+
+@dataclass(frozen=True, slots=True)
+class JointDetector:
+    """UniGoal's two detectors as one: Mask R-CNN for its map, Grounded-SAM for its scene graph."""
+
+    network: MaskRcnn
+    min_confidence: float
+    grounded: Detector
+    graph_filters: FilterConfig = UNIGOAL_GRAPH
+
+    def detect(self, images: Sequence[NDArray[np.uint8]], depths_m: Sequence[NDArray[np.float32]]) -> list[Found]:
+        """What both find; of what both found, the map's word stands, which every table has a graph's word for."""
+        firsts = self.network.detect(images, _COCO, self.min_confidence)
+        seconds = self.grounded.detect(images, depths_m)
+        return [
+            joined(filtered(first, EVERYTHING), filtered(second, self.graph_filters), _SAME_IOU)
+            for first, second in zip(firsts, seconds, strict=True)
+        ]
+
+
+def stack_of(agent: str) -> StackName:
+    """The stack that `auto` means for an agent."""
+    return "unigoal" if agent.startswith("unigoal") else "3d-mem"
+
+
+def weights_of(stack: StackName, config: StackConfig) -> dict[str, Weights]:
+    """What a stack loads, by part.
+
+    Raises:
+        PerceptionError: An option names weights that are not known.
+        InvalidArgumentError: An option is none of this stack's.
+    """
+    defaults: dict[StackName, dict[str, str]] = {
+        "3d-mem": {
+            "detector": "yolov8x-world.pt",
+            "text": "timm/vit_base_patch32_clip_224.openai",
+            "sam": "sam_l.pt",
+            "clip": "laion/CLIP-ViT-B-32-laion2B-s34B-b79K",
+        },
+        "unigoal": {
+            "network": "maskrcnn_resnet50_fpn_coco-bf2d0c1e.pth",
+            "detector": "IDEA-Research/grounding-dino-tiny",
+            "sam": "facebook/sam-vit-huge",
+        },
+        "transformers": {
+            "detector": "google/owlv2-base-patch16-ensemble",
+            "sam": "facebook/sam-vit-large",
+            "clip": "openai/clip-vit-base-patch32",
+        },
+    }
+    if stack == "unigoal" and config.vocabulary is not None:
+        raise InvalidArgumentError("predicted:unigoal has words of its own; leave vocabulary out")
+    names = {**defaults[stack], **({"detector": config.detector} if config.detector else {})}
+    names |= {"sam": config.sam} if config.sam else {}
+    for part, name in names.items():
+        if ("/" in name) != ("/" in defaults[stack][part]):
+            library = "ultralytics" if stack == "3d-mem" else "transformers"
+            raise InvalidArgumentError(f"predicted:{stack}: {part} is {name!r}, expected weights of {library}")
+    return {part: known(name) for part, name in names.items()}
+
+
+def modules_of(stack: StackName) -> tuple[str, ...]:
+    """Modules that a stack imports."""
+    return {
+        "3d-mem": ("torch", "open_clip", "ultralytics"),
+        "unigoal": ("torch", "torchvision", "transformers"),
+        "transformers": ("torch", "torchvision", "transformers"),
+    }[stack]
+
+
+def facts_of(stack: StackName, config: StackConfig, models: str | None) -> dict[str, Any]:
+    """What decides a stack's results beside its options: hashes of its weights and versions of its libraries.
+
+    Raises:
+        PerceptionError: A library or a file is missing, or a file is not what it should be.
+        InvalidArgumentError: An option makes no sense.
+    """
+    config.words  # noqa: B018 - may raise
+    folder = models_folder(models)
+    weights = weights_of(stack, config).values()
+    versions = libraries.library_versions(modules_of(stack))
+    return {"libraries": versions, "weights": {k: v for one in weights for k, v in fingerprint(one, folder).items()}}
+
+
+def load_stack(stack: StackName, config: StackConfig, models: str | None, device: str) -> Parts:
+    """A stack's models; what another stack or episode of this process has loaded is not loaded again.
+
+    Args:
+        stack: Its name.
+        config: Its options.
+        models: Folder of weights.
+        device: `auto`, `cpu`, `cuda` or `cuda:N`.
+
+    Raises:
+        PerceptionError: A library, a file or the device is missing, or a file cannot be loaded.
+        InvalidArgumentError: An option makes no sense.
+    """
+    words = config.words
+    folder = models_folder(models)
+    paths = {part: str(located(one, folder)) for part, one in weights_of(stack, config).items()}
+    on = libraries.device_of(device)
+    min_score = config.min_mask_score
+    if stack == "3d-mem":
+        from evonav.perception.models import open_clip_models, ultralytics_models
+
+        min_confidence = _either(config.min_confidence, 0.4)
+        detector: Detector = PromptedDetector(
+            ultralytics_models.load_yolo_world(paths["detector"], paths["text"], on),
+            ultralytics_models.load_ultralytics_sam(paths["sam"], on),
+            words,
+            min_confidence,
+            _either(min_score, -math.inf),
+        )
+        embedder: Embedder = open_clip_models.load_open_clip("ViT-B-32", paths["clip"], on)
+        return Parts(detector, replace(FilterConfig(), min_confidence=min_confidence), embedder)
+    from evonav.perception.models import transformers_models
+
+    masker = transformers_models.load_sam(paths["sam"], on)
+    if stack == "transformers":
+        min_confidence = _either(config.min_confidence, 0.3)
+        detector = PromptedDetector(
+            transformers_models.load_owlv2(paths["detector"], on),
+            masker,
+            words,
+            min_confidence,
+            _either(min_score, -math.inf),
+        )
+        embedder = transformers_models.load_clip(paths["clip"], on)
+        return Parts(detector, replace(FilterConfig(), min_confidence=min_confidence), embedder)
+    from evonav.perception.models.torchvision_models import load_mask_rcnn
+
+    grounded = PromptedDetector(
+        transformers_models.load_grounding_dino(paths["detector"], on),
+        masker,
+        DINO_UNIGOAL,
+        _either(config.min_confidence, 0.3),
+        _either(min_score, _MIN_MASK_SCORE),
+    )
+    least = _either(config.min_confidence, 0.5)
+    network = load_mask_rcnn(paths["network"], on, min(least, 0.05))
+    return Parts(JointDetector(network, least, grounded), EVERYTHING, None)
+
+
+def _either(given: float | None, published: float) -> float:
+    return published if given is None else given

@@ -1,0 +1,289 @@
+"""Files that models need: where they come from, where they are, and whether they are what they were.
+
+A file is looked for in the folder of `--models` (or `EVONAV_MODELS`), under the hub's own name. Without a folder it is
+looked for where its library keeps such files, and fetched from the library's hub if it is not there. Either way its
+SHA-256 is compared with the published one, or, where none is published, with the one of its first use, which a lock
+file beside the files keeps.
+"""
+
+import hashlib
+import json
+import os
+import socket
+from dataclasses import dataclass, field
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from evonav.errors import PerceptionError, StoreError
+from evonav.folders import write_atomically
+
+MODELS_VARIABLE = "EVONAV_MODELS"
+LOCK_NAME = "evonav-models.json"
+PROBE_S = 3.0
+"""A hub that does not answer in this time is not reached; its own client would try for half a minute."""
+_HUGGING_FACE = "https://huggingface.co"
+_ULTRALYTICS = "https://github.com/ultralytics/assets/releases/download/v8.4.0"
+_TRANSFORMERS = ("config.json", "preprocessor_config.json", "model.safetensors")
+
+
+@dataclass(frozen=True, slots=True)
+class WeightFile:
+    """A file of a hub."""
+
+    name: str
+    """Path in a folder of models: of a release, the file; of Hugging Face, ORGANISATION/REPOSITORY/FILE."""
+    licence: str
+    size_mb: int = 0
+    """About; 0 for a file of text."""
+    sha256: str = ""
+    """As published, or its beginning where that is all that is; empty: unknown until the first use."""
+    url: str = ""
+    """Of a release's file; empty: on Hugging Face."""
+
+    @property
+    def source(self) -> str:
+        """Where it is to be had."""
+        if self.url:
+            return self.url
+        repository, _, file = self.name.rpartition("/")
+        return f"{_HUGGING_FACE}/{repository}/resolve/main/{file}"
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """What one model is loaded from: a file, or the files of a repository."""
+
+    name: str
+    """As options name it."""
+    files: tuple[WeightFile, ...] = field(repr=False)
+
+
+def _release(name: str, size_mb: int) -> Weights:
+    return Weights(name, (WeightFile(name, "AGPL-3.0", size_mb, url=f"{_ULTRALYTICS}/{name}"),))
+
+
+def _repository(name: str, size_mb: int, licence: str, *more: str) -> Weights:
+    files = tuple(
+        WeightFile(f"{name}/{file}", licence, size_mb if file.endswith(".safetensors") else 0)
+        for file in (*_TRANSFORMERS, *more)
+    )
+    return Weights(name, files)
+
+
+_TOKENIZER = ("tokenizer.json", "tokenizer_config.json")
+_OPENAI, _LAION = "timm/vit_base_patch32_clip_224.openai", "laion/CLIP-ViT-B-32-laion2B-s34B-b79K"
+_MASK_RCNN = "maskrcnn_resnet50_fpn_coco-bf2d0c1e.pth"
+
+_CATALOGUE = (
+    _release("yolov8x-world.pt", 147),
+    _release("yolov8x-worldv2.pt", 146),
+    _release("yolov8l-worldv2.pt", 94),
+    _release("yolov8m-worldv2.pt", 57),
+    _release("yolov8s-worldv2.pt", 26),
+    *(
+        Weights(name, (WeightFile(name, "Apache-2.0", size_mb, url=f"{_ULTRALYTICS}/{name}"),))
+        for name, size_mb in (("sam_l.pt", 1250), ("sam_b.pt", 375), ("mobile_sam.pt", 41))
+    ),
+    Weights(_OPENAI, (WeightFile(f"{_OPENAI}/open_clip_model.safetensors", "MIT", 605),)),
+    Weights(_LAION, (WeightFile(f"{_LAION}/open_clip_model.safetensors", "MIT", 605),)),
+    Weights(
+        _MASK_RCNN,
+        (WeightFile(_MASK_RCNN, "BSD-3-Clause", 178, "bf2d0c1e", f"https://download.pytorch.org/models/{_MASK_RCNN}"),),
+    ),
+    _repository("IDEA-Research/grounding-dino-tiny", 689, "Apache-2.0", *_TOKENIZER),
+    _repository("facebook/sam-vit-huge", 2564, "Apache-2.0"),
+    _repository("facebook/sam-vit-large", 1250, "Apache-2.0"),
+    _repository("facebook/sam-vit-base", 375, "Apache-2.0"),
+    _repository(
+        "google/owlv2-base-patch16-ensemble", 620, "Apache-2.0", "vocab.json", "merges.txt", "tokenizer_config.json"
+    ),
+    _repository("openai/clip-vit-base-patch32", 605, "MIT", *_TOKENIZER),
+)
+CATALOGUE: dict[str, Weights] = {weights.name: weights for weights in _CATALOGUE}
+"""By name. Sizes are to the nearest few MB and are never compared."""
+
+
+def models_folder(models: str | None) -> Path | None:
+    """The folder that was named, by option or variable.
+
+    Raises:
+        PerceptionError: It is no folder.
+    """
+    named = models or os.environ.get(MODELS_VARIABLE) or None
+    if named is None:
+        return None
+    folder = Path(named).expanduser()
+    if not folder.is_dir():
+        by = "--models" if models else MODELS_VARIABLE
+        raise PerceptionError(f"{by}: {folder} is no folder; name the folder that holds the models' files")
+    return folder.absolute()
+
+
+def known(name: str) -> Weights:
+    """Weights by their name.
+
+    Raises:
+        PerceptionError: There are none of this name.
+    """
+    if name not in CATALOGUE:
+        raise PerceptionError(f"no weights {name!r} are known; there are {', '.join(sorted(CATALOGUE))}")
+    return CATALOGUE[name]
+
+
+def located(weights: Weights, folder: Path | None) -> Path:
+    """Where weights are; those that are nowhere are fetched if no folder was named.
+
+    Args:
+        weights: Of a model.
+        folder: See `models_folder`.
+
+    Returns:
+        The file, or the folder of the repository's files.
+
+    Raises:
+        PerceptionError: A file is missing, and cannot be fetched.
+    """
+    paths = [_located(file, folder) for file in weights.files]
+    return paths[0] if len(paths) == 1 else paths[0].parent
+
+
+def fingerprint(weights: Weights, folder: Path | None) -> dict[str, str]:
+    """SHA-256 of each file, checked.
+
+    Args:
+        weights: Of a model.
+        folder: See `models_folder`.
+
+    Raises:
+        PerceptionError: A file is missing, or is not what was published, or not what it was.
+    """
+    return {file.name: _checked(file, _located(file, folder), folder) for file in weights.files}
+
+
+def is_there(weights: Weights, folder: Path | None) -> bool:
+    """Whether nothing would have to be fetched."""
+    return all(_path_of(file, folder).is_file() for file in weights.files)
+
+
+def _path_of(file: WeightFile, folder: Path | None) -> Path:
+    """Where a file is, or would be."""
+    if folder is not None:
+        return folder / file.name
+    if file.url:
+        return own_folder() / file.name
+    try:
+        from huggingface_hub import try_to_load_from_cache
+    except ImportError:
+        return own_folder() / file.name
+    repository, _, name = file.name.rpartition("/")
+    cached = try_to_load_from_cache(repository, name)
+    return Path(cached) if isinstance(cached, str) else own_folder() / file.name
+
+
+def own_folder() -> Path:
+    """Where files of releases go, and the lock file of all that is in no folder of the user's."""
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "evonav" / "models"
+
+
+def _located(file: WeightFile, folder: Path | None) -> Path:
+    path = _path_of(file, folder)
+    if path.is_file():
+        return path
+    about = f" (about {file.size_mb} MB)" if file.size_mb else ""
+    if folder is not None:
+        raise PerceptionError(
+            f"{path} is missing{about}: put {file.source} there, or leave --models and {MODELS_VARIABLE} out to have "
+            "it fetched"
+        )
+    _probe(file, about)
+    return _fetched(file, path)
+
+
+def _probe(file: WeightFile, about: str) -> None:
+    """Fails at once where the hub's client would try again and again."""
+    host = urlsplit(file.source).hostname or ""
+    is_off = os.environ.get("HF_HUB_OFFLINE", "").lower() in ("1", "true", "yes", "on")
+    try:
+        if is_off:
+            raise OSError("HF_HUB_OFFLINE is set")
+        socket.create_connection((host, 443), timeout=PROBE_S).close()
+    except OSError as error:
+        raise PerceptionError(
+            f"{file.name}{about} is not on this machine and {host} cannot be reached ({error}): get {file.source} "
+            f"where there is a network and name its folder with --models DIR, as DIR/{file.name}"
+        ) from None
+
+
+def _fetched(file: WeightFile, path: Path) -> Path:
+    try:
+        if not file.url:
+            from huggingface_hub import hf_hub_download
+
+            repository, _, name = file.name.rpartition("/")
+            return Path(hf_hub_download(repository, name))
+        from torch.hub import download_url_to_file
+
+        path.parent.mkdir(parents=True, exist_ok=True)
+        download_url_to_file(file.url, str(path), hash_prefix=file.sha256 or None, progress=False)
+    except ImportError as error:
+        raise PerceptionError(f"{file.name} cannot be fetched: pip install 'evonav[torch]' ({error})") from None
+    except Exception as error:  # of several clients, each with errors of its own
+        said = " ".join(str(error).split())[:300]
+        raise PerceptionError(
+            f"{file.name} could not be fetched from {file.source} ({type(error).__name__}: {said}): try again, or put "
+            "it in a folder and name that with --models"
+        ) from error
+    return path
+
+
+def _checked(file: WeightFile, path: Path, folder: Path | None) -> str:
+    """SHA-256 of a file; it is computed again only when the file has changed."""
+    lock = (folder or own_folder()) / LOCK_NAME
+    entries = _read_lock(lock)
+    entry = entries.get(file.name, {})
+    try:
+        stat = path.stat()
+        stamp = [stat.st_size, stat.st_mtime_ns]
+        digest = str(entry["sha256"]) if entry.get("stamp") == stamp else _sha256(path)
+    except OSError as error:
+        raise PerceptionError(f"{path} cannot be read: {error.strerror}") from error
+    if not digest.startswith(file.sha256):
+        raise PerceptionError(
+            f"{path}: its SHA-256 is {digest}, published is {file.sha256}: it is damaged or another file; get "
+            f"{file.source} again"
+        )
+    if entry and entry.get("sha256") != digest:
+        raise PerceptionError(
+            f"{path}: its SHA-256 is {digest} and was {entry.get('sha256')} when it was first used: get "
+            f"{file.source} again, or take {file.name!r} out of {lock} if it was changed on purpose"
+        )
+    if entry.get("stamp") != stamp:
+        _write_lock(lock, {**entries, file.name: {"sha256": digest, "stamp": stamp}})
+    return digest
+
+
+def _read_lock(lock: Path) -> dict[str, dict[str, object]]:
+    try:
+        entries = json.loads(lock.read_text(encoding="utf-8")) if lock.is_file() else {}
+        if not isinstance(entries, dict) or not all(isinstance(entry, dict) for entry in entries.values()):
+            raise ValueError("not an object of objects")
+    except (OSError, ValueError) as error:
+        raise PerceptionError(f"{lock} cannot be read ({error}): delete it, hashes are then taken anew") from error
+    return entries
+
+
+def _write_lock(lock: Path, entries: dict[str, dict[str, object]]) -> None:
+    """Of a folder that may not be written to, hashes are computed each time and never compared with earlier ones."""
+    try:
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(lock, json.dumps(entries, indent=1, sort_keys=True) + "\n")
+    except (OSError, StoreError):
+        return
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()
