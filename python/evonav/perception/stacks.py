@@ -157,7 +157,7 @@ def weights_of(stack: StackName, config: StackConfig) -> dict[str, Weights]:
         "transformers": {
             "detector": "google/owlv2-base-patch16-ensemble",
             "sam": "facebook/sam-vit-large",
-            "clip": "openai/clip-vit-base-patch32",
+            "clip": "laion/CLIP-ViT-B-32-laion2B-s34B-b79K for transformers",
         },
     }
     if stack == "unigoal" and config.vocabulary is not None:

@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import socket
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -97,7 +97,7 @@ _CATALOGUE = (
     _repository(
         "google/owlv2-base-patch16-ensemble", 620, "Apache-2.0", "vocab.json", "merges.txt", "tokenizer_config.json"
     ),
-    _repository("openai/clip-vit-base-patch32", 605, "MIT", *_TOKENIZER),
+replace(_repository(_LAION, 605, "MIT", *_TOKENIZER), name=f"{_LAION} for transformers"),
 )
 CATALOGUE: dict[str, Weights] = {weights.name: weights for weights in _CATALOGUE}
 """By name. Sizes are to the nearest few MB and are never compared."""

@@ -293,7 +293,7 @@ def _pooled(features: Any) -> Any:  # noqa: ANN401 - a tensor, which the library
 
 def _word_in(phrase: str, words: tuple[str, ...]) -> str | None:
     """The word that a phrase is or holds, the longest of several."""
-    said = phrase.lower().strip()
+    said = " ".join(phrase.lower().replace(".", " ").split())
     held = [word for word in words if f" {word.lower()} " in f" {said} "]
     return said if said in words else max(held, key=len, default=None)
 
