@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST_SOURCES := $(shell find rust -name '*.rs' -o -name '*.json' -path 'rust/*' -o -name 'Cargo.toml' -path 'rust/*') Cargo.toml Cargo.lock
 
-.PHONY: setup demo test test-procthor lint bench wheel data readme docs clean
+.PHONY: setup demo test test-procthor test-models lint bench wheel data readme docs clean
 
 $(VENV)/.dependencies: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -36,6 +36,16 @@ $(VENV)-procthor/.dependencies: pyproject.toml
 
 test-procthor: setup $(VENV)-procthor/.dependencies
 	EVONAV_PROCTHOR_PYTHON=$(CURDIR)/$(VENV)-procthor/bin/python $(BIN)/python -m pytest tests/thor/test_procthor_houses.py
+
+# Models of predicted perception with random weights, in an environment of its own (6 GB; docs/perception.md).
+$(VENV)-models/.dependencies: pyproject.toml
+	$(PYTHON) -m venv $(VENV)-models
+	$(VENV)-models/bin/python -m pip install --quiet --upgrade "pip>=25.1"
+	$(VENV)-models/bin/python -m pip install --quiet --group models
+	touch $@
+
+test-models: setup $(VENV)-models/.dependencies
+	PYTHONPATH=$(CURDIR)/python $(VENV)-models/bin/python -m pytest tests/models
 
 lint: setup
 	cargo fmt --all --check
@@ -72,4 +82,4 @@ docs: setup
 	$(BIN)/python scripts/build_docs.py
 
 clean:
-	rm -rf $(VENV) target dist out
+	rm -rf $(VENV) $(VENV)-models $(VENV)-procthor target dist out

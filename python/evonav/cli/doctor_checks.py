@@ -15,6 +15,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
+from evonav.perception.stacks import STACKS, StackConfig, StackName, weights_of
+from evonav.perception.weights import models_folder, places
+
 State = Literal["ok", "missing", "failed"]
 RENDER_S = 1.0
 PING_S = 5.0
@@ -25,12 +28,22 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "ray": (("ray",), "--engine ray: many machines"),
     "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
     "thor": (("ai2thor", "msgpack", "prior"), "--simulator ai2thor, ProcTHOR-10k"),
+    "torch": (
+        ("huggingface-hub", "open-clip-torch", "torch", "torchvision", "transformers"),
+        "--perception predicted: models",
+    ),
     "video": (("imageio", "av"), "videos of episodes"),
     "viz": (("matplotlib", "resvg-py"), "figures as PNG and PDF"),
     "vlm": (("openai",), "--decision vlm: a model behind an endpoint"),
+    "yolo": (("open-clip-torch", "torch", "ultralytics"), "--perception predicted:3d-mem, AGPL-3.0"),
 }
 """Packages of each extra, and what it is for."""
-_MODULES = {"rerun-sdk": "rerun", "resvg-py": "resvg_py"}
+_MODULES = {
+    "huggingface-hub": "huggingface_hub",
+    "open-clip-torch": "open_clip",
+    "rerun-sdk": "rerun",
+    "resvg-py": "resvg_py",
+}
 _X86_FEATURES = ("sse4_2", "avx", "avx2", "fma", "avx512f")
 _ARM_FEATURES = ("asimd", "neon", "sve")
 
@@ -73,6 +86,8 @@ def all_checks(where: Where) -> Iterator[Check]:
     for extra in EXTRAS:
         yield _guarded(f"extra {extra}", lambda extra=extra: _extra(extra))  # type: ignore[misc]
     yield _guarded("GPU", _gpu)
+    for stack in STACKS:
+        yield _guarded(f"models {stack}", lambda stack=stack: _models(stack))  # type: ignore[misc]
     yield _guarded("AI2-THOR", _thor)
     yield _guarded("ProcTHOR-10k", _procthor)
     yield _guarded("model endpoint", lambda: _endpoint(where))
@@ -210,6 +225,24 @@ def _gpu() -> Check:
     done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)  # noqa: S603 - nvidia-smi
     names = [" ".join(line.split()) for line in done.stdout.splitlines() if line.strip()]
     return Check("GPU", "ok", "; ".join(names) + torch) if done.returncode == 0 and names else none
+
+
+def _models(stack: StackName) -> Check:
+    """Files by name and place: hashes, which take seconds, are compared before a run."""
+    folder = models_folder(None)
+    files = {
+        file.name: (file, path)
+        for one in weights_of(stack, StackConfig()).values()
+        for file, path in places(one, folder)
+    }
+    lacking = [file for file, path in files.values() if not path.is_file()]
+    where = str(folder) if folder is not None else "the libraries' own folders"
+    if lacking:
+        size_mb = sum(file.size_mb for file in lacking)
+        said = f"{len(lacking)} of {len(files)} files are not in {where} (about {size_mb} MB): {lacking[0].name}"
+        remedy = "fetched at first use" if folder is None else "docs/perception.md says where they are to be had"
+        return Check(f"models {stack}", "missing", f"{said}, ..." if len(lacking) > 1 else said, remedy)
+    return Check(f"models {stack}", "ok", f"{len(files)} files in {where}")
 
 
 def _thor() -> Check:

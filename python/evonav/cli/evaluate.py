@@ -28,6 +28,8 @@ from evonav.cli.options import (
     Houses,
     InProcess,
     Limit,
+    ModelDevice,
+    Models,
     OneAgent,
     Out,
     PerceptionName,
@@ -76,6 +78,8 @@ def evaluate(
     subset: Subset = None,
     seed: Seed = 0,
     perception: PerceptionName = "gt",
+    models: Models = None,
+    device: ModelDevice = None,
     workers: Workers = None,
     engine: Engine = EngineOption.LOCAL,
     ray_address: RayAddress = None,
@@ -111,7 +115,7 @@ def evaluate(
         x_display=thor_display,
         timeout_s=thor_timeout if simulator is SimulatorName.AI2THOR else None,
     )
-    config = _config(seed, with_perception(backend, perception), decisions, out, num_workers)
+    config = _config(seed, with_perception(backend, perception, models, device), decisions, out, num_workers)
     hosting = _hosting(in_process, agent_timeout or decision_settings(decisions).answer_timeout_s, agent_memory)
     config = replace(config, hosting=hosting)
     names = names_of(agents, agent)

@@ -55,6 +55,16 @@ PerceptionName = Annotated[
         "(docs/perception.md).",
     ),
 ]
+Models = Annotated[
+    Path | None,
+    typer.Option(
+        "--models",
+        help="--perception predicted: folder of the models' weights. Default: EVONAV_MODELS, else their own hubs.",
+    ),
+]
+ModelDevice = Annotated[
+    str | None, typer.Option("--device", help="--perception predicted: auto, cpu, cuda or cuda:N. Default: auto.")
+]
 Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-room) houses or tasks.")]
 Subset = Annotated[
     str | None,
@@ -139,12 +149,22 @@ def count_of(workers: int | None) -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def with_perception(backend: "Backend", word: str) -> "Backend":
+def with_perception(backend: "Backend", word: str, models: Path | None = None, device: str | None = None) -> "Backend":
     """A backend whose agents see with what `--perception` names.
+
+    Args:
+        backend: The rest.
+        word: As `--perception` takes it.
+        models: Folder of weights, for models.
+        device: That they compute on.
 
     Raises:
         InvalidArgumentError: There is no such perception, or one of its keys makes no sense.
     """
     from evonav.evaluation.settings import PerceptionSettings
 
-    return PerceptionSettings(make=word).backend(backend)
+    given = {"models": models and str(models.absolute()), "device": device}
+    options = {key: value for key, value in given.items() if value is not None}
+    if options and not word.startswith("predicted"):
+        raise typer.BadParameter(f"--{next(iter(options))} is for --perception predicted")
+    return PerceptionSettings(make=word, options=options).backend(backend)

@@ -1,6 +1,6 @@
 """What a worker builds for itself, named by import path so that it crosses process borders without pickle."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from difflib import get_close_matches
 from importlib import import_module
@@ -27,6 +27,15 @@ class Startable(Protocol):
         ...
 
 
+@runtime_checkable
+class NeedsMeans(Protocol):
+    """A perception of means that may be missing here: libraries, files, a device."""
+
+    def check(self, agents: Sequence[str]) -> Mapping[str, Any]:
+        """Whether all is there that these agents will need; what it is, as far as it decides what they see."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
 class Backend:
     """Import paths (`module:function`) of what an episode needs."""
@@ -39,6 +48,8 @@ class Backend:
     """Makes a `Perception`."""
     perception_options: Mapping[str, Any] = field(default_factory=dict)
     """Keywords for `perception`, as JSON."""
+    perception_host_options: Mapping[str, Any] = field(default_factory=dict)
+    """More of them, on this machine's means (folder of models, device): not part of what makes runs the same."""
     simulator_options: Mapping[str, Any] = field(default_factory=dict)
     """Keywords for `simulator`, as JSON."""
     host_options: Mapping[str, Any] = field(default_factory=dict)
@@ -53,7 +64,7 @@ class Backend:
 
     def identity(self) -> dict[str, Any]:
         """What makes runs the same."""
-        host = ("host_options", "decision_host_options")
+        host = ("host_options", "perception_host_options", "decision_host_options")
         return {key: value for key, value in asdict(self).items() if key not in host and value != {}}
 
     def load_case(self, path: Path) -> EpisodeCase:
@@ -93,8 +104,19 @@ class Backend:
 
     def make_perception(self) -> Perception:
         """A perception of the worker's own."""
-        perception: Perception = _imported(self.perception)(**self.perception_options)
+        options = {**self.perception_options, **self.perception_host_options}
+        perception: Perception = _imported(self.perception)(**options)
         return perception
+
+    def check_perception(self, agents: Sequence[str]) -> dict[str, Any]:
+        """What decides what these agents see beside the perception's options: weights and versions, if it has some.
+
+        Raises:
+            InvalidArgumentError: Its options make no sense.
+            PerceptionError: Something that it needs is missing here; the message says what to do.
+        """
+        perception = self.make_perception()
+        return dict(perception.check(agents)) if isinstance(perception, NeedsMeans) else {}
 
 
 def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:

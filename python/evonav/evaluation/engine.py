@@ -41,6 +41,8 @@ __all__ = [
 ]
 
 SUMMARY_NAME = "summary.json"
+MODELS_KEY = "perception_models"
+"""Of a run's header and summary: hashes of weights and versions of libraries, by stack."""
 NUM_RETRIES = 2
 """Of a stage that lost its worker, its simulator or its agent's process."""
 
@@ -238,6 +240,7 @@ def _begun(request: RunRequest, num_workers: int, num_retries: int, retry_errore
     ]
     if jobs:
         with RunStore(request.run_dir) as store:
+            _claim_models(store, request)
             note_session(store, num_workers)
     return Run(request.run_dir, setup, limit_s, request.agents, request.tasks, jobs, states)
 
@@ -278,10 +281,13 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
         num_stages = sum(store.meta("num_stages").values())
         records = {agent: list(store.records(agent, is_brief=True)) for agent in agents}
         backend = (store.meta("config") or {}).get("backend", {})
+        models = store.meta(MODELS_KEY)
     summaries = {agent: summarise(agent, records[agent], num_stages) for agent in agents}
     content = summary_json(list(summaries.values()), paired_differences(records))
     if make := backend.get("perception"):
         content["perception"] = word_of(make, backend.get("perception_options", {}))
+    if models:
+        content[MODELS_KEY] = models
     write_atomically(run_dir / SUMMARY_NAME, json.dumps(content, indent=2, sort_keys=True) + "\n")
     return [summaries[agent] for agent in only or agents]
 
@@ -327,6 +333,16 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
         "tasks": hashlib.sha256("".join(f"{t.task_id} {t.digest}\n" for t in tasks).encode()).hexdigest(),
         "num_tasks": len(tasks),
     }
+
+
+def _claim_models(store: RunStore, request: RunRequest) -> None:
+    """Notes the models of the perception before anyone looks through them, or checks that they are the run's."""
+    found = request.config.backend.check_perception(request.agents)
+    there = store.meta(MODELS_KEY) or {}
+    both = found.keys() & there.keys()
+    check_same_run({key: there[key] for key in both}, {key: found[key] for key in both}, request.run_dir)
+    if found.keys() - there.keys():
+        store.set_meta(MODELS_KEY, {**there, **found})
 
 
 def _claim(store: RunStore, request: RunRequest) -> None:

@@ -15,7 +15,7 @@ from evonav.decision.ledger import LEDGER_NAME
 from evonav.decision.vlm import Mode
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend
-from evonav.perception.words import read_word
+from evonav.perception.words import PREDICTED, read_word
 from evonav.tasks.records import Record
 
 if TYPE_CHECKING:
@@ -32,6 +32,8 @@ ANSWER_TIMEOUT_S, VLM_ANSWER_TIMEOUT_S = 600.0, 3600.0
 _BACKENDS = "evonav.evaluation.backend"
 _HOST = ("gpu_device", "x_display", "timeout_s")
 """Of a simulator's settings: this machine's means, not part of what makes runs the same."""
+_MEANS = ("models", "device")
+"""Likewise of predicted perception's."""
 
 
 class SettingError(InvalidArgumentError):
@@ -107,7 +109,9 @@ class PerceptionSettings(Settings):
             InvalidArgumentError: There is no such perception, or a keyword makes no sense.
         """
         word = read_word(self.make, self.options)
-        return replace(backend, perception=word.make, perception_options=word.options)
+        means = {key: word.options[key] for key in _MEANS if word.make == PREDICTED and key in word.options}
+        options = {key: value for key, value in word.options.items() if key not in means}
+        return replace(backend, perception=word.make, perception_options=options, perception_host_options=means)
 
 
 class DecisionSettings(Settings):

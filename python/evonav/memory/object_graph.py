@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from evonav.memory.objects import ObjectMap, ObjectMapConfig
-from evonav.memory.vocabulary import WORD_OF_TYPE, relabelled
+from evonav.memory.vocabulary import WORD_OF_LABEL, relabelled
 from evonav.sensors.observation import View
 
 Point2 = tuple[float, float]
@@ -130,10 +130,10 @@ class ObjectGraph:
             Pairs that need a relation: every new node with each old one and each other new one. A node whose caption
             has changed is new, and its edges are gone.
         """
-        found = relabelled(view.detections, WORD_OF_TYPE)
+        found = relabelled(view.detections, WORD_OF_LABEL)
         shown = View(view.pose, view.intrinsics, view.depth_m, found, view.occupancy, view.rgb, view.camera_height_m)
         update = self.objects.update(shown)
-        types = [label for label in view.detections.labels if label in WORD_OF_TYPE]
+        types = [label for label in view.detections.labels if label in WORD_OF_LABEL]
         for entry_id, kind in zip(update.entry_ids, types, strict=True):
             if entry_id is not None:
                 self._types.setdefault(entry_id, Counter())[kind] += 1

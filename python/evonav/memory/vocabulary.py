@@ -70,13 +70,16 @@ Of the 15, `windows` are background to our perception, `kitchen`, `bedroom` and 
 `picture` is what `painting` already names.
 """
 
+WORD_OF_LABEL: dict[str, str] = {**{word: word for word in WORD_OF_TYPE.values()}, **WORD_OF_TYPE}
+"""The same, and the words themselves: a detector that says `table` cannot tell which of ProcTHOR's tables it is."""
+
 
 def relabelled(detections: Detections, words: Mapping[str, str]) -> Detections:
     """What a detector that knows only certain words finds.
 
     Args:
-        detections: Ground truth, labelled with types.
-        words: Word by type; a type without one is not detected.
+        detections: Labelled with types, or in the detector's own words.
+        words: Word by label; a label without one is not detected.
     """
     kept = [index for index, label in enumerate(detections.labels) if label in words]
     if len(kept) == len(detections.labels):

@@ -97,7 +97,7 @@ _CATALOGUE = (
     _repository(
         "google/owlv2-base-patch16-ensemble", 620, "Apache-2.0", "vocab.json", "merges.txt", "tokenizer_config.json"
     ),
-replace(_repository(_LAION, 605, "MIT", *_TOKENIZER), name=f"{_LAION} for transformers"),
+    replace(_repository(_LAION, 605, "MIT", *_TOKENIZER), name=f"{_LAION} for transformers"),
 )
 CATALOGUE: dict[str, Weights] = {weights.name: weights for weights in _CATALOGUE}
 """By name. Sizes are to the nearest few MB and are never compared."""
@@ -160,9 +160,14 @@ def fingerprint(weights: Weights, folder: Path | None) -> dict[str, str]:
     return {file.name: _checked(file, _located(file, folder), folder) for file in weights.files}
 
 
-def is_there(weights: Weights, folder: Path | None) -> bool:
-    """Whether nothing would have to be fetched."""
-    return all(_path_of(file, folder).is_file() for file in weights.files)
+def places(weights: Weights, folder: Path | None) -> list[tuple[WeightFile, Path]]:
+    """Where each file is, or would be; nothing is fetched.
+
+    Args:
+        weights: Of a model.
+        folder: See `models_folder`.
+    """
+    return [(file, _path_of(file, folder)) for file in weights.files]
 
 
 def _path_of(file: WeightFile, folder: Path | None) -> Path:

@@ -1,0 +1,130 @@
+"""Whole stacks from a folder of weights, through an episode, as `--perception predicted:STACK` has it."""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from evonav.errors import PerceptionError, StoreError
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.settings import PerceptionSettings
+from evonav.evaluation.store import RunStore
+from evonav.perception import StageScene, weights
+from evonav.perception.predicted import predicted_perception
+from evonav.perception.vocabulary import PROCTHOR_TYPES
+from evonav.tasks.public import StageInput
+from evonav.world.embedded import EmbeddedSimulator
+
+MASK_RCNN = "maskrcnn_resnet50_fpn_coco-bf2d0c1e.pth"
+
+
+@pytest.fixture(scope="module")
+def all_models(tiny_models: Path) -> Path:
+    """With Mask R-CNN, of random weights, whose published hash is left out of the catalogue."""
+    import torch
+    from torchvision.models.detection import maskrcnn_resnet50_fpn
+
+    torch.manual_seed(0)
+    network = maskrcnn_resnet50_fpn(weights=None, weights_backbone=None)
+    torch.save(network.state_dict(), tiny_models / MASK_RCNN)
+    return tiny_models
+
+
+@pytest.fixture
+def without_published_hash(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = weights.CATALOGUE[MASK_RCNN]
+    files = tuple(replace(file, sha256="") for file in known.files)
+    monkeypatch.setitem(weights.CATALOGUE, MASK_RCNN, replace(known, files=files))
+
+
+def config_of(word: str, models: Path, **protocol: int) -> RunConfig:
+    settings = PerceptionSettings(make=word, options={"models": str(models), "device": "cpu"})
+    return RunConfig(protocol=ProtocolConfig(**protocol), backend=settings.backend(Backend()))
+
+
+def run(folder: Path, config: RunConfig, agents: tuple[str, ...]) -> None:
+    with bundled_tasks() as tasks:
+        evaluate(list(agents), task_files(tasks, 1), folder, config=config, num_workers=0)
+
+
+def assert_looked(folder: Path, agent: str) -> None:
+    """Every stage was scored, its time told by component, and the weights are in the summary."""
+    with RunStore(folder) as store:
+        records = list(store.records(agent))
+        costs = store.costs()
+    assert records
+    assert all(record.is_scored for record in records)
+    for record in records:
+        cost = costs[agent, record.task_id, record.stage]
+        assert 0.0 < cost["perception_wall_s"] < cost["wall_s"]
+    print(f"{agent}: perception {cost['perception_wall_s']:.2f} s of {cost['wall_s']:.2f} s in the last stage")
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    (facts,) = summary["perception_models"].values()
+    assert all(len(digest) == 64 for digest in facts["weights"].values())
+    assert "torch" in facts["libraries"]
+
+
+def test_an_episode_with_owlv2_sam_and_clip(tiny_models: Path, tmp_path: Path) -> None:
+    config = config_of("predicted:transformers,min_confidence=0.3", tiny_models, max_rounds=2)
+    run(tmp_path / "run", config, ("fu",))
+    assert_looked(tmp_path / "run", "fu")
+
+
+def test_an_episode_with_unigoals_detectors(all_models: Path, without_published_hash: None, tmp_path: Path) -> None:
+    from evonav.perception.models.torchvision_models import load_mask_rcnn
+
+    network = load_mask_rcnn(str(all_models / MASK_RCNN), "cpu", 0.05)
+    network._model.transform.min_size = (64,)  # 800 px of noise take a minute a view
+    config = config_of("predicted,min_confidence=0.5,min_mask_score=0", all_models, max_actions=3)
+    run(tmp_path / "run", config, ("unigoal",))
+    assert_looked(tmp_path / "run", "unigoal")
+
+
+def test_the_published_hash_keeps_other_weights_out(all_models: Path, tmp_path: Path) -> None:
+    with pytest.raises(PerceptionError, match="published is bf2d0c1e"):
+        run(tmp_path / "run", config_of("predicted:unigoal", all_models), ("unigoal",))
+
+
+def test_a_run_is_not_resumed_with_other_weights(tiny_models: Path, tmp_path: Path) -> None:
+    models = tmp_path / "models"
+    shutil.copytree(tiny_models, models)
+    config = config_of("predicted:transformers", models, max_rounds=1)
+    run(tmp_path / "run", config, ("fu",))
+    sam = models / "facebook/sam-vit-large/config.json"
+    sam.write_text(sam.read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    with pytest.raises(PerceptionError, match="when it was first used"):
+        run(tmp_path / "run", config, ("stage-reset",))
+    (models / weights.LOCK_NAME).unlink()
+    with pytest.raises(StoreError, match=r"facebook/sam-vit-large/config\.json: there"):
+        run(tmp_path / "run", config, ("stage-reset",))
+
+
+def test_percepts_hold_types_features_and_one_label_a_pixel(tiny_models: Path) -> None:
+    perception = predicted_perception("transformers", str(tiny_models), "cpu", min_confidence=0.0)
+    goal = StageInput(
+        stage=1, category="Bed", basic_instruction="", appearance_instruction="", unified_instruction="bed"
+    )
+    perception.begin_stage(StageScene("task", goal, "fu", 0, ()))
+    simulator = EmbeddedSimulator()
+    from evonav.house import bundled_houses
+
+    simulator.reset(next(iter(bundled_houses())).to_json())
+    frames = [simulator.render(instances=False)]
+    (percept,) = perception.perceive(frames)
+    (again,) = perception.perceive(frames)
+    detections = percept.detections
+    assert np.array_equal(detections.masks, again.detections.masks)
+    assert set(detections.labels) <= set(PROCTHOR_TYPES)
+    assert detections.labels
+    assert sorted(set(np.unique(detections.masks).tolist()) - {-1}) == list(range(len(detections.labels)))
+    assert detections.features is not None
+    assert detections.features.shape[0] == len(detections.labels)
+    text = perception.text_feature("bed")
+    assert text is not None
+    assert text.shape == detections.features.shape[1:]

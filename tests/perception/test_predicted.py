@@ -1,0 +1,240 @@
+"""Predicted perception with a detector by rule: what it takes over from it, and a whole episode with it."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scripted_models
+from scripted_models import ColourEmbedder, scripted_perception
+
+from evonav.errors import InvalidArgumentError, PerceptionError, StoreError
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.settings import PerceptionSettings
+from evonav.evaluation.store import RunStore
+from evonav.house import bundled_houses
+from evonav.memory.vocabulary import CATEGORY_OF_TYPE, WORD_OF_LABEL, category_image, relabelled
+from evonav.perception.detector import Found, nothing_found
+from evonav.perception.filters import FilterConfig
+from evonav.perception.predicted import PredictedPerception, StackPerception, predicted_perception
+from evonav.perception.stacks import EVERYTHING, JointDetector, StackConfig, stack_of, weights_of
+from evonav.perception.vocabulary import (
+    COCO_UNIGOAL,
+    DINO_UNIGOAL,
+    PROCTHOR_NOUNS,
+    PROCTHOR_TYPES,
+    SCANNET200,
+    TYPE_OF_WORD,
+    type_of_word,
+)
+from evonav.sensors.observation import Detections
+from evonav.world.embedded import EmbeddedSimulator
+from evonav.world.pose import Pose
+from evonav.world.simulator import Frame, Intrinsics
+
+SIDE = 64
+
+
+class Told:
+    """Finds what it is told to."""
+
+    def __init__(self, *found):
+        self.found = found
+
+    def detect(self, images, depths_m):
+        return list(self.found)
+
+
+def frame(instances=None):
+    depth_m = np.random.default_rng(1).uniform(1.0, 4.0, (SIDE, SIDE)).astype(np.float32)
+    rgb = np.random.default_rng(2).integers(0, 256, (SIDE, SIDE, 3), dtype=np.uint8)
+    return Frame(Pose(1, 1.5, 2, 0.3), Intrinsics(SIDE, SIDE, math.pi / 2), depth_m, rgb, instances)
+
+
+def found(*parts):
+    """Masks that fill their boxes (left, top, right, bottom)."""
+    masks = np.zeros((len(parts), SIDE, SIDE), np.bool_)
+    for mask, (left, top, right, bottom), _, _ in zip(masks, *zip(*parts, strict=True), strict=True):
+        mask[top:bottom, left:right] = True
+    boxes, labels, confidences = zip(*parts, strict=True)
+    return Found(masks, np.array(boxes, np.float32), labels, np.array(confidences, np.float32))
+
+
+def same(a: Detections, b: Detections) -> bool:
+    return (
+        a.labels == b.labels
+        and np.array_equal(a.masks, b.masks)
+        and np.array_equal(a.confidences, b.confidences)
+        and np.array_equal(a.features, b.features)
+    )
+
+
+def test_no_ground_truth_goes_in() -> None:
+    nonsense = np.random.default_rng(3).integers(0, 10**6, (SIDE, SIDE)).astype(np.int32)
+    without, with_nonsense = (scripted_perception().perceive([frame(instances)])[0] for instances in (None, nonsense))
+    assert len(without.detections.labels) > 1
+    assert same(without.detections, with_nonsense.detections)
+    assert with_nonsense.pose == frame().pose
+    assert np.array_equal(with_nonsense.depth_m, frame().depth_m)
+
+
+def test_words_become_types_and_words_without_one_stay() -> None:
+    (percept,) = scripted_perception().perceive([frame()])
+    assert set(percept.detections.labels) == {"Sofa", "DiningTable", "GarbageCan", "gizmo"}
+    assert percept.detections.features is not None
+    assert percept.detections.features.shape == (4, 4)
+
+
+def test_masks_confidences_and_features_stay_together_when_some_are_dropped() -> None:
+    parts = found(((0, 0, 30, 20), "cup", 0.5), ((32, 32, 60, 50), "sofa", 0.3), ((40, 2, 60, 30), "bed", 0.9))
+    features = np.eye(3, dtype=np.float32)
+    (percept,) = PredictedPerception(Told(replace(parts, features=features))).perceive([frame()])
+    assert percept.detections.labels == ("Bed", "Cup")  # the doubtful one went, the most confident is first
+    assert percept.detections.confidences.tolist() == pytest.approx([0.9, 0.5])
+    assert percept.detections.features.tolist() == [[0, 0, 1], [1, 0, 0]]
+    assert (percept.detections.masks[2:30, 40:60] == 0).all()
+    assert (percept.detections.masks[0:20, 0:30] == 1).all()
+
+
+def test_a_mask_that_smaller_ones_cover_goes_and_the_rest_is_renumbered() -> None:
+    whole = found(((0, 0, 40, 40), "bed", 0.9), ((50, 50, 60, 60), "cup", 0.8))
+    halves = found(((0, 0, 20, 40), "pillow", 0.7), ((20, 0, 40, 40), "book", 0.6))
+    both = Found(
+        np.concatenate([whole.masks, halves.masks]),
+        np.concatenate([whole.boxes_px, halves.boxes_px]),
+        whole.labels + halves.labels,
+        np.concatenate([whole.confidences, halves.confidences]),
+    )
+    config = replace(EVERYTHING, min_share_of_inner=1.0)
+    (percept,) = PredictedPerception(Told(both), config).perceive([frame()])
+    assert percept.detections.labels == ("Cup", "Pillow", "Book")
+    assert sorted(np.unique(percept.detections.masks).tolist()) == [-1, 0, 1, 2]
+    assert percept.detections.masks[55, 55] == 0
+
+
+def test_nothing_found_is_no_error_and_wrong_shapes_are() -> None:
+    (percept,) = PredictedPerception(Told(nothing_found((SIDE, SIDE))), embedder=ColourEmbedder()).perceive([frame()])
+    assert percept.detections.labels == ()
+    assert percept.detections.features.shape == (0, 4)
+    with pytest.raises(InvalidArgumentError, match="1 results for 2 images"):
+        PredictedPerception(Told(nothing_found((SIDE, SIDE)))).perceive([frame(), frame()])
+    with pytest.raises(InvalidArgumentError, match="a detector's `masks`"):
+        PredictedPerception(Told(replace(found(((0, 0, 9, 9), "a", 1.0)), labels=("a", "b")))).perceive([frame()])
+    with pytest.raises(InvalidArgumentError, match="no colours"):
+        scripted_perception().perceive([replace(frame(), rgb=None)])
+
+
+def test_unigoals_detectors_are_one_and_the_maps_word_stands() -> None:
+    class Network:
+        def detect(self, images, words, min_confidence):
+            return [found(((0, 0, 30, 30), "couch", 0.6))]
+
+    graph = found(((0, 0, 30, 31), "sofa", 0.9), ((40, 40, 60, 60), "painting", 0.9), ((0, 0, 64, 40), "kitchen", 0.9))
+    joint = JointDetector(Network(), 0.5, Told(graph))
+    (percept,) = PredictedPerception(joint, EVERYTHING).perceive([frame()])
+    assert set(percept.detections.labels) == {"Sofa", "Painting"}  # a box over half the image is no object
+
+
+def test_vocabularies_are_what_they_say() -> None:
+    types = set()
+    simulator = EmbeddedSimulator()
+    for house in list(bundled_houses())[:20]:
+        simulator.reset(house.to_json())
+        types |= {body.category for body in simulator.objects if body.kind == "object"}
+    assert len(types) > 60
+    assert types <= set(PROCTHOR_TYPES)
+    assert len(SCANNET200) == len(set(SCANNET200)) == 200
+    assert {"wall", "floor", "mattress"} <= set(SCANNET200)
+    assert set(TYPE_OF_WORD.values()) <= set(PROCTHOR_TYPES)
+    assert [TYPE_OF_WORD[noun] for noun in PROCTHOR_NOUNS] == list(PROCTHOR_TYPES)
+    assert type_of_word("Trash cans") == "GarbageCan"
+    assert type_of_word("table") is None  # dining, coffee or side
+    assert type_of_word("wall") is None
+    assert set(FilterConfig().background) & set(TYPE_OF_WORD) == set()
+
+
+def test_unigoal_reads_its_own_words_again() -> None:
+    """A word becomes a type on the way to the agent, whose tables must lead back to the word."""
+    for word in COCO_UNIGOAL:
+        kind = TYPE_OF_WORD.get(word)
+        assert word == "oven" if kind is None else CATEGORY_OF_TYPE[kind] == word
+    label = {word: TYPE_OF_WORD.get(word, word) for word in DINO_UNIGOAL}
+    told = Detections(
+        np.arange(len(label), dtype=np.int32)[None], tuple(label.values()), np.ones(len(label), np.float32)
+    )
+    kept = relabelled(told, WORD_OF_LABEL).labels
+    assert {"table", "tv", "chair", "sofa", "bed", "plant", "painting", "cabinet", "mirror", "curtain"} <= set(kept)
+    assert category_image(told).shape == (1, len(label))
+
+
+def test_stacks_are_chosen_by_the_agent_and_options_are_checked() -> None:
+    assert [stack_of(name) for name in ("unigoal", "unigoal-paper", "fu", "3d-mem")] == [
+        "unigoal",
+        "unigoal",
+        "3d-mem",
+        "3d-mem",
+    ]
+    assert predicted_perception().needs_rgb
+    assert weights_of("3d-mem", StackConfig(sam="mobile_sam.pt"))["sam"].name == "mobile_sam.pt"
+    assert StackConfig().words == PROCTHOR_NOUNS
+    assert StackConfig(vocabulary="Sofa; tv ;sofa").words == ("sofa", "tv")
+    with pytest.raises(InvalidArgumentError, match="no option 'confidence'; there are vocabulary, min_confidence"):
+        predicted_perception(confidence=0.5)
+    with pytest.raises(InvalidArgumentError, match="min_confidence is 2"):
+        predicted_perception(min_confidence=2)
+    with pytest.raises(InvalidArgumentError, match="no stack 'yolo'"):
+        predicted_perception("yolo")
+    with pytest.raises(InvalidArgumentError, match=r"sam is 'sam_l\.pt', expected weights of transformers"):
+        weights_of("transformers", StackConfig(sam="sam_l.pt"))
+    with pytest.raises(InvalidArgumentError, match="words of its own"):
+        weights_of("unigoal", StackConfig(vocabulary="procthor"))
+    with pytest.raises(PerceptionError, match=r"no weights 'yolo\.pt' are known; there are .*yolov8x-world\.pt"):
+        weights_of("3d-mem", StackConfig(detector="yolo.pt"))
+    with pytest.raises(InvalidArgumentError, match="no vocabulary 'coco'"):
+        _ = StackConfig(vocabulary="coco").words
+    with pytest.raises(InvalidArgumentError, match="before it looks"):
+        StackPerception("auto", StackConfig(), None, "cpu").perceive([frame()])
+
+
+def test_folder_and_device_are_no_part_of_what_makes_runs_the_same() -> None:
+    backend = PerceptionSettings(make="predicted:3d-mem,models=/somewhere,device=cpu,min_confidence=0.5").backend(
+        Backend()
+    )
+    assert backend.perception_host_options == {"models": "/somewhere", "device": "cpu"}
+    assert backend.identity()["perception_options"] == {"stack": "3d-mem", "min_confidence": 0.5}
+    assert "/somewhere" not in json.dumps(backend.identity())
+
+
+def run(folder, perception, agents=("fu",), limit=1):
+    protocol = ProtocolConfig(max_rounds=4, max_actions=10)
+    config = RunConfig(protocol=protocol, backend=Backend(perception=f"scripted_models:{perception}"))
+    with bundled_tasks() as tasks:
+        return evaluate(list(agents), task_files(tasks, limit), folder, config=config, num_workers=0)
+
+
+def test_a_whole_episode_with_a_scripted_detector(tmp_path) -> None:
+    run(tmp_path / "run", "scripted_perception", agents=("3d-mem", "unigoal"))
+    with RunStore(tmp_path / "run") as store:
+        records = list(store.records("3d-mem"))
+        costs = store.costs()
+    assert len(records) >= 3
+    assert all(record.is_scored for record in records)
+    labels = {entry.label for record in records for entry in record.entries}
+    assert labels
+    assert labels <= {"Sofa", "DiningTable", "GarbageCan", "gizmo"}
+    assert all(cost["perception_wall_s"] > 0.0 for cost in costs.values())
+    assert len(costs) == 2 * len(records)
+
+
+def test_a_run_goes_on_with_the_same_weights_alone(tmp_path, monkeypatch) -> None:
+    run(tmp_path, "checked_perception")
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["perception_models"] == {"scripted": {"weights": {"a.pt": "00"}}}
+    monkeypatch.setattr(scripted_models.Counted, "facts", {"scripted": {"weights": {"a.pt": "11"}}})
+    run(tmp_path, "checked_perception")  # nothing is left to do
+    with pytest.raises(StoreError, match=r"scripted\.weights\.a\.pt: there '00', asked '11'"):
+        run(tmp_path, "checked_perception", agents=("stage-reset",))
