@@ -65,12 +65,14 @@ def detections(*parts):
 def test_small_objects_and_windows_are_ignored_and_walls_are_nothing():
     depth = np.full((40, 40), 2.0, np.float32)
     depth[10:15, 0:20], depth[15:20, 0:20] = 3.0, np.inf
+    depth[25:35, 0:5], depth[35:, :] = 1.0, 1.94
     truth = true_objects(frame(scene(), depth), OBJECTS)
     assert truth.labels == ("Sofa", "Bed", "Mug", "Window")
     assert truth.num_wanted == 2
     assert truth.areas_px.tolist() == [200, 100, 9, 64]
     assert truth.distances_m.tolist() == [3.0, 2.0, 2.0, 2.0]
-    assert truth.is_cut.tolist() == [True, False, False, True]
+    # All around the sofa is nearer, or is the image's border; so is what is left of the bed, but not the floor below.
+    assert truth.outline_shares.tolist() == pytest.approx([0, 30 / 40, 1, 24 / 32])
     with pytest.raises(InvalidArgumentError, match="instances"):
         true_objects(Frame(Pose(0, 0, 0, 0), Intrinsics(4, 4, 1.0), np.ones((4, 4), np.float32)), OBJECTS)
 

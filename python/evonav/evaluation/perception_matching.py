@@ -20,6 +20,7 @@ IOU_LIMIT = 0.5
 MIN_AREA_PX = 25
 MIN_AREA_SHARE = 0.001
 """As `GroundTruthPerception`: an object of fewer pixels, or of a smaller part of the image, is ignored."""
+NEARER_M, NEARER_SHARE = 0.05, 0.05
 IGNORED_KINDS = ("door", "window")
 
 NONE, IGNORED = -1, -2
@@ -37,8 +38,8 @@ class TrueObjects:
     areas_px: NDArray[np.int64]
     distances_m: NDArray[np.float64]
     """`(T,)` median depth (planar z) of its pixels."""
-    is_cut: NDArray[np.bool_]
-    """`(T,)` it goes on beyond the image's edge, or seems to."""
+    outline_shares: NDArray[np.float64]
+    """`(T,)` part of its outline that is its own, see `own_outlines`."""
     masks: NDArray[np.int32]
     """`(H, W)`, -1 where none is."""
 
@@ -87,7 +88,7 @@ def true_objects(frame: Frame, objects: Sequence[SceneObject]) -> TrueObjects:
         labels=tuple(objects[i].category for i in bodies.tolist()),
         areas_px=areas[bodies],
         distances_m=median_depths_m(frame.depth_m, masks, len(bodies)),
-        is_cut=_cut(masks, len(bodies)),
+        outline_shares=own_outlines(masks, frame.depth_m, len(bodies)),
         masks=masks,
     )
 
@@ -104,6 +105,26 @@ def median_depths_m(depth_m: NDArray[np.float32], masks: NDArray[np.int32], num_
     full = counts > 0
     medians[full] = depths[(ends - counts + (counts - 1) // 2)[full]]
     return medians
+
+
+def own_outlines(masks: NDArray[np.int32], depth_m: NDArray[np.float32], num_masks: int) -> NDArray[np.float64]:
+    """`(num_masks,)` part of each mask's outline that is cut by nothing nearer, nor by the image's border.
+
+    A sign of occlusion that needs no second rendering. Nearer is what is so by more than 5 cm and 5%: an object's foot
+    on the floor is its own. 1 of a mask without pixels.
+    """
+    sides, cut = np.zeros((2, num_masks))
+    padded = np.pad(masks, 1, constant_values=-1)
+    depths = np.pad(depth_m, 1, constant_values=-np.inf)
+    height, width = masks.shape
+    for row, column in ((0, 1), (2, 1), (1, 0), (1, 2)):
+        rows, columns = slice(row, row + height), slice(column, column + width)
+        is_side = (masks >= 0) & (padded[rows, columns] != masks)
+        ids, mine = masks[is_side], depth_m[is_side]
+        is_nearer = depths[rows, columns][is_side] < np.minimum(mine - NEARER_M, (1.0 - NEARER_SHARE) * mine)
+        sides += np.bincount(ids, minlength=num_masks)
+        cut += np.bincount(ids[is_nearer], minlength=num_masks)
+    return 1.0 - cut / np.maximum(sides, 1.0)
 
 
 def overlaps_px(a: NDArray[np.int32], num_a: int, b: NDArray[np.int32], num_b: int) -> NDArray[np.int64]:
@@ -179,10 +200,3 @@ def main_objects(truth: TrueObjects, found: Detections) -> NDArray[np.int64]:
     areas = np.bincount(found.masks[found.masks >= 0], minlength=num)
     best = common.argmax(axis=0)
     return np.where(2 * common.max(axis=0) > areas, truth.bodies[best], NONE)
-
-
-def _cut(masks: NDArray[np.int32], num_masks: int) -> NDArray[np.bool_]:
-    edge = np.concatenate([masks[0], masks[-1], masks[:, 0], masks[:, -1]])
-    is_cut = np.zeros(num_masks, np.bool_)
-    is_cut[edge[edge >= 0]] = True
-    return is_cut

@@ -40,7 +40,8 @@ class TrueRows(_Part):
     category: list[str] = []
     area_px: list[int] = []
     distance_m: list[float] = []
-    is_cut: list[bool] = []
+    outline_share: list[float] = []
+    """Part of its outline that is cut by nothing nearer, nor by the image's border."""
     found: list[int] = []
     """Row of the detection with the right label, -1 without."""
     located: list[int] = []

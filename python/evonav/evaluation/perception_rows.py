@@ -155,7 +155,7 @@ class Rows:
         truths.category += truth.labels[:wanted]
         truths.area_px += truth.areas_px[:wanted].tolist()
         truths.distance_m += [round(value, 3) for value in truth.distances_m[:wanted].tolist()]
-        truths.is_cut += truth.is_cut[:wanted].tolist()
+        truths.outline_share += [round(value, 3) for value in truth.outline_shares[:wanted].tolist()]
         truths.found += _shifted(matched.found.detection_of[:wanted], first_row)
         truths.located += _shifted(matched.located.detection_of[:wanted], first_row)
         areas = np.bincount(found.masks[found.masks >= 0], minlength=num)

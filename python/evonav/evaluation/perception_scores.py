@@ -22,7 +22,8 @@ SIZES = ("small", "medium", "large")
 AP_LIMITS = tuple(round(IOU_LIMIT + 0.05 * i, 2) for i in range(10))
 """COCO's, from the one that pairs are made by."""
 DISTANCES = other.DISTANCES
-EDGES = ("whole", "cut off")
+OUTLINE_LIMITS = (0.5, 0.9)
+OUTLINES = ("under 50%", "50-90%", "over 90%")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ class Scores:
     num_views: int
     overall: Mapping[str, Estimate]
     groups: Mapping[str, Sequence[Group]]
-    """By `category`, `distance`, `size` and `edge`."""
+    """By `category`, `distance`, `size` and `outline`."""
     confusions: Sequence[Confusion]
     """The most frequent first."""
     unexplained: Sequence[tuple[str, int]]
@@ -106,7 +107,7 @@ class _Scorer:
         self.truth_group = {
             "distance": _distance_bins([v for t in truths for v in t.distance_m]),
             "size": _size_bins([v / r.image_px for r in records for v in r.truths.area_px]),
-            "edge": np.array([int(v) for t in truths for v in t.is_cut], np.int64),
+            "outline": np.digitize(np.array([v for t in truths for v in t.outline_share], np.float64), OUTLINE_LIMITS),
         }
         self.group = {
             "distance": _distance_bins([math.inf if v is None else v for d in found for v in d.distance_m]),
@@ -119,7 +120,7 @@ class _Scorer:
         everything = np.ones(len(self.truth_house), np.bool_), np.ones(len(self.house), np.bool_)
         overall = {**self._measures(*everything), **precisions.pop("")}
         groups = {"category": self._categories(precisions)}
-        for by, names in (("distance", DISTANCES), ("size", SIZES), ("edge", EDGES)):
+        for by, names in (("distance", DISTANCES), ("size", SIZES), ("outline", OUTLINES)):
             found = self.group.get(by)
             groups[by] = [
                 Group(name, self._measures(self.truth_group[by] == i, None if found is None else found == i))

@@ -23,7 +23,7 @@ def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> lis
         _headline(found),
         _parts(found),
         *(_by_group(found, by, words) for by, words in (("distance", "distance"), ("size", "size in the image"))),
-        _by_edge(found),
+        _by_outline(found),
         _categories(found, MAX_CATEGORIES if is_brief else None),
         _confusions(found, MAX_CONFUSIONS if is_brief else 4 * MAX_CONFUSIONS),
         _memory(found),
@@ -99,12 +99,14 @@ def _by_group(found: Sequence[Scores], by: str, words: str) -> Table:
     return Table(f"By {words}", ("perception", "", *names), rows, (note,))
 
 
-def _by_edge(found: Sequence[Scores]) -> Table:
+def _by_outline(found: Sequence[Scores]) -> Table:
     rows = tuple(
-        (one.word, *(percent(group.measures.get("recall"), has_n=True) for group in one.groups["edge"]))
+        (one.word, *(percent(group.measures.get("recall"), has_n=True) for group in one.groups["outline"]))
         for one in found
     )
-    return Table("Recall by whether the image's edge cuts the object off", ("perception", "whole", "cut off"), rows)
+    names = [group.name for group in found[0].groups["outline"]]
+    note = "In % (n), by the part of the object's outline that is cut by nothing nearer, nor by the image's border."
+    return Table("Recall by how much is in the way", ("perception", *names), rows, (note,))
 
 
 def _categories(found: Sequence[Scores], most: int | None) -> Table:
