@@ -1,5 +1,6 @@
 """Stub of the Rust extension; `mypy.stubtest evonav._core` holds it to the binary."""
 
+from collections.abc import Sequence
 from typing import Any, TypeAlias, final
 
 import numpy as np
@@ -159,6 +160,60 @@ def number_instances(
     min_area_px: int,
     max_box_fraction: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]: ...
+def draw_normals(seed: int, labels: Sequence[Sequence[str]], *, num_draws: int) -> NDArray[np.float64]:
+    """`(N, num_draws)` standard normals, a row of each named stream."""
+
+def mask_outlines(masks: NDArray[np.int32], depth_m: NDArray[np.float32], *, num_masks: int) -> NDArray[np.float64]:
+    """`(num_masks, 3)`: sides of each mask's outline, those that something nearer or the border cuts, mean depth."""
+
+def distort_masks(
+    masks: NDArray[np.int32], changes: NDArray[np.int32], margins_px: NDArray[np.float64]
+) -> NDArray[np.int32]:
+    """Masks that grow or shrink by their margins, then are split, cut and renamed.
+
+    `changes` is `(N, 8)`: number, number of the rest, whether split by column, first row or column of the rest, then
+    top, left, bottom and right that the mask is cut to.
+    """
+
+def surface_sites(
+    depth_m: NDArray[np.float32],
+    *,
+    vertical_fov_rad: float,
+    position_m: tuple[float, float, float],
+    yaw_rad: float,
+    horizon_rad: float,
+    cell_m: float,
+    stride_px: int,
+    persistence: float,
+    seed: int,
+    lasting: Sequence[str],
+    passing: Sequence[str],
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Cells of the world with a surface in view.
+
+    `(N, 2)` row and column, `(N, 5)` depth, latent, two lasting draws, one passing.
+    """
+
+def paint_blobs(
+    masks: NDArray[np.int32],
+    surfaces: NDArray[np.int32],
+    blobs: NDArray[np.int64],
+    radii_px: NDArray[np.float64],
+) -> None:
+    """Paints `(N, 3)` row, column, number with `(N, 2)` radii into `masks`, each over its own surface alone."""
+
+def noisy_depth(
+    depth_m: NDArray[np.float32],
+    *,
+    sigma_m: float,
+    sigma_per_m: float,
+    step_per_m: float,
+    dropout: float,
+    edge_dropout: float,
+    max_depth_m: float,
+    seed: int,
+    labels: Sequence[str],
+) -> NDArray[np.float32]: ...
 def instance_areas(instances: NDArray[np.int32], num_instances: int) -> NDArray[np.int64]:
     """`(N,)` pixels of each instance of an `(H, W)` image: 0 where nothing is, else 1 + index."""
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
@@ -61,16 +62,28 @@ class GroundTruthPerception:
             InvalidArgumentError: The frame has no instances, they are outside `objects`, or a parameter of this
                 perception is outside its domain.
         """
-        if frame.instances is None:
-            raise InvalidArgumentError("argument `frame` has no instances, expected a frame rendered with them")
-        masks, instances = _core.number_instances(
-            frame.instances,
-            np.array([body.kind == "object" for body in objects], np.bool_),
-            min_area_px=max(self.min_area_px, round(self.min_area_fraction * frame.instances.size)),
-            max_box_fraction=self.max_box_fraction,
-        )
+        masks, instances = self.number(frame, objects)
         return Detections(
             masks=masks,
             labels=tuple(objects[index].category for index in instances),
             confidences=np.ones(len(instances), np.float32),
         )
+
+    def number(self, frame: Frame, objects: Sequence[SceneObject]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+        """The same as masks, and the index into `objects` of each: oracle data.
+
+        Raises:
+            InvalidArgumentError: As `detect`.
+        """
+        if frame.instances is None:
+            raise InvalidArgumentError("argument `frame` has no instances, expected a frame rendered with them")
+        return _core.number_instances(
+            frame.instances,
+            np.array([body.kind == "object" for body in objects], np.bool_),
+            min_area_px=self.min_px(frame),
+            max_box_fraction=self.max_box_fraction,
+        )
+
+    def min_px(self, frame: Frame) -> int:
+        """Fewest pixels of a mask in a frame."""
+        return max(self.min_area_px, round(self.min_area_fraction * frame.depth_m.size))

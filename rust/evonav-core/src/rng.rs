@@ -29,6 +29,17 @@ impl Stream {
         Self { key, counter: 0 }
     }
 
+    /// The stream of a place within this one, whatever has been drawn from it; places are told
+    /// apart by their numbers and by how many there are.
+    pub fn at(&self, place: &[i64]) -> Self {
+        // Labels mix bytes and 256; the sign bit keeps numbers apart from both.
+        let step = |key: u64, number: u64| {
+            mix(key.wrapping_mul(0x0000_0100_0000_01b3) ^ number ^ (1 << 63)).wrapping_add(GOLDEN)
+        };
+        let numbers = place.iter().map(|&number| number as u64).chain([place.len() as u64]);
+        Self { key: numbers.fold(self.key, step), counter: 0 }
+    }
+
     /// The next 64 bits.
     pub fn next_u64(&mut self) -> u64 {
         self.counter = self.counter.wrapping_add(1);
@@ -38,6 +49,13 @@ impl Stream {
     /// Uniform in [0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 * 2.0_f64.powi(-53)
+    }
+
+    /// Standard normal (Box & Muller 1958); two draws.
+    pub fn normal(&mut self) -> f64 {
+        // 1 - u is never 0.
+        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.uniform()).cos()
     }
 
     /// Uniform in `0..bound`; 0 for an empty range.

@@ -8,6 +8,7 @@ mod evolution;
 mod house;
 mod inspect;
 mod memory;
+mod noise;
 mod objects;
 mod planning;
 mod sensors;
@@ -23,6 +24,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     house::register(module)?;
     inspect::register(module)?;
     sensors::register(module)?;
+    noise::register(module)?;
     memory::register(module)?;
     planning::register(module)?;
     camera::register(module)?;
