@@ -68,3 +68,17 @@ class Broken(Erring):
 
     def perceive(self, frames):
         raise RuntimeError("out of memory")
+
+
+class Weighted(Erring):
+    """Needs weights, of which there are two versions."""
+
+    version = "one"
+
+    def check(self, agents):
+        assert list(agents) == ["fu"]
+        return {"weights": self.version}
+
+
+def weighted():
+    return Weighted()

@@ -246,3 +246,13 @@ def test_the_command(tasks, tmp_path):
     unknown = CliRunner().invoke(app, [*words, "--perception", "nosy"])
     assert isinstance(unknown.exception, InvalidArgumentError)
     assert "did you mean noisy?" in str(unknown.exception)
+
+
+def test_weights_are_the_same_for_all_records(tasks, tmp_path, monkeypatch):
+    spec = PerceptionSpec("weighted", "erring_perceptions:weighted")
+    measure([spec], tasks[:1], tmp_path, config=CONFIG, num_workers=0)
+    assert json.loads((tmp_path / "perception.json").read_text())["models"] == {"weighted": {"weights": "one"}}
+    monkeypatch.setattr("erring_perceptions.Weighted.version", "two")
+    measure([spec], tasks[:1], tmp_path, config=CONFIG, num_workers=0)  # nothing to look at
+    with pytest.raises(StoreError, match="there 'one', asked 'two'"):
+        measure([spec], tasks[:2], tmp_path, config=CONFIG, num_workers=0)

@@ -7,7 +7,18 @@ import typer
 
 from evonav.cli import completion
 from evonav.cli.display import interruptible, show
-from evonav.cli.options import EXIT_INCOMPLETE, AnyAsset, Limit, Seed, Subset, Workers, count_of
+from evonav.cli.options import (
+    EXIT_INCOMPLETE,
+    AnyAsset,
+    Limit,
+    ModelDevice,
+    Models,
+    Seed,
+    Subset,
+    Workers,
+    count_of,
+    with_perception,
+)
 
 
 def perception(
@@ -36,6 +47,8 @@ def perception(
         ),
     ] = 2,
     seed: Seed = 0,
+    models: Models = None,
+    device: ModelDevice = None,
     allow_unknown_assets: AnyAsset = False,
     workers: Workers = None,
 ) -> None:
@@ -46,10 +59,10 @@ def perception(
     from rich import progress as bars
     from rich.console import Console
 
+    from evonav.evaluation.backend import Backend
     from evonav.evaluation.datasets import bundled_tasks
     from evonav.evaluation.engine import task_files
     from evonav.evaluation.perception_quality import PerceptionSpec, TourConfig, measure
-    from evonav.perception.words import read_word
     from evonav.report.perception_page import write_perception_report
     from evonav.report.perception_tables import perception_tables
 
@@ -57,8 +70,9 @@ def perception(
         raise typer.BadParameter("give --limit or --subset, not both")
     specs = []
     for word in perceptions or ["gt"]:
-        found = read_word(word)
-        specs.append(PerceptionSpec(word, found.make, found.options))
+        is_model = word.startswith("predicted")
+        found = with_perception(Backend(), word, models if is_model else None, device if is_model else None)
+        specs.append(PerceptionSpec(word, found.perception, found.perception_options, found.perception_host_options))
     name = "lenient_simulator" if allow_unknown_assets else "embedded_simulator"
     columns = (
         bars.TextColumn("{task.description}"),

@@ -40,6 +40,8 @@ from evonav.world.simulator import Frame, Simulator
 WORK = "evonav.evaluation.perception_quality:make_worker"
 TASK_TIMEOUT_S = 3600.0
 """Without a sign of life; a place of a tour is one."""
+AGENT = "fu"
+"""Whom percepts are for, where that matters: models of `predicted:auto`."""
 NUM_PICTURES = 4
 """Tasks that have a picture."""
 
@@ -54,6 +56,17 @@ class PerceptionSpec:
     """Import path."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Keywords."""
+    host_options: Mapping[str, Any] = field(default_factory=dict)
+    """More of them, on this machine's means."""
+
+    def backend(self, simulator: str) -> Backend:
+        """What a worker builds."""
+        return Backend(
+            simulator=simulator,
+            perception=self.make,
+            perception_options=self.options,
+            perception_host_options=self.host_options,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +133,6 @@ def measure(
         raise InvalidArgumentError(f"no {'task' if specs else 'perception'} to measure")
     if len(set(words)) != len(words):
         raise InvalidArgumentError(f"a perception is named twice: {', '.join(words)}")
-    for spec in specs:
-        Backend(perception=spec.make, perception_options=spec.options).make_perception()
     with writing(out):
         header = _begun(specs, tasks, out, config, simulator)
         jobs: list[tuple[PerceptionSpec, TaskFile, bool]] = [
@@ -130,6 +141,7 @@ def measure(
             for spec in specs
             if not record_path(out, spec.word, task.task_id).exists()
         ]
+        _claim_models(header, [spec for spec in specs if any(spec is job[0] for job in jobs)], out, simulator)
         num_all = len(tasks) * len(specs)
         num_done, failures = num_all - len(jobs), []
         on_progress(num_done, num_all, "")
@@ -172,27 +184,37 @@ def _begun(
                 for word in there.words:
                     record_path(out, word, task_id).unlink(missing_ok=True)
         digests = {**there.digests, **digests}
-    header = Header(
-        identity=identity, words=words, options=options, tasks=[task.task_id for task in tasks], digests=digests
+    return Header(
+        identity=identity,
+        words=words,
+        options=options,
+        models={} if there is None else there.models,
+        tasks=[task.task_id for task in tasks],
+        digests=digests,
     )
+
+
+def _claim_models(header: Header, specs: Sequence[PerceptionSpec], out: Path, simulator: str) -> None:
+    """Notes hashes of weights and versions of libraries before anyone looks, or checks that they are the folder's."""
+    for spec in specs:
+        found = spec.backend(simulator).check_perception([AGENT])
+        there = header.models.setdefault(spec.word, found)
+        check_same_run({spec.word: there}, {spec.word: found}, out)
     write_header(out, header)
-    return header
 
 
 def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
     """The function from a job to its record, as `evonav.parallel` calls it."""
     values = json.loads(settings)
     config = TourConfig(**values["config"])
-    backend = Backend(simulator=values["simulator"])
-    simulator = backend.make_simulator()
+    simulator = Backend(simulator=values["simulator"]).make_simulator()
 
     def work(text: str) -> str:
-        spec, path, digest, has_picture = json.loads(text)
-        case = backend.load_case(Path(path))
-        perception = Backend(perception=spec["make"], perception_options=spec["options"]).make_perception()
-        record = measure_task(
-            case, perception, simulator, config, word=spec["word"], has_picture=has_picture, alive=alive
-        )
+        given, path, digest, has_picture = json.loads(text)
+        spec = PerceptionSpec(**given)
+        backend = spec.backend(values["simulator"])
+        case, perception = backend.load_case(Path(path)), backend.make_perception()
+        record = measure_task(case, perception, simulator, config, word=spec.word, has_picture=has_picture, alive=alive)
         record.digest = digest
         return record.model_dump_json()
 
@@ -231,7 +253,7 @@ def measure_task(
         objects = simulator.objects
         places = tour(case, stage, simulator, views_per_room=config.views_per_room, seed=config.seed)
         goal = case.stages[stage - 1].public
-        perception.begin_stage(StageScene(case.task_id, goal, "", config.seed, objects))
+        perception.begin_stage(StageScene(case.task_id, goal, AGENT, config.seed, objects))
         memory.begin_stage(stage, objects)
         if states:
             states.append(memory.state(0.0))

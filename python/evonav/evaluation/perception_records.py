@@ -174,6 +174,8 @@ class Header(_Part):
     """Perceptions, in the order in which they were first asked for."""
     options: dict[str, dict[str, Any]]
     """By word: import path and keywords."""
+    models: dict[str, dict[str, Any]] = {}
+    """By word: hashes of weights and versions of libraries, of perceptions that have some."""
     tasks: list[str]
     """Of the last command."""
     digests: dict[str, str]
