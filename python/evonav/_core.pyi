@@ -538,6 +538,31 @@ def project_points(
 ) -> NDArray[np.float64]:
     """`(N, 3)` column, row and planar depth of `(N, 3)` world points; NaN behind the camera."""
 
+# nn
+
+@final
+class MiniNetwork:
+    """The mini detector's network with its weights."""
+
+    def __new__(cls, weights: bytes) -> MiniNetwork: ...
+    @property
+    def classes(self) -> list[str]: ...
+    def logits(self, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
+        """`(75, 75, 1 + classes + 2)`: background, classes, links to the right and downwards."""
+
+    def detect(
+        self,
+        rgb: NDArray[np.uint8],
+        depth_m: NDArray[np.float32],
+        *,
+        min_cells: int,
+        min_confidence: float,
+        colour: float = 0.02,
+        depth: float = 8.0,
+        place: float = 0.5,
+    ) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.float32]]:
+        """`(H, W)` instance of each pixel or -1; class and confidence of each instance."""
+
 # simulator
 
 @final

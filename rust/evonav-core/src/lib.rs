@@ -11,6 +11,7 @@ pub mod geometry;
 pub mod grid;
 pub mod house;
 pub mod memory;
+pub mod nn;
 pub mod planning;
 pub mod rng;
 pub mod sensors;

@@ -8,6 +8,7 @@ mod evolution;
 mod house;
 mod inspect;
 mod memory;
+mod nn;
 mod noise;
 mod objects;
 mod planning;
@@ -26,6 +27,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     sensors::register(module)?;
     noise::register(module)?;
     memory::register(module)?;
+    nn::register(module)?;
     planning::register(module)?;
     camera::register(module)?;
     simulator::register(module)?;

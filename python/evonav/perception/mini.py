@@ -1,0 +1,83 @@
+"""The mini detector: a small network of our own for the embedded simulator's pictures, run by the Rust core.
+
+It needs no torch and no download. It knows the embedded simulator's pictures alone and stands for no published model:
+its figures are never the paper's column. See docs/mini-detector.md.
+"""
+
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav import _core
+from evonav.errors import InvalidArgumentError
+from evonav.perception.detector import Found
+
+WEIGHTS = Path(__file__).parents[1] / "data" / "mini.weights"
+"""What ships, made by `scripts/train_mini.py` and `scripts/export_mini.py`."""
+
+
+@cache
+def _network(weights: Path) -> _core.MiniNetwork:
+    """Read once a process."""
+    try:
+        return _core.MiniNetwork(weights.read_bytes())
+    except (OSError, InvalidArgumentError) as error:
+        raise InvalidArgumentError(
+            f"the mini detector's weights {weights} cannot be used ({error}); reinstall evonav, or name a file that "
+            "scripts/export_mini.py wrote"
+        ) from error
+
+
+class MiniDetector:
+    """Objects of the types in `classes`, from colours and depth together. Shared by all episodes of a process."""
+
+    def __init__(self, weights: Path | None = None, *, min_cells: int = 2, min_confidence: float = 0.25) -> None:
+        """A detector.
+
+        Args:
+            weights: A file of `scripts/export_mini.py`; default: what ships.
+            min_cells: Fewest cells of an object, each of 4 by 4 pixels in a view of 300 by 300.
+            min_confidence: Least mean probability of an object's type over its cells.
+
+        Raises:
+            InvalidArgumentError: The file is missing or broken.
+        """
+        self._network = _network(weights or WEIGHTS)
+        self._min_cells = min_cells
+        self._min_confidence = min_confidence
+        self.classes = tuple(self._network.classes)
+        """ProcTHOR's types that it tells apart."""
+
+    def detect(self, images: Sequence[NDArray[np.uint8]], depths_m: Sequence[NDArray[np.float32]]) -> list[Found]:
+        """Each view by itself: how many come at once changes nothing.
+
+        Args:
+            images: Each `(H, W, 3)` RGB, of a camera of 90 degrees field of view.
+            depths_m: Each `(H, W)` planar z, `inf` where nothing is.
+
+        Returns:
+            Instances, whose masks do not overlap.
+
+        Raises:
+            InvalidArgumentError: An image and its depths do not fit, or a depth is not a number.
+        """
+        return [self._found(image, depth_m) for image, depth_m in zip(images, depths_m, strict=True)]
+
+    def _found(self, image: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> Found:
+        numbers, classes, confidences = self._network.detect(
+            np.ascontiguousarray(image),
+            np.ascontiguousarray(depth_m),
+            min_cells=self._min_cells,
+            min_confidence=self._min_confidence,
+        )
+        extents = _core.mask_extents(numbers, num_masks=len(classes))
+        seen = np.flatnonzero(extents[:, 0] > 0)
+        return Found(
+            masks=numbers == seen[:, None, None],
+            boxes_px=extents[seen, 1:].astype(np.float32),
+            labels=tuple(self.classes[index] for index in classes[seen].tolist()),
+            confidences=confidences[seen],
+        )

@@ -1,0 +1,244 @@
+//! Instances from what the network says of cells, and their pixels in the picture.
+
+use crate::{
+    Error,
+    nn::{
+        conv::Tensor,
+        network::{SIDE_CELLS, samples},
+    },
+};
+
+/// Instances in the grid of cells.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Segments {
+    /// Instance of each cell, row-major; -1 where none.
+    pub cells: Vec<i32>,
+    /// Class of each instance.
+    pub classes: Vec<usize>,
+    /// Mean probability of that class over the instance's cells.
+    pub confidences: Vec<f32>,
+}
+
+/// Joins neighbouring cells that the network links into instances, and has each instance's cells
+/// vote for its class.
+///
+/// A cell is part of an object if a class is likelier there than the background. Two such
+/// neighbours are joined if the link between them is likelier than not.
+///
+/// # Arguments
+/// * `logits` - by cell: background, classes, link to the right, link downwards.
+/// * `min_cells` - instances of fewer are dropped.
+/// * `min_confidence` - so are those less sure of their class.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] if a cell has no class, or a threshold is not a number.
+///
+/// # Complexity
+/// O(cells x classes).
+pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Result<Segments, Error> {
+    Error::require("logits", logits.channels, "at least 4 a cell", |channels| channels >= 4)?;
+    Error::require("min_confidence", min_confidence, "in 0..=1", |v| (0.0..=1.0).contains(&v))?;
+    let (width, num_classes) = (logits.width, logits.channels - 3);
+    let cells: Vec<&[f32]> = logits.values.chunks_exact(logits.channels).collect();
+    let is_object: Vec<bool> =
+        cells.iter().map(|cell| cell[1..=num_classes].iter().any(|&v| v > cell[0])).collect();
+    let mut forest = Forest::new(cells.len());
+    for (place, cell) in cells.iter().enumerate().filter(|(place, _)| is_object[*place]) {
+        let right = (place % width + 1 < width).then_some(place + 1);
+        let links = [(right, cell[num_classes + 1]), (Some(place + width), cell[num_classes + 2])];
+        for (other, link) in links {
+            if let Some(other) = other.filter(|&other| is_object.get(other) == Some(&true))
+                && link > 0.0
+            {
+                forest.join(place, other);
+            }
+        }
+    }
+    // Instances count up in the order of their first cell.
+    let mut number_of = vec![usize::MAX; cells.len()];
+    let mut votes: Vec<(usize, Vec<f32>)> = Vec::new();
+    let mut found = vec![usize::MAX; cells.len()];
+    for (place, cell) in cells.iter().enumerate().filter(|(place, _)| is_object[*place]) {
+        let root = forest.root(place);
+        if number_of[root] == usize::MAX {
+            number_of[root] = votes.len();
+            votes.push((0, vec![0.0; num_classes]));
+        }
+        found[place] = number_of[root];
+        let (num_cells, sums) = &mut votes[number_of[root]];
+        *num_cells += 1;
+        add_probabilities(&cell[..=num_classes], sums);
+    }
+    let mut kept = Segments::default();
+    let numbers: Vec<i32> = votes
+        .iter()
+        .map(|(num_cells, sums)| {
+            let class = largest(sums);
+            let confidence = (sums[class] / *num_cells as f32).clamp(0.0, 1.0);
+            if *num_cells < min_cells || confidence.is_nan() || confidence < min_confidence {
+                return -1;
+            }
+            kept.classes.push(class);
+            kept.confidences.push(confidence);
+            kept.classes.len() as i32 - 1
+        })
+        .collect();
+    kept.cells = found.iter().map(|&number| numbers.get(number).copied().unwrap_or(-1)).collect();
+    Ok(kept)
+}
+
+/// Adds each class's share of the softmax; the background's is left out.
+fn add_probabilities(logits: &[f32], sums: &mut [f32]) {
+    let most = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let powers: Vec<f32> = logits.iter().map(|logit| (logit - most).exp()).collect();
+    let total: f32 = powers.iter().sum();
+    for (sum, power) in sums.iter_mut().zip(&powers[1..]) {
+        *sum += power / total;
+    }
+}
+
+/// Index of the largest number, the first of equals.
+fn largest(values: &[f32]) -> usize {
+    let mut best = 0;
+    for (index, value) in values.iter().enumerate() {
+        if *value > values[best] {
+            best = index;
+        }
+    }
+    best
+}
+
+/// Sets that only grow together; the smallest member stands for a set.
+struct Forest(Vec<usize>);
+
+impl Forest {
+    fn new(len: usize) -> Self {
+        Self((0..len).collect())
+    }
+
+    fn root(&mut self, mut place: usize) -> usize {
+        while self.0[place] != place {
+            self.0[place] = self.0[self.0[place]];
+            place = self.0[place];
+        }
+        place
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b)] = a.min(b);
+    }
+}
+
+/// What makes a pixel resemble a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resemblance {
+    /// Of a step of one in one colour channel.
+    pub colour: f32,
+    /// Of one being twice as far away as the other.
+    pub depth: f32,
+    /// Of a cell's width between them.
+    pub place: f32,
+}
+
+impl Default for Resemblance {
+    fn default() -> Self {
+        Self { colour: 0.02, depth: 8.0, place: 0.5 }
+    }
+}
+
+/// Gives every pixel the instance of the cell around it that it resembles most: outlines become
+/// those of the picture.
+///
+/// # Arguments
+/// * `cells` - instance of each cell of the network's grid.
+/// * `rgb`, `depth_m`, `size_px` - as for [`super::network::input`].
+/// * `weigh` - how differences count.
+///
+/// # Returns
+/// Instance of each pixel, -1 where none.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] if the numbers of cells or pixels are off.
+///
+/// # Complexity
+/// O(pixels), nine comparisons each where the cells around differ.
+pub fn refine(
+    cells: &[i32],
+    rgb: &[u8],
+    depth_m: &[f32],
+    size_px: [usize; 2],
+    weigh: Resemblance,
+) -> Result<Vec<i32>, Error> {
+    let [width, height] = size_px;
+    Error::require("cells", cells.len(), "one a cell", |len| len == SIDE_CELLS * SIDE_CELLS)?;
+    let num_px = width.checked_mul(height).unwrap_or(0);
+    let fits = num_px > 0 && depth_m.len() == num_px && rgb.len() == 3 * num_px;
+    Error::require("rgb", rgb.len(), "three bytes, and a depth, a pixel", |_| fits)?;
+    let (pixels, [rows, cols]) = (rgb.as_chunks::<3>().0, [height, width].map(samples));
+    let guide = |place: usize| Guide { rgb: pixels[place].map(f32::from), z_m: depth_m[place] };
+    let guides: Vec<Guide> = (0..SIDE_CELLS * SIDE_CELLS)
+        .map(|cell| guide(rows[cell / SIDE_CELLS * 2] * width + cols[cell % SIDE_CELLS * 2]))
+        .collect();
+    let mut found = Vec::with_capacity(num_px);
+    let col_cells: Vec<usize> = (0..width).map(|col| col * SIDE_CELLS / width).collect();
+    for row in 0..height {
+        let near_rows = around(row * SIDE_CELLS / height);
+        let mut last = (usize::MAX, None);
+        for (col, &col_cell) in col_cells.iter().enumerate() {
+            if last.0 != col_cell {
+                last = (col_cell, same_around(cells, near_rows.clone(), around(col_cell)));
+            }
+            if let Some(instance) = last.1 {
+                found.push(instance);
+                continue;
+            }
+            let pixel = guide(row * width + col);
+            let mut best = (f32::INFINITY, -1);
+            for cell_row in near_rows.clone() {
+                let down = (row as f32 - rows[2 * cell_row] as f32) * SIDE_CELLS as f32;
+                for cell_col in around(col_cell) {
+                    let right = (col as f32 - cols[2 * cell_col] as f32) * SIDE_CELLS as f32;
+                    let cell = cell_row * SIDE_CELLS + cell_col;
+                    let apart =
+                        weigh.place * (down.abs() / height as f32 + right.abs() / width as f32);
+                    let unlike = apart + pixel.unlike(&guides[cell], weigh);
+                    if unlike < best.0 {
+                        best = (unlike, cells[cell]);
+                    }
+                }
+            }
+            found.push(best.1);
+        }
+    }
+    Ok(found)
+}
+
+struct Guide {
+    rgb: [f32; 3],
+    z_m: f32,
+}
+
+impl Guide {
+    fn unlike(&self, other: &Self, weigh: Resemblance) -> f32 {
+        let colour: f32 = self.rgb.iter().zip(&other.rgb).map(|(a, b)| (a - b).abs()).sum();
+        let (a, b) = (self.z_m.clamp(0.05, 20.0), other.z_m.clamp(0.05, 20.0));
+        weigh.colour * colour + weigh.depth * ((a - b).abs() / a.min(b)).min(1.0)
+    }
+}
+
+/// A cell's place and the ones beside it.
+fn around(place: usize) -> std::ops::Range<usize> {
+    place.saturating_sub(1)..(place + 2).min(SIDE_CELLS)
+}
+
+/// The instance that all cells of a block are of.
+fn same_around(
+    cells: &[i32],
+    rows: std::ops::Range<usize>,
+    cols: std::ops::Range<usize>,
+) -> Option<i32> {
+    let first = cells[rows.start * SIDE_CELLS + cols.start];
+    let mut rows = rows.map(|row| &cells[row * SIDE_CELLS..][cols.clone()]);
+    rows.all(|row| row.iter().all(|&instance| instance == first)).then_some(first)
+}
