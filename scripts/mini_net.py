@@ -19,7 +19,9 @@ def inputs(rgb: NDArray[np.uint8], depth_m: NDArray[np.float16]) -> torch.Tensor
     row = (torch.arange(SIDE_PX, dtype=torch.float32) + 0.5) / (SIDE_PX / 2) - 1.0  # of a 90 degree field of view
     colours = torch.from_numpy(rgb).permute(0, 3, 1, 2).float() / 127.5 - 1.0
     below_m = z_m * row[None, :, None]
-    return torch.cat([colours, torch.stack([z_m.clamp(max=10.0) / 5 - 1, below_m.clamp(-3, 3), 1 / z_m.clamp(min=0.25) - 1], 1)], 1)
+    return torch.cat(
+        [colours, torch.stack([z_m.clamp(max=10.0) / 5 - 1, below_m.clamp(-3, 3), 1 / z_m.clamp(min=0.25) - 1], 1)], 1
+    )
 
 
 def _conv(c_in: int, c_out: int, size: int, stride: int = 1, groups: int = 1) -> nn.Sequential:

@@ -80,7 +80,10 @@ def render(tasks: list[list[Path]], seed: int, classes: list[str] | None) -> tup
     num = len(tasks) * PER_HOUSE
     shape = (num, SIDE_PX, SIDE_PX)
     found = Pictures(
-        np.empty((*shape, 3), np.uint8), np.empty(shape, np.float16), np.empty(shape, np.uint8), np.zeros((num, 256), np.uint8)
+        rgb=np.empty((*shape, 3), np.uint8),
+        depth_m=np.empty(shape, np.float16),
+        instances=np.empty(shape, np.uint8),
+        classes=np.zeros((num, 256), np.uint8),
     )
     labels = []
     for index, frame in enumerate(frames(tasks, PER_HOUSE, seed)):
@@ -119,7 +122,12 @@ def endless(tasks: list[list[Path]], pictures: Pictures, classes: list[str], see
             if rng.random() < 0.5:
                 rgb, depth_m, instances = (np.ascontiguousarray(x[:, :, ::-1]) for x in (rgb, depth_m, instances))
             cells = instances[:, ::2, ::2].astype(np.int64)
-            yield inputs(rgb, depth_m), cells, np.take_along_axis(pictures.classes[rows].astype(np.int64), cells.reshape(len(rows), -1), 1).reshape(cells.shape)
+            yield inputs(rgb, depth_m), cells, by_number(pictures.classes[rows].astype(np.int64), cells)
+
+
+def by_number(values: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Of each frame's row of `values`, the one that each cell's number stands for."""
+    return np.take_along_axis(values, numbers.reshape(len(numbers), -1), 1).reshape(numbers.shape)
 
 
 def loss_of(net: MiniNet, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
@@ -127,7 +135,7 @@ def loss_of(net: MiniNet, batch: Batch) -> tuple[torch.Tensor, torch.Tensor]:
     x, cells, classes = batch
     kept = (cells > 0) | (torch.rand(cells.shape).numpy() < BACKGROUND_KEPT)
     sizes = np.stack([np.bincount(frame.ravel(), minlength=256) for frame in cells])
-    area = np.take_along_axis(sizes, cells.reshape(len(cells), -1), 1).reshape(cells.shape)
+    area = by_number(sizes, cells)
     # An object's weight grows with the root of its area, not with the area.
     weight = np.where(cells > 0, np.clip(np.sqrt(100.0 / area), 0.4, 5.0), BACKGROUND_WEIGHT).astype(np.float32)
     features = net.features(x).permute(0, 2, 3, 1)[torch.from_numpy(kept)]

@@ -10,10 +10,11 @@ from evonav.agents.explorer import nearest_frontier
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.asking import Asker
 from evonav.decision.matching import Matcher
+from evonav.decision.minilm import encoder
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
 from evonav.decision.questions.frontier_update import ChooseQuestion
 from evonav.decision.questions.question import DecisionModel
-from evonav.decision.ranking import rank_by_feature, rank_entries
+from evonav.decision.ranking import rank_by_feature, rank_by_text, rank_entries
 from evonav.decision.text_match import TextMatch
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
@@ -34,6 +35,8 @@ class FrontierUpdateConfig:
     """Without a valid answer: explore on (the paper leaves it open), or end the stage as 3D-Mem does."""
     explore_towards: Literal["object", "agent"] = "object"
     """An object that the map does not reach leads to the frontier nearest to it, or to the agent."""
+    ranking: Literal["words", "text"] = "words"
+    """Without image features, entries go by the instruction's words or by their meaning (extra `evonav[text]`)."""
 
 
 class FrontierUpdate:
@@ -41,6 +44,8 @@ class FrontierUpdate:
 
     def __init__(self, config: FrontierUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or FrontierUpdateConfig()
+        if self.config.ranking == "text":
+            encoder()  # a missing extra is told before the episode
         model: DecisionModel = decision or TextMatch()
         self.sensing = Sensing(needs_rgb=model.needs_images)
         self._asker = Asker(model, num_tries=self.config.num_tries)
@@ -102,7 +107,9 @@ class FrontierUpdate:
         entries = navigator.objects.entries
         remembered = [navigator.candidate(entry) for entry in entries]
         goal_feature = observation.goal_feature
-        if goal_feature is None:
+        if goal_feature is None and self.config.ranking == "text":
+            order = rank_by_text(self._goal, remembered, here)
+        elif goal_feature is None:
             order = rank_entries(self._matcher, self._goal, remembered, here)
         else:
             order = rank_by_feature(goal_feature, [entry.feature for entry in entries], [entry.id for entry in entries])

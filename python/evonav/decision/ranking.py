@@ -1,13 +1,14 @@
 """Which remembered objects a decision model is shown first."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
+from evonav.decision.text_features import similarity_of_label
 from evonav.tasks.public import StageInput
 
 
@@ -26,7 +27,29 @@ def rank_entries(
         position_m: Of the agent.
     """
     parsed = matcher.parsed(goal)
-    scores = {label: matcher.label_score(parsed, label) for label in {entry.label for entry in entries}}
+    return _ranked({label: matcher.label_score(parsed, label) for label in _labels(entries)}, entries, position_m)
+
+
+def rank_by_text(goal: StageInput, entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
+    """As `rank_entries`, by what labels and the instruction mean to a language model (extra `evonav[text]`).
+
+    Args:
+        goal: Of the stage.
+        entries: All that is remembered.
+        position_m: Of the agent.
+
+    Raises:
+        InvalidArgumentError: The extra is missing or broken.
+    """
+    said = goal.unified_instruction
+    return _ranked({label: similarity_of_label(said, label) for label in _labels(entries)}, entries, position_m)
+
+
+def _labels(entries: Sequence[ObjectCandidate]) -> set[str]:
+    return {entry.label for entry in entries}
+
+
+def _ranked(scores: Mapping[str, float], entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
     keys = []
     for index, entry in enumerate(entries):
         keys.append(

@@ -231,23 +231,25 @@ impl Conv {
     }
 }
 
-/// Adds a row of the window to a tile's sums: plain arrays, which compilers turn into SIMD.
-#[inline(always)]
+/// Adds a row of the window to a tile's sums: plain arrays, which compilers turn into SIMD, as long
+/// as the function is not inlined and the sums stay in registers.
+#[inline(never)]
 fn add_products(
     sums: &mut [[f32; LANES]; TILE],
     windows: [&[f32]; TILE],
     weights: &[[f32; LANES]],
 ) {
-    let len = weights.len();
-    let windows = windows.map(|window| &window[..len]);
+    let mut kept = *sums;
+    let windows = windows.map(|window| &window[..weights.len()]);
     for (i, weights) in weights.iter().enumerate() {
-        for (sums, window) in sums.iter_mut().zip(&windows) {
-            let value = window[i];
+        let values = windows.map(|window| window[i]);
+        for (sums, value) in kept.iter_mut().zip(values) {
             for (sum, weight) in sums.iter_mut().zip(weights) {
                 *sum += value * weight;
             }
         }
     }
+    *sums = kept;
 }
 
 /// An image with zeros around it.
