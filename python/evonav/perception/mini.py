@@ -4,9 +4,11 @@ It needs no torch and no download. It knows the embedded simulator's pictures al
 its figures are never the paper's column. See docs/mini-detector.md.
 """
 
+import hashlib
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,8 @@ from numpy.typing import NDArray
 from evonav import _core
 from evonav.errors import InvalidArgumentError
 from evonav.perception.detector import Found
+from evonav.perception.filters import FilterConfig
+from evonav.perception.predicted import PredictedPerception
 
 WEIGHTS = Path(__file__).parents[1] / "data" / "mini.weights"
 """What ships, made by `scripts/train_mini.py` and `scripts/export_mini.py`."""
@@ -31,6 +35,31 @@ def _network(weights: Path) -> _core.MiniNetwork:
         ) from error
 
 
+class MiniPerception(PredictedPerception):
+    """What `predicted:mini` stands for. Masks do not overlap, so that only specks and doubts are left to filter."""
+
+    def __init__(self, *, min_confidence: float = 0.4, min_cells: int = 2) -> None:
+        """A perception with the shipped weights.
+
+        Args:
+            min_confidence: Of a detection, 0 to 1.
+            min_cells: As for `MiniDetector`.
+
+        Raises:
+            InvalidArgumentError: A parameter is outside its domain, or the weights are broken.
+        """
+        filters = FilterConfig(min_confidence=min_confidence, max_box_fraction=1.0, min_centre_distance_px=0.0)
+        super().__init__(MiniDetector(min_confidence=min_confidence, min_cells=min_cells), filters)
+
+    def check(self, agents: Sequence[str]) -> dict[str, Any]:
+        """What decides results beside options: the checksum of the weights.
+
+        Args:
+            agents: That will look with it; they all see the same.
+        """
+        return {"mini": {WEIGHTS.name: hashlib.sha256(WEIGHTS.read_bytes()).hexdigest()}}
+
+
 class MiniDetector:
     """Objects of the types in `classes`, from colours and depth together. Shared by all episodes of a process."""
 
@@ -43,8 +72,12 @@ class MiniDetector:
             min_confidence: Least mean probability of an object's type over its cells.
 
         Raises:
-            InvalidArgumentError: The file is missing or broken.
+            InvalidArgumentError: The file is missing or broken, or a parameter is outside its domain.
         """
+        if min_cells < 0 or not 0.0 <= min_confidence <= 1.0:
+            raise InvalidArgumentError(
+                f"mini: min_cells is {min_cells}, expected 0 or more; min_confidence {min_confidence}, expected 0..1"
+            )
         self._network = _network(weights or WEIGHTS)
         self._min_cells = min_cells
         self._min_confidence = min_confidence

@@ -165,11 +165,16 @@ def predicted_perception(
         stack: Of `evonav.perception.words.STACKS`; `auto`: UniGoal its own, all others 3D-Mem's.
         models: Folder of weights; default: `EVONAV_MODELS`, else the libraries' own hubs.
         device: `auto`, `cpu`, `cuda` or `cuda:N`.
-        options: See `evonav.perception.stacks.StackConfig`.
+        options: See `evonav.perception.stacks.StackConfig`; of `mini`, which needs neither models nor a device,
+            `evonav.perception.mini.MiniPerception`.
 
     Raises:
         InvalidArgumentError: There is no such stack or option.
     """
+    if stack == "mini":
+        from evonav.perception.mini import MiniPerception
+
+        return MiniPerception(**options)
     if stack != "auto" and stack not in STACKS:
-        raise InvalidArgumentError(f"no stack {stack!r}; there are auto, {', '.join(STACKS)}")
+        raise InvalidArgumentError(f"no stack {stack!r}; there are auto, {', '.join(STACKS)}, mini")
     return StackPerception(stack, StackConfig.from_options(options), models, device)

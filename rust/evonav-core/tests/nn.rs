@@ -13,7 +13,7 @@ use proptest::{collection::vec, prelude::*};
 
 /// Every output by itself, in the order that `Conv::run` promises.
 fn convolved_naive(shape: ConvShape, weights: &[f32], bias: &[f32], image: &Tensor) -> Vec<f32> {
-    let ConvShape { num_in, num_out, size, stride, is_depthwise } = shape;
+    let ConvShape { num_in, size, stride, is_depthwise, .. } = shape;
     let (half, area) = (size / 2, size * size);
     let pixel = |row: usize, col: usize, channel: usize| {
         let (row, col) = (row.checked_sub(half)?, col.checked_sub(half)?);
@@ -23,8 +23,8 @@ fn convolved_naive(shape: ConvShape, weights: &[f32], bias: &[f32], image: &Tens
     let mut out = Vec::new();
     for row in (0..image.height).step_by(stride) {
         for col in (0..image.width).step_by(stride) {
-            for output in 0..num_out {
-                let mut sum = bias[output];
+            for (output, bias) in bias.iter().enumerate() {
+                let mut sum = *bias;
                 for k in 0..area {
                     let inputs = if is_depthwise { output..output + 1 } else { 0..num_in };
                     for input in inputs {

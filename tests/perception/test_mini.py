@@ -1,0 +1,129 @@
+"""The mini detector with its shipped weights: what it finds, that it always finds the same, and an episode with it."""
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import mini_frames
+import numpy as np
+import pytest
+
+from evonav import _core
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.settings import PerceptionSettings
+from evonav.evaluation.store import RunStore
+from evonav.perception import mini
+from evonav.perception.mini import MiniDetector
+from evonav.perception.vocabulary import PROCTHOR_TYPES
+
+MIN_AREA_PX = 1000
+MIN_RECALL, MIN_PRECISION = 0.3, 0.4
+"""Of objects and detections of that size."""
+
+
+@pytest.fixture(scope="module")
+def frames() -> list[mini_frames.LabelledFrame]:
+    """Of bundled houses, which are of the test split: none was trained on."""
+    with bundled_tasks() as tasks:
+        return list(mini_frames.frames(mini_frames.house_files(tasks)[:16], 4, seed=3))
+
+
+def test_it_finds_most_large_objects_and_is_mostly_right(frames: list[mini_frames.LabelledFrame]) -> None:
+    found = MiniDetector().detect([frame.rgb for frame in frames], [frame.depth_m for frame in frames])
+    num_objects = num_found = num_claims = num_right = 0
+    for frame, one in zip(frames, found, strict=True):
+        one.check(frame.instances.shape)
+        assert not (one.masks.sum(0) > 1).any()
+        areas = np.bincount(frame.instances.ravel(), minlength=len(frame.labels) + 1)
+        hits = set()
+        for mask, label in zip(one.masks, one.labels, strict=True):
+            inside = np.bincount(frame.instances[mask], minlength=len(frame.labels) + 1)
+            either = areas + mask.sum() - inside
+            right = [i for i, name in enumerate(frame.labels, 1) if name == label and 2 * inside[i] >= either[i]]
+            hits.update(right)
+            if mask.sum() >= MIN_AREA_PX:
+                num_claims += 1
+                num_right += bool(right)
+        large = {i for i in range(1, len(areas)) if areas[i] >= MIN_AREA_PX}
+        num_objects += len(large)
+        num_found += len(large & hits)
+    assert num_objects > 50
+    assert num_found / num_objects > MIN_RECALL, f"{num_found} of {num_objects} found"
+    assert num_right / num_claims > MIN_PRECISION, f"{num_right} of {num_claims} right"
+
+
+def test_classes_are_types_of_procthor() -> None:
+    assert len(MiniDetector().classes) > 80
+    assert set(MiniDetector().classes) <= set(PROCTHOR_TYPES)
+
+
+def test_a_view_gives_the_same_bits_alone_in_a_batch_and_in_many_threads(
+    frames: list[mini_frames.LabelledFrame],
+) -> None:
+    network = mini._network(mini.WEIGHTS)
+    detector = MiniDetector()
+    views = [(frame.rgb, frame.depth_m) for frame in frames[:6]]
+    together = detector.detect(*zip(*views, strict=True))
+    with ThreadPoolExecutor(4) as pool:
+        alone = list(pool.map(lambda view: detector.detect([view[0]], [view[1]])[0], views))
+        logits = list(pool.map(lambda view: network.logits(*view), views))
+    for view, batched, one, many in zip(views, together, alone, logits, strict=True):
+        assert batched.labels == one.labels
+        assert batched.masks.tobytes() == one.masks.tobytes()
+        assert batched.confidences.tobytes() == one.confidences.tobytes()
+        assert network.logits(*view).tobytes() == many.tobytes()
+
+
+@pytest.mark.parametrize("size", [(150, 150), (64, 200), (480, 640)])
+def test_views_of_any_size(frames: list[mini_frames.LabelledFrame], size: tuple[int, int]) -> None:
+    rows, cols = (np.arange(side) * 300 // side for side in size)
+    frame = max(frames, key=lambda frame: (frame.instances > 0).sum())
+    (found,) = MiniDetector().detect([frame.rgb[rows[:, None], cols]], [frame.depth_m[rows[:, None], cols]])
+    found.check(size)
+    assert len(found) > 0
+
+
+def test_bad_input_is_named(frames: list[mini_frames.LabelledFrame], tmp_path: Path) -> None:
+    frame = frames[0]
+    with pytest.raises(InvalidArgumentError, match="`rgb` is of shape"):
+        MiniDetector().detect([frame.rgb[:10]], [frame.depth_m])
+    with pytest.raises(InvalidArgumentError, match="`depth_m` is NaN"):
+        MiniDetector().detect([frame.rgb], [np.full_like(frame.depth_m, np.nan)])
+    with pytest.raises(InvalidArgumentError, match="min_confidence 2"):
+        MiniDetector(min_confidence=2)
+    with pytest.raises(InvalidArgumentError, match=r"weights .*nowhere.* cannot be used"):
+        MiniDetector(tmp_path / "nowhere")
+    data = mini.WEIGHTS.read_bytes()
+    broken = tmp_path / "broken"
+    for number, bad in enumerate((data[:-3], data + b"0", data[8:], data[:100], data.replace(b'"stem"', b'"stam"'))):
+        broken.with_suffix(f".{number}").write_bytes(bad)
+        with pytest.raises(InvalidArgumentError, match="cannot be used"):
+            MiniDetector(broken.with_suffix(f".{number}"))
+
+
+def test_weights_that_are_not_numbers_are_refused() -> None:
+    data = mini.WEIGHTS.read_bytes()
+    with pytest.raises(InvalidArgumentError, match="finite"):
+        _core.MiniNetwork(data[:-2] + b"\x00\x7e")
+
+
+def test_a_whole_episode_with_it(tmp_path: Path) -> None:
+    backend = PerceptionSettings(make="predicted:mini").backend(Backend())
+    config = RunConfig(protocol=ProtocolConfig(max_rounds=4), backend=backend)
+    told = []
+    for folder, num_workers in ((tmp_path / "a", 0), (tmp_path / "b", 2)):
+        with bundled_tasks() as tasks:
+            evaluate(["fu"], task_files(tasks, 2), folder, config=config, num_workers=num_workers)
+        with RunStore(folder) as store:
+            told.append(list(store.records("fu")))
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        assert summary["perception"] == "predicted:mini"
+        assert set(summary["perception_models"]["mini"]) == {"mini.weights"}
+    assert told[0] == told[1]
+    labels = {entry.label for record in told[0] for entry in record.entries}
+    assert len(labels) > 3
+    assert labels <= set(MiniDetector().classes)
