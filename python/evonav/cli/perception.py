@@ -83,7 +83,7 @@ def perception(
     )
     with interruptible(out), bundled_tasks() as bundled:
         with bars.Progress(*columns, console=Console(stderr=True)) as bar:
-            line = bar.add_task("tours")
+            line = bar.add_task("tours", total=None)
             measured = measure(
                 specs,
                 task_files(tasks or bundled, limit, subset),

@@ -77,7 +77,7 @@ def feature_figures(found: Sequence[Scores]) -> list[str]:
             )
             for name, share in shares.items()
         ]
-        axes = Axes(f"{one.word}: how alike features are", "cosine", "share of pairs", (float(low), 1.0), top)
+        axes = Axes(one.word, "cosine of features", "share of pairs", (float(low), 1.0), top)
         drawn.append(square_chart(axes, curves))
     return drawn
 

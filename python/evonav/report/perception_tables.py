@@ -8,7 +8,7 @@ from evonav.evaluation.perception_estimates import Estimate, Group
 from evonav.evaluation.perception_scores import Scores
 from evonav.report.tables import NONE, Table
 
-MAX_CATEGORIES, MAX_CONFUSIONS = 12, 6
+MAX_CATEGORIES, MAX_CONFUSIONS = 8, 4
 INTERVALS = "[..]: 95% interval, bootstrap by house."
 
 
@@ -112,16 +112,21 @@ def _by_outline(found: Sequence[Scores]) -> Table:
 def _categories(found: Sequence[Scores], most: int | None) -> Table:
     by_word = [{group.name: group.measures for group in one.groups["category"]} for one in found]
     names = [group.name for group in found[0].groups["category"]]
-    rows = []
-    for name in names[:most]:
-        cells = [name, str(found[0].groups["category"][names.index(name)].measures["recall"].n)]
-        for measures in by_word:
-            mine = measures.get(name, {})
-            cells += [percent(mine.get(measure)) for measure in ("recall", "precision", "ap50")]
-        rows.append(tuple(cells))
-    heads = [f"{one.word}: {what}" for one in found for what in ("recall", "precision", "AP50")]
+    measures = ("recall", "precision", "ap50", "labelled")
+    rows = tuple(
+        (
+            name if i == 0 else "",
+            one.word,
+            str(mine[name]["recall"].n),
+            str(mine[name]["precision"].n),
+            *(percent(mine[name][measure]) for measure in measures),
+        )
+        for name in names[:most]
+        for i, (one, mine) in enumerate(zip(found, by_word, strict=True))
+    )
+    columns = ("category", "perception", "objects", "detections", "recall", "precision", "AP50", "label right")
     left = "" if most is None or len(names) <= most else f" The {most} most frequent of {len(names)}."
-    return Table("By category", ("category", "objects", *heads), tuple(rows), (f"In %. {INTERVALS}{left}",))
+    return Table("By category", columns, rows, (f"In %. {INTERVALS}{left}",))
 
 
 def _confusions(found: Sequence[Scores], most: int) -> Table:
