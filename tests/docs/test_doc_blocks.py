@@ -31,6 +31,7 @@ PARSED_ONLY = {
     "--simulator ai2thor": "AI2-THOR: tests/world, tests/thor",
     "--decision vlm": "a model: tests/decision, with a stand-in",
     "--vlm-model": "a model: tests/decision, with a stand-in",
+    "--perception predicted": "weights: tests/models",
     "evonav mock-vlm": "serves until it is stopped: tests/decision",
     "my_package": "a package that is not there",
     "--open": "opens a browser",

@@ -147,6 +147,7 @@ def tiny_open_clip() -> open_clip_models.OpenClip:
 def test_mask_rcnn_finds_cocos_categories_in_unigoals_words(images) -> None:
     network = torchvision_models.load_mask_rcnn("", "cpu")
     network._model.transform.min_size = (64,)  # 800 px of noise take a minute
+    network._model.roi_heads.detections_per_img = 8
     found = network.detect(images, _COCO, 0.0)
     for one in found:
         one.check((96, 96))

@@ -81,7 +81,8 @@ def test_an_episode_with_unigoals_detectors(all_models: Path, without_published_
 
     network = load_mask_rcnn(str(all_models / MASK_RCNN), "cpu", 0.05)
     network._model.transform.min_size = (64,)  # 800 px of noise take a minute a view
-    config = config_of("predicted,min_confidence=0.5,min_mask_score=0", all_models, max_actions=3)
+    network._model.roi_heads.detections_per_img = 8
+    config = config_of("predicted,min_confidence=0.5,min_mask_score=0", all_models, max_actions=2)
     run(tmp_path / "run", config, ("unigoal",))
     assert_looked(tmp_path / "run", "unigoal")
 
@@ -107,9 +108,7 @@ def test_a_run_is_not_resumed_with_other_weights(tiny_models: Path, tmp_path: Pa
 
 def test_percepts_hold_types_features_and_one_label_a_pixel(tiny_models: Path) -> None:
     perception = predicted_perception("transformers", str(tiny_models), "cpu", min_confidence=0.0)
-    goal = StageInput(
-        stage=1, category="Bed", basic_instruction="", appearance_instruction="", unified_instruction="bed"
-    )
+    goal = StageInput(1, "Bed", "", "", "the bed", np.zeros((300, 300, 3), np.uint8))
     perception.begin_stage(StageScene("task", goal, "fu", 0, ()))
     simulator = EmbeddedSimulator()
     from evonav.house import bundled_houses

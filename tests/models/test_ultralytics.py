@@ -131,15 +131,9 @@ def test_a_round_with_3d_mems_stack(folder: Path) -> None:
     assert set(facts["libraries"]) == {"torch", "open_clip_torch", "ultralytics"}
     assert len(facts["weights"]) == 4
     perception = StackPerception("auto", config, str(folder), "cpu")
-    goal = StageInput(
-        stage=1, category="Bed", basic_instruction="", appearance_instruction="", unified_instruction="bed"
-    )
+    goal = StageInput(1, "Bed", "", "", "the bed", np.zeros((300, 300, 3), np.uint8))
     perception.begin_stage(StageScene("task", goal, "fu", 0, ()))
-    from evonav.house import bundled_houses
-
-    simulator = EmbeddedSimulator()
-    simulator.reset(next(iter(bundled_houses())).to_json())
-    (percept,) = perception.perceive([simulator.render(instances=False)])
+    (percept,) = perception.perceive([frame])
     assert set(percept.detections.labels) <= {"Bed", "table"}
     assert percept.detections.features is not None
     assert percept.detections.features.shape == (len(percept.detections.labels), 512)
