@@ -123,10 +123,16 @@ def test_masks_stay_with_their_boxes_when_some_are_dropped(sam, images, monkeypa
     assert made.scores.tolist() == pytest.approx([0.6, 0.0, 0.7])
 
 
-def test_a_round_with_3d_mems_stack(folder: Path) -> None:
-    config = StackConfig(
-        detector="yolov8s-worldv2.pt", sam="mobile_sam.pt", min_confidence=LEAST, vocabulary="bed;table"
-    )
+def test_a_round_with_3d_mems_stack(folder: Path, yolo) -> None:
+    from evonav.house import bundled_houses
+
+    simulator = EmbeddedSimulator()
+    simulator.reset(next(iter(bundled_houses())).to_json())
+    frame = simulator.render(instances=False)
+    assert frame.rgb is not None
+    (boxes,) = yolo.find([frame.rgb], ("bed", "table"), LEAST)
+    sixth = float(np.sort(boxes.confidences)[-6])  # a network that is sure of nothing finds 300 things
+    config = StackConfig("bed;table", sixth, detector="yolov8s-worldv2.pt", sam="mobile_sam.pt")
     facts = facts_of("3d-mem", config, str(folder))
     assert set(facts["libraries"]) == {"torch", "open_clip_torch", "ultralytics"}
     assert len(facts["weights"]) == 4

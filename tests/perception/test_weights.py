@@ -118,12 +118,12 @@ def test_a_missing_library_names_its_extra(monkeypatch) -> None:
         with pytest.raises(PerceptionError, match=rf"needs {module}: pip install 'evonav\[{extra}\]'"):
             libraries.library(module)
     monkeypatch.setattr(libraries, "_PACKAGES", {"ultralytics": "no-such-package-of-anyone"})
-    with pytest.raises(PerceptionError, match=r"pip install 'evonav\[yolo\]'"):
-        libraries.library_versions(("ultralytics",))
+    with pytest.raises(PerceptionError, match=r"pip install 'evonav\[yolo\]'; `predicted:mini` needs nothing"):
+        libraries.library_versions(("ultralytics",), "yolo")
 
 
 def test_what_is_missing_is_told_before_anything_runs(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(libraries, "library_versions", lambda modules: dict.fromkeys(modules, "1"))
+    monkeypatch.setattr(libraries, "library_versions", lambda modules, extra: dict.fromkeys(modules, "1"))
     for agent, file in (("fu", r"yolov8x-world\.pt"), ("unigoal", r"maskrcnn_resnet50_fpn_coco-bf2d0c1e\.pth")):
         with pytest.raises(PerceptionError, match=rf"{file} is missing \(about 1\d\d MB\)"):
             predicted_perception(models=str(tmp_path)).check([agent])

@@ -190,7 +190,7 @@ def facts_of(stack: StackName, config: StackConfig, models: str | None) -> dict[
     config.words  # noqa: B018 - may raise
     folder = models_folder(models)
     weights = weights_of(stack, config).values()
-    versions = libraries.library_versions(modules_of(stack))
+    versions = libraries.library_versions(modules_of(stack), "yolo" if stack == "3d-mem" else "torch")
     return {"libraries": versions, "weights": {k: v for one in weights for k, v in fingerprint(one, folder).items()}}
 
 

@@ -41,11 +41,12 @@ def library(module: str) -> Any:  # noqa: ANN401 - a module
         raise PerceptionError(f"predicted perception needs {module}: pip install 'evonav[{extra}]' ({said})") from None
 
 
-def library_versions(modules: tuple[str, ...]) -> dict[str, str]:
+def library_versions(modules: tuple[str, ...], extra: str) -> dict[str, str]:
     """Version by package, without importing any.
 
     Args:
         modules: Of `EXTRA_OF`.
+        extra: That brings them all.
 
     Raises:
         PerceptionError: One is not installed.
@@ -57,7 +58,7 @@ def library_versions(modules: tuple[str, ...]) -> dict[str, str]:
             found[package] = version(package)
         except PackageNotFoundError:
             raise PerceptionError(
-                f"predicted perception needs {package}: pip install 'evonav[{EXTRA_OF[module]}]'"
+                f"predicted perception needs {package}: pip install 'evonav[{extra}]'; `predicted:mini` needs nothing"
             ) from None
     return found
 
