@@ -1,0 +1,29 @@
+"""Whole runs under simulated perception: the same for any workers, and the ground truth's where it is perfect."""
+
+from pathlib import Path
+
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.settings import PerceptionSettings
+from evonav.evaluation.store import RunStore
+
+
+def records(out: Path, word: str, num_workers: int) -> list[str]:
+    """Of two bundled tasks, a few rounds a stage."""
+    backend = PerceptionSettings(make=word).backend(Backend())
+    config = RunConfig(seed=3, backend=backend, protocol=ProtocolConfig(max_rounds=6))
+    with bundled_tasks() as folder:
+        evaluate(["fu"], task_files(folder, 2, None), out, config=config, num_workers=num_workers)
+    with RunStore(out) as store:
+        return [record.model_dump_json() for record in store.records("fu")]
+
+
+def test_records_do_not_depend_on_workers_and_perfect_ones_are_the_truths(tmp_path: Path) -> None:
+    poor = records(tmp_path / "1", "noisy:poor", 1)
+    assert poor == records(tmp_path / "2", "noisy:poor", 2)
+    exact = records(tmp_path / "gt", "gt", 0)
+    assert records(tmp_path / "perfect", "noisy:perfect", 0) == exact
+    assert poor != exact
+    assert len(poor) >= 6
