@@ -238,3 +238,13 @@ def test_a_run_goes_on_with_the_same_weights_alone(tmp_path, monkeypatch) -> Non
     run(tmp_path, "checked_perception")  # nothing is left to do
     with pytest.raises(StoreError, match=r"scripted\.weights\.a\.pt: there '00', asked '11'"):
         run(tmp_path, "checked_perception", agents=("stage-reset",))
+
+
+def test_what_cannot_begin_leaves_nothing_behind(tmp_path, monkeypatch) -> None:
+    def refuse(self, agents):
+        raise PerceptionError(f"no weights for {agents}")
+
+    monkeypatch.setattr(scripted_models.Counted, "check", refuse)
+    with pytest.raises(PerceptionError, match="no weights for"):
+        run(tmp_path / "run", "checked_perception")
+    assert not (tmp_path / "run").exists()

@@ -122,11 +122,15 @@ def test_a_missing_library_names_its_extra(monkeypatch) -> None:
         libraries.library_versions(("ultralytics",), "yolo")
 
 
-def test_what_is_missing_is_told_before_anything_runs(tmp_path: Path, monkeypatch) -> None:
+def test_all_that_is_missing_is_told_before_anything_runs(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(libraries, "library_versions", lambda modules, extra: dict.fromkeys(modules, "1"))
-    for agent, file in (("fu", r"yolov8x-world\.pt"), ("unigoal", r"maskrcnn_resnet50_fpn_coco-bf2d0c1e\.pth")):
-        with pytest.raises(PerceptionError, match=rf"{file} is missing \(about 1\d\d MB\)"):
-            predicted_perception(models=str(tmp_path)).check([agent])
+    (tmp_path / "sam_l.pt").write_bytes(b"here")
+    with pytest.raises(PerceptionError, match=r"lacks 3 of the models' files \(about 1357 MB\)") as caught:
+        predicted_perception(models=str(tmp_path)).check(["fu"])
+    assert "yolov8x-world.pt from https://github.com/" in str(caught.value)
+    assert "sam_l" not in str(caught.value)
+    with pytest.raises(PerceptionError, match=r"maskrcnn_resnet50_fpn_coco-bf2d0c1e\.pth from https://download"):
+        predicted_perception(models=str(tmp_path)).check(["unigoal"])
     with pytest.raises(InvalidArgumentError, match="no vocabulary"):
         predicted_perception("3d-mem", vocabulary="scannet", models=str(tmp_path)).check(["fu"])
 

@@ -17,7 +17,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState
 from evonav.evaluation.running import Progress, Run, TaskFile, run_all
 from evonav.evaluation.sessions import note_session
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.store import FILE_NAME, RunStore
 from evonav.evaluation.workers import WORK, EpisodeJob, Setup
 from evonav.folders import check_same_run, write_atomically, writing
 from evonav.parallel import EngineName, Resources, open_pool
@@ -183,12 +183,16 @@ def evaluate_all(
     Raises:
         InvalidArgumentError: An agent is unknown or asked for twice, or two requests have one folder.
         StoreError: A folder holds a run of another configuration or cannot be written.
+        PerceptionError: Models of a perception are missing.
         EngineError: Workers cannot be had.
     """
     folders = [request.run_dir.absolute() for request in requests]
     if len(set(folders)) != len(folders):
         raise InvalidArgumentError("two runs are asked for in one folder")
     _check_requests(requests, num_workers)
+    for request in requests:
+        if not (request.run_dir / FILE_NAME).exists():  # what cannot begin leaves nothing behind
+            request.config.backend.check_perception(request.agents)
     with ExitStack() as stack:
         runs: list[Run] = []
         for index, request in enumerate(requests):

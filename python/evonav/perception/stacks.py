@@ -15,7 +15,7 @@ from evonav.perception.models import libraries
 from evonav.perception.models.prompted import PromptedDetector
 from evonav.perception.models.torchvision_models import MaskRcnn
 from evonav.perception.vocabulary import COCO_UNIGOAL, DINO_UNIGOAL, VOCABULARIES
-from evonav.perception.weights import Weights, fingerprint, known, located, models_folder
+from evonav.perception.weights import Weights, check_folder, fingerprint, known, located, models_folder
 
 StackName = Literal["3d-mem", "unigoal", "transformers"]
 STACKS: tuple[StackName, ...] = get_args(StackName)
@@ -189,8 +189,10 @@ def facts_of(stack: StackName, config: StackConfig, models: str | None) -> dict[
     """
     config.words  # noqa: B018 - may raise
     folder = models_folder(models)
-    weights = weights_of(stack, config).values()
+    weights = list(weights_of(stack, config).values())
     versions = libraries.library_versions(modules_of(stack), "yolo" if stack == "3d-mem" else "torch")
+    if folder is not None:
+        check_folder(weights, folder)
     return {"libraries": versions, "weights": {k: v for one in weights for k, v in fingerprint(one, folder).items()}}
 
 

@@ -10,6 +10,7 @@ import hashlib
 import json
 import os
 import socket
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -160,6 +161,26 @@ def fingerprint(weights: Weights, folder: Path | None) -> dict[str, str]:
     return {file.name: _checked(file, _located(file, folder), folder) for file in weights.files}
 
 
+def check_folder(weights: Sequence[Weights], folder: Path) -> None:
+    """Looks for all files at once, so that those that are missing can be got at once.
+
+    Args:
+        weights: Of the models of a stack.
+        folder: That was named.
+
+    Raises:
+        PerceptionError: Some are missing; each is named with where it is to be had.
+    """
+    lacking = [file for one in weights for file, path in places(one, folder) if not path.is_file()]
+    if lacking:
+        told = "; ".join(f"{file.name} from {file.source}" for file in lacking)
+        size_mb = sum(file.size_mb for file in lacking)
+        raise PerceptionError(
+            f"{folder} lacks {len(lacking)} of the models' files (about {size_mb} MB): put them there by these names, "
+            f"or leave --models and {MODELS_VARIABLE} out to have them fetched: {told}"
+        )
+
+
 def places(weights: Weights, folder: Path | None) -> list[tuple[WeightFile, Path]]:
     """Where each file is, or would be; nothing is fetched.
 
@@ -197,8 +218,7 @@ def _located(file: WeightFile, folder: Path | None) -> Path:
     about = f" (about {file.size_mb} MB)" if file.size_mb else ""
     if folder is not None:
         raise PerceptionError(
-            f"{path} is missing{about}: put {file.source} there, or leave --models and {MODELS_VARIABLE} out to have "
-            "it fetched"
+            f"{path} is missing{about}: put {file.source} there, or leave --models and {MODELS_VARIABLE} out"
         )
     _probe(file, about)
     return _fetched(file, path)
