@@ -243,6 +243,9 @@ def test_the_command(tasks, tmp_path):
     broken = CliRunner().invoke(app, [*words, "--perception", "erring_perceptions:breaking"])
     assert broken.exit_code == 3
     assert "out of memory" in broken.output
+    useless = CliRunner().invoke(app, [*words, "--device", "cpu"])
+    assert useless.exit_code == 2
+    assert "--perception predicted" in useless.output
     unknown = CliRunner().invoke(app, [*words, "--perception", "nosy"])
     assert isinstance(unknown.exception, InvalidArgumentError)
     assert "did you mean noisy?" in str(unknown.exception)

@@ -68,8 +68,11 @@ def perception(
 
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")
+    words = perceptions or ["gt"]
+    if (models or device) and not any(word.startswith("predicted") for word in words):
+        raise typer.BadParameter("--models and --device are for --perception predicted")
     specs = []
-    for word in perceptions or ["gt"]:
+    for word in words:
         is_model = word.startswith("predicted")
         found = with_perception(Backend(), word, models if is_model else None, device if is_model else None)
         specs.append(PerceptionSpec(word, found.perception, found.perception_options, found.perception_host_options))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav import _core
 from evonav.errors import InvalidArgumentError
 from evonav.sensors.observation import Detections
 from evonav.world.simulator import Frame, SceneObject
@@ -20,7 +21,6 @@ IOU_LIMIT = 0.5
 MIN_AREA_PX = 25
 MIN_AREA_SHARE = 0.001
 """As `GroundTruthPerception`: an object of fewer pixels, or of a smaller part of the image, is ignored."""
-NEARER_M, NEARER_SHARE = 0.05, 0.05
 IGNORED_KINDS = ("door", "window")
 
 NONE, IGNORED = -1, -2
@@ -113,18 +113,8 @@ def own_outlines(masks: NDArray[np.int32], depth_m: NDArray[np.float32], num_mas
     A sign of occlusion that needs no second rendering. Nearer is what is so by more than 5 cm and 5%: an object's foot
     on the floor is its own. 1 of a mask without pixels.
     """
-    sides, cut = np.zeros((2, num_masks))
-    padded = np.pad(masks, 1, constant_values=-1)
-    depths = np.pad(depth_m, 1, constant_values=-np.inf)
-    height, width = masks.shape
-    for row, column in ((0, 1), (2, 1), (1, 0), (1, 2)):
-        rows, columns = slice(row, row + height), slice(column, column + width)
-        is_side = (masks >= 0) & (padded[rows, columns] != masks)
-        ids, mine = masks[is_side], depth_m[is_side]
-        is_nearer = depths[rows, columns][is_side] < np.minimum(mine - NEARER_M, (1.0 - NEARER_SHARE) * mine)
-        sides += np.bincount(ids, minlength=num_masks)
-        cut += np.bincount(ids[is_nearer], minlength=num_masks)
-    return 1.0 - cut / np.maximum(sides, 1.0)
+    outlines = _core.mask_outlines(masks, depth_m, num_masks=num_masks)
+    return np.asarray(1.0 - outlines[:, 1] / np.maximum(outlines[:, 0], 1.0))
 
 
 def overlaps_px(a: NDArray[np.int32], num_a: int, b: NDArray[np.int32], num_b: int) -> NDArray[np.int64]:

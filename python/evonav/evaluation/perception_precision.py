@@ -68,7 +68,7 @@ def _block(
     precision = np.divide(right, seen, out=np.zeros_like(right), where=seen > 0)
     envelope = np.maximum.accumulate(precision[:, ::-1], axis=1)[:, ::-1]
     recall = right / np.maximum(wanted, 1.0)[:, None]
-    # One search for all rows: row i's recalls, 0..1, are put at 2i..2i+1.
+    # One search for all rows: row i's recalls, 0..1, are put at 2i..2i+1, less what that costs in digits.
     shift = 2.0 * np.arange(num_rows)[:, None]
     places = np.searchsorted((recall + shift).ravel(), (RECALLS[None, :] + shift - 1e-9).ravel(), side="left")
     columns = places.reshape(num_rows, -1) - num * np.arange(num_rows)[:, None]
