@@ -90,10 +90,11 @@ def test_specks_and_boxes_over_half_the_image_go() -> None:
     parts = (
         ((0, 0, 64, 128), 0.9, "half"),
         ((0, 0, 65, 128), 0.9, "more"),
+        ((0, 0, 1, 1), 0.9, "1"),
         ((0, 0, 6, 4), 0.9, "24"),
         ((0, 0, 5, 5), 0.9, "25"),
     )
-    assert without_specks_and_giants(found(*parts), CONFIG).labels == ("half", "24", "25")
+    assert without_specks_and_giants(found(*parts), CONFIG).labels == ("half", "1", "24", "25")
     original = replace(CONFIG, reference_px=(SIDE, SIDE))
     assert without_specks_and_giants(found(*parts), original).labels == ("half", "25")
 

@@ -108,10 +108,12 @@ def test_a_mask_that_smaller_ones_cover_goes_and_the_rest_is_renumbered() -> Non
         np.concatenate([whole.boxes_px, halves.boxes_px]),
         whole.labels + halves.labels,
         np.concatenate([whole.confidences, halves.confidences]),
+        np.eye(4, dtype=np.float32),
     )
     config = replace(EVERYTHING, min_share_of_inner=1.0)
     (percept,) = PredictedPerception(Told(both), config).perceive([frame()])
     assert percept.detections.labels == ("Cup", "Pillow", "Book")
+    assert percept.detections.features.argmax(axis=1).tolist() == [1, 2, 3]
     assert sorted(np.unique(percept.detections.masks).tolist()) == [-1, 0, 1, 2]
     assert percept.detections.masks[55, 55] == 0
 
