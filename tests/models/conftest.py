@@ -9,9 +9,6 @@ import pytest
 
 from evonav.perception.vocabulary import DINO_UNIGOAL
 
-torch = pytest.importorskip("torch", reason="needs PyTorch: make test-models")
-torch.set_num_threads(1)  # tiny networks gain nothing from more, and lose much where other processes compute too
-
 SIDE_PX = 64
 
 
@@ -164,6 +161,9 @@ def _write_grounding_dino(folder: Path) -> None:
 @pytest.fixture(scope="session")
 def tiny_models(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder for `--models`, of transformers."""
+    import torch
+
+    torch.set_num_threads(1)  # tiny networks gain nothing from more, and lose much where other processes compute too
     torch.manual_seed(0)
     folder = tmp_path_factory.mktemp("models")
     _write_clip(folder / "laion/CLIP-ViT-B-32-laion2B-s34B-b79K")

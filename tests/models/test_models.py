@@ -14,6 +14,8 @@ from evonav.perception.models.prompted import Boxes
 from evonav.perception.stacks import _COCO
 from evonav.perception.vocabulary import DINO_UNIGOAL
 
+pytest.importorskip("torch", reason="needs PyTorch: make test-models")
+
 BOXES = [
     np.array([[10, 10, 50, 60], [0, 0, 2, 96], [-5, 80, 200, 120]], np.float32),
     np.zeros((0, 4), np.float32),

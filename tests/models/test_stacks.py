@@ -21,6 +21,8 @@ from evonav.perception.vocabulary import PROCTHOR_TYPES
 from evonav.tasks.public import StageInput
 from evonav.world.embedded import EmbeddedSimulator
 
+pytest.importorskip("torch", reason="needs PyTorch: make test-models")
+
 MASK_RCNN = "maskrcnn_resnet50_fpn_coco-bf2d0c1e.pth"
 
 
