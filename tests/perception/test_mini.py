@@ -21,7 +21,7 @@ from evonav.perception.mini import MiniDetector
 from evonav.perception.vocabulary import PROCTHOR_TYPES
 
 MIN_AREA_PX = 1000
-MIN_RECALL, MIN_PRECISION = 0.3, 0.4
+MIN_RECALL, MIN_PRECISION = 0.5, 0.6
 """Of objects and detections of that size."""
 
 

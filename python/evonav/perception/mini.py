@@ -38,7 +38,7 @@ def _network(weights: Path) -> _core.MiniNetwork:
 class MiniPerception(PredictedPerception):
     """What `predicted:mini` stands for. Masks do not overlap, so that only specks and doubts are left to filter."""
 
-    def __init__(self, *, min_confidence: float = 0.4, min_cells: int = 2) -> None:
+    def __init__(self, *, min_confidence: float = 0.3, min_cells: int = 2) -> None:
         """A perception with the shipped weights.
 
         Args:

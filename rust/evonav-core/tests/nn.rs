@@ -5,7 +5,7 @@ use evonav_core::{
     nn::{
         conv::{Conv, ConvShape, Tensor},
         network::{Network, SIDE_CELLS, SIDE_PX, input},
-        segments::{Resemblance, refine, segments},
+        segments::{MIN_AGREEMENT, MIN_LINK, Resemblance, refine, segments},
         weights::from_half,
     },
 };
@@ -64,6 +64,10 @@ fn flooded_naive(logits: &Tensor) -> Vec<i32> {
     let (width, classes) = (logits.width, logits.channels - 3);
     let cell = |place: usize| &logits.values[place * logits.channels..][..logits.channels];
     let is_object = |place: usize| cell(place)[1..=classes].iter().any(|&v| v > cell(place)[0]);
+    let powers = |place: usize| cell(place)[1..=classes].iter().map(|&v| f64::from(v).exp());
+    let dot = |a: usize, b: usize| powers(a).zip(powers(b)).map(|(a, b)| a * b).sum::<f64>();
+    let agree =
+        |a: usize, b: usize| dot(a, b) > f64::from(MIN_AGREEMENT) * (dot(a, a) * dot(b, b)).sqrt();
     let mut found = vec![-1; logits.height * width];
     let mut next = 0;
     for start in 0..found.len() {
@@ -79,9 +83,9 @@ fn flooded_naive(logits: &Tensor) -> Vec<i32> {
             for other in (0..found.len()).filter(|&other| is_object(other)) {
                 let (low, high) = (place.min(other), place.max(other));
                 let is_beside = high == low + 1 && high % width != 0;
-                let is_linked = (is_beside && cell(low)[classes + 1] > 0.0)
-                    || (high == low + width && cell(low)[classes + 2] > 0.0);
-                if is_linked {
+                let is_linked = (is_beside && cell(low)[classes + 1] > MIN_LINK)
+                    || (high == low + width && cell(low)[classes + 2] > MIN_LINK);
+                if is_linked && agree(low, high) {
                     open.push(other);
                 }
             }

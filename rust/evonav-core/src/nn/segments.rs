@@ -8,6 +8,13 @@ use crate::{
     },
 };
 
+/// Logit of a link from which on it counts; and least cosine between the class probabilities of
+/// linked cells. With 0 and without the second, many things would be one with what they stand on:
+/// F1 on validation houses was 0.33 instead of 0.38.
+pub const MIN_LINK: f32 = 1.0;
+/// See [`MIN_LINK`].
+pub const MIN_AGREEMENT: f32 = 0.8;
+
 /// Instances in the grid of cells.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Segments {
@@ -23,7 +30,8 @@ pub struct Segments {
 /// vote for its class.
 ///
 /// A cell is part of an object if a class is likelier there than the background. Two such
-/// neighbours are joined if the link between them is likelier than not.
+/// neighbours are joined if the link between them is sure enough ([`MIN_LINK`]) and they are of
+/// like classes ([`MIN_AGREEMENT`]).
 ///
 /// # Arguments
 /// * `logits` - by cell: background, classes, link to the right, link downwards.
@@ -42,13 +50,19 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
     let cells: Vec<&[f32]> = logits.values.chunks_exact(logits.channels).collect();
     let is_object: Vec<bool> =
         cells.iter().map(|cell| cell[1..=num_classes].iter().any(|&v| v > cell[0])).collect();
+    let shares: Vec<Vec<f32>> = cells
+        .iter()
+        .zip(&is_object)
+        .map(|(cell, &is_object)| if is_object { shares(&cell[..=num_classes]) } else { vec![] })
+        .collect();
     let mut forest = Forest::new(cells.len());
     for (place, cell) in cells.iter().enumerate().filter(|(place, _)| is_object[*place]) {
         let right = (place % width + 1 < width).then_some(place + 1);
         let links = [(right, cell[num_classes + 1]), (Some(place + width), cell[num_classes + 2])];
         for (other, link) in links {
             if let Some(other) = other.filter(|&other| is_object.get(other) == Some(&true))
-                && link > 0.0
+                && link > MIN_LINK
+                && agree(&shares[place], &shares[other])
             {
                 forest.join(place, other);
             }
@@ -58,7 +72,7 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
     let mut number_of = vec![usize::MAX; cells.len()];
     let mut votes: Vec<(usize, Vec<f32>)> = Vec::new();
     let mut found = vec![usize::MAX; cells.len()];
-    for (place, cell) in cells.iter().enumerate().filter(|(place, _)| is_object[*place]) {
+    for place in (0..cells.len()).filter(|&place| is_object[place]) {
         let root = forest.root(place);
         if number_of[root] == usize::MAX {
             number_of[root] = votes.len();
@@ -67,7 +81,9 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
         found[place] = number_of[root];
         let (num_cells, sums) = &mut votes[number_of[root]];
         *num_cells += 1;
-        add_probabilities(&cell[..=num_classes], sums);
+        for (sum, share) in sums.iter_mut().zip(&shares[place]) {
+            *sum += share;
+        }
     }
     let mut kept = Segments::default();
     let numbers: Vec<i32> = votes
@@ -87,14 +103,18 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
     Ok(kept)
 }
 
-/// Adds each class's share of the softmax; the background's is left out.
-fn add_probabilities(logits: &[f32], sums: &mut [f32]) {
+/// Each class's share of the softmax; the background's, which comes first, is left out.
+fn shares(logits: &[f32]) -> Vec<f32> {
     let most = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let powers: Vec<f32> = logits.iter().map(|logit| (logit - most).exp()).collect();
     let total: f32 = powers.iter().sum();
-    for (sum, power) in sums.iter_mut().zip(&powers[1..]) {
-        *sum += power / total;
-    }
+    powers[1..].iter().map(|power| power / total).collect()
+}
+
+/// Whether two cells' shares are alike.
+fn agree(a: &[f32], b: &[f32]) -> bool {
+    let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
+    dot(a, b) > MIN_AGREEMENT * (dot(a, a) * dot(b, b)).sqrt()
 }
 
 /// Index of the largest number, the first of equals.

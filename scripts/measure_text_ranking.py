@@ -1,0 +1,98 @@
+"""How often the right category is among the first five: by the instruction's words, and by meaning (`evonav[text]`).
+
+    python scripts/measure_text_ranking.py TASKS [MORE]
+
+The categories ranked are all of those in the stage's house. Prints shares with 95% intervals from a bootstrap over
+houses, for the unified instruction, and for one whose nouns are replaced by everyday words that evonav's list of
+synonyms does not hold ("recliner" for an arm chair), where the category has such a word.
+"""
+
+import argparse
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from evonav.decision.language import parse_goal
+from evonav.decision.matching import Matcher
+from evonav.decision.text_features import similarity_of_label
+from evonav.evaluation.backend import load_case
+from evonav.tasks.language import noun_of
+from evonav.world.embedded import EmbeddedSimulator
+
+EVERYDAY = {
+    "ArmChair": "recliner",
+    "Bed": "place to sleep",
+    "Bottle": "flask",
+    "Bread": "loaf",
+    "CellPhone": "smartphone",
+    "Chair": "seat",
+    "CoffeeMachine": "espresso maker",
+    "Cup": "tumbler",
+    "Desk": "writing table",
+    "DiningTable": "table for meals",
+    "DishSponge": "scrubber",
+    "Dresser": "chest of drawers",
+    "Faucet": "tap",
+    "FloorLamp": "standing light",
+    "Fridge": "icebox",
+    "GarbageCan": "wastebasket",
+    "HousePlant": "potted fern",
+    "Laptop": "notebook computer",
+    "Mug": "coffee cup",
+    "Newspaper": "daily paper",
+    "Painting": "framed artwork",
+    "Pan": "skillet",
+    "Pillow": "cushion",
+    "Pot": "saucepan",
+    "RemoteControl": "TV clicker",
+    "ShelvingUnit": "storage rack",
+    "Sofa": "loveseat",
+    "Statue": "sculpture",
+    "TeddyBear": "plush toy",
+    "Television": "TV screen",
+    "Toilet": "lavatory",
+    "Vase": "flower jar",
+    "Watch": "timepiece",
+}
+
+
+def main() -> None:
+    """Measures."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("tasks", nargs="+", type=Path)
+    args = parser.parse_args()
+    matcher = Matcher()
+    hits: dict[tuple[str, str], dict[str, list[bool]]] = defaultdict(lambda: defaultdict(list))
+    simulator = EmbeddedSimulator(allow_unknown_assets=True)
+    for task in sorted(path.parent for folder in args.tasks for path in folder.glob("**/task.json")):
+        case = load_case(task)
+        for stage in case.stages:
+            simulator.reset(stage.house_json)
+            labels = sorted({body.category for body in simulator.objects if body.kind == "object"})
+            goal = stage.public
+            said = {"unified": goal.unified_instruction}
+            noun = noun_of(goal.category)
+            if goal.category in EVERYDAY and noun in goal.unified_instruction:
+                said["everyday words"] = goal.unified_instruction.replace(noun, EVERYDAY[goal.category])
+            for kind, text in said.items():
+                parsed = parse_goal(text, "")
+                words = {label: matcher.label_score(parsed, label) for label in labels}
+                meaning = {label: similarity_of_label(text, label) for label in labels}
+                for name, scores in (("words", words), ("text", meaning)):
+                    first = sorted(labels, key=lambda label: (-scores[label], label))[:5]
+                    hits[kind, name][task.name].append(goal.category in first)
+    rng = np.random.default_rng(0)
+    for (kind, name), houses in hits.items():
+        rows = list(houses.values())
+        draws = [
+            np.mean([hit for i in rng.integers(len(rows), size=len(rows)) for hit in rows[i]]) for _ in range(1000)
+        ]
+        low, high = np.percentile(draws, [2.5, 97.5])
+        num = sum(map(len, rows))
+        share = np.mean([hit for row in rows for hit in row])
+        print(f"{kind}, by {name}: {share:.3f} [{low:.3f}, {high:.3f}], n = {num} in {len(rows)} houses")
+
+
+if __name__ == "__main__":
+    main()
