@@ -8,6 +8,9 @@ from toy_house import ToySimulator, stage_case
 
 from evonav.agents.agent import Sensing
 from evonav.agents.frontier_update import FrontierUpdate
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.rollout import Episode
 from evonav.perception import StageScene
@@ -106,3 +109,19 @@ def test_cells_seen_are_those_of_the_true_pose(episode):
     for believed, true in zip(agent.seen[0].views, truthful.seen[0].views, strict=True):
         assert np.array_equal(believed.occupancy.free, true.occupancy.free)
         assert np.array_equal(believed.occupancy.blocked, true.occupancy.blocked)
+
+
+def test_all_agents_of_a_run_meet_the_same_errors_and_another_seed_others(tmp_path):
+    seen = []
+    for seed in (0, 1):
+        path = tmp_path / f"{seed}.txt"
+        backend = Backend(perception="seeds_seen:Noting", perception_options={"path": str(path)})
+        config = RunConfig(seed=seed, backend=backend, protocol=ProtocolConfig(max_rounds=1))
+        with bundled_tasks() as folder:
+            evaluate(["stay-still", "shortest-path"], task_files(folder, 2), tmp_path / f"run{seed}", config=config)
+        seen.append({tuple(line.split()) for line in path.read_text(encoding="utf-8").splitlines()})
+    for told in seen:
+        assert {agent for agent, _, _ in told} == {"stay-still", "shortest-path"}
+        assert len(told) == 4
+        assert len({(task, seed) for _, task, seed in told}) == len({seed for _, _, seed in told}) == 2
+    assert {one[2] for one in seen[0]}.isdisjoint({one[2] for one in seen[1]})

@@ -34,6 +34,7 @@ __all__ = [
     "agent_seed",
     "evaluate",
     "evaluate_all",
+    "perception_seed",
     "run_identity",
     "task_file",
     "task_files",
@@ -237,7 +238,13 @@ def _begun(request: RunRequest, num_workers: int, num_retries: int, retry_errore
             _forget_errored(store, request)
         states = store.states()
     jobs = [
-        EpisodeJob(agent, task.task_id, str(task.path.absolute()), agent_seed(config.seed, agent, task.task_id))
+        EpisodeJob(
+            agent,
+            task.task_id,
+            str(task.path.absolute()),
+            agent_seed(config.seed, agent, task.task_id),
+            perception_seed(config.seed, task.task_id),
+        )
         for task in request.tasks
         for agent in request.agents
         if any((agent, task.task_id, stage) not in states for stage in range(1, task.num_stages + 1))
@@ -300,6 +307,11 @@ def agent_seed(seed: int, agent: str, task_id: str) -> int:
     """The seed of an agent's random choices: a function of names, not of order or workers."""
     digest = hashlib.sha256(f"{seed}\0{agent}\0{task_id}".encode()).digest()
     return int.from_bytes(digest[:6], "big")
+
+
+def perception_seed(seed: int, task_id: str) -> int:
+    """The seed of a perception's errors: the same for all agents, which then meet the same ones."""
+    return agent_seed(seed, "", task_id)
 
 
 def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:

@@ -32,10 +32,21 @@ class Episode:
         protocol: ProtocolConfig,
         seed: int,
         observer: EpisodeObserver | None = None,
+        *,
+        perception_seed: int | None = None,
     ) -> None:
         self._case = case
         self._agent_name = agent_name
-        self._parts = Participants(case, agent, simulator, perception, protocol, seed, observer)
+        self._parts = Participants(
+            case,
+            agent,
+            simulator,
+            perception,
+            protocol,
+            seed,
+            seed if perception_seed is None else perception_seed,
+            observer,
+        )
         self._carried = Carried()
         self.replace_agent(agent)
         self._told_costs: Mapping[str, float] = {}

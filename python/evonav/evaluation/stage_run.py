@@ -63,6 +63,8 @@ class Participants:
     perception: Perception
     protocol: ProtocolConfig
     seed: int
+    """The agent's."""
+    perception_seed: int
     observer: EpisodeObserver | None
 
 
@@ -97,6 +99,7 @@ class StageRun:
         self._perception = parts.perception
         self._protocol = parts.protocol
         self._seed = parts.seed
+        self._perception_seed = parts.perception_seed
         self._observer = parts.observer
         self._stage = self._case.stages[record.stage - 1]
         self._record = record
@@ -255,7 +258,7 @@ class StageRun:
             task_id=self._case.task_id,
             goal=self._stage.public,
             agent=self._record.agent,
-            seed=self._seed,
+            seed=self._perception_seed,
             objects=self._simulator.objects,
         )
         with blame(ErrorKind.SIMULATION):

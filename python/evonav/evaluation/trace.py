@@ -18,7 +18,7 @@ from evonav.decision.own import own_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.differences import record_differences
-from evonav.evaluation.engine import agent_seed
+from evonav.evaluation.engine import agent_seed, perception_seed
 from evonav.evaluation.episode_parts import LOSSES
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
@@ -139,7 +139,17 @@ class RunReplay:
                 losses = {stage: loss for stage in stored if (loss := _loss(stored[stage]))}
                 tracer = Tracer(agent, on_round, losses, self._heading_px, keeps_depth=self._keeps_depth)
                 perception = self.backend.make_perception()
-                episode = Episode(case, agent_name, agent, simulator, perception, self.protocol, seed, tracer)
+                episode = Episode(
+                    case,
+                    agent_name,
+                    agent,
+                    simulator,
+                    perception,
+                    self.protocol,
+                    seed,
+                    tracer,
+                    perception_seed=perception_seed(self.seed, case.task_id),
+                )
                 for outcome in episode.run():
                     traced = tracer.take(outcome)
                     fov_rad = traced.fov_rad

@@ -74,6 +74,8 @@ class EpisodeJob:
     """Of the task."""
     seed: int
     """The agent's."""
+    perception_seed: int
+    """The perception's."""
 
     def text(self, setup_text: str) -> str:
         """As a worker takes it."""
@@ -196,7 +198,17 @@ def _attempt(case: EpisodeCase, job: EpisodeJob, workplace: Workplace) -> Genera
     with workplace.simulator() as simulator:
         agent = workplace.agent(job)
         observer = _Heartbeat(workplace.on_round)
-        yield from Episode(case, job.agent, agent, simulator, perception, setup.protocol, job.seed, observer).run()
+        yield from Episode(
+            case,
+            job.agent,
+            agent,
+            simulator,
+            perception,
+            setup.protocol,
+            job.seed,
+            observer,
+            perception_seed=job.perception_seed,
+        ).run()
 
 
 class EpisodeWork:

@@ -22,7 +22,8 @@ class StageScene:
     agent: str
     """Name of the agent that is given the percepts: published agents have detectors of their own."""
     seed: int
-    """Of the agent's episode: with `task_id` and the stage, what random errors may depend on."""
+    """What random errors may depend on, with `task_id` and the stage: the same for all agents of a run, so that they
+    are compared under the same errors."""
     objects: Sequence[SceneObject]
     """Bodies in instance order."""
 

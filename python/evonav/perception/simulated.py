@@ -1,6 +1,6 @@
 """Ground truth with simulated errors, every one of them adjustable (docs/perception.md).
 
-What is random depends on the episode's seed, the task, the stage, the round, the view and the object or place, each
+What is random depends on the run's seed, the task, the stage, the round, the view and the object or place, each
 through a named stream of its own; not on workers, nor on what else is seen.
 """
 
