@@ -20,6 +20,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind
 from evonav.evaluation.store import RunStore
 from evonav.folders import writing
+from evonav.report.run import load_run
 
 TOY = Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator")
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
@@ -230,6 +231,22 @@ def test_a_second_writer_is_kept_out(tasks, tmp_path):
     with writing(tmp_path / "run"), pytest.raises(StoreError, match="another evonav"):
         evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
     evaluate(["toy_agents:Idle"], tasks, tmp_path / "run", config=CONFIG, num_workers=0)
+
+
+def test_a_run_is_read_as_of_one_moment_while_it_is_written(tasks, tmp_path, monkeypatch):
+    run = tmp_path / "run"
+    evaluate(["random-walk"], tasks, run, config=CONFIG)
+    read_states = RunStore.states
+
+    def states(store):
+        found = read_states(store)
+        monkeypatch.undo()
+        evaluate(["toy_agents:Idle"], tasks, run, config=CONFIG)
+        return found
+
+    monkeypatch.setattr(RunStore, "states", states)
+    assert load_run(run).agents == ("random-walk",)
+    assert load_run(run).agents == ("random-walk", "toy_agents:Idle")
 
 
 INTERRUPTED = """

@@ -230,6 +230,22 @@ class RunStore:
             except ValidationError as error:
                 raise StoreError(f"{self.path}: {error}") from error
 
+    @contextmanager
+    def snapshot(self) -> Iterator[None]:
+        """What is read inside is of one moment, whatever another process writes meanwhile.
+
+        Without a write-ahead log, on a network file system, it is not: there a reader would keep the writer waiting.
+        """
+        ((mode,),) = self._rows("PRAGMA journal_mode", ())
+        if mode != "wal":
+            yield
+            return
+        self._db.execute("BEGIN")
+        try:
+            yield
+        finally:
+            self._db.execute("ROLLBACK")
+
     def record_texts(self, agent: str | None = None, task_id: str | None = None) -> Iterator[str]:
         """The records as stored, in the order of `records`: equal runs give equal texts."""
         return self._texts("record", agent, task_id)

@@ -107,7 +107,7 @@ class RunReplay:
             StoreError: The run cannot be read.
             TaskError: The task cannot be read.
         """
-        with RunStore(self._run_dir) as store:
+        with RunStore(self._run_dir) as store, store.snapshot():
             stored = {record.stage: record for record in store.records(agent, task_id)}
             texts = dict(zip(stored, store.record_texts(agent, task_id), strict=True))
             stored = {k: record for k, record in stored.items() if last_stage is None or k <= last_stage}

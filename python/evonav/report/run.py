@@ -131,7 +131,7 @@ def load_run(run_dir: Path) -> Run:
         StoreError: There is no run, it cannot be read, or its rows are not those of its stages, each once: no rate of
             such a run would mean anything.
     """
-    with RunStore(run_dir) as store:
+    with RunStore(run_dir) as store, store.snapshot():
         outcomes: dict[tuple[str, str, int], StageOutcome] = {}
         states = store.states()
         asked_stages = store.meta("num_stages")
