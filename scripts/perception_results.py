@@ -1,0 +1,230 @@
+"""Agents under perceptions from perfect to poor: runs them, and writes the marked parts of docs/results.md about it.
+
+    python scripts/perception_results.py --out out/perception --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val
+
+evaluates the agents on a subset of the tasks under every perception and writes curves, and what the paper says of
+perception beside what is found here. Run again, it goes on where it ended; `--write-only` runs nothing. A folder of
+results holds one version of the code.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from results import PAGE, pooled_tasks, with_part
+
+from evonav.evaluation.agent_process import AgentHosting
+from evonav.evaluation.backend import Backend
+from evonav.evaluation.engine import Progress, RunConfig, TaskFile, evaluate
+from evonav.evaluation.metrics import AgentSummary
+from evonav.evaluation.records import EndState, StageRecord
+from evonav.paired import PairedEffect, paired_effect
+from evonav.perception.words import read_word
+from evonav.report.line_chart import Line, line_chart
+from evonav.report.paper import PAPER, PaperResult
+from evonav.report.run import PAPER_ORDER, Run, load_run
+from evonav.report.tables import NONE, Table, percent
+from evonav.significance import Interval
+
+PERCEPTIONS = (
+    "noisy:perfect",
+    "noisy:perfect,features=true",
+    "noisy:good",
+    "noisy:yolo-world-like",
+    "noisy:poor",
+)
+FIGURES = PAGE.parent / "images"
+
+Keep = Callable[[StageRecord], bool]
+CLAIMS: tuple[tuple[str, str, str, Keep], ...] = (
+    ("MSGNav less FTU", "ftu", "msgnav", lambda record: True),
+    ("3D-Mem less FU", "fu", "3d-mem", lambda record: True),
+    ("Stage-Reset less FU", "fu", "stage-reset", lambda record: True),
+    ("FTU less FU", "fu", "ftu", lambda record: True),
+    ("FTU less FU, relocated", "fu", "ftu", lambda record: record.stage > 1 and record.target.is_relocated),
+    ("FTU less FU, not relocated", "fu", "ftu", lambda record: record.stage > 1 and not record.target.is_relocated),
+)
+"""Differences that the paper draws its conclusions about perception from (its Sec. 5, Tables 1 and 2)."""
+
+
+def main() -> None:
+    """See the module."""
+    asked = _arguments()
+    words = asked.perceptions.split(";")
+    tasks = pooled_tasks(asked.tasks)
+    subset = tasks[:: max(1, len(tasks) // asked.houses)][: asked.houses]
+    if not asked.write_only:
+        for word in words:
+            _run(asked.out / folder_of(word), asked.agents.split(","), subset, word, asked)
+    runs = {word: load_run(asked.out / folder_of(word)) for word in words if (asked.out / folder_of(word)).exists()}
+    page = PAGE.read_text(encoding="utf-8")
+    for name, text in parts(runs).items():
+        page = with_part(page, name, text)
+    PAGE.write_text(page, encoding="utf-8")
+    sys.stdout.write(f"{PAGE}\n")
+
+
+def folder_of(word: str) -> str:
+    """Of a perception's run."""
+    return word.replace(":", "-").replace(",", "-").replace("=", "")
+
+
+def name_of(word: str) -> str:
+    """Of a perception in tables."""
+    return word.removeprefix("noisy:").replace(",features=true", " + features").removesuffix("-like")
+
+
+def parts(runs: Mapping[str, Run]) -> dict[str, str]:
+    """The marked parts of the page, by name; draws the figures."""
+    charts = []
+    for measure in ("sr", "spl"):
+        path = FIGURES / f"perception-{measure}.svg"
+        path.write_text(_figure(runs, measure), encoding="utf-8")
+        charts.append(f"![{measure.upper()} by perception](images/{path.name})")
+    tables = [rate_table(runs, "sr"), rate_table(runs, "spl")]
+    return {
+        "perception-rates": "\n\n".join((*charts, *(table.markdown() for table in tables))),
+        "perception-claims": claim_table(runs).markdown(),
+        "perception-costs": cost_table(runs).markdown(),
+    }
+
+
+def rate_table(runs: Mapping[str, Run], measure: str) -> Table:
+    """SR or SPL of every agent under every perception."""
+    rows = []
+    for agent in _agents(runs):
+        found = [_rate(_summary(run, agent), measure) for run in runs.values()]
+        rows.append((agent, *(NONE if rate is None else percent(*rate) for rate in found)))
+    return Table(
+        f"{measure.upper()} by perception", ("Agent", *map(name_of, runs)), tuple(rows), (_words(runs, measure),)
+    )
+
+
+def claim_table(runs: Mapping[str, Run]) -> Table:
+    """Differences in SR between agents under every perception, with the paper's two settings beside them."""
+    rows = []
+    for title, a, b, keep in CLAIMS:
+        paper = tuple(_paper_difference(PAPER[half][a], PAPER[half][b], title) for half in ("gt", "prediction"))
+        rows.append((title, *paper, *(_points(_between(run, a, run, b, keep)) for run in runs.values())))
+    columns = ("SR, points", "paper, GT", "paper, Prediction", *map(name_of, runs))
+    return Table("What the paper concludes from", columns, tuple(rows), ("Of the same stages; bootstrap over houses.",))
+
+
+def cost_table(runs: Mapping[str, Run]) -> Table:
+    """What evolution costs an agent that sees perfectly, and what errors of perception cost it."""
+    (first, best), *others = runs.items()
+    rows = []
+    for agent in _agents(runs):
+        summary = _summary(best, agent)
+        splits = {} if summary is None else summary.splits
+        moved, stayed = splits.get("relocated"), splits.get("not_relocated")
+        gap = NONE
+        if moved is not None and stayed is not None and moved.sr is not None and stayed.sr is not None:
+            gap = f"{100 * (moved.sr - stayed.sr):+.1f}"
+        costs = (_points(_between(best, agent, run, agent, lambda record: True)) for _, run in others)
+        rows.append((agent, gap, *costs))
+    columns = (
+        "Agent",
+        f"relocation, {name_of(first)}",
+        *(f"{name_of(word)} less {name_of(first)}" for word, _ in others),
+    )
+    note = (
+        "Points of SR. Relocation: relocated targets less those that stayed, other stages. The rest: the same stages."
+    )
+    return Table("What evolution costs, and what perception costs", columns, tuple(rows), (note,))
+
+
+def _between(run_a: Run, a: str, run_b: Run, b: str, keep: Keep) -> PairedEffect | None:
+    """Success of `b` in one run less that of `a` in another, over the stages that both scored."""
+    ours, theirs = (
+        {key[1:]: one.record for key, one in run.outcomes.items() if key[0] == name and one.record.is_scored}
+        for run, name in ((run_a, a), (run_b, b))
+    )
+    keys = [key for key, record in ours.items() if key in theirs and keep(record)]
+    if not keys:
+        return None
+    before, after = (
+        np.array([records[key].state is EndState.SUCCESS for key in keys], np.float64) for records in (ours, theirs)
+    )
+    return paired_effect(before, after, [ours[key].house for key in keys])
+
+
+def _points(effect: PairedEffect | None) -> str:
+    if effect is None:
+        return NONE
+    ends = "" if effect.ci95 is None else f" [{100 * effect.ci95[0]:+.1f}, {100 * effect.ci95[1]:+.1f}]"
+    return f"{100 * effect.difference:+.1f}{ends}"
+
+
+def _paper_difference(a: PaperResult, b: PaperResult, title: str) -> str:
+    if title.endswith("not relocated"):
+        return f"{100 * (b.num_not_relocated - a.num_not_relocated) / 166:+.1f}"
+    if title.endswith("relocated"):
+        return f"{100 * (b.num_relocated - a.num_relocated) / 109:+.1f}"
+    return f"{100 * (b.num_all - a.num_all) / 365:+.1f}"
+
+
+def _agents(runs: Mapping[str, Run]) -> list[str]:
+    found = {agent for run in runs.values() for agent in run.agents}
+    return [agent for agent in PAPER_ORDER if agent in found]
+
+
+def _summary(run: Run, agent: str) -> AgentSummary | None:
+    return next((summary for summary in run.summaries if summary.agent == agent), None)
+
+
+def _rate(summary: AgentSummary | None, measure: str) -> tuple[float, Interval | None] | None:
+    if summary is None:
+        return None
+    value, ends = (summary.sr, summary.sr_ci95) if measure == "sr" else (summary.spl, summary.spl_ci95)
+    return None if value is None else (value, ends)
+
+
+def _words(runs: Mapping[str, Run], measure: str) -> str:
+    run = next(iter(runs.values()))
+    num_stages = sum(run.num_stages.values())
+    return f"{measure.upper()} %, {len(run.num_stages)} houses, {num_stages} stages; bootstrap over houses."
+
+
+def _figure(runs: Mapping[str, Run], measure: str) -> str:
+    lines = []
+    for agent in _agents(runs):
+        found = [(x, rate) for x, run in enumerate(runs.values()) if (rate := _rate(_summary(run, agent), measure))]
+        ends = [None if ci is None else (100 * ci[0], 100 * ci[1]) for _, (_, ci) in found]
+        lines.append(Line(agent, [(x, 100 * value) for x, (value, _) in found], ends))
+    words = measure.upper()
+    return line_chart(
+        lines, f"{words} by perception", "perception", f"{words}, %", x_names=[name_of(word) for word in runs]
+    )
+
+
+def _run(out: Path, agents: Sequence[str], tasks: Sequence[TaskFile], word: str, asked: argparse.Namespace) -> None:
+    def tell(news: Progress) -> None:
+        if news.latest is not None and news.num_done % 50 == 0:
+            sys.stderr.write(f"{out.name}: {news.num_done} of {news.num_stages} stages\n")
+
+    perception = read_word(word)
+    backend = Backend(perception=perception.make, perception_options=perception.options)
+    config = RunConfig(seed=asked.seed, backend=backend, hosting=AgentHosting(is_in_process=True))
+    evaluate(agents, tasks, out, config=config, num_workers=asked.workers, on_progress=tell)
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--tasks", nargs="+", required=True, help="folders of tasks, each with an optional :LIMIT")
+    parser.add_argument("--out", type=Path, required=True, help="folder of the runs")
+    parser.add_argument("--agents", default=",".join(PAPER_ORDER))
+    parser.add_argument(
+        "--perceptions", default=";".join(PERCEPTIONS), help="words, with ; between them; the best first"
+    )
+    parser.add_argument("--houses", type=int, default=40)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--write-only", action="store_true", help="run nothing, write what is there")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()
