@@ -18,6 +18,7 @@ SECTIONS = {
     "gym": "Gymnasium",
     "memory": "Memory",
     "navigation": "Navigation",
+    "perception": "Perception",
     "rendering": "Rendering",
     "thor": "AI2-THOR engine",
 }
