@@ -27,7 +27,8 @@ Work = Callable[[str], str | Generator[str, None, str]]
 MAX_LOSSES = 2
 """Workers that a job may lose before it is given up, unless said otherwise."""
 MAX_FAILED_STARTS = 5
-"""Workers in a row that may die before they are ready."""
+"""Workers that may die before they are ready with no job done meanwhile: then no more are started, and if none is at
+work, none can be had."""
 START_TIMEOUT_S = 300.0
 """For a worker to be ready."""
 SIGN_OF_LIFE_S = 5.0
@@ -275,6 +276,10 @@ class WorkerPool:
         self._assign()
         return self._answers.popleft()
 
+    @property
+    def _has_ready(self) -> bool:
+        return any(slot.is_ready for slot in self._slots)
+
     def _limit_s(self, slot: _Slot) -> float:
         if slot.job is None:
             return START_TIMEOUT_S
@@ -287,6 +292,8 @@ class WorkerPool:
             slot.worker.send(slot.job.text)
         num_starting = sum(not slot.is_ready for slot in self._slots)
         num_missing = min(len(self._queue) - num_starting, self._num_workers - len(self._slots))
+        if self._num_failed_starts >= MAX_FAILED_STARTS and self._has_ready:
+            return
         self._slots += [_Slot(self._host.start()) for _ in range(num_missing)]
 
     def _receive(self, slot: _Slot) -> None:
@@ -305,6 +312,7 @@ class WorkerPool:
             answer = _answer(slot.job.key, kind, text)
             self._answers.append(answer)
             if answer.is_end:
+                self._num_failed_starts = 0
                 self._losses.pop(answer.key, None)
                 slot.job = None
 
@@ -312,7 +320,7 @@ class WorkerPool:
         self._close(slot)
         if not slot.is_ready:
             self._num_failed_starts += 1
-            if self._num_failed_starts >= MAX_FAILED_STARTS:
+            if self._num_failed_starts >= MAX_FAILED_STARTS and not self._has_ready:
                 raise EngineError(f"workers do not start: {message}")
         if slot.job is None:
             return

@@ -6,7 +6,7 @@ import pytest
 
 from evonav import parallel
 from evonav.errors import InvalidArgumentError
-from evonav.parallel import EngineError, Job, open_pool
+from evonav.parallel import EngineError, Job, WorkerLostError, WorkerPool, open_pool
 
 
 def make_echo(settings, alive):
@@ -58,6 +58,59 @@ def test_workers_that_never_start_are_an_error(monkeypatch):
         pool.submit(Job(0, ""))
         with pytest.raises(EngineError, match=r"workers do not start: the worker process died \(exit code 3\)"):
             pool.next_answer()
+
+
+class ScriptedWorker:
+    """Says what it is told to, and then is lost."""
+
+    def __init__(self, *said):
+        self.said = list(said)
+
+    def send(self, text):
+        pass
+
+    def receive(self):
+        if not self.said:
+            raise WorkerLostError("gone")
+        return self.said.pop(0)
+
+    def close(self):
+        pass
+
+
+class ScriptedHost:
+    """Starts the worker it is given, then ones that are never ready; hears these whenever there are any."""
+
+    def __init__(self, first):
+        self.first, self.num_started = first, 0
+
+    def start(self):
+        self.num_started += 1
+        return self.first if self.num_started == 1 else ScriptedWorker()
+
+    def wait(self, workers, timeout_s):
+        new = [worker for worker in workers if worker is not self.first]
+        is_starting = self.first.said[:1] == [("ready", "")]
+        return [self.first] if is_starting or not new else new[:1]
+
+    def close(self):
+        pass
+
+
+def test_one_worker_goes_on_alone_where_no_others_start():
+    texts = [str(i) for i in range(6)]
+    host = ScriptedHost(ScriptedWorker(("ready", ""), *(("done", text) for text in texts)))
+    with WorkerPool(host, 3, 60.0, 2) as pool:
+        answers = answers_of(pool, texts)
+    assert sorted(answer.text for answer in answers.values()) == texts
+    # Each job that is done gives the others a few more chances, not endless ones.
+    assert parallel.MAX_FAILED_STARTS < host.num_started <= 1 + (len(texts) + 1) * (parallel.MAX_FAILED_STARTS + 2)
+
+
+def test_it_is_an_error_once_that_worker_is_lost_too():
+    host = ScriptedHost(ScriptedWorker(("ready", ""), ("done", "0")))
+    with WorkerPool(host, 3, 60.0, 2) as pool, pytest.raises(EngineError, match="workers do not start: gone"):
+        answers_of(pool, ["0", "1", "2", "3"])
 
 
 def test_arguments_are_checked():
