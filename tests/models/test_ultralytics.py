@@ -27,7 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     folder = tmp_path_factory.mktemp("ultralytics")
     os.environ["YOLO_CONFIG_DIR"] = str(folder)
-    ultralytics = libraries.library("ultralytics")
+    ultralytics = libraries.imported("ultralytics")
     from ultralytics.models.sam.build import build_mobile_sam
 
     torch.manual_seed(0)

@@ -116,14 +116,14 @@ def test_a_missing_library_names_its_extra(monkeypatch) -> None:
         monkeypatch.setitem(sys.modules, module.partition(".")[0], None)
         monkeypatch.setitem(sys.modules, module, None)
         with pytest.raises(PerceptionError, match=rf"needs {module}: pip install 'evonav\[{extra}\]'"):
-            libraries.library(module)
+            libraries.imported(module)
     monkeypatch.setattr(libraries, "_PACKAGES", {"ultralytics": "no-such-package-of-anyone"})
     with pytest.raises(PerceptionError, match=r"pip install 'evonav\[yolo\]'; `predicted:mini` needs nothing"):
-        libraries.library_versions(("ultralytics",), "yolo")
+        libraries.versions_of(("ultralytics",), "yolo")
 
 
 def test_all_that_is_missing_is_told_before_anything_runs(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(libraries, "library_versions", lambda modules, extra: dict.fromkeys(modules, "1"))
+    monkeypatch.setattr(libraries, "versions_of", lambda modules, extra: dict.fromkeys(modules, "1"))
     (tmp_path / "sam_l.pt").write_bytes(b"here")
     with pytest.raises(PerceptionError, match=r"lacks 3 of the models' files \(about 1357 MB\)") as caught:
         predicted_perception(models=str(tmp_path)).check(["fu"])

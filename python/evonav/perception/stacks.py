@@ -190,7 +190,7 @@ def facts_of(stack: StackName, config: StackConfig, models: str | None) -> dict[
     config.words  # noqa: B018 - may raise
     folder = models_folder(models)
     weights = list(weights_of(stack, config).values())
-    versions = libraries.library_versions(modules_of(stack), "yolo" if stack == "3d-mem" else "torch")
+    versions = libraries.versions_of(modules_of(stack), "yolo" if stack == "3d-mem" else "torch")
     if folder is not None:
         check_folder(weights, folder)
     return {"libraries": versions, "weights": {k: v for one in weights for k, v in fingerprint(one, folder).items()}}

@@ -19,7 +19,7 @@ EXTRA_OF = {
 _PACKAGES = {"open_clip": "open_clip_torch"}
 
 
-def library(module: str) -> Any:  # noqa: ANN401 - a module
+def imported(module: str) -> Any:  # noqa: ANN401 - a module
     """A module of an extra.
 
     Raises:
@@ -41,7 +41,7 @@ def library(module: str) -> Any:  # noqa: ANN401 - a module
         raise PerceptionError(f"predicted perception needs {module}: pip install 'evonav[{extra}]' ({said})") from None
 
 
-def library_versions(modules: tuple[str, ...], extra: str) -> dict[str, str]:
+def versions_of(modules: tuple[str, ...], extra: str) -> dict[str, str]:
     """Version by package, without importing any.
 
     Args:
@@ -69,7 +69,7 @@ def device_of(word: str) -> str:
     Raises:
         PerceptionError: There is no such device.
     """
-    torch = library("torch")
+    torch = imported("torch")
     has_gpu = bool(torch.cuda.is_available())
     if word == "auto":
         return "cuda" if has_gpu else "cpu"
@@ -83,7 +83,7 @@ def device_of(word: str) -> str:
 
 def make_repeatable() -> None:
     """The same input, the same output, as far as PyTorch can: no choice of kernels by speed, no rounding to 19 bits."""
-    torch = library("torch")
+    torch = imported("torch")
     torch.backends.cudnn.benchmark = False
     torch.backends.cudnn.deterministic = True
     torch.backends.cudnn.allow_tf32 = False

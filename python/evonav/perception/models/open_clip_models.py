@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from evonav.errors import PerceptionError
 from evonav.perception.models.crops import padded_crops, unit
-from evonav.perception.models.libraries import library, make_repeatable
+from evonav.perception.models.libraries import imported, make_repeatable
 
 _BATCH = 64
 
@@ -37,8 +37,8 @@ class OpenClip:
         self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]
     ) -> list[NDArray[np.float32]]:
         """Unit features of padded crops, all images' in batches of 64."""
-        torch = library("torch")
-        pil = library("PIL.Image")
+        torch = imported("torch")
+        pil = imported("PIL.Image")
         crops = [
             self._preprocess(pil.fromarray(np.ascontiguousarray(crop)))
             for image, boxes in zip(images, boxes_px, strict=True)
@@ -60,7 +60,7 @@ class OpenClip:
 
     def text_features(self, texts: Sequence[str]) -> NDArray[np.float32]:
         """`(N, D)` of unit length."""
-        torch = library("torch")
+        torch = imported("torch")
         with torch.inference_mode():
             rows = [
                 self._model.encode_text(self._tokenizer(list(texts[start : start + _BATCH])).to(self._device))
@@ -84,7 +84,7 @@ def load_open_clip(architecture: str, path: str, device: str) -> OpenClip:
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.
     """
-    open_clip = library("open_clip")
+    open_clip = imported("open_clip")
     make_repeatable()
     try:
         model, _, preprocess = open_clip.create_model_and_transforms(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from evonav.errors import PerceptionError
 from evonav.perception.detector import Found
-from evonav.perception.models.libraries import library, make_repeatable
+from evonav.perception.models.libraries import imported, make_repeatable
 
 _MIN_MASK = 0.5
 """Probability from which a pixel belongs to a mask."""
@@ -40,7 +40,7 @@ class MaskRcnn:
             words: What each category of interest is called.
             min_confidence: Of a detection.
         """
-        torch = library("torch")
+        torch = imported("torch")
         batch = [
             torch.from_numpy(np.ascontiguousarray(image)).permute(2, 0, 1).float().div(255.0).to(self._device)
             for image in images
@@ -73,7 +73,7 @@ def load_mask_rcnn(path: str, device: str, min_score: float = 0.05) -> MaskRcnn:
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.
     """
-    detection, torch = library("torchvision.models.detection"), library("torch")
+    detection, torch = imported("torchvision.models.detection"), imported("torch")
     make_repeatable()
     model = detection.maskrcnn_resnet50_fpn(weights=None, weights_backbone=None, box_score_thresh=min_score)
     if path:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from evonav.errors import PerceptionError
 from evonav.perception.models.crops import padded_crops, unit
-from evonav.perception.models.libraries import library, make_repeatable
+from evonav.perception.models.libraries import imported, make_repeatable
 from evonav.perception.models.prompted import Boxes, Masks, box_masks
 
 _Model = TypeVar("_Model")
@@ -40,7 +40,7 @@ class GroundingDino:
 
     def find(self, images: Sequence[NDArray[np.uint8]], words: tuple[str, ...], min_confidence: float) -> list[Boxes]:
         """Boxes of all images, as one batch. A box whose phrase holds none of the words is dropped."""
-        torch = library("torch")
+        torch = imported("torch")
         text = " ".join(f"{word.lower()}." for word in words)
         inputs = self._processor(images=list(images), text=[text] * len(images), return_tensors="pt").to(self._device)
         with torch.inference_mode():
@@ -76,7 +76,7 @@ class Owlv2:
 
     def find(self, images: Sequence[NDArray[np.uint8]], words: tuple[str, ...], min_confidence: float) -> list[Boxes]:
         """Boxes of all images, as one batch: the best 100 of each, none of them on a better one of its word."""
-        torch, ops = library("torch"), library("torchvision.ops")
+        torch, ops = imported("torch"), imported("torchvision.ops")
         pixels = self._processor(images=list(images), return_tensors="pt")["pixel_values"].to(self._device)
         with torch.inference_mode():
             queries = self._queries_of(words).expand(len(images), -1, -1)
@@ -130,7 +130,7 @@ class Sam:
 
     def outline(self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]) -> list[Masks]:
         """Images with boxes are encoded as one batch, then masks are made; an empty one is the box itself."""
-        torch = library("torch")
+        torch = imported("torch")
         busy = [index for index, boxes in enumerate(boxes_px) if len(boxes)]
         made = [
             Masks(np.zeros((0, *image.shape[:2]), np.bool_), np.zeros(0, np.float32)) for image in images
@@ -180,7 +180,7 @@ class Clip:
         self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]
     ) -> list[NDArray[np.float32]]:
         """Unit features of padded crops, all images' in batches of 64."""
-        torch = library("torch")
+        torch = imported("torch")
         crops = [
             np.ascontiguousarray(crop)
             for image, boxes in zip(images, boxes_px, strict=True)
@@ -201,7 +201,7 @@ class Clip:
 
     def text_feature(self, text: str) -> NDArray[np.float32]:
         """`(D,)` of unit length; what is longer than the model reads is cut off."""
-        torch = library("torch")
+        torch = imported("torch")
         tokens = self._tokenizer([text], truncation=True, return_tensors="pt").to(self._device)
         with torch.inference_mode():
             features = _pooled(self._model.get_text_features(tokens["input_ids"], tokens["attention_mask"]))
@@ -275,7 +275,7 @@ def load_clip(path: str, device: str) -> Clip:
 
 
 def _loaded(path: str, kind: str, load: Callable[[Any], _Model]) -> _Model:
-    transformers = library("transformers")
+    transformers = imported("transformers")
     make_repeatable()
     transformers.utils.logging.disable_progress_bar()
     try:

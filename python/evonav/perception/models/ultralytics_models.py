@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import PerceptionError
-from evonav.perception.models.libraries import library, make_repeatable
+from evonav.perception.models.libraries import imported, make_repeatable
 from evonav.perception.models.open_clip_models import OpenClip, load_open_clip
 from evonav.perception.models.prompted import Boxes, Masks, box_masks
 
@@ -61,7 +61,7 @@ class YoloWorld:
         if words == self._words:
             return
         if words not in self._features:
-            torch = library("torch")
+            torch = imported("torch")
             features = np.array(self._encoder.text_features(words))
             self._features[words] = torch.from_numpy(features)[None].to(self._device)
         network = self._model.model
@@ -119,7 +119,7 @@ def load_yolo_world(path: str, text_path: str, device: str) -> YoloWorld:
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.
     """
-    ultralytics = library("ultralytics")
+    ultralytics = imported("ultralytics")
     make_repeatable()
     encoder = load_open_clip("ViT-B-32-quickgelu", text_path, device)
     try:
@@ -141,7 +141,7 @@ def load_ultralytics_sam(path: str, device: str) -> UltralyticsSam:
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.
     """
-    ultralytics = library("ultralytics")
+    ultralytics = imported("ultralytics")
     make_repeatable()
     try:
         model = ultralytics.SAM(path)
