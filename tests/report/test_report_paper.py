@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import perception_results
 import pytest
 from made_up_run import WriteRun, entry, record_run, stage_record
 from scipy import stats
@@ -257,6 +258,8 @@ def test_the_page_has_every_part_that_the_script_writes(script, write_run: Write
     page = script.PAGE.read_text(encoding="utf-8")
     parts = script.parts(run_dir.parent, ["fu", "ftu"])
     marked = re.findall(r"<!-- results: (\S+) -->", page)
-    assert sorted(marked) == sorted(parts | script.large_parts(run_dir))
+    monkeypatch.setattr(perception_results, "FIGURES", run_dir.parent)
+    of_perception = perception_results.parts({"noisy:perfect": load_run(run_dir), "noisy:poor": load_run(run_dir)})
+    assert sorted(marked) == sorted(parts | script.large_parts(run_dir) | of_perception)
     assert "| ftu" in parts["table-1"]
     assert script._source("attr-onav-0001k-val-0100-0003-f47224-s0") == "attr-onav-0001k-val-0100"
