@@ -9,15 +9,13 @@ results holds one version of the code.
 
 import argparse
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-from results import PAGE, pooled_tasks, with_part
+from results import PAGE, pooled_tasks, run_agents, with_part
 
-from evonav.evaluation.agent_process import AgentHosting
 from evonav.evaluation.backend import Backend
-from evonav.evaluation.engine import Progress, RunConfig, TaskFile, evaluate
 from evonav.evaluation.metrics import AgentSummary
 from evonav.evaluation.records import EndState, StageRecord
 from evonav.paired import PairedEffect, paired_effect
@@ -57,7 +55,7 @@ def main() -> None:
     subset = tasks[:: max(1, len(tasks) // asked.houses)][: asked.houses]
     if not asked.write_only:
         for word in words:
-            _run(asked.out / folder_of(word), asked.agents.split(","), subset, word, asked)
+            run_agents(asked.out / folder_of(word), asked.agents.split(","), subset, _backend(word), asked)
     runs = {word: load_run(asked.out / folder_of(word)) for word in words if (asked.out / folder_of(word)).exists()}
     page = PAGE.read_text(encoding="utf-8")
     for name, text in parts(runs).items():
@@ -200,15 +198,9 @@ def _figure(runs: Mapping[str, Run], measure: str) -> str:
     )
 
 
-def _run(out: Path, agents: Sequence[str], tasks: Sequence[TaskFile], word: str, asked: argparse.Namespace) -> None:
-    def tell(news: Progress) -> None:
-        if news.latest is not None and news.num_done % 50 == 0:
-            sys.stderr.write(f"{out.name}: {news.num_done} of {news.num_stages} stages\n")
-
+def _backend(word: str) -> Backend:
     perception = read_word(word)
-    backend = Backend(perception=perception.make, perception_options=perception.options)
-    config = RunConfig(seed=asked.seed, backend=backend, hosting=AgentHosting(is_in_process=True))
-    evaluate(agents, tasks, out, config=config, num_workers=asked.workers, on_progress=tell)
+    return Backend(perception=perception.make, perception_options=perception.options)
 
 
 def _arguments() -> argparse.Namespace:

@@ -40,9 +40,9 @@ def main() -> None:
     agents = asked.agents.split(",")
     subset = tasks[:: max(1, len(tasks) // asked.sweep)][: asked.sweep]
     if not asked.write_only:
-        _run(asked.out / "main", agents, tasks, Backend(), asked)
+        run_agents(asked.out / "main", agents, tasks, Backend(), asked)
         for rate in RATES:
-            _run(asked.out / f"wrong-{rate:g}", asked.sweep_agents.split(","), subset, noisy_backend(rate), asked)
+            run_agents(asked.out / f"wrong-{rate:g}", asked.sweep_agents.split(","), subset, noisy_backend(rate), asked)
     page = PAGE.read_text(encoding="utf-8")
     found = parts(asked.out, agents)
     if asked.large is not None:
@@ -213,9 +213,11 @@ def _source(task_id: str) -> str:
     return re.sub(r"-\d+-[0-9a-f]{6}-s\d+$", "", task_id)
 
 
-def _run(
+def run_agents(
     out: Path, agents: Sequence[str], tasks: Sequence[TaskFile], backend: Backend, asked: argparse.Namespace
 ) -> None:
+    """Evaluates agents on tasks into a folder, or what is left of it, with news now and then."""
+
     def tell(news: Progress) -> None:
         if news.latest is not None and news.num_done % 50 == 0:
             sys.stderr.write(f"{out.name}: {news.num_done} of {news.num_stages} stages\n")
