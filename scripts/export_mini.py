@@ -49,8 +49,8 @@ def main() -> None:
     num = 0
     for frame in frames(house_files(args.tasks), 2, 5):
         num += 1
-        mine = core.logits(frame.rgb, frame.depth_m)
-        x = inputs(shrunk(frame.rgb)[None], shrunk(frame.depth_m)[None])
+        mine = core.logits(frame.rgb, frame.depth_m, frame.horizon_rad)
+        x = inputs(shrunk(frame.rgb)[None], shrunk(frame.depth_m)[None], np.array([frame.horizon_rad]))
         with torch.no_grad():
             for which, model in enumerate((rounded, net)):
                 theirs = model(x)[0].permute(1, 2, 0).numpy()
@@ -80,7 +80,7 @@ def as_conv(layer: nn.Module, weights: np.ndarray, bias: np.ndarray) -> nn.Conv2
 
 def packed(layers: dict[str, tuple[np.ndarray, np.ndarray]], classes: list[str]) -> bytes:
     """The file: see `evonav_core::nn::weights`."""
-    header: dict[str, Any] = {"format": "evonav-mini/1", "classes": classes, "layers": []}
+    header: dict[str, Any] = {"format": "evonav-mini/2", "classes": classes, "layers": []}
     stem_or_down = {"stem", "down1", "down2", "down3"}
     for name, (weights, _) in layers.items():
         is_depthwise = name in DEPTHWISE

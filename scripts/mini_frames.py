@@ -17,6 +17,7 @@ from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 
 NEAR_OBJECT_M = (0.5, 2.2)
+TILTS_RAD = (math.radians(-5), math.radians(35))
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,7 @@ class LabelledFrame:
     instances: NDArray[np.uint8]
     """`(H, W)`: 0 where no object is, else 1 + place in `labels`."""
     labels: tuple[str, ...]
+    horizon_rad: float
 
 
 def house_files(folder: Path) -> list[list[Path]]:
@@ -36,13 +38,14 @@ def house_files(folder: Path) -> list[list[Path]]:
     return [sorted((task.parent / "houses").glob("*.json.gz")) for task in sorted(folder.glob("**/task.json"))]
 
 
-def frames(tasks: list[list[Path]], num_per_house: int, seed: int) -> Iterator[LabelledFrame]:
+def frames(tasks: list[list[Path]], num_per_house: int, seed: int, tilted: float = 0.0) -> Iterator[LabelledFrame]:
     """Frames of one stage's house of each task.
 
     Args:
         tasks: As `house_files` finds them.
         num_per_house: Frames of each house.
         seed: Of everything random.
+        tilted: Share of views whose camera looks down by any of `TILTS_RAD` instead of as the house has it.
     """
     simulator = EmbeddedSimulator(allow_unknown_assets=True)
     for index, stages in enumerate(tasks):
@@ -55,6 +58,8 @@ def frames(tasks: list[list[Path]], num_per_house: int, seed: int) -> Iterator[L
             pose = _anywhere(rng, positions_m, home)
             if bodies and rng.random() < 0.5:
                 pose = _before_object(rng, positions_m, bodies[int(rng.integers(len(bodies)))].centre_m, home) or pose
+            if tilted and rng.random() < tilted:
+                pose = replace(pose, horizon_rad=float(rng.uniform(*TILTS_RAD)))
             yield _labelled(simulator, pose, stage.parent.parent.name)
 
 
@@ -84,4 +89,4 @@ def _labelled(simulator: EmbeddedSimulator, pose: Pose, house: str) -> LabelledF
     number = np.zeros(len(objects) + 1, np.uint8)
     number[seen] = np.arange(1, len(seen) + 1)
     labels = tuple(objects[i - 1].category for i in seen)
-    return LabelledFrame(house, frame.rgb, frame.depth_m, number[frame.instances], labels)
+    return LabelledFrame(house, frame.rgb, frame.depth_m, number[frame.instances], labels, pose.horizon_rad)

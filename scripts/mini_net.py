@@ -13,12 +13,13 @@ CHANNELS = (24, 48, 96, 128)
 DECODER = 48
 
 
-def inputs(rgb: NDArray[np.uint8], depth_m: NDArray[np.float16]) -> torch.Tensor:
-    """`(B, 6, 150, 150)`: colours, depth, height below the camera's axis, nearness."""
+def inputs(rgb: NDArray[np.uint8], depth_m: NDArray[np.float16], horizons_rad: NDArray[np.float64]) -> torch.Tensor:
+    """`(B, 6, 150, 150)`: colours, depth, height below the camera, nearness."""
     z_m = torch.from_numpy(depth_m.astype(np.float32)).clamp(0.05, 20.0)
     row = (torch.arange(SIDE_PX, dtype=torch.float32) + 0.5) / (SIDE_PX / 2) - 1.0  # of a 90 degree field of view
+    sin, cos = (torch.from_numpy(part(horizons_rad).astype(np.float32))[:, None] for part in (np.sin, np.cos))
     colours = torch.from_numpy(rgb).permute(0, 3, 1, 2).float() / 127.5 - 1.0
-    below_m = z_m * row[None, :, None]
+    below_m = z_m * (sin + cos * row)[:, :, None]
     return torch.cat(
         [colours, torch.stack([z_m.clamp(max=10.0) / 5 - 1, below_m.clamp(-3, 3), 1 / z_m.clamp(min=0.25) - 1], 1)], 1
     )

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-from results import PAGE, pooled_tasks, run_agents, with_part
+from results import PAGE, pooled_tasks, run_agents, spread, with_part
 
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.metrics import AgentSummary
@@ -51,8 +51,7 @@ def main() -> None:
     """See the module."""
     asked = _arguments()
     words = asked.perceptions.split(";")
-    tasks = pooled_tasks(asked.tasks)
-    subset = tasks[:: max(1, len(tasks) // asked.houses)][: asked.houses]
+    subset = spread(pooled_tasks(asked.tasks), asked.houses)
     if not asked.write_only:
         for word in words:
             run_agents(asked.out / folder_of(word), asked.agents.split(","), subset, _backend(word), asked)

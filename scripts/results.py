@@ -38,7 +38,7 @@ def main() -> None:
     asked = _arguments()
     tasks = pooled_tasks(asked.tasks)
     agents = asked.agents.split(",")
-    subset = tasks[:: max(1, len(tasks) // asked.sweep)][: asked.sweep]
+    subset = spread(tasks, asked.sweep)
     if not asked.write_only:
         run_agents(asked.out / "main", agents, tasks, Backend(), asked)
         for rate in RATES:
@@ -60,6 +60,12 @@ def pooled_tasks(folders: Sequence[str]) -> list[TaskFile]:
         path, _, limit = folder.partition(":")
         found += task_files(Path(path), int(limit) if limit else None)
     return found
+
+
+def spread(tasks: Sequence[TaskFile], num: int) -> list[TaskFile]:
+    """That many of the tasks, evenly over them all."""
+    num = min(num, len(tasks))
+    return [tasks[index * len(tasks) // num] for index in range(num)]
 
 
 def noisy_backend(rate: float) -> Backend:

@@ -23,6 +23,8 @@ from torch.nn import functional
 
 BATCH = 16
 PER_HOUSE = 9
+TILTED = 0.5
+"""Most houses of the train splits have cameras that look down 30 degrees, others look straight ahead."""
 BACKGROUND_KEPT = 0.2
 """Share of the background's cells that a step learns from."""
 BACKGROUND_WEIGHT = 2.0
@@ -38,6 +40,7 @@ class Pictures:
     instances: NDArray[np.uint8]
     classes: NDArray[np.uint8]
     """`(N, 256)`: of each frame's instances; 0 is the background."""
+    horizons_rad: NDArray[np.float64]
 
 
 def main() -> None:
@@ -84,12 +87,14 @@ def render(tasks: list[list[Path]], seed: int, classes: list[str] | None) -> tup
         depth_m=np.empty(shape, np.float16),
         instances=np.empty(shape, np.uint8),
         classes=np.zeros((num, 256), np.uint8),
+        horizons_rad=np.empty(num),
     )
     labels = []
-    for index, frame in enumerate(frames(tasks, PER_HOUSE, seed)):
+    for index, frame in enumerate(frames(tasks, PER_HOUSE, seed, TILTED)):
         found.rgb[index] = shrunk(frame.rgb)
         found.depth_m[index] = np.minimum(shrunk(frame.depth_m), 20.0)
         found.instances[index] = shrunk(frame.instances)
+        found.horizons_rad[index] = frame.horizon_rad
         labels.append(frame.labels)
     if classes is None:
         classes = sorted({label for names in labels for label in names})
@@ -122,7 +127,8 @@ def endless(tasks: list[list[Path]], pictures: Pictures, classes: list[str], see
             if rng.random() < 0.5:
                 rgb, depth_m, instances = (np.ascontiguousarray(x[:, :, ::-1]) for x in (rgb, depth_m, instances))
             cells = instances[:, ::2, ::2].astype(np.int64)
-            yield inputs(rgb, depth_m), cells, by_number(pictures.classes[rows].astype(np.int64), cells)
+            x = inputs(rgb, depth_m, pictures.horizons_rad[rows])
+            yield x, cells, by_number(pictures.classes[rows].astype(np.int64), cells)
 
 
 def by_number(values: np.ndarray, numbers: np.ndarray) -> np.ndarray:

@@ -547,13 +547,14 @@ class MiniNetwork:
     def __new__(cls, weights: bytes) -> MiniNetwork: ...
     @property
     def classes(self) -> list[str]: ...
-    def logits(self, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
+    def logits(self, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32], horizon_rad: float) -> NDArray[np.float32]:
         """`(75, 75, 1 + classes + 2)`: background, classes, links to the right and downwards."""
 
     def detect(
         self,
         rgb: NDArray[np.uint8],
         depth_m: NDArray[np.float32],
+        horizon_rad: float,
         *,
         min_cells: int,
         min_confidence: float,

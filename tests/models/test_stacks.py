@@ -15,6 +15,7 @@ from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.settings import PerceptionSettings
 from evonav.evaluation.store import RunStore
+from evonav.evaluation.trace import RunReplay
 from evonav.perception import StageScene, weights
 from evonav.perception.predicted import predicted_perception
 from evonav.perception.vocabulary import PROCTHOR_TYPES
@@ -76,6 +77,25 @@ def test_an_episode_with_owlv2_sam_and_clip(tiny_models: Path, tmp_path: Path) -
     config = config_of("predicted:transformers,min_confidence=0.3", tiny_models, max_rounds=2)
     run(tmp_path / "run", config, ("fu",))
     assert_looked(tmp_path / "run", "fu")
+
+
+def test_a_replay_finds_the_models_where_the_run_had_them(
+    tiny_models: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(weights.MODELS_VARIABLE, raising=False)
+    run(tmp_path / "run", config_of("predicted:transformers,min_confidence=0.3", tiny_models, max_rounds=1), ("fu",))
+    with bundled_tasks() as tasks:
+        (task,) = task_files(tasks, 1)
+        replay = RunReplay(tmp_path / "run", lambda _: task.path)
+        stages = list(replay.episode("fu", task.task_id))
+        assert replay.backend.perception_host_options == {"models": str(tiny_models)}
+        assert [stage.record.stage for stage in stages] == list(range(1, task.num_stages + 1))
+        assert not any(stage.differences for stage in stages)
+        monkeypatch.setenv(weights.MODELS_VARIABLE, str(tmp_path / "gone"))
+        (first, *_) = RunReplay(tmp_path / "run", lambda _: task.path).episode("fu", task.task_id)
+        assert first.differences
+        assert first.record.error is not None
+        assert "EVONAV_MODELS" in first.record.error.message
 
 
 def test_an_episode_with_unigoals_detectors(all_models: Path, without_published_hash: None, tmp_path: Path) -> None:

@@ -14,8 +14,8 @@ WORDS = ("couch", "dining table", "trash can", "gizmo")
 class BandDetector:
     """In each quarter of an image, what is nearer than its neighbourhood is one of four things."""
 
-    def detect(self, images, depths_m):
-        return [self._found(depth_m) for depth_m in depths_m]
+    def detect(self, views):
+        return [self._found(view.depth_m) for view in views]
 
     def _found(self, depth_m):
         height, width = depth_m.shape

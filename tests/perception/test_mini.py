@@ -2,6 +2,7 @@
 
 import json
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import mini_frames
@@ -17,6 +18,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.settings import PerceptionSettings
 from evonav.evaluation.store import RunStore
 from evonav.perception import mini
+from evonav.perception.detector import View
 from evonav.perception.mini import MiniDetector
 from evonav.perception.vocabulary import PROCTHOR_TYPES
 
@@ -32,8 +34,12 @@ def frames() -> list[mini_frames.LabelledFrame]:
         return list(mini_frames.frames(mini_frames.house_files(tasks)[:16], 4, seed=3))
 
 
+def view_of(frame: mini_frames.LabelledFrame) -> View:
+    return View(frame.rgb, frame.depth_m, frame.horizon_rad)
+
+
 def test_it_finds_most_large_objects_and_is_mostly_right(frames: list[mini_frames.LabelledFrame]) -> None:
-    found = MiniDetector().detect([frame.rgb for frame in frames], [frame.depth_m for frame in frames])
+    found = MiniDetector().detect([view_of(frame) for frame in frames])
     num_objects = num_found = num_claims = num_right = 0
     for frame, one in zip(frames, found, strict=True):
         one.check(frame.instances.shape)
@@ -66,23 +72,25 @@ def test_a_view_gives_the_same_bits_alone_in_a_batch_and_in_many_threads(
 ) -> None:
     network = mini._network(mini.WEIGHTS)
     detector = MiniDetector()
-    views = [(frame.rgb, frame.depth_m) for frame in frames[:6]]
-    together = detector.detect(*zip(*views, strict=True))
+    views = [view_of(frame) for frame in frames[:6]]
+    together = detector.detect(views)
     with ThreadPoolExecutor(4) as pool:
-        alone = list(pool.map(lambda view: detector.detect([view[0]], [view[1]])[0], views))
-        logits = list(pool.map(lambda view: network.logits(*view), views))
+        alone = list(pool.map(lambda view: detector.detect([view])[0], views))
+        logits = list(pool.map(lambda view: network.logits(*astuple(view)), views))
     for view, batched, one, many in zip(views, together, alone, logits, strict=True):
         assert batched.labels == one.labels
         assert batched.masks.tobytes() == one.masks.tobytes()
         assert batched.confidences.tobytes() == one.confidences.tobytes()
-        assert network.logits(*view).tobytes() == many.tobytes()
+        assert network.logits(*astuple(view)).tobytes() == many.tobytes()
 
 
 @pytest.mark.parametrize("size", [(150, 150), (64, 200), (480, 640)])
 def test_views_of_any_size(frames: list[mini_frames.LabelledFrame], size: tuple[int, int]) -> None:
     rows, cols = (np.arange(side) * 300 // side for side in size)
     frame = max(frames, key=lambda frame: (frame.instances > 0).sum())
-    (found,) = MiniDetector().detect([frame.rgb[rows[:, None], cols]], [frame.depth_m[rows[:, None], cols]])
+    (found,) = MiniDetector().detect(
+        [View(frame.rgb[rows[:, None], cols], frame.depth_m[rows[:, None], cols], frame.horizon_rad)]
+    )
     found.check(size)
     assert len(found) > 0
 
@@ -90,9 +98,11 @@ def test_views_of_any_size(frames: list[mini_frames.LabelledFrame], size: tuple[
 def test_bad_input_is_named(frames: list[mini_frames.LabelledFrame], tmp_path: Path) -> None:
     frame = frames[0]
     with pytest.raises(InvalidArgumentError, match="`rgb` is of shape"):
-        MiniDetector().detect([frame.rgb[:10]], [frame.depth_m])
+        MiniDetector().detect([replace(view_of(frame), rgb=frame.rgb[:10])])
     with pytest.raises(InvalidArgumentError, match="`depth_m` is NaN"):
-        MiniDetector().detect([frame.rgb], [np.full_like(frame.depth_m, np.nan)])
+        MiniDetector().detect([replace(view_of(frame), depth_m=np.full_like(frame.depth_m, np.nan))])
+    with pytest.raises(InvalidArgumentError, match="`horizon_rad` is NaN"):
+        MiniDetector().detect([replace(view_of(frame), horizon_rad=np.nan)])
     with pytest.raises(InvalidArgumentError, match="min_confidence 2"):
         MiniDetector(min_confidence=2)
     with pytest.raises(InvalidArgumentError, match=r"weights .*nowhere.* cannot be used"):

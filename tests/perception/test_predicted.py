@@ -21,7 +21,7 @@ from evonav.memory.vocabulary import CATEGORY_OF_TYPE, WORD_OF_LABEL, category_i
 from evonav.perception.detector import Found, nothing_found
 from evonav.perception.filters import FilterConfig
 from evonav.perception.predicted import PredictedPerception, StackPerception, predicted_perception
-from evonav.perception.stacks import EVERYTHING, JointDetector, StackConfig, stack_of, weights_of
+from evonav.perception.stacks import EVERYTHING, JointDetector, StackConfig, SwappedColours, stack_of, weights_of
 from evonav.perception.vocabulary import (
     COCO_UNIGOAL,
     DINO_UNIGOAL,
@@ -31,6 +31,7 @@ from evonav.perception.vocabulary import (
     TYPE_OF_WORD,
     type_of_word,
 )
+from evonav.perception.words import read_word
 from evonav.sensors.observation import Detections
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
@@ -45,7 +46,7 @@ class Told:
     def __init__(self, *found):
         self.found = found
 
-    def detect(self, images, depths_m):
+    def detect(self, views):
         return list(self.found)
 
 
@@ -122,7 +123,7 @@ def test_nothing_found_is_no_error_and_wrong_shapes_are() -> None:
     (percept,) = PredictedPerception(Told(nothing_found((SIDE, SIDE))), embedder=ColourEmbedder()).perceive([frame()])
     assert percept.detections.labels == ()
     assert percept.detections.features.shape == (0, 4)
-    with pytest.raises(InvalidArgumentError, match="1 results for 2 images"):
+    with pytest.raises(InvalidArgumentError, match="1 results for 2 views"):
         PredictedPerception(Told(nothing_found((SIDE, SIDE)))).perceive([frame(), frame()])
     with pytest.raises(InvalidArgumentError, match="a detector's `masks`"):
         PredictedPerception(Told(replace(found(((0, 0, 9, 9), "a", 1.0)), labels=("a", "b")))).perceive([frame()])
@@ -139,6 +140,26 @@ def test_unigoals_detectors_are_one_and_the_maps_word_stands() -> None:
     joint = JointDetector(Network(), 0.5, Told(graph))
     (percept,) = PredictedPerception(joint, EVERYTHING).perceive([frame()])
     assert set(percept.detections.labels) == {"Sofa", "Painting"}  # a box over half the image is no object
+
+
+def test_colours_can_be_swapped_as_3d_mems_code_does() -> None:
+    class Looking:
+        def detect(self, views):
+            self.views = views
+            return [nothing_found((SIDE, SIDE))]
+
+    looking, one = Looking(), frame()
+    PredictedPerception(SwappedColours(looking)).perceive([one])
+    (view,) = looking.views
+    np.testing.assert_array_equal(view.rgb, one.rgb[..., [2, 1, 0]])
+    assert view.depth_m is one.depth_m
+    assert view.horizon_rad == one.pose.horizon_rad
+    word = read_word("predicted:3d-mem,swapped_colours=true")
+    assert weights_of("3d-mem", StackConfig(swapped_colours=word.options["swapped_colours"]))
+    with pytest.raises(InvalidArgumentError, match="predicted:unigoal: swapped_colours is of 3d-mem"):
+        weights_of("unigoal", StackConfig(swapped_colours=True))
+    with pytest.raises(InvalidArgumentError, match="swapped_colours is 'yes', expected true or false"):
+        StackConfig(swapped_colours="yes")
 
 
 def test_vocabularies_are_what_they_say() -> None:

@@ -373,6 +373,7 @@ def _claim(store: RunStore, request: RunRequest) -> None:
             "num_stages": {task.task_id: task.num_stages for task in request.tasks},
             "agents": sorted({*(store.meta("agents") or []), *request.agents}),
             "tasks_dir": str(request.tasks[0].path.absolute().parent),  # for `evonav view`
+            "models_dir": request.config.backend.perception_host_options.get("models"),  # likewise
             "task_digests": {task.task_id: task.digest for task in request.tasks},  # for `evonav pack`
         }
     )

@@ -7,6 +7,7 @@ stage in that round without asking the agent, and goes on with a fresh one, as t
 """
 
 import inspect
+import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
@@ -27,6 +28,7 @@ from evonav.evaluation.settings import EXCHANGES_NAME
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.traced import TracedRound, TracedStage
 from evonav.evaluation.tracer import Loss, Tracer
+from evonav.perception.weights import MODELS_VARIABLE
 
 
 def _near(run_dir: Path, task_id: str) -> str:
@@ -67,18 +69,21 @@ class RunReplay:
         self._keeps_depth = keeps_depth
         with RunStore(run_dir) as store:
             config = store.meta("config") or {}
+            models = store.meta("models_dir")
         try:
             self.seed = int(config["seed"])
             self.protocol = ProtocolConfig(**config["protocol"])
             backend = Backend(**config["backend"])
         except (KeyError, TypeError, ValueError) as error:
             raise StoreError(f"{run_dir}: header of the run: {type(error).__name__}: {error}") from error
+        if models is not None and MODELS_VARIABLE not in os.environ and Path(models).is_dir():
+            backend = replace(backend, perception_host_options={"models": models})
         self.backend = backend
         self._why_not = ""
         if "exchanges" in inspect.signature(imported(backend.decision)).parameters:
             path = exchanges or run_dir / EXCHANGES_NAME
             if path.is_file():
-                self.backend = replace(backend, decision_host_options={"exchanges": str(path), "mode": "replay"})
+                self.backend = replace(self.backend, decision_host_options={"exchanges": str(path), "mode": "replay"})
             elif not _answers_itself(backend):
                 self._why_not = f"The model's answers were not kept: {path} not found."
 

@@ -1,4 +1,4 @@
-"""What a detector is: images in, masks, boxes, words and confidences out. It is told nothing of the scene."""
+"""What a detector is: views in, masks, boxes, words and confidences out. It is told nothing of the scene."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,6 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What a detector is shown of a frame."""
+
+    rgb: NDArray[np.uint8]
+    """`(H, W, 3)`."""
+    depth_m: NDArray[np.float32]
+    """`(H, W)` planar z, `inf` where nothing is; most detectors do without."""
+    horizon_rad: float
+    """How far down the camera looks."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,17 +87,13 @@ def nothing_found(shape: tuple[int, int]) -> Found:
 
 
 class Detector(Protocol):
-    """Finds objects in images. It may be shared by the episodes of a process, so it keeps nothing between calls."""
+    """Finds objects in views. It may be shared by the episodes of a process, so it keeps nothing between calls."""
 
-    def detect(self, images: Sequence[NDArray[np.uint8]], depths_m: Sequence[NDArray[np.float32]]) -> Sequence[Found]:
+    def detect(self, views: Sequence[View]) -> Sequence[Found]:
         """The views of a round, as one batch.
 
-        Args:
-            images: Each `(H, W, 3)` RGB.
-            depths_m: Each `(H, W)` planar z, `inf` where nothing is; most detectors do without.
-
         Returns:
-            One `Found` an image.
+            One `Found` a view.
         """
         ...
 

@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
-from evonav.perception.detector import Found
+from evonav.perception.detector import Found, View
 from evonav.perception.filters import FilterConfig
 from evonav.perception.predicted import PredictedPerception
 
@@ -84,25 +83,25 @@ class MiniDetector:
         self.classes = tuple(self._network.classes)
         """ProcTHOR's types that it tells apart."""
 
-    def detect(self, images: Sequence[NDArray[np.uint8]], depths_m: Sequence[NDArray[np.float32]]) -> list[Found]:
+    def detect(self, views: Sequence[View]) -> list[Found]:
         """Each view by itself: how many come at once changes nothing.
 
         Args:
-            images: Each `(H, W, 3)` RGB, of a camera of 90 degrees field of view.
-            depths_m: Each `(H, W)` planar z, `inf` where nothing is.
+            views: Of a camera of 90 degrees field of view.
 
         Returns:
             Instances, whose masks do not overlap.
 
         Raises:
-            InvalidArgumentError: An image and its depths do not fit, or a depth is not a number.
+            InvalidArgumentError: An image and its depths do not fit, or a depth or horizon is not a number.
         """
-        return [self._found(image, depth_m) for image, depth_m in zip(images, depths_m, strict=True)]
+        return [self._found(view) for view in views]
 
-    def _found(self, image: NDArray[np.uint8], depth_m: NDArray[np.float32]) -> Found:
+    def _found(self, view: View) -> Found:
         numbers, classes, confidences = self._network.detect(
-            np.ascontiguousarray(image),
-            np.ascontiguousarray(depth_m),
+            np.ascontiguousarray(view.rgb),
+            np.ascontiguousarray(view.depth_m),
+            view.horizon_rad,
             min_cells=self._min_cells,
             min_confidence=self._min_confidence,
         )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
-from evonav.perception.detector import Detector, Embedder, Found
+from evonav.perception.detector import Detector, Embedder, Found, View
 from evonav.perception.filters import FilterConfig, filtered, mask_areas_px, one_label_a_pixel
 from evonav.perception.perception import Percept, Perception, StageScene
 from evonav.perception.stacks import STACKS, StackConfig, StackName, facts_of, load_stack, stack_of
@@ -19,7 +19,7 @@ from evonav.perception.vocabulary import TYPE_OF_WORD
 from evonav.sensors.observation import Detections
 from evonav.world.simulator import Frame
 
-__all__ = ["Detector", "Embedder", "Found", "PredictedPerception", "StackPerception", "predicted_perception"]
+__all__ = ["Detector", "Embedder", "Found", "PredictedPerception", "StackPerception", "View", "predicted_perception"]
 
 
 class PredictedPerception:
@@ -56,17 +56,17 @@ class PredictedPerception:
         Raises:
             InvalidArgumentError: A frame has no colours, or what the detector returns does not fit.
         """
-        images = [_colours(frame) for frame in frames]
-        found = self._detector.detect(images, [frame.depth_m for frame in frames])
-        if len(found) != len(images):
-            raise InvalidArgumentError(f"a detector returned {len(found)} results for {len(images)} images")
+        views = [View(_colours(frame), frame.depth_m, frame.pose.horizon_rad) for frame in frames]
+        found = self._detector.detect(views)
+        if len(found) != len(views):
+            raise InvalidArgumentError(f"a detector returned {len(found)} results for {len(views)} views")
         kept = []
-        for one, image in zip(found, images, strict=True):
-            one.check((image.shape[0], image.shape[1]))
+        for one, view in zip(found, views, strict=True):
+            one.check((view.rgb.shape[0], view.rgb.shape[1]))
             kept.append(filtered(one, self._filters))
         features: Sequence[NDArray[np.float32] | None] = [one.features for one in kept]
         if self._embedder is not None:
-            features = self._embedder.image_features(images, [one.boxes_px for one in kept])
+            features = self._embedder.image_features([view.rgb for view in views], [one.boxes_px for one in kept])
         return [
             Percept(self._detections(one, feature), frame.depth_m, frame.pose)
             for one, feature, frame in zip(kept, features, frames, strict=True)

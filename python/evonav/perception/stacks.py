@@ -5,11 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, get_args
 
-import numpy as np
-from numpy.typing import NDArray
-
 from evonav.errors import InvalidArgumentError
-from evonav.perception.detector import Detector, Embedder, Found
+from evonav.perception.detector import Detector, Embedder, Found, View
 from evonav.perception.filters import FilterConfig, filtered, joined
 from evonav.perception.models import libraries
 from evonav.perception.models.prompted import PromptedDetector
@@ -56,6 +53,8 @@ class StackConfig:
     """Weights of SAM: 3d-mem sam_l.pt, transformers facebook/sam-vit-large, unigoal facebook/sam-vit-huge."""
     min_mask_score: float | None = None
     """Of SAM's masks that are kept; unigoal 0.95, the others keep all."""
+    swapped_colours: bool = False
+    """3d-mem: show detector and SAM red as blue and blue as red, as 3D-Mem's released code does."""
 
     def __post_init__(self) -> None:
         """Refuses what makes no sense.
@@ -68,6 +67,10 @@ class StackConfig:
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
             if value is not None and not (is_number and 0.0 <= value <= 1.0):
                 raise InvalidArgumentError(f"predicted perception: {name} is {value!r}, expected 0..1")
+        if not isinstance(self.swapped_colours, bool):
+            raise InvalidArgumentError(
+                f"predicted perception: swapped_colours is {self.swapped_colours!r}, expected true or false"
+            )
         for name in ("vocabulary", "detector", "sam"):
             value = getattr(self, name)
             if value is not None and not (isinstance(value, str) and value.strip()):
@@ -120,14 +123,25 @@ class JointDetector:
     grounded: Detector
     graph_filters: FilterConfig = UNIGOAL_GRAPH
 
-    def detect(self, images: Sequence[NDArray[np.uint8]], depths_m: Sequence[NDArray[np.float32]]) -> list[Found]:
+    def detect(self, views: Sequence[View]) -> list[Found]:
         """What both find; of what both found, the map's word stands, which every table has a graph's word for."""
-        firsts = self.network.detect(images, _COCO, self.min_confidence)
-        seconds = self.grounded.detect(images, depths_m)
+        firsts = self.network.detect([view.rgb for view in views], _COCO, self.min_confidence)
+        seconds = self.grounded.detect(views)
         return [
             joined(filtered(first, EVERYTHING), filtered(second, self.graph_filters), _SAME_IOU)
             for first, second in zip(firsts, seconds, strict=True)
         ]
+
+
+@dataclass(frozen=True, slots=True)
+class SwappedColours:
+    """A detector that is shown red as blue and blue as red."""
+
+    detector: Detector
+
+    def detect(self, views: Sequence[View]) -> Sequence[Found]:
+        """What it finds so."""
+        return self.detector.detect([replace(view, rgb=view.rgb[..., ::-1]) for view in views])
 
 
 def stack_of(agent: str) -> StackName:
@@ -162,6 +176,8 @@ def weights_of(stack: StackName, config: StackConfig) -> dict[str, Weights]:
     }
     if stack == "unigoal" and config.vocabulary is not None:
         raise InvalidArgumentError("predicted:unigoal has words of its own; leave vocabulary out")
+    if stack != "3d-mem" and config.swapped_colours:
+        raise InvalidArgumentError(f"predicted:{stack}: swapped_colours is of 3d-mem")
     names = {**defaults[stack], **({"detector": config.detector} if config.detector else {})}
     names |= {"sam": config.sam} if config.sam else {}
     for part, name in names.items():
@@ -225,6 +241,8 @@ def load_stack(stack: StackName, config: StackConfig, models: str | None, device
             min_confidence,
             _either(min_score, -math.inf),
         )
+        if config.swapped_colours:
+            detector = SwappedColours(detector)
         embedder: Embedder = open_clip_models.load_open_clip("ViT-B-32", paths["clip"], on)
         return Parts(detector, replace(FilterConfig(), min_confidence=min_confidence), embedder)
     from evonav.perception.models import transformers_models

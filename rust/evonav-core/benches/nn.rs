@@ -25,11 +25,11 @@ fn stages(criterion: &mut Criterion) {
     let (rgb, depth_m) = picture();
     let resemblance = Resemblance::default();
     let config = DetectorConfig { min_cells: 2, min_confidence: 0.1, resemblance };
-    let made = input(&rgb, &depth_m, SIZE_PX).expect("a picture");
+    let made = input(&rgb, &depth_m, SIZE_PX, 0.5).expect("a picture");
     let logits = network.run(&made).expect("an input");
     let found = segments(&logits, 2, 0.1).expect("logits");
     criterion.bench_function("mini/input", |b| {
-        b.iter(|| input(black_box(&rgb), black_box(&depth_m), SIZE_PX));
+        b.iter(|| input(black_box(&rgb), black_box(&depth_m), SIZE_PX, 0.5));
     });
     criterion.bench_function("mini/network", |b| b.iter(|| network.run(black_box(&made))));
     criterion.bench_function("mini/segments", |b| b.iter(|| segments(black_box(&logits), 2, 0.1)));
@@ -37,7 +37,7 @@ fn stages(criterion: &mut Criterion) {
         b.iter(|| refine(black_box(&found.cells), &rgb, &depth_m, SIZE_PX, resemblance));
     });
     criterion.bench_function("mini/view", |b| {
-        b.iter(|| detect(&network, black_box(&rgb), black_box(&depth_m), SIZE_PX, &config));
+        b.iter(|| detect(&network, black_box(&rgb), black_box(&depth_m), SIZE_PX, 0.5, &config));
     });
 }
 

@@ -139,7 +139,7 @@ proptest! {
 
     #[test]
     fn no_file_makes_the_reader_panic(bytes in vec(any::<u8>(), 0..200), len in 0..200_u32) {
-        let header = br#"{"format":"evonav-mini/1","classes":["A"],"layers":[{"name":"stem","num_in":6,"num_out":2,"size":3,"stride":2,"is_depthwise":false}]}"#;
+        let header = br#"{"format":"evonav-mini/2","classes":["A"],"layers":[{"name":"stem","num_in":6,"num_out":2,"size":3,"stride":2,"is_depthwise":false}]}"#;
         let with_len = [b"EVONAVNN".as_slice(), &len.to_le_bytes(), &bytes].concat();
         let with_header =
             [b"EVONAVNN".as_slice(), &(header.len() as u32).to_le_bytes(), header, &bytes].concat();
@@ -196,13 +196,40 @@ fn halves_are_numbers() {
 fn a_picture_of_any_size_is_an_input() {
     for [width, height] in [[1, 1], [7, 301], [300, 300]] {
         let depth_m = vec![f32::INFINITY; width * height];
-        let made = input(&vec![255; 3 * width * height], &depth_m, [width, height]);
+        let made = input(&vec![255; 3 * width * height], &depth_m, [width, height], 0.0);
         let made = made.expect("a picture");
         assert_eq!(made.shape(), [SIDE_PX, SIDE_PX, 6]);
         assert!(made.values.iter().all(|value| value.is_finite()));
     }
-    assert!(input(&[0; 3], &[f32::NAN], [1, 1]).is_err());
-    assert!(input(&[0; 2], &[1.0], [1, 1]).is_err());
-    assert!(input(&[], &[], [0, 5]).is_err());
-    assert!(input(&[0; 3], &[1.0], [usize::MAX, 2]).is_err());
+    assert!(input(&[0; 3], &[f32::NAN], [1, 1], 0.0).is_err());
+    assert!(input(&[0; 2], &[1.0], [1, 1], 0.0).is_err());
+    assert!(input(&[], &[], [0, 5], 0.0).is_err());
+    assert!(input(&[0; 3], &[1.0], [usize::MAX, 2], 0.0).is_err());
+    assert!(input(&[0; 3], &[1.0], [1, 1], f64::NAN).is_err());
+}
+
+/// What lies on the floor is as far below a camera that looks down as below one that looks ahead.
+#[test]
+fn height_is_measured_from_the_camera_and_not_from_its_axis() {
+    let floor_m = 1.5;
+    for horizon_rad in [-0.2_f64, 0.0, 0.3, 0.6] {
+        let rows = 0..SIDE_PX;
+        let slopes = rows.map(|i| (2 * i + 1) as f64 / SIDE_PX as f64 - 1.0);
+        let below = slopes.map(|slope| horizon_rad.sin() + horizon_rad.cos() * slope);
+        let depth_m: Vec<f32> = below
+            .flat_map(|below| [if below > 0.1 { (floor_m / below) as f32 } else { f32::INFINITY }; SIDE_PX])
+            .collect();
+        let rgb = vec![0; 3 * depth_m.len()];
+        let made = input(&rgb, &depth_m, [SIDE_PX; 2], horizon_rad).expect("a picture");
+        let (mut seen, mut high) = (0, 0);
+        for (pixel, z_m) in made.values.as_chunks::<6>().0.iter().zip(&depth_m) {
+            if z_m.is_finite() {
+                seen += 1;
+                assert!((f64::from(pixel[4]) - floor_m).abs() < 1e-4, "{horizon_rad}: {pixel:?}");
+            } else {
+                high += usize::from(pixel[4] <= 2.0);
+            }
+        }
+        assert!(seen > SIDE_PX * SIDE_PX / 4 && high > 0);
+    }
 }

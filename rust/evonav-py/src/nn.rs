@@ -34,17 +34,18 @@ impl MiniNetwork {
         py: Python<'py>,
         rgb: PyReadonlyArray3<'py, u8>,
         depth_m: PyReadonlyArray2<'py, f32>,
+        horizon_rad: f64,
     ) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let (pixels, depths, size_px) = picture(&rgb, &depth_m)?;
         let logits = py
-            .detach(|| self.0.run(&network::input(pixels, depths, size_px)?))
+            .detach(|| self.0.run(&network::input(pixels, depths, size_px, horizon_rad)?))
             .map_err(error::to_py)?;
         let shape = logits.shape();
         arrays::image_of(py, logits.values, shape)
     }
 
     /// Masks, classes and confidences.
-    #[pyo3(signature = (rgb, depth_m, *, min_cells, min_confidence, colour=0.02, depth=8.0, place=0.5))]
+    #[pyo3(signature = (rgb, depth_m, horizon_rad, *, min_cells, min_confidence, colour=0.02, depth=8.0, place=0.5))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
     #[expect(clippy::type_complexity, reason = "a triple of arrays")]
     fn detect<'py>(
@@ -52,6 +53,7 @@ impl MiniNetwork {
         py: Python<'py>,
         rgb: PyReadonlyArray3<'py, u8>,
         depth_m: PyReadonlyArray2<'py, f32>,
+        horizon_rad: f64,
         min_cells: usize,
         min_confidence: f32,
         colour: f32,
@@ -63,7 +65,7 @@ impl MiniNetwork {
         let resemblance = Resemblance { colour, depth, place };
         let config = detector::DetectorConfig { min_cells, min_confidence, resemblance };
         let found = py
-            .detach(|| detector::detect(&self.0, pixels, depths, size_px, &config))
+            .detach(|| detector::detect(&self.0, pixels, depths, size_px, horizon_rad, &config))
             .map_err(error::to_py)?;
         let classes = found.classes.into_iter().map(|class| class as i64).collect();
         Ok((

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.perception.detector import Found, nothing_found
+from evonav.perception.detector import Found, View, nothing_found
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,8 +59,9 @@ class PromptedDetector:
     min_mask_score: float = 0.0
     """Masks below it are dropped."""
 
-    def detect(self, images: Sequence[NDArray[np.uint8]], depths_m: Sequence[NDArray[np.float32]]) -> list[Found]:
-        """Boxes and masks of all images as one batch; depth is not looked at."""
+    def detect(self, views: Sequence[View]) -> list[Found]:
+        """Boxes and masks of all views as one batch; depth is not looked at."""
+        images = [view.rgb for view in views]
         boxes = self.finder.find(images, self.words, self.min_confidence)
         masks = self.masker.outline(images, [one.boxes_px for one in boxes])
         return [

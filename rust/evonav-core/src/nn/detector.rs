@@ -33,18 +33,19 @@ pub struct Instances {
 /// Finds instances in a picture.
 ///
 /// # Arguments
-/// * `rgb`, `depth_m`, `size_px` - as for [`input`].
+/// * `rgb`, `depth_m`, `size_px`, `horizon_rad` - as for [`input`].
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] if the numbers of pixels are off or a threshold is not a number.
+/// [`Error::InvalidArgument`] if the numbers of pixels are off, or the horizon or a threshold is not a number.
 pub fn detect(
     network: &Network,
     rgb: &[u8],
     depth_m: &[f32],
     size_px: [usize; 2],
+    horizon_rad: f64,
     config: &DetectorConfig,
 ) -> Result<Instances, Error> {
-    let logits = network.run(&input(rgb, depth_m, size_px)?)?;
+    let logits = network.run(&input(rgb, depth_m, size_px, horizon_rad)?)?;
     let found = segments(&logits, config.min_cells, config.min_confidence)?;
     let masks = refine(&found.cells, rgb, depth_m, size_px, config.resemblance)?;
     Ok(Instances { masks, classes: found.classes, confidences: found.confidences })

@@ -102,25 +102,35 @@ fn relu(mut image: Tensor) -> Tensor {
     image
 }
 
-/// A picture as the network takes it: colours, depth, height below the camera's axis, nearness.
+/// A picture as the network takes it: colours, depth, height below the camera, nearness.
 ///
 /// # Arguments
 /// * `rgb` - row-major, three bytes a pixel.
 /// * `depth_m` - planar z of each pixel, infinite where nothing is.
 /// * `size_px` - width and height.
+/// * `horizon_rad` - how far down the camera looks.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] if there are no pixels, not as many of either as the size says, or a depth is not a number.
-pub fn input(rgb: &[u8], depth_m: &[f32], size_px: [usize; 2]) -> Result<Tensor, Error> {
+/// [`Error::InvalidArgument`] if there are no pixels, not as many of either as the size says, a depth is not a number
+/// or the horizon not finite.
+pub fn input(
+    rgb: &[u8],
+    depth_m: &[f32],
+    size_px: [usize; 2],
+    horizon_rad: f64,
+) -> Result<Tensor, Error> {
     let [width, height] = size_px;
     Error::require("depth_m", depth_m.len(), "one a pixel", |len| {
         len > 0 && Some(len) == width.checked_mul(height)
     })?;
     Error::require("rgb", rgb.len(), "three bytes a pixel", |len| len == 3 * depth_m.len())?;
+    Error::require("horizon_rad", horizon_rad, "finite", f64::is_finite)?;
+    let (sin, cos) = (horizon_rad.sin() as f32, horizon_rad.cos() as f32);
     let (pixels, rows, cols) = (rgb.as_chunks::<3>().0, samples(height), samples(width));
     let mut values = Vec::with_capacity(SIDE_PX * SIDE_PX * 6);
     for (i, row) in rows.iter().enumerate() {
-        let below = (i as f32 + 0.5) / (SIDE_PX as f32 / 2.0) - 1.0;
+        // Metres below the camera for each metre of depth, in a field of view of 90 degrees.
+        let below = sin + cos * ((i as f32 + 0.5) / (SIDE_PX as f32 / 2.0) - 1.0);
         for col in &cols {
             let place = row * width + col;
             let z_m = depth_m[place];

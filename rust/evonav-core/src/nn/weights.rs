@@ -9,7 +9,7 @@ use crate::{
 };
 
 const MAGIC: &[u8; 8] = b"EVONAVNN";
-const FORMAT: &str = "evonav-mini/1";
+const FORMAT: &str = "evonav-mini/2";
 
 #[derive(Deserialize)]
 struct Header {
