@@ -16,12 +16,14 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import task_files
+from evonav.evaluation.perception_estimates import Houses
 from evonav.evaluation.perception_quality import PerceptionSpec, TourConfig, measure
 from evonav.evaluation.perception_records import read_record, read_records, record_path
-from evonav.evaluation.perception_scores import scores
+from evonav.evaluation.perception_scores import differences, scores
 from evonav.evaluation.perception_tour import tour
 from evonav.report.perception_page import write_perception_report
 from evonav.report.perception_tables import perception_tables
+from evonav.significance import percentile_interval
 
 SPECS = [
     PerceptionSpec("gt", "evonav.evaluation.backend:ground_truth"),
@@ -127,6 +129,33 @@ def test_features_are_compared_by_what_they_are_of(found):
     assert erring.overall["cosine_text_other"].value < 0.5
 
 
+def test_differences_are_of_the_same_houses_in_every_resample(folder, found):
+    records = read_records(folder)
+    twice = scores({"once": records["missing_a_third"], "again": records["missing_a_third"]})
+    (same,) = differences(twice)
+    assert (same.word, same.less) == ("again", "once")
+    assert {each.value for each in same.measures.values()} == {0.0}
+    assert {each.interval for each in same.measures.values()} == {(0.0, 0.0)}  # of one alone they are not
+    assert twice[0].overall["recall"].interval[0] < twice[0].overall["recall"].interval[1]
+    pairs = {(each.word, each.less): each.measures for each in differences(list(found.values()))}
+    assert len(pairs) == 6
+    less_truth = pairs["missing_a_third", "gt"]["recall"]
+    assert less_truth.value == pytest.approx(found["missing_a_third"].overall["recall"].value - 1)
+    assert less_truth.interval == pytest.approx([e - 1 for e in found["missing_a_third"].overall["recall"].interval])
+    rates = {}
+    for word in ("missing_a_third", "confusing"):
+        shares = [(r.house, np.array(r.truths.found) >= 0) for r in records[word]]
+        draws = Houses(records[word], 0).draws
+        order = sorted({house for house, _ in shares})
+        tops, alls = (
+            np.array([sum(f(hits) for house, hits in shares if house == name) for name in order]) for f in (np.sum, len)
+        )
+        rates[word] = (draws @ tops) / (draws @ alls)
+    gaps = rates["confusing"] - rates["missing_a_third"]
+    ends = percentile_interval(gaps[:, None], len(order))[0]
+    assert pairs["confusing", "missing_a_third"]["recall"].interval == pytest.approx(ends)
+
+
 def test_what_has_moved_makes_entries_stale(folder, found):
     records = read_records(folder)
     assert any(len(one.stages) == 2 for one in records["gt"])
@@ -224,7 +253,12 @@ def test_files_tell_the_same_as_the_scores(folder, found, tmp_path):
     recalls = [row for row in rows if row["measure"] == "recall" and row["by"] == ""]
     assert [float(row["value"]) for row in recalls] == [one.overall["recall"].value for one in shown]
     assert Counter(row["by"] for row in rows)["distance"] == 4 * 5 * 6
+    gaps = json.loads((tmp_path / "copy" / "summary.json").read_text())["differences"]
+    assert [(gap["perception"], gap["less"]) for gap in gaps[:2]] == [("missing_a_third", "gt"), ("confusing", "gt")]
+    lesser = [row for row in rows if row["by"] == "less" and row["measure"] == "recall"]
+    assert [float(row["value"]) for row in lesser] == [gap["recall"]["value"] for gap in gaps]
     text = page.read_text()
+    assert "confusing less missing_a_third" in text
     assert text.count("data:image/jpeg;base64,") == 4 * 3
     brief, full = (perception_tables(shown, is_brief=brief) for brief in (True, False))
     assert [table.title for table in brief] == [table.title for table in full]

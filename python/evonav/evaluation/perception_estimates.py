@@ -1,7 +1,7 @@
 """Ratios over houses with their intervals: what all figures of a perception are made of."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,41 @@ class Estimate:
     """95%, bootstrap by house; `None` of one house."""
     n: int
     """What it is a mean over."""
+    drawn: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
+    """In every resample of the houses, the same for all perceptions; `None` without an interval."""
+
+    def less(self, other: "Estimate", num_houses: int) -> "Estimate":
+        """By how much it is ahead of another perception's, over the same views.
+
+        Args:
+            other: The same figure.
+            num_houses: That both are of.
+
+        Returns:
+            The difference; its interval is of the differences within resamples, and its n the smaller one.
+        """
+        n = min(self.n, other.n)
+        if self.value is None or other.value is None:
+            return Estimate(None, None, n)
+        value = self.value - other.value
+        if self.drawn is None or other.drawn is None:
+            return Estimate(value, None, n)
+        return estimate(value, self.drawn - other.drawn, n, num_houses)
+
+
+def estimate(value: float, drawn: NDArray[np.float64], n: int, num_houses: int) -> Estimate:
+    """A figure with its interval.
+
+    Args:
+        value: Of all houses.
+        drawn: `(R,)` in resamples; NaN where there is none.
+        n: What it is a mean over.
+        num_houses: That were resampled.
+    """
+    if num_houses < 2 or np.isnan(drawn).all():
+        return Estimate(value, None, n)
+    low, high = percentile_interval(drawn[:, None], num_houses)[0]
+    return Estimate(value, (float(low), float(high)), n, drawn)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,11 +123,4 @@ class Houses:
             return Estimate(value, None, n)
         sums = self.draws @ bottoms
         drawn = np.divide(self.draws @ tops, sums, out=np.full_like(sums, np.nan), where=sums > 0)
-        return Estimate(value, self.interval(shape(drawn)), n)
-
-    def interval(self, drawn: NDArray[np.float64]) -> Interval | None:
-        """Ends of resampled values."""
-        if self.num < 2 or np.isnan(drawn).all():
-            return None
-        low, high = percentile_interval(drawn[:, None], self.num)[0]
-        return (float(low), float(high))
+        return estimate(value, shape(drawn), n, self.num)

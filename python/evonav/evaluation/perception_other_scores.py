@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.evaluation.perception_estimates import Estimate, Group, Houses
+from evonav.evaluation.perception_estimates import Estimate, Group, Houses, estimate
 from evonav.evaluation.perception_records import DISTANCE_BINS_M, NUM_COSINE_BINS, MemoryState, TaskRecord
 
 NUM_CONFIDENCE_BINS = 10
@@ -40,7 +40,7 @@ def calibration(
         return {"ece": Estimate(None, None, 0)}, rows
     value = float(np.abs(tops.sum(axis=1) - sums.sum(axis=1)).sum() / num)
     drawn = np.abs(houses.draws @ (tops - sums).T).sum(axis=1) / np.maximum(houses.draws @ counts.sum(axis=0), 1.0)
-    return {"ece": Estimate(value, houses.interval(drawn), num)}, rows
+    return {"ece": estimate(value, drawn, num, houses.num)}, rows
 
 
 def depth_groups(houses: Houses, records: Sequence[TaskRecord]) -> list[Group]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from evonav.errors import StoreError
 from evonav.evaluation import perception_other_scores as other
-from evonav.evaluation.perception_estimates import Estimate, Group, Houses
+from evonav.evaluation.perception_estimates import Estimate, Group, Houses, estimate
 from evonav.evaluation.perception_matching import IGNORED, IOU_LIMIT, NONE
 from evonav.evaluation.perception_precision import interpolated, resampled
 from evonav.evaluation.perception_records import DISTANCE_BINS_M, TaskRecord
@@ -24,6 +24,9 @@ AP_LIMITS = tuple(round(IOU_LIMIT + 0.05 * i, 2) for i in range(10))
 DISTANCES = other.DISTANCES
 OUTLINE_LIMITS = (0.5, 0.9)
 OUTLINES = ("under 50%", "50-90%", "over 90%")
+COMPARED = ("ap50", "ap", "precision", "recall", "f1", "located")
+COMPARED_MEMORY = ("memory_precision", "memory_recall")
+"""What perceptions are set against each other by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +82,37 @@ def scores(records: Mapping[str, Sequence[TaskRecord]], *, seed: int = 0) -> lis
     if not records or not all(records.values()):
         raise StoreError("no task has a record of every perception yet: run the command again")
     return [_Scorer(word, mine, seed).scores() for word, mine in records.items()]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One perception less another, over the same views."""
+
+    word: str
+    less: str
+    measures: Mapping[str, Estimate]
+
+
+def differences(found: Sequence[Scores]) -> list[Difference]:
+    """Of every two perceptions: those that people compare detectors by.
+
+    Args:
+        found: Of the same tasks.
+    """
+    return [
+        Difference(
+            b.word,
+            a.word,
+            {
+                name: theirs[name].less(ours[name], a.num_houses)
+                for ours, theirs, names in ((a.overall, b.overall, COMPARED), (a.memory, b.memory, COMPARED_MEMORY))
+                for name in names
+                if name in ours and name in theirs
+            },
+        )
+        for i, a in enumerate(found)
+        for b in found[i + 1 :]
+    ]
 
 
 class _Scorer:
@@ -205,17 +239,16 @@ class _Scorer:
                 values[i, j] = curve.mean()
                 if j == 0:
                     curves.append(curve)
-            interval = houses.interval(drawn[i, 0])
-            found[name] = {"ap50": Estimate(float(values[i, 0]), interval, int(wanted.sum()))}
+            found[name] = {"ap50": estimate(float(values[i, 0]), drawn[i, 0], int(wanted.sum()), houses.num)}
         num, every = len(self.truth_house), np.ones(len(self.house), np.bool_)
         wanted = houses.sums(self.truth_house)
         curve, of_places = self._precision_curve(every, self.place, self.place_iou, wanted, AP_LIMITS[0], draws)
         # A resample may lack a category; then the mean is over the others.
         means = np.nanmean(drawn, axis=0)
         found[""] = {
-            "ap50": Estimate(float(values[:, 0].mean()), houses.interval(means[0]), num),
-            "ap": Estimate(float(values.mean()), houses.interval(means.mean(axis=0)), num),
-            "ap50_located": Estimate(float(curve.mean()), houses.interval(of_places), num),
+            "ap50": estimate(float(values[:, 0].mean()), means[0], num, houses.num),
+            "ap": estimate(float(values.mean()), means.mean(axis=0), num, houses.num),
+            "ap50_located": estimate(float(curve.mean()), of_places, num, houses.num),
         }
         return np.mean(curves, axis=0).tolist(), found
 

@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from evonav.evaluation.perception_other_scores import measure_values
 from evonav.evaluation.perception_records import read_header, read_records
-from evonav.evaluation.perception_scores import Scores, scores
+from evonav.evaluation.perception_scores import Scores, differences, scores
 from evonav.folders import write_atomically
 from evonav.report.line_chart import PLOT_CSS
 from evonav.report.page import page_environment, policy, text_of
@@ -58,7 +58,13 @@ def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
 
 def perception_json(found: Sequence[Scores]) -> dict[str, Any]:
     """The content of `summary.json`."""
-    return {"schema_version": 1, "perceptions": [_values(one) for one in found]}
+    return {
+        "schema_version": 1,
+        "perceptions": [_values(one) for one in found],
+        "differences": [
+            {"perception": each.word, "less": each.less, **measure_values(each.measures)} for each in differences(found)
+        ],
+    }
 
 
 def _values(one: Scores) -> dict[str, Any]:

@@ -5,7 +5,7 @@ import io
 from collections.abc import Mapping, Sequence
 
 from evonav.evaluation.perception_estimates import Estimate, Group
-from evonav.evaluation.perception_scores import Scores
+from evonav.evaluation.perception_scores import COMPARED, COMPARED_MEMORY, Scores, differences
 from evonav.report.tables import NONE, Table
 
 MAX_CATEGORIES, MAX_CONFUSIONS = 8, 4
@@ -21,6 +21,7 @@ def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> lis
     """
     tables = [
         _headline(found),
+        _differences(found),
         _parts(found),
         *(_by_group(found, by, words) for by, words in (("distance", "distance"), ("size", "size in the image"))),
         _by_outline(found),
@@ -42,6 +43,16 @@ def percent(estimate: Estimate | None, *, has_n: bool = False) -> str:
     if estimate.interval is not None:
         told += " [{:.1f}, {:.1f}]".format(*(100 * end for end in estimate.interval))
     return f"{told} ({estimate.n})" if has_n else told
+
+
+def points(estimate: Estimate | None) -> str:
+    """A difference of shares in points with its interval."""
+    if estimate is None or estimate.value is None:
+        return NONE
+    told = f"{100 * estimate.value:+.1f}"
+    if estimate.interval is not None:
+        told += " [{:+.1f}, {:+.1f}]".format(*(100 * end for end in estimate.interval))
+    return told
 
 
 def number(estimate: Estimate | None, decimals: int = 2) -> str:
@@ -72,6 +83,16 @@ def _headline(found: Sequence[Scores]) -> Table:
         "In %, at IoU 0.5 and with the right label; AP: mean over IoU 0.5 to 0.95.",
     )
     return Table("What perceptions find", ("perception", *heads), rows, notes)
+
+
+def _differences(found: Sequence[Scores]) -> Table:
+    heads = ("AP50", "AP", "precision", "recall", "F1", "located", "memory precision", "memory recall")
+    rows = tuple(
+        (f"{each.word} less {each.less}", *(points(each.measures.get(name)) for name in (*COMPARED, *COMPARED_MEMORY)))
+        for each in differences(found)
+    )
+    note = f"In points. {INTERVALS} Of the same views: an interval without 0 in it is a difference."
+    return Table("Perceptions against each other", ("perceptions", *heads), rows, (note,))
 
 
 def _parts(found: Sequence[Scores]) -> Table:
@@ -226,21 +247,23 @@ def perception_csv(found: Sequence[Scores]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("perception", "by", "group", "measure", "value", "low", "high", "n", "num_houses"))
 
-    def write(one: Scores, by: str, group: str, measures: Mapping[str, Estimate]) -> None:
+    def write(word: str, by: str, group: str, measures: Mapping[str, Estimate]) -> None:
         for name, each in measures.items():
             low, high = each.interval or ("", "")
             value = "" if each.value is None else each.value
-            writer.writerow((one.word, by, group, name, value, low, high, each.n, one.num_houses))
+            writer.writerow((word, by, group, name, value, low, high, each.n, found[0].num_houses))
 
+    for each in differences(found):
+        write(each.word, "less", each.less, each.measures)
     for one in found:
-        write(one, "", "", one.overall)
-        write(one, "memory", "", one.memory)
+        write(one.word, "", "", one.overall)
+        write(one.word, "memory", "", one.memory)
         for share, measures in one.memory_curve:
-            write(one, "memory by share of the tour", f"{share:g}", measures)
+            write(one.word, "memory by share of the tour", f"{share:g}", measures)
         groups: dict[str, Sequence[Group]] = {**one.groups, "depth": one.depth}
         for by, rows in groups.items():
             for group in rows:
-                write(one, by, group.name, group.measures)
-        for each in one.confusions:
-            write(one, "confusion", f"{each.category} as {each.label}", {"share": each.share})
+                write(one.word, by, group.name, group.measures)
+        for pair in one.confusions:
+            write(one.word, "confusion", f"{pair.category} as {pair.label}", {"share": pair.share})
     return text.getvalue()
