@@ -32,7 +32,9 @@ PERCEPTIONS = (
     "noisy:good",
     "noisy:yolo-world-like",
     "noisy:poor",
+    "predicted:mini",
 )
+"""The curves are of the first ones; what a learned detector gives stands beside them in the tables."""
 FIGURES = PAGE.parent / "images"
 
 Keep = Callable[[StageRecord], bool]
@@ -70,7 +72,7 @@ def folder_of(word: str) -> str:
 
 def name_of(word: str) -> str:
     """Of a perception in tables."""
-    return word.removeprefix("noisy:").replace(",features=true", " + features").removesuffix("-like")
+    return word.partition(":")[2].replace(",features=true", " + features").removesuffix("-like")
 
 
 def parts(runs: Mapping[str, Run]) -> dict[str, str]:
@@ -187,6 +189,7 @@ def _words(runs: Mapping[str, Run], measure: str) -> str:
 
 def _figure(runs: Mapping[str, Run], measure: str) -> str:
     lines = []
+    runs = {word: run for word, run in runs.items() if word.startswith("noisy:")}
     for agent in _agents(runs):
         found = [(x, rate) for x, run in enumerate(runs.values()) if (rate := _rate(_summary(run, agent), measure))]
         ends = [None if ci is None else (100 * ci[0], 100 * ci[1]) for _, (_, ci) in found]

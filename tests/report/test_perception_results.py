@@ -35,6 +35,7 @@ def test_every_default_perception_is_a_word_with_a_folder_and_a_name_of_its_own(
         "good",
         "yolo-world",
         "poor",
+        "mini",
     ]
     for word in script.PERCEPTIONS:
         read_word(word)

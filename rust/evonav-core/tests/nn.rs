@@ -217,7 +217,9 @@ fn height_is_measured_from_the_camera_and_not_from_its_axis() {
         let slopes = rows.map(|i| (2 * i + 1) as f64 / SIDE_PX as f64 - 1.0);
         let below = slopes.map(|slope| horizon_rad.sin() + horizon_rad.cos() * slope);
         let depth_m: Vec<f32> = below
-            .flat_map(|below| [if below > 0.1 { (floor_m / below) as f32 } else { f32::INFINITY }; SIDE_PX])
+            .flat_map(|below| {
+                [if below > 0.1 { (floor_m / below) as f32 } else { f32::INFINITY }; SIDE_PX]
+            })
             .collect();
         let rgb = vec![0; 3 * depth_m.len()];
         let made = input(&rgb, &depth_m, [SIDE_PX; 2], horizon_rad).expect("a picture");
