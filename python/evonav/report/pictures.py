@@ -62,8 +62,12 @@ def write_picture(svg: str, path: Path) -> Path:
 def _png(svg: str) -> bytes:
     fonts: dict[str, Any] = {}
     if (plots := find_spec("matplotlib")) is not None and plots.origin is not None:
-        # Where the machine has no fonts, words would be missing.
-        fonts = {"font_dirs": [str(Path(plots.origin).parent / "mpl-data" / "fonts" / "ttf")]}
+        # Where the machine has no fonts, or not those that resvg takes for the usual ones, words would be missing.
+        fonts = {
+            "font_dirs": [str(Path(plots.origin).parent / "mpl-data" / "fonts" / "ttf")],
+            **dict.fromkeys(("font_family", "serif_family", "sans_serif_family"), "DejaVu Sans"),
+            "monospace_family": "DejaVu Sans Mono",
+        }
     return bytes(_resvg().svg_to_bytes(svg_string=svg, zoom=ZOOM, background="#ffffff", **fonts))
 
 
