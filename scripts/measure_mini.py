@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from mini_frames import LabelledFrame, frames, house_files
 
-from evonav.perception.detector import Found, View
+from evonav.perception.detector import DetectorView, Found
 from evonav.perception.mini import MiniDetector
 
 MIN_AREA_PX = 90
@@ -52,7 +52,7 @@ def main() -> None:
     num_views, spent_s = 0, 0.0
     for frame in frames([t for folder in args.tasks for t in house_files(folder)], args.per_house, args.seed):
         began_s = time.process_time()
-        (found,) = detector.detect([View(frame.rgb, frame.depth_m, frame.horizon_rad)])
+        (found,) = detector.detect([DetectorView(frame.rgb, frame.depth_m, frame.horizon_rad)])
         spent_s += time.process_time() - began_s
         num_views += 1
         count(houses[frame.house], frame, found)

@@ -18,7 +18,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.settings import PerceptionSettings
 from evonav.evaluation.store import RunStore
 from evonav.perception import mini
-from evonav.perception.detector import View
+from evonav.perception.detector import DetectorView
 from evonav.perception.mini import MiniDetector
 from evonav.perception.vocabulary import PROCTHOR_TYPES
 
@@ -38,8 +38,8 @@ def frames() -> list[mini_frames.LabelledFrame]:
     return views()
 
 
-def view_of(frame: mini_frames.LabelledFrame) -> View:
-    return View(frame.rgb, frame.depth_m, frame.horizon_rad)
+def view_of(frame: mini_frames.LabelledFrame) -> DetectorView:
+    return DetectorView(frame.rgb, frame.depth_m, frame.horizon_rad)
 
 
 @pytest.mark.parametrize("tilted", [0.0, 1.0])
@@ -96,7 +96,7 @@ def test_views_of_any_size(frames: list[mini_frames.LabelledFrame], size: tuple[
     rows, cols = (np.arange(side) * 300 // side for side in size)
     frame = max(frames, key=lambda frame: (frame.instances > 0).sum())
     (found,) = MiniDetector().detect(
-        [View(frame.rgb[rows[:, None], cols], frame.depth_m[rows[:, None], cols], frame.horizon_rad)]
+        [DetectorView(frame.rgb[rows[:, None], cols], frame.depth_m[rows[:, None], cols], frame.horizon_rad)]
     )
     found.check(size)
     assert len(found) > 0

@@ -11,7 +11,7 @@ from evonav.errors import InvalidArgumentError
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class DetectorView:
     """What a detector is shown of a frame."""
 
     rgb: NDArray[np.uint8]
@@ -89,7 +89,7 @@ def nothing_found(shape: tuple[int, int]) -> Found:
 class Detector(Protocol):
     """Finds objects in views. It may be shared by the episodes of a process, so it keeps nothing between calls."""
 
-    def detect(self, views: Sequence[View]) -> Sequence[Found]:
+    def detect(self, views: Sequence[DetectorView]) -> Sequence[Found]:
         """The views of a round, as one batch.
 
         Returns:

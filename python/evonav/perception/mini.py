@@ -14,7 +14,7 @@ import numpy as np
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
-from evonav.perception.detector import Found, View
+from evonav.perception.detector import DetectorView, Found
 from evonav.perception.filters import FilterConfig
 from evonav.perception.predicted import PredictedPerception
 
@@ -83,7 +83,7 @@ class MiniDetector:
         self.classes = tuple(self._network.classes)
         """ProcTHOR's types that it tells apart."""
 
-    def detect(self, views: Sequence[View]) -> list[Found]:
+    def detect(self, views: Sequence[DetectorView]) -> list[Found]:
         """Each view by itself: how many come at once changes nothing.
 
         Args:
@@ -97,7 +97,7 @@ class MiniDetector:
         """
         return [self._found(view) for view in views]
 
-    def _found(self, view: View) -> Found:
+    def _found(self, view: DetectorView) -> Found:
         numbers, classes, confidences = self._network.detect(
             np.ascontiguousarray(view.rgb),
             np.ascontiguousarray(view.depth_m),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
-from evonav.perception.detector import Detector, Embedder, Found, View
+from evonav.perception.detector import Detector, DetectorView, Embedder, Found
 from evonav.perception.filters import FilterConfig, filtered, mask_areas_px, one_label_a_pixel
 from evonav.perception.perception import Percept, Perception, StageScene
 from evonav.perception.stacks import STACKS, StackConfig, StackName, facts_of, load_stack, stack_of
@@ -19,7 +19,15 @@ from evonav.perception.vocabulary import TYPE_OF_WORD
 from evonav.sensors.observation import Detections
 from evonav.world.simulator import Frame
 
-__all__ = ["Detector", "Embedder", "Found", "PredictedPerception", "StackPerception", "View", "predicted_perception"]
+__all__ = [
+    "Detector",
+    "DetectorView",
+    "Embedder",
+    "Found",
+    "PredictedPerception",
+    "StackPerception",
+    "predicted_perception",
+]
 
 
 class PredictedPerception:
@@ -56,7 +64,7 @@ class PredictedPerception:
         Raises:
             InvalidArgumentError: A frame has no colours, or what the detector returns does not fit.
         """
-        views = [View(_colours(frame), frame.depth_m, frame.pose.horizon_rad) for frame in frames]
+        views = [DetectorView(_colours(frame), frame.depth_m, frame.pose.horizon_rad) for frame in frames]
         found = self._detector.detect(views)
         if len(found) != len(views):
             raise InvalidArgumentError(f"a detector returned {len(found)} results for {len(views)} views")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, get_args
 
 from evonav.errors import InvalidArgumentError
-from evonav.perception.detector import Detector, Embedder, Found, View
+from evonav.perception.detector import Detector, DetectorView, Embedder, Found
 from evonav.perception.filters import FilterConfig, filtered, joined
 from evonav.perception.models import libraries
 from evonav.perception.models.prompted import PromptedDetector
@@ -123,7 +123,7 @@ class JointDetector:
     grounded: Detector
     graph_filters: FilterConfig = UNIGOAL_GRAPH
 
-    def detect(self, views: Sequence[View]) -> list[Found]:
+    def detect(self, views: Sequence[DetectorView]) -> list[Found]:
         """What both find; of what both found, the map's word stands, which every table has a graph's word for."""
         firsts = self.network.detect([view.rgb for view in views], _COCO, self.min_confidence)
         seconds = self.grounded.detect(views)
@@ -139,7 +139,7 @@ class SwappedColours:
 
     detector: Detector
 
-    def detect(self, views: Sequence[View]) -> Sequence[Found]:
+    def detect(self, views: Sequence[DetectorView]) -> Sequence[Found]:
         """What it finds so."""
         return self.detector.detect([replace(view, rgb=view.rgb[..., ::-1]) for view in views])
 

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.perception.detector import Found, View, nothing_found
+from evonav.perception.detector import DetectorView, Found, nothing_found
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class PromptedDetector:
     min_mask_score: float = 0.0
     """Masks below it are dropped."""
 
-    def detect(self, views: Sequence[View]) -> list[Found]:
+    def detect(self, views: Sequence[DetectorView]) -> list[Found]:
         """Boxes and masks of all views as one batch; depth is not looked at."""
         images = [view.rgb for view in views]
         boxes = self.finder.find(images, self.words, self.min_confidence)
