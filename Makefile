@@ -56,6 +56,8 @@ lint: setup
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest evonav._core
 	$(BIN)/lint-imports
+	$(BIN)/typos
+	$(BIN)/python scripts/check_english.py
 
 bench: setup
 	$(BIN)/python -m pip install --quiet --group bench
