@@ -136,7 +136,7 @@ def _axes(pose: Pose) -> NDArray[np.float64]:
 
 def _look(boxes: NDArray[np.float64], x_m: float, height_m: float, z_m: float, yaw_rad: float, tilt_rad: float) -> View:
     """Depth and masks of boxes, ray by ray; masks count in their order."""
-    pose = Pose(x_m, 0.0, z_m, yaw_rad, tilt_rad)
+    pose = Pose(x_m, height_m, z_m, yaw_rad, tilt_rad)
     uv = (np.arange(SIDE_PX) + 0.5 - SIDE_PX / 2) / _INTRINSICS.focal_px
     local = np.stack([*np.meshgrid(uv, uv), np.ones((SIDE_PX, SIDE_PX))], axis=-1)
     rays = local @ _axes(pose)
@@ -148,14 +148,14 @@ def _look(boxes: NDArray[np.float64], x_m: float, height_m: float, z_m: float, y
         enter, leave = sides.min(0).max(-1), sides.max(0).min(-1)
         is_hit = (enter < leave) & (enter > 0) & (enter < depth_m)
         depth_m[is_hit], masks[is_hit] = enter[is_hit], index
-    return _view(pose, height_m, depth_m, masks, len(boxes))
+    return _view(pose, depth_m, masks, len(boxes))
 
 
-def _view(pose: Pose, height_m: float, depth_m: NDArray[np.float32], masks: NDArray[np.int32], num: int) -> View:
+def _view(pose: Pose, depth_m: NDArray[np.float32], masks: NDArray[np.int32], num: int) -> View:
     nothing = np.zeros((0, 2), np.int32)
     found = Detections(masks, ("Box",) * num, np.ones(num, np.float32))
     occupancy = VisibleOccupancy(nothing, nothing)
-    return View(pose, _INTRINSICS, depth_m, found, occupancy, camera_height_m=height_m)
+    return View(pose, _INTRINSICS, depth_m, found, occupancy)
 
 
 def _full_map(num_boxes: int = 100) -> ObjectMap:
@@ -174,7 +174,7 @@ def _frame() -> View:
     areas = np.bincount(view.detections.masks[view.detections.masks >= 0], minlength=100)
     number_of = np.full(101, -1, np.int32)
     number_of[np.argsort(-areas, kind="stable")[:20]] = np.arange(20)
-    return _view(view.pose, view.camera_height_m, view.depth_m, number_of[view.detections.masks], 20)
+    return _view(view.pose, view.depth_m, number_of[view.detections.masks], 20)
 
 
 @dataclass
@@ -200,7 +200,7 @@ def _largest_cluster(cloud: o3d.geometry.PointCloud) -> o3d.geometry.PointCloud:
 def _detect_open3d(view: View) -> list[_Cloud]:
     uv = (np.arange(SIDE_PX) + 0.5 - SIDE_PX / 2) / _INTRINSICS.focal_px
     u, v = np.meshgrid(uv, uv)
-    axes, camera_m = _axes(view.pose), (view.pose.x_m, view.camera_height_m, view.pose.z_m)
+    axes, camera_m = _axes(view.pose), view.pose.position_m
     clouds = []
     for number, label in enumerate(view.detections.labels):
         mask = view.detections.masks == number

@@ -361,7 +361,6 @@ def view_of(points_m):
         depth_m=depth_m,
         detections=Detections(masks, ("Screen",), np.ones(1, np.float32)),
         occupancy=VisibleOccupancy(np.zeros((0, 2), np.int32), np.zeros((0, 2), np.int32)),
-        camera_height_m=1.0,
     )
 
 

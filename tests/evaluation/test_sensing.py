@@ -13,10 +13,17 @@ from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.rollout import Episode
+from evonav.evaluation.sensing import Sensors
+from evonav.house import bundled_houses
+from evonav.memory import ObjectMap
+from evonav.memory.bev import BevMap
+from evonav.memory.clouds import clouds_of
 from evonav.perception import StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import Observation
+from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
+from evonav.world.simulator import SimulatorConfig
 
 START = Pose(1.0, 0.9, 3.0, 0.0)
 CASE = EpisodeCase("toy", "toy", START, (stage_case(1, "Bed|1"), stage_case(2, "Mug|1")))
@@ -109,6 +116,39 @@ def test_cells_seen_are_those_of_the_true_pose(episode):
     for believed, true in zip(agent.seen[0].views, truthful.seen[0].views, strict=True):
         assert np.array_equal(believed.occupancy.free, true.occupancy.free)
         assert np.array_equal(believed.occupancy.blocked, true.occupancy.blocked)
+
+
+@pytest.mark.parametrize("camera_height_m", [0.9, 1.575])
+def test_memories_place_objects_where_they_are_at_any_camera_height(camera_height_m):
+    simulator = EmbeddedSimulator(SimulatorConfig(camera_height_m=camera_height_m))
+    simulator.reset(next(bundled_houses()).to_json())
+    scene = StageScene("a-house", stage_case(1, "Bed|1").public, "an-agent", 0, simulator.objects)
+    observation = Sensors(simulator, GroundTruthPerception(), Sensing(), scene).observe(
+        is_first=True, num_rounds_left=1
+    )
+    assert observation.pose.y_m == pytest.approx(0.9), "the pose of the body"
+
+    entries, bev = ObjectMap(), BevMap((observation.pose.x_m, observation.pose.z_m), 0)
+    for view in observation.views:
+        assert view.pose.y_m == camera_height_m
+        entries.update(view)
+        bev.integrate(view)
+        clouds = clouds_of(view)
+        for index, label in enumerate(view.detections.labels):
+            assert is_of_a_body(clouds.points_m(index), label, simulator.objects), label
+    assert len(entries.entries) > 3
+    for entry in entries.entries:
+        assert is_of_a_body(entries.points_m(entry.id), entry.label, simulator.objects), entry.label
+    assert 0.0 < bev.obstacles.sum() < 0.5 * bev.explored.sum(), "the floor is no obstacle"
+
+
+def is_of_a_body(points_m, label, bodies):
+    """Whether all points lie in the bounding box of one body of this category, to 5 cm."""
+    return any(
+        (np.abs(points_m - body.centre_m) <= np.array(body.size_m) / 2 + 0.05).all()
+        for body in bodies
+        if body.category == label
+    )
 
 
 def test_all_agents_of_a_run_meet_the_same_errors_and_another_seed_others(tmp_path):

@@ -20,14 +20,7 @@ def look(simulator):
     frame = simulator.render(rgb=False, instances=False)
     found = Detections(np.full(frame.depth_m.shape, -1, np.int32), (), np.empty(0, np.float32))
     nothing = np.empty((0, 2), np.int32)
-    return View(
-        frame.pose,
-        frame.intrinsics,
-        frame.depth_m,
-        found,
-        VisibleOccupancy(nothing, nothing),
-        camera_height_m=frame.pose.y_m,
-    )
+    return View(frame.pose, frame.intrinsics, frame.depth_m, found, VisibleOccupancy(nothing, nothing))
 
 
 class Walk:

@@ -26,7 +26,6 @@ def floor_and_box(yaw_rad: float, horizon_rad: float, box: tuple[float, float, f
         horizon_rad: Of the camera.
         box: Smallest and largest x, smallest and largest z.
     """
-    pose = Pose(0.0, 0.9, 0.0, yaw_rad, horizon_rad)
     camera = Pose(0.0, CAMERA_M, 0.0, yaw_rad, horizon_rad)
     rays = unproject(np.ones((300, 300), np.float32), camera, INTRINSICS) - (0.0, CAMERA_M, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -38,9 +37,7 @@ def floor_and_box(yaw_rad: float, horizon_rad: float, box: tuple[float, float, f
             depth = np.where((enter < leave) & (enter > 0), np.minimum(depth, enter), depth)
     nothing = np.empty((0, 2), np.int32)
     found = Detections(np.full((300, 300), -1, np.int32), (), np.empty(0, np.float32))
-    return View(
-        pose, INTRINSICS, depth.astype(np.float32), found, VisibleOccupancy(nothing, nothing), camera_height_m=CAMERA_M
-    )
+    return View(camera, INTRINSICS, depth.astype(np.float32), found, VisibleOccupancy(nothing, nothing))
 
 
 def where(cells: NDArray[np.bool_], bev: BevMap) -> NDArray[np.float64]:

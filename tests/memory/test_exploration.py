@@ -41,7 +41,7 @@ class Walker:
             seen = visible_occupancy(self.grid, pose, frame.intrinsics, 3.0)
             self.num_conflicts += len(self.map.integrate(seen, (pose.x_m, pose.z_m)))
             found = GroundTruthPerception().detect(frame, self.simulator.objects)
-            self.entries.update(View(pose, frame.intrinsics, frame.depth_m, found, seen))
+            self.entries.update(View(frame.pose, frame.intrinsics, frame.depth_m, found, seen))
         self.map.explore_around((self.pose.x_m, self.pose.z_m))
 
     def explore(self, max_rounds: int) -> None:

@@ -28,7 +28,7 @@ def seen(free: NDArray[np.int32], blocked: NDArray[np.int32]) -> VisibleOccupanc
 
 def a_view(depth_m: NDArray[np.float32], masks: NDArray[np.int32], *labels: str) -> View:
     found = Detections(masks, labels, np.ones(len(labels), np.float32))
-    return View(Pose(0.0, 0.9, 0.0, 0.0, 0.0), INTRINSICS, depth_m, found, seen(cells(), cells()))
+    return View(Pose(0.0, 1.575, 0.0, 0.0, 0.0), INTRINSICS, depth_m, found, seen(cells(), cells()))
 
 
 def block(col: int = 20, depth_m: float = 2.0) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
@@ -124,7 +124,7 @@ def test_a_stale_entry_is_told_from_one_still_there() -> None:
     low, high = points_m.min(0), points_m.max(0)
     np.testing.assert_allclose(entry.centre_m, (low + high) / 2, atol=1e-6)
     np.testing.assert_allclose(entry.size_m, high - low, atol=1e-6)
-    assert entry.centre_m[1] == pytest.approx(here.camera_height_m, abs=0.1)
+    assert entry.centre_m[1] == pytest.approx(here.pose.y_m, abs=0.1)
     assert entries.remove(1)
     assert entries.entry(1) is None
     assert len(entries) == 1

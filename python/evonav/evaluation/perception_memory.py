@@ -60,7 +60,6 @@ class JudgedMemory:
             depth_m=percept.depth_m,
             detections=percept.detections,
             occupancy=VisibleOccupancy(_NO_CELLS, _NO_CELLS),
-            camera_height_m=frame.pose.y_m,
         )
         sources = main_objects(truth, percept.detections).tolist()
         done = self.map.update(view)

@@ -87,7 +87,7 @@ class BevMap:
         self.core.integrate(
             view.depth_m,
             categories,
-            position_m=(view.pose.x_m, view.camera_height_m, view.pose.z_m),
+            position_m=view.pose.position_m,
             yaw_rad=view.pose.yaw_rad,
             horizon_rad=view.pose.horizon_rad,
             vertical_fov_rad=view.intrinsics.vertical_fov_rad,
@@ -98,7 +98,7 @@ class BevMap:
         return self.core.cells_of(
             view.depth_m,
             mask,
-            position_m=(view.pose.x_m, view.camera_height_m, view.pose.z_m),
+            position_m=view.pose.position_m,
             yaw_rad=view.pose.yaw_rad,
             horizon_rad=view.pose.horizon_rad,
             vertical_fov_rad=view.intrinsics.vertical_fov_rad,

@@ -46,7 +46,7 @@ def clouds_of(view: View, *, max_points: int = 500) -> ViewClouds:
     Raises:
         InvalidArgumentError: An array does not fit, or holds NaN.
     """
-    camera_m = (view.pose.x_m, view.camera_height_m, view.pose.z_m)
+    camera_m = view.pose.position_m
     points_m, ends = _core.unproject_masks(
         view.depth_m,
         view.detections.masks,

@@ -7,7 +7,7 @@ that most detections at a place gave.
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from evonav.memory.objects import ObjectMap, ObjectMapConfig
 from evonav.memory.vocabulary import WORD_OF_LABEL, relabelled
@@ -130,9 +130,7 @@ class ObjectGraph:
             Pairs that need a relation: every new node with each old one and each other new one. A node whose caption
             has changed is new, and its edges are gone.
         """
-        found = relabelled(view.detections, WORD_OF_LABEL)
-        shown = View(view.pose, view.intrinsics, view.depth_m, found, view.occupancy, view.rgb, view.camera_height_m)
-        update = self.objects.update(shown)
+        update = self.objects.update(replace(view, detections=relabelled(view.detections, WORD_OF_LABEL)))
         types = [label for label in view.detections.labels if label in WORD_OF_LABEL]
         for entry_id, kind in zip(update.entry_ids, types, strict=True):
             if entry_id is not None:

@@ -154,7 +154,7 @@ class ObjectMap:
             list(found.labels),
             found.confidences,
             found.features,
-            position_m=_camera_m(view),
+            position_m=view.pose.position_m,
             yaw_rad=view.pose.yaw_rad,
             horizon_rad=view.pose.horizon_rad,
             vertical_fov_rad=view.intrinsics.vertical_fov_rad,
@@ -175,7 +175,7 @@ class ObjectMap:
             list(found.labels),
             found.confidences,
             found.features,
-            position_m=_camera_m(view),
+            position_m=view.pose.position_m,
             yaw_rad=view.pose.yaw_rad,
             horizon_rad=view.pose.horizon_rad,
             vertical_fov_rad=view.intrinsics.vertical_fov_rad,
@@ -216,7 +216,3 @@ class ObjectMap:
         return entry is not None and any(
             label == entry.label and here for label, here in zip(view.detections.labels, is_here.tolist(), strict=True)
         )
-
-
-def _camera_m(view: View) -> tuple[float, float, float]:
-    return (view.pose.x_m, view.camera_height_m, view.pose.z_m)

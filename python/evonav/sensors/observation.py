@@ -38,7 +38,8 @@ class View:
     """One camera pose's worth of sensing."""
 
     pose: Pose
-    """The camera's own, as in `Frame`: `y_m` is the height of its optical centre."""
+    """The camera's pose, as in `Frame`: `y_m` is the height of its optical centre over the floor, whereas that of
+    `Observation.pose` is the height of the agent's body."""
     intrinsics: Intrinsics
     depth_m: NDArray[np.float32]
     """`(H, W)` planar z, `inf` where nothing is."""
@@ -46,8 +47,6 @@ class View:
     occupancy: VisibleOccupancy
     rgb: NDArray[np.uint8] | None = None
     """`(H, W, 3)`; `None` when the agent declared that it needs none."""
-    camera_height_m: float = 1.575
-    """Of the optical centre over the floor (y = 0); the pose's own height is the body's."""
 
 
 @dataclass(frozen=True, slots=True)
