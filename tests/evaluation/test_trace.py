@@ -142,9 +142,9 @@ def test_views_are_drawn_in_colours_at_the_recorded_poses(fu_run, fu_stages):
     simulator.reset(case.stages[2].house_json)
     for step in stages[2].rounds:
         assert len(step.views) == (7 if step.record.round == 0 else 3)
-        assert step.views[-1].yaw_rad == pytest.approx(step.pose.yaw_rad)
+        assert step.views[-1].pose.yaw_rad == pytest.approx(step.pose.yaw_rad)
         for view in step.views:
-            pose = replace(case.start, x_m=step.pose.x_m, z_m=step.pose.z_m, yaw_rad=view.yaw_rad)
+            pose = replace(case.start, x_m=step.pose.x_m, z_m=step.pose.z_m, yaw_rad=view.pose.yaw_rad)
             wanted = simulator.render(pose).rgb
             drawn = np.asarray(Image.open(BytesIO(view.jpeg)))
             assert drawn.shape == wanted.shape

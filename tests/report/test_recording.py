@@ -16,6 +16,7 @@ from evonav.evaluation.store import RunStore
 from evonav.report.recording import check_recording
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
+from evonav.world.simulator import SimulatorConfig
 
 rerun_chunk = pytest.importorskip("rerun.chunk", reason="rerun is not installed")
 
@@ -96,7 +97,7 @@ def test_depth_is_what_the_camera_measured(recording: Path, viewed_run: Path) ->
     assert np.allclose(depth_m, frame.depth_m, atol=5.01e-4)
 
 
-def test_cameras_look_where_the_agent_looks(recording: Path, viewed_run: Path) -> None:
+def test_cameras_stand_at_their_height_and_look_where_the_agent_looks(recording: Path, viewed_run: Path) -> None:
     with RunStore(viewed_run) as store:
         poses = [step.pose for record in store.records("fu") for step in record.trace]
     found = [row for row in rows(recording)["/world/agent/heading"] if any("mat3x3" in key and row[key] for key in row)]
@@ -105,6 +106,8 @@ def test_cameras_look_where_the_agent_looks(recording: Path, viewed_run: Path) -
     for row, pose in zip(found, poses, strict=True):
         (matrix,) = next(row[key] for key in row if key.endswith(":mat3x3"))
         axes = np.reshape(matrix, (3, 3)).T  # stored by columns
+        (place,) = next(row[key] for key in row if key.endswith(":translation"))
+        assert place == pytest.approx((pose.x_m, pose.z_m, SimulatorConfig().camera_height_m), abs=1e-5)
         assert np.allclose(axes @ axes.T, np.eye(3), atol=1e-5)
         assert np.linalg.det(axes) == pytest.approx(1.0, abs=1e-5)
         ahead = axes[:, 2]

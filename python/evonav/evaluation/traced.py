@@ -48,7 +48,8 @@ class TracedFrontier:
 class TracedView:
     """What one camera of a round saw, in colours."""
 
-    yaw_rad: float
+    pose: PoseRecord
+    """The camera's, as the agent was given it."""
     jpeg: bytes
     depth_png: bytes | None = None
     """Planar depth in whole millimetres, 16 bits, 0 where there is none; only of a replay that keeps it."""

@@ -117,7 +117,8 @@ class Tracer:
                 rgb = self._simulator.render(replace(view.pose, y_m=observation.pose.y_m), instances=False).rgb
             assert rgb is not None
             jpeg = jpeg_of(rgb, heading_px if is_heading else side_px, quality)
-            views.append(TracedView(view.pose.yaw_rad, jpeg, depth_png(view.depth_m) if self._keeps_depth else None))
+            depth = depth_png(view.depth_m) if self._keeps_depth else None
+            views.append(TracedView(pose_record(view.pose), jpeg, depth))
             width_px, height_px = view.intrinsics.width_px, view.intrinsics.height_px
             self._fov_rad = 2 * math.atan(math.tan(view.intrinsics.vertical_fov_rad / 2) * width_px / height_px)
         self._pending = TracedRound(None, pose_record(observation.pose), tuple(views))

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records import PoseRecord, StageMap, StageRecord
+from evonav.evaluation.records import StageMap, StageRecord
 from evonav.evaluation.traced import BLOCKED, TracedMap, TracedRound, TracedStage, TracedView
 from evonav.report.causes import sentence
 from evonav.report.maps import outcome_words
@@ -146,7 +146,7 @@ class _Recorder:
         rr, log, record = self._rr, self._stream.log, traced.record
         pose = traced.pose
         for number, view in enumerate(reversed(traced.views)):
-            self._view("heading" if number == 0 else f"side_{number}", view, pose)
+            self._view("heading" if number == 0 else f"side_{number}", view)
         at = (pose.x_m, pose.z_m, 0.05)
         log("world/agent", rr.Points3D([at], colors=[_WALL], radii=[0.15]))
         if traced.map is not None:
@@ -164,9 +164,9 @@ class _Recorder:
         if words := evaluator_words(self._stage.record, traced):
             log("words/evaluator", rr.TextLog(words, level="WARN"))
 
-    def _view(self, name: str, view: TracedView, pose: PoseRecord) -> None:
-        rr, path = self._rr, f"world/agent/{name}"
-        sin, cos = math.sin(view.yaw_rad), math.cos(view.yaw_rad)
+    def _view(self, name: str, view: TracedView) -> None:
+        rr, path, pose = self._rr, f"world/agent/{name}", view.pose
+        sin, cos = math.sin(pose.yaw_rad), math.cos(pose.yaw_rad)
         down, ahead = math.sin(pose.horizon_rad), math.cos(pose.horizon_rad)
         # Columns: the camera's right, down and forward in the scene.
         axes = [[cos, -down * sin, ahead * sin], [-sin, -down * cos, ahead * cos], [0.0, -ahead, -down]]

@@ -228,7 +228,7 @@ class _StagePainter:
                 canvas.disc(goal, canvas.unit(0.8), None, CHOSEN)
         at = cm((step.pose.x_m, step.pose.z_m))
         for view in step.views[:-1]:
-            canvas.cone(at, view.yaw_rad, self._stage.fov_rad, 9 * self._frame.unit, 22)
+            canvas.cone(at, view.pose.yaw_rad, self._stage.fov_rad, 9 * self._frame.unit, 22)
         canvas.cone(at, step.pose.yaw_rad, self._stage.fov_rad, 12 * self._frame.unit, 80)
         canvas.disc(at, canvas.unit(1.5), colour("ink"), colour("paper"), width=0.5)
 

@@ -131,10 +131,7 @@ class _Rounds:
         heading_rad = step.pose.yaw_rad
         found: dict[str, Any] = {
             "p": [*cm((step.pose.x_m, step.pose.z_m)), round(math.degrees(heading_rad), 1)],
-            "v": [
-                [self._page.image(view.jpeg), round(math.degrees(math.remainder(view.yaw_rad - heading_rad, math.tau)))]
-                for view in step.views
-            ],
+            "v": [[self._page.image(view.jpeg), _turn_deg(heading_rad, view.pose.yaw_rad)] for view in step.views],
         }
         if record is not None:
             found |= self._told(record)
@@ -204,6 +201,11 @@ class _Rounds:
         gone = [name for name in self._entries if name not in now]
         self._entries = now
         return {**({"e": changed} if changed else {}), **({"x": gone} if gone else {})}
+
+
+def _turn_deg(from_rad: float, to_rad: float) -> int:
+    """Return the smallest turn from one heading to another, positive to the right."""
+    return round(math.degrees(math.remainder(to_rad - from_rad, math.tau)))
 
 
 def _offer_words(question: TracedQuestion) -> str:
