@@ -19,7 +19,7 @@ from benches import canned_engine
 from benches.table import Row
 from evonav.house import bundled_houses
 from evonav.thor.engine import Engine
-from evonav.thor.event import Emitter
+from evonav.thor.events.emitter import Emitter
 
 NOTES = """Steps of the unmodified `ai2thor` 5.0.0 `Controller`, 300x300, in bundled houses: `RotateRight` by 30
 degrees and, every third step, `MoveAhead`. The time is CPU time of both processes, client and engine, pinned to one

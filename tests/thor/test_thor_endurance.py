@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from evonav.thor import actions
+from evonav.thor.actions import registry
 
 NUM_ACTIONS = 10_000
 # The house would soon be empty, or everything out of sight.
@@ -33,8 +33,8 @@ def _action(rng: random.Random, house: dict[str, Any], ids: list[str]) -> dict[s
         return {"action": "TeleportFull", **agent}
     if kind < 0.72:
         return {"action": rng.choice(["Nope", "", "moveahead", "__init__", "é\ud800"])}
-    name = rng.choice(sorted(set(actions.action_names()) - LEFT_OUT))
-    keys = [key for key in actions._served()[name].types if rng.random() < 0.7]
+    name = rng.choice(sorted(set(registry.action_names()) - LEFT_OUT))
+    keys = [key for key in registry.parameter_types(name) if rng.random() < 0.7]
     if rng.random() < 0.05:
         keys.append("nonsense")
     return {"action": name} | {key: _argument(rng, house, ids) for key in keys}

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import evonav.thor
-from evonav.thor.fifo import MAX_MESSAGE_BYTES, ClientGone, Fifo, FramingError
+from evonav.thor.transport.fifo import MAX_MESSAGE_BYTES, ClientGone, Fifo, FramingError
 
 HEADER = struct.Struct("!BI")
 EOM = HEADER.pack(255, 0)

@@ -8,9 +8,9 @@ import msgpack
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from evonav.thor import actions
+from evonav.thor.actions import registry
 from evonav.thor.engine import Engine
-from evonav.thor.event import Emitter
+from evonav.thor.events.emitter import Emitter
 
 JsonObject = dict[str, Any]
 
@@ -65,14 +65,14 @@ def _fresh(house: JsonObject) -> tuple[Engine, Emitter]:
 
 def _arguments(name: str) -> st.SearchStrategy[JsonObject]:
     """Keywords of an action, some of them missing, some unknown, with values of any type."""
-    types = actions._served()[name].types
+    types = registry.parameter_types(name)
     known = st.sampled_from(sorted(types)) if types else st.just("x")
     keys = st.one_of(known, known, known, st.sampled_from(["engine", "self", "agentId", "renderImage", "sequenceId"]))
     return st.dictionaries(keys, values, max_size=6)
 
 
 # The house is worn out by the actions and thrown away with the engine; sizes would only make it slow.
-_NAMES = [name for name in actions.action_names() if name not in {"ChangeResolution"}]
+_NAMES = [name for name in registry.action_names() if name not in {"ChangeResolution"}]
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evonav.house import bundled_houses
-from evonav.thor.actions import ErrorCode
+from evonav.thor.actions.registry import ErrorCode
 from evonav.thor.engine import Engine, Result
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose

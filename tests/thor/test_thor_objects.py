@@ -14,8 +14,8 @@ import pytest
 
 from evonav.house import bundled_houses
 from evonav.thor import edits, objects
+from evonav.thor.asset_metadata import facts_of
 from evonav.thor.engine import Engine
-from evonav.thor.facts import facts_of
 
 Json = dict[str, Any]
 

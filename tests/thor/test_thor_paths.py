@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from evonav.house import bundled_houses
 from evonav.thor import objects
-from evonav.thor.actions import ErrorCode
+from evonav.thor.actions.registry import ErrorCode
 from evonav.thor.engine import Engine
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import SimulatorConfig
@@ -118,9 +118,9 @@ def test_too_many_steps() -> None:
 def test_a_grid_of_too_many_positions_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     engine = engine_in(HOUSES[0])
     num_points = len(run(engine, "GetReachablePositions", gridSize=0.5))
-    monkeypatch.setattr("evonav.thor.paths._MAX_POSITIONS", num_points)
+    monkeypatch.setattr("evonav.thor.actions.paths._MAX_POSITIONS", num_points)
     run(engine, "GetReachablePositions", gridSize=0.5)
-    monkeypatch.setattr("evonav.thor.paths._MAX_POSITIONS", num_points - 1)
+    monkeypatch.setattr("evonav.thor.actions.paths._MAX_POSITIONS", num_points - 1)
     assert f"gridSize 0.5 m gives more than {num_points - 1} positions" in refused(
         engine, "GetReachablePositions", gridSize=0.5
     )

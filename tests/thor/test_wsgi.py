@@ -8,8 +8,8 @@ import msgpack
 import numpy as np
 import pytest
 
-from evonav.thor.fifo import ClientGone, FieldType, FramingError
-from evonav.thor.wsgi import Wsgi, is_loopback
+from evonav.thor.transport.fifo import ClientGone, FieldType, FramingError
+from evonav.thor.transport.wsgi import Wsgi, is_loopback
 
 wsgi_server = pytest.importorskip("ai2thor.wsgi_server", reason="ai2thor is not installed (group `thor`)")
 

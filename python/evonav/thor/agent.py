@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
-from evonav.thor.actions import ActionError, Vector3
+from evonav.thor.actions.registry import ActionError, Vector3
 from evonav.world.pose import Pose
 
 BODY_Y_M = 0.9009992

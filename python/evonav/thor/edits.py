@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from evonav.errors import EvonavError
 from evonav.thor import objects
-from evonav.thor.actions import ActionError
-from evonav.thor.facts import AssetFacts, facts_of
+from evonav.thor.actions.registry import ActionError
+from evonav.thor.asset_metadata import AssetFacts, facts_of
 from evonav.thor.scene import Scene
 from evonav.thor.surfaces import Surfaces, fresh_surfaces
 

@@ -9,8 +9,8 @@ from typing import Any, Protocol
 from pydantic import BaseModel, ConfigDict
 
 from evonav.errors import EvonavError
-from evonav.thor import actions
-from evonav.thor.actions import ActionError, ErrorCode
+from evonav.thor.actions import registry
+from evonav.thor.actions.registry import ActionError, ErrorCode
 from evonav.thor.agent import Agent
 from evonav.thor.scene import Scene
 from evonav.world.camera import CameraView, Images
@@ -127,11 +127,11 @@ class Engine:
 
     def execute(self, message: Mapping[str, Any]) -> Result:
         """Does one action. Whatever happens is an answer: a failed action, never an exception."""
-        name = actions.brief(message.get("action", ""))
+        name = registry.brief(message.get("action", ""))
         try:
             if message.get("agentId", 0) != 0:
-                raise ActionError(f"agentId {actions.brief(message['agentId'])}: this engine has one agent, 0")
-            self.last = Result(name, action_return=actions.call(self, message))
+                raise ActionError(f"agentId {registry.brief(message['agentId'])}: this engine has one agent, 0")
+            self.last = Result(name, action_return=registry.call(self, message))
         except ActionError as error:
             self.last = Result(name, False, _short(str(error)), error.code)
         except EvonavError as error:

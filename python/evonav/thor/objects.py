@@ -15,9 +15,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.thor.actions import ActionError
+from evonav.thor.actions.registry import ActionError
 from evonav.thor.agent import Agent
-from evonav.thor.facts import AssetFacts, facts_of
+from evonav.thor.asset_metadata import AssetFacts, facts_of
 from evonav.thor.scene import Scene
 from evonav.world.camera import CameraView
 from evonav.world.embedded import EmbeddedSimulator

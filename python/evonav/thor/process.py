@@ -11,11 +11,11 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from evonav.thor.fifo import ClientGone, Fifo, FramingError
-from evonav.thor.supervisor import fork_worker
+from evonav.thor.transport.fifo import ClientGone, Fifo, FramingError
+from evonav.thor.transport.supervisor import fork_worker
 
 if TYPE_CHECKING:
-    from evonav.thor.wsgi import Wsgi
+    from evonav.thor.transport.wsgi import Wsgi
 
 _LOG = logging.getLogger("evonav.thor")
 
@@ -89,7 +89,7 @@ def _transport(is_orphan: Callable[[], bool]) -> "Fifo | Wsgi":
     kind = variables.get("SERVER_TYPE")
     try:
         if kind == "WSGI":
-            from evonav.thor.wsgi import Wsgi
+            from evonav.thor.transport.wsgi import Wsgi
 
             return Wsgi(variables["HOST"], int(variables["PORT"]), variables["CLIENT_TOKEN"], is_orphan)
         server_pipe, client_pipe = variables["FIFO_SERVER_PIPE_PATH"], variables["FIFO_CLIENT_PIPE_PATH"]
@@ -102,7 +102,7 @@ def _transport(is_orphan: Callable[[], bool]) -> "Fifo | Wsgi":
 def _serve(transport: "Fifo | Wsgi", options: argparse.Namespace) -> None:
     # Imported with the pipes open: a client whose engine fails before that waits for ever.
     from evonav.thor.engine import Engine
-    from evonav.thor.event import Emitter
+    from evonav.thor.events.emitter import Emitter
 
     engine = Engine(width_px=options.width, height_px=options.height)
     has_camera = not options.nographics and os.environ.get("AI2THOR_SERVER_SIDE_SCREENSHOT") != "False"

@@ -5,7 +5,7 @@ import json
 from itertools import count
 from typing import Any
 
-from evonav.thor.actions import ActionError
+from evonav.thor.actions.registry import ActionError
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import SimulatorConfig
 

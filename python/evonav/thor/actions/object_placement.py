@@ -12,11 +12,11 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from evonav.thor import edits, objects
-from evonav.thor.actions import ActionError, Vector3, action, brief
+from evonav.thor.actions.registry import ActionError, Vector3, action, brief
+from evonav.thor.actions.teleport import out_of_range
 from evonav.thor.engine import Engine
 from evonav.thor.scene import Scene
 from evonav.thor.surfaces import fresh_surfaces
-from evonav.thor.teleport import out_of_range
 
 # AI2-THOR places things this much over a surface, and lets them fall.
 _CLEARANCE_M = 0.005

@@ -5,10 +5,10 @@ After `teleportFull` and its callers in AI2-THOR's `BaseFPSAgentController` and 
 
 import math
 
-from evonav.thor.actions import ActionError, ErrorCode, Vector3, action
+from evonav.thor.actions.motion import invalid_operation, is_within_bounds, missing_arguments, snapped, vector_text
+from evonav.thor.actions.registry import ActionError, ErrorCode, Vector3, action
 from evonav.thor.agent import BODY_Y_M, canonical_deg, canonical_yaw_deg
 from evonav.thor.engine import Engine
-from evonav.thor.motion import invalid_operation, is_within_bounds, missing_arguments, snapped, vector_text
 
 _FLOAT32_MAX = 3.4028234663852886e38
 _GROUND_M = 0.05

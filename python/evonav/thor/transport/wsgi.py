@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable
 import msgpack
 from pydantic_core import to_json
 
-from evonav.thor.fifo import MAX_MESSAGE_BYTES, Body, ClientGone, Field, FieldType, FramingError
+from evonav.thor.transport.fifo import MAX_MESSAGE_BYTES, Body, ClientGone, Field, FieldType, FramingError
 
 _NAMES = {
     FieldType.RGB_IMAGE: "image",

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from evonav.thor.actions import ActionError, Vector3, action
+from evonav.thor.actions.motion import invalid_operation
+from evonav.thor.actions.registry import ActionError, Vector3, action
+from evonav.thor.actions.teleport import out_of_range
 from evonav.thor.engine import Engine
-from evonav.thor.motion import invalid_operation
 from evonav.thor.scene import Scene
-from evonav.thor.teleport import out_of_range
 from evonav.world.camera import CameraView, Images
 from evonav.world.pose import Pose
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from pydantic import BaseModel, ConfigDict, NonNegativeInt
 
-from evonav.thor.actions import ActionError, ErrorCode, action
+from evonav.thor.actions.registry import ActionError, ErrorCode, action
+from evonav.thor.asset_metadata import facts_of
 from evonav.thor.engine import Engine
-from evonav.thor.facts import facts_of
 from evonav.thor.objects import placed_objects
 from evonav.thor.scene import Document
 

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from evonav.thor import objects
-from evonav.thor.colors import Palette, palette_of
+from evonav.thor.events.colors import Palette, palette_of
 from evonav.thor.scene import Scene
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from pydantic import BaseModel, ConfigDict, PydanticUserError, TypeAdapter, Vali
 
 # Whose functions register themselves.
 _MODULES = (
-    *("dialogue", "motion", "teleport", "paths", "assets", "random_spawn", "spawn"),
-    *("frame_actions", "interactable", "object_actions", "states", "cameras"),
+    *("session", "motion", "teleport", "paths", "asset_database", "random_spawn", "spawn"),
+    *("object_queries", "interactable_poses", "object_placement", "object_states", "cameras"),
 )
 
 # What any action may carry (`DynamicServerAction.AllowedExtraneousParameters`), and what the client may add to it.
@@ -117,6 +117,11 @@ def action_names() -> tuple[str, ...]:
     return tuple(sorted(_served()))
 
 
+def parameter_types(name: str) -> Mapping[str, Any]:
+    """Return the types of an action's parameters, by name."""
+    return MappingProxyType(_served()[name].types)
+
+
 def call(engine: object, message: Mapping[str, Any]) -> object:
     """Does an action.
 
@@ -151,7 +156,7 @@ def call(engine: object, message: Mapping[str, Any]) -> object:
 @cache
 def _served() -> dict[str, _Action]:
     for module in _MODULES:
-        importlib.import_module(f"evonav.thor.{module}")
+        importlib.import_module(f"evonav.thor.actions.{module}")
     return _ACTIONS
 
 

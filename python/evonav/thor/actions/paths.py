@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from evonav.thor import motion, objects
-from evonav.thor.actions import ActionError, Vector3, action
+from evonav.thor import objects
+from evonav.thor.actions import motion
+from evonav.thor.actions.registry import ActionError, Vector3, action
 from evonav.thor.agent import Agent
 from evonav.thor.engine import Engine
 from evonav.world.camera import project

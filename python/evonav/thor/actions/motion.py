@@ -7,7 +7,7 @@ messages these are; where those throw, the message starts with the exception's n
 import math
 from collections.abc import Callable
 
-from evonav.thor.actions import ActionError, ErrorCode, Vector3, action
+from evonav.thor.actions.registry import ActionError, ErrorCode, Vector3, action
 from evonav.thor.agent import canonical_deg, canonical_yaw_deg
 from evonav.thor.engine import Engine
 

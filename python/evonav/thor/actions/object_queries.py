@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from evonav.thor import objects
-from evonav.thor.actions import ActionError, Vector3, action
+from evonav.thor.actions.motion import invalid_operation
+from evonav.thor.actions.registry import ActionError, Vector3, action
+from evonav.thor.actions.teleport import out_of_range
 from evonav.thor.engine import Engine
-from evonav.thor.motion import invalid_operation
 from evonav.thor.surfaces import Hit, surfaces_of
-from evonav.thor.teleport import out_of_range
 
 _Vec3 = tuple[float, float, float]
 

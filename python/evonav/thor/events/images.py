@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.thor.colors import Palette
-from evonav.thor.fifo import Field, FieldType
+from evonav.thor.events.colors import Palette
+from evonav.thor.transport.fifo import Field, FieldType
 from evonav.world.camera import Images
 from evonav.world.simulator import Frame
 

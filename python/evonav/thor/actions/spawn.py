@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from evonav.errors import EvonavError
-from evonav.thor.actions import ActionError, ErrorCode, Vector3, action
-from evonav.thor.assets import is_known
+from evonav.thor.actions.asset_database import is_known
+from evonav.thor.actions.registry import ActionError, ErrorCode, Vector3, action
 from evonav.thor.engine import Engine
 from evonav.thor.scene import Document, Scene
 

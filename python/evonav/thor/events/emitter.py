@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from evonav.errors import EvonavError
-from evonav.thor import images
 from evonav.thor.engine import Engine, Result, log_once
-from evonav.thor.fifo import Field, FieldType
-from evonav.thor.images import Kinds
-from evonav.thor.metadata import MetadataEncoder, patch
+from evonav.thor.events import images
+from evonav.thor.events.images import Kinds
+from evonav.thor.events.metadata import MetadataEncoder, patch
 from evonav.thor.scene import Scene
+from evonav.thor.transport.fifo import Field, FieldType
 
 
 class Emitter:

@@ -4,9 +4,9 @@ from functools import cache
 from typing import Any
 
 from evonav import _core
-from evonav.thor.actions import action
+from evonav.thor.actions.registry import action
+from evonav.thor.asset_metadata import facts_of
 from evonav.thor.engine import Engine
-from evonav.thor.facts import facts_of
 
 
 def is_known(asset_id: str) -> bool:

@@ -8,11 +8,11 @@ from pydantic import ValidationError
 
 from evonav.errors import EvonavError
 from evonav.thor import objects
-from evonav.thor.actions import ActionError, ErrorCode, action
+from evonav.thor.actions.registry import ActionError, ErrorCode, action
 from evonav.thor.agent import Agent, body_of
 from evonav.thor.engine import Engine, Settings
-from evonav.thor.images import FAR_M
-from evonav.thor.metadata import Vector, scene_bounds, vector
+from evonav.thor.events.images import FAR_M
+from evonav.thor.events.metadata import Vector, scene_bounds, vector
 from evonav.thor.scene import Document, Scene
 
 SCENES = ("Procedural",)

@@ -8,8 +8,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from evonav.thor import edits, frame_actions, objects
-from evonav.thor.actions import ActionError, action
+from evonav.thor import edits, objects
+from evonav.thor.actions import object_queries
+from evonav.thor.actions.registry import ActionError, action
 from evonav.thor.engine import Engine
 from evonav.thor.scene import Scene
 
@@ -161,7 +162,7 @@ def _target(engine: Engine, object_id: str | None, x: float | None, y: float | N
     if object_id is None:
         if x is None or y is None:
             raise ActionError("objectId, or x and y, must be given")
-        object_id, _ = frame_actions.object_at(engine, x, y)
+        object_id, _ = object_queries.object_at(engine, x, y)
     record = objects.record_of(engine.scene, object_id)
     if not is_forced:
         seen = objects.visible_ids(engine.scene, engine.agent, engine.settings.visibilityDistance)

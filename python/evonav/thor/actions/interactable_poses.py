@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from evonav.thor import objects, paths
-from evonav.thor.actions import ActionError, Vector3, action
+from evonav.thor import objects
+from evonav.thor.actions import paths
+from evonav.thor.actions.motion import invalid_operation
+from evonav.thor.actions.registry import ActionError, Vector3, action
+from evonav.thor.actions.teleport import out_of_range
 from evonav.thor.agent import Agent
 from evonav.thor.engine import Engine
-from evonav.thor.motion import invalid_operation
 from evonav.thor.surfaces import surfaces_of
-from evonav.thor.teleport import out_of_range
 
 Pose = dict[str, float | bool]
 

@@ -10,7 +10,7 @@ import select
 import signal
 from contextlib import suppress
 
-from evonav.thor.fifo import Fifo
+from evonav.thor.transport.fifo import Fifo
 
 _WATCH_MS = 500
 # For the worker to finish its action and say goodbye.

@@ -1,0 +1,1 @@
+"""The actions that the engine executes, and their registry."""

@@ -1,0 +1,1 @@
+"""Transports of AI2-THOR's client: named pipes (FIFO) and HTTP (WSGI)."""
