@@ -1,0 +1,70 @@
+"""A run and a pack that evonav wrote before its redesign are still read, resumed and replayed.
+
+Both hold one bundled task: `data/records.sqlite.gz` has the agents fu and random-walk, with errors of perception and of
+decisions; `data/packed.evonav.zip` has fu and ftu.
+"""
+
+import csv
+import gzip
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+DATA = Path(__file__).with_name("data")
+OPTIONS = ("--limit", 1, "--noise", "wrong=0.2", "--perception", "noisy:good", "--in-process")
+
+
+def _evonav(*arguments: object) -> str:
+    command = [sys.executable, "-m", "evonav", *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture
+def older_run(tmp_path: Path) -> Path:
+    run = tmp_path / "run"
+    run.mkdir()
+    (run / "records.sqlite").write_bytes(gzip.decompress((DATA / "records.sqlite.gz").read_bytes()))
+    return run
+
+
+def test_commands_show_an_older_run(older_run: Path) -> None:
+    assert re.search(r"success \(paper\), % +50.0 +0.0", _evonav("measures", older_run))
+    assert re.search(r"random-walk less fu: -50.0 points", _evonav("compare", older_run, "fu", "random-walk"))
+    assert "50.0" in _evonav("breakdown", older_run)
+    assert "50.0" in _evonav("paper", older_run)
+    _evonav("export", older_run, "--csv", older_run / "stages.csv")
+    with (older_run / "stages.csv").open(encoding="utf-8") as file:
+        assert sum(row["state"] == "success" for row in csv.DictReader(file)) == 2
+    _evonav("report", older_run)
+    assert (older_run / "report.html").read_text(encoding="utf-8").count("random-walk") > 10
+
+
+def test_an_older_run_is_resumed(older_run: Path) -> None:
+    """Another agent is added to it; what is there is not run again."""
+    _evonav("evaluate", "--agents", "fu,random-walk,stay-still", *OPTIONS, "--workers", 0, "--out", older_run)
+    summary = json.loads((older_run / "summary.json").read_bytes())
+    assert {agent: row["sr"] for agent, row in summary["agents"].items()} == {
+        "fu": 0.5,
+        "random-walk": 0.0,
+        "stay-still": 0.0,
+    }
+
+
+@pytest.mark.slow
+def test_an_older_run_is_replayed(older_run: Path) -> None:
+    """`evonav view` fails where a replay is not, byte for byte, what was recorded."""
+    _evonav("view", older_run, "--agent", "fu", "--out", older_run / "view")
+    assert list((older_run / "view").rglob("*.html"))
+
+
+@pytest.mark.slow
+def test_an_older_pack_is_verified() -> None:
+    verdict = json.loads(_evonav("verify", DATA / "packed.evonav.zip", "--limit", 1, "--json"))
+    assert verdict["is_accepted"]
+    assert {agent: row["sr"] for agent, row in verdict["summary"]["agents"].items()} == {"ftu": 0.75, "fu": 0.5}
