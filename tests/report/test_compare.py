@@ -14,7 +14,7 @@ from evonav.evaluation.store import RunStore
 from evonav.report import compare_words as words
 from evonav.report.compare import Comparison, compare, comparison_json
 from evonav.report.export import csv_cell
-from evonav.report.maps import VIEW_DIR, page_name
+from evonav.report.maps.stage_map import VIEW_DIR, page_name
 from evonav.report.sides import read_sides
 
 SUCCESS = EndState.SUCCESS

@@ -17,7 +17,7 @@ from evonav.evaluation.records import EndState, StageError, StageRecord
 from evonav.evaluation.trace import RunReplay
 from evonav.evaluation.traced import TracedStage
 from evonav.report import html, write_report
-from evonav.report.maps import page_name
+from evonav.report.maps.stage_map import page_name
 from evonav.report.viewer import write_episode
 
 HERE = Path(__file__).parent

@@ -10,12 +10,12 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records import EndState
-from evonav.report.maps import file_css, map_css, stage_svg
-from evonav.report.overlay import rounds as choices
-from evonav.report.plan import label_point
+from evonav.report.maps.floor_plan import label_point
+from evonav.report.maps.stage_map import file_css, map_css, stage_svg
+from evonav.report.maps.strip import most_telling, write_strip
+from evonav.report.maps.svg import Point, polyline, simplified, slug
+from evonav.report.maps.trajectory import rounds as choices
 from evonav.report.run import load_run
-from evonav.report.strip import most_telling, write_strip
-from evonav.report.svg import Point, polyline, simplified, slug
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -14,7 +14,7 @@ from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.trace import RunReplay
 from evonav.evaluation.traced import TracedStage
 from evonav.report.canvas import MapCanvas, colour, font, plain, wrapped
-from evonav.report.plan import Frame
+from evonav.report.maps.floor_plan import Frame
 from evonav.report.video import write_video
 from evonav.report.video_frames import LEFTS, MAP_SIZE, SIZE, TOP, episode_frame, stage_frames
 

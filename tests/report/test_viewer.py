@@ -24,9 +24,9 @@ from evonav.evaluation.store import RunStore
 from evonav.evaluation.trace import RunReplay
 from evonav.evaluation.traced import TracedEntry, TracedMap, TracedRound, TracedStage, Truth
 from evonav.report.html import write_report
-from evonav.report.maps import page_name
-from evonav.report.plan import Frame
-from evonav.report.svg import cm
+from evonav.report.maps.floor_plan import Frame
+from evonav.report.maps.stage_map import page_name
+from evonav.report.maps.svg import cm
 from evonav.report.viewer import write_episode
 from evonav.report.viewer_data import PageData, cells_text
 

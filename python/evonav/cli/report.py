@@ -102,7 +102,7 @@ def _count(replays: str) -> int | None:
 def _replay(run: "Run", num: int | None, tasks: Path | None, exchanges: Path | None) -> None:
     """Makes the pages of the most telling episodes that have none of these records yet."""
     from evonav.errors import EvonavError
-    from evonav.report.maps import VIEW_DIR
+    from evonav.report.maps.stage_map import VIEW_DIR
     from evonav.report.telling import telling_episodes
     from evonav.report.viewer import listed_pages
 

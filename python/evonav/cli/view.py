@@ -83,7 +83,7 @@ def replay_pages(
 ) -> "tuple[list[WrittenPage], Path]":
     """Replays these episodes (agent, task) of a run, and writes their pages and the index; the rest as `make_pages`."""
     from evonav.evaluation.trace import RunReplay
-    from evonav.report.maps import VIEW_DIR
+    from evonav.report.maps.stage_map import VIEW_DIR
     from evonav.report.viewer import write_episode, write_index
 
     replay = RunReplay(found.run_dir, task_path(found.run_dir, tasks), exchanges)

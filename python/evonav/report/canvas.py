@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from evonav.evaluation.records import ObjectFootprint, Relocation, StageMap
-from evonav.report.maps import map_css
-from evonav.report.plan import FLAT_CATEGORIES, FLOORS, Frame
-from evonav.report.svg import cm
+from evonav.report.maps.floor_plan import FLAT_CATEGORIES, FLOORS, Frame
+from evonav.report.maps.stage_map import map_css
+from evonav.report.maps.svg import cm
 from evonav.tasks.language import noun_of
 
 Colour = tuple[int, int, int]

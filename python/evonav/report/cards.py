@@ -7,11 +7,11 @@ from markupsafe import Markup
 
 from evonav.evaluation.records import EndState, StageRecord
 from evonav.report.causes import sentence
-from evonav.report.maps import change_words, outcome_words, task_frame
-from evonav.report.overlay import change, course, rounds
-from evonav.report.plan import Frame, furniture, ground, item_labels, labels, moving_ids
+from evonav.report.maps.floor_plan import Frame, furniture, ground, item_labels, labels, moving_ids
+from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
+from evonav.report.maps.svg import clean, join, slug
+from evonav.report.maps.trajectory import change, course, rounds
 from evonav.report.run import Run, Task
-from evonav.report.svg import clean, join, slug
 
 
 @dataclass(frozen=True, slots=True)

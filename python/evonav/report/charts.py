@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from importlib.resources import files
 
+from evonav.report.maps.svg import escape, join, title
 from evonav.report.panels import Panel
-from evonav.report.svg import escape, join, title
 
 WIDTH, HEIGHT = 400, 300
 LEFT, RIGHT, TOP, BOTTOM = 44, 12, 34, 86

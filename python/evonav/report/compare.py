@@ -18,7 +18,7 @@ from evonav.evaluation.measures import StageRow
 from evonav.evaluation.records import EndState
 from evonav.paired import PairedEffect, holm, mcnemar, paired_effects
 from evonav.report.causes import WORDS, Cause
-from evonav.report.maps import VIEW_DIR, page_name
+from evonav.report.maps.stage_map import VIEW_DIR, page_name
 from evonav.report.sides import Side, config_differences
 
 MEASURES = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_success": "strict SR"}

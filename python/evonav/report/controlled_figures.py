@@ -12,7 +12,7 @@ from evonav.report.controlled import MEASURES, Analysis, Measure
 from evonav.report.controlled_rates import by_rate
 from evonav.report.figures import _matplotlib
 from evonav.report.line_chart import COLOURS, Line, line_chart
-from evonav.report.svg import escape, join, title
+from evonav.report.maps.svg import escape, join, title
 from evonav.significance import Interval
 
 ARM_WORDS = ("Fixed", "Not Fixed")

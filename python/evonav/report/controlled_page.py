@@ -12,11 +12,12 @@ from evonav.report.controlled import BASELINE, MEASURES, Analysis, Key, load_ana
 from evonav.report.controlled_claims import claim_table
 from evonav.report.controlled_figures import bars_svg, lines_svg, write_figures
 from evonav.report.controlled_rates import rate_tables
-from evonav.report.legend import legend
-from evonav.report.maps import map_css, outcome_words
-from evonav.report.overlay import change, rounds
+from evonav.report.maps.floor_plan import furniture, ground, labels, moving_ids
+from evonav.report.maps.legend import legend
+from evonav.report.maps.stage_map import map_css, outcome_words
+from evonav.report.maps.svg import join, slug
+from evonav.report.maps.trajectory import change, rounds
 from evonav.report.page import page_environment, picture_uri, policy, text_of
-from evonav.report.plan import furniture, ground, labels, moving_ids
 from evonav.report.rollouts import (
     REASONS,
     Rollout,
@@ -29,7 +30,6 @@ from evonav.report.rollouts import (
     telling_pairs,
     walk_and_course,
 )
-from evonav.report.svg import join, slug
 from evonav.report.tables import Table
 
 PAGE_NAME = "index.html"

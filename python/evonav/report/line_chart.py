@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from evonav.report.svg import escape, join, title
+from evonav.report.maps.svg import escape, join, title
 from evonav.significance import Interval
 
 WIDTH, HEIGHT = 560, 330

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from evonav.report.line_chart import COLOURS, plot_file
-from evonav.report.svg import escape, title
+from evonav.report.maps.svg import escape, title
 from evonav.significance import Interval
 
 SIDE_PX = 300

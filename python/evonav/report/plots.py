@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from evonav.report.line_chart import COLOURS, Line, line_chart, plot_file
-from evonav.report.svg import escape, join, title
+from evonav.report.maps.svg import escape, join, title
 from evonav.significance import Interval
 
 ROW_PX, HEAD_PX, FOOT_PX = 24, 56, 46

@@ -10,12 +10,12 @@ from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.report.causes import sentence
 from evonav.report.controlled import SPLITS, Analysis, Key, has_moved_far, split_of
-from evonav.report.legend import legend_row
-from evonav.report.maps import change_words, file_css, outcome_words, success_radius_of, task_frame
-from evonav.report.overlay import change, course
-from evonav.report.pictures import check_picture, write_picture
-from evonav.report.plan import Frame, ground, labels
-from evonav.report.svg import arrow_head, cm, escape, join, polyline, simplified, text_lines, title
+from evonav.report.maps.files import check_picture, write_picture
+from evonav.report.maps.floor_plan import Frame, ground, labels
+from evonav.report.maps.legend import legend_row
+from evonav.report.maps.stage_map import change_words, file_css, outcome_words, success_radius_of, task_frame
+from evonav.report.maps.svg import arrow_head, cm, escape, join, polyline, simplified, text_lines, title
+from evonav.report.maps.trajectory import change, course
 from evonav.tasks.controlled import run_of
 
 PANEL_PX, GAP_PX, HEAD_PX, FOOT_PX, IMAGE_PX = 560, 20, 96, 58, 84

@@ -16,7 +16,7 @@ from evonav.evaluation.metrics import AgentSummary, PairedDifference, paired_dif
 from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.evaluation.store import FailureRow, RunStore
 from evonav.report.causes import Cause, cause_of
-from evonav.report.maps import success_radius_of
+from evonav.report.maps.stage_map import success_radius_of
 
 PAPER_ORDER = ("unigoal", "3d-mem", "msgnav", "fu", "stage-reset", "ftu")
 """Agents in the order of the paper's tables."""

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from evonav.evaluation.plans import door_ends, house_map, image_uri, target_record, transition_record, true_footprints
 from evonav.evaluation.records import ObjectFootprint, RoomFootprint, StageMap
 from evonav.house import House
-from evonav.report.overlay import relocation_arrows, start_mark, target_mark
-from evonav.report.plan import (
+from evonav.report.maps.floor_plan import (
     FLAT_CATEGORIES,
     Frame,
     floors,
@@ -21,7 +20,8 @@ from evonav.report.plan import (
     outline,
     structure,
 )
-from evonav.report.svg import Point, cm, join, polyline, title
+from evonav.report.maps.svg import Point, cm, join, polyline, title
+from evonav.report.maps.trajectory import relocation_arrows, start_mark, target_mark
 from evonav.tasks import Task
 from evonav.tasks.language import noun_of
 from evonav.tasks.oracle import Evolution, OracleStage

@@ -15,12 +15,12 @@ from markupsafe import Markup
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records import StageMap, StageRecord
 from evonav.evaluation.traced import TracedStage
-from evonav.report.legend import ENTRIES, legend_html
-from evonav.report.maps import map_css, outcome_words, page_name, task_frame
-from evonav.report.overlay import change, end_mark, ring, start_mark, target_mark
+from evonav.report.maps.floor_plan import Frame, floors, furniture, item_labels, labels, structure
+from evonav.report.maps.legend import ENTRIES, legend_html
+from evonav.report.maps.stage_map import map_css, outcome_words, page_name, task_frame
+from evonav.report.maps.svg import cm
+from evonav.report.maps.trajectory import change, end_mark, ring, start_mark, target_mark
 from evonav.report.page import page_environment, policy, text_of
-from evonav.report.plan import Frame, floors, furniture, item_labels, labels, structure
-from evonav.report.svg import cm
 from evonav.report.viewer_data import PageData
 
 INDEX_NAME, LIST_NAME = "index.html", "pages.json"

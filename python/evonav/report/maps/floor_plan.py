@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from evonav.evaluation.records import ObjectFootprint, RoomFootprint, StageMap
-from evonav.report.svg import Point, cm, escape, join, polyline, title
+from evonav.report.maps.svg import Point, cm, escape, join, polyline, title
 from evonav.tasks.language import noun_of
 
 MARGIN_CM = 40

@@ -15,8 +15,8 @@ from evonav.evaluation.records import (
     TargetRecord,
     TransitionRecord,
 )
-from evonav.report.plan import Frame, distance_m, furniture
-from evonav.report.svg import Point, arrow_head, cm, join, polyline, simplified, star, title
+from evonav.report.maps.floor_plan import Frame, distance_m, furniture
+from evonav.report.maps.svg import Point, arrow_head, cm, join, polyline, simplified, star, title
 from evonav.tasks.language import noun_of
 
 NUM_TIMES = 10

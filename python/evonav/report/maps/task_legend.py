@@ -2,8 +2,8 @@
 
 from markupsafe import Markup
 
-from evonav.report.legend import legend_html
-from evonav.report.svg import arrow_head, star
+from evonav.report.maps.legend import legend_html
+from evonav.report.maps.svg import arrow_head, star
 
 _RECT = 'x="3" y="6" width="18" height="12" stroke-width="1.4"'
 

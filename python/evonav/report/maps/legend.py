@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from markupsafe import Markup
 
-from evonav.report.svg import arrow_head, escape, join, star
+from evonav.report.maps.svg import arrow_head, escape, join, star
 
 ENTRIES = (
     (

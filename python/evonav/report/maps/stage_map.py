@@ -7,9 +7,9 @@ from importlib.resources import files
 from evonav.evaluation.metrics import SUCCESS_RADIUS_M
 from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.report.causes import sentence
-from evonav.report.overlay import change, course
-from evonav.report.plan import Frame, frame_of, ground, item_labels, labels
-from evonav.report.svg import escape, slug
+from evonav.report.maps.floor_plan import Frame, frame_of, ground, item_labels, labels
+from evonav.report.maps.svg import escape, slug
+from evonav.report.maps.trajectory import change, course
 from evonav.tasks.language import noun_of
 
 STAGE_WIDTH_PX = 900

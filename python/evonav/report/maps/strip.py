@@ -7,8 +7,10 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records import EndState, StageMap, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.report.causes import sentence
-from evonav.report.legend import legend_row
-from evonav.report.maps import (
+from evonav.report.maps.files import check_picture, write_picture
+from evonav.report.maps.floor_plan import Frame
+from evonav.report.maps.legend import legend_row
+from evonav.report.maps.stage_map import (
     change_words,
     file_css,
     outcome_words,
@@ -16,10 +18,8 @@ from evonav.report.maps import (
     success_radius_of,
     task_frame,
 )
-from evonav.report.pictures import check_picture, write_picture
-from evonav.report.plan import Frame
+from evonav.report.maps.svg import escape, join, text_lines
 from evonav.report.run import load_run
-from evonav.report.svg import escape, join, text_lines
 from evonav.report.telling import most_telling
 
 PANEL_PX = 360
