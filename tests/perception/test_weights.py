@@ -4,7 +4,11 @@ import hashlib
 import socket
 import sys
 import time
+from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -34,7 +38,7 @@ def test_a_file_is_found_in_the_folder_and_its_hash_is_kept(folder: Path) -> Non
 
 def test_a_file_is_hashed_again_only_when_it_has_changed(folder: Path, monkeypatch) -> None:
     fingerprint(SAM, folder)
-    monkeypatch.setattr(weights, "_sha256", lambda path: pytest.fail("hashed again"))
+    monkeypatch.setattr(weights, "sha256_of_file", lambda path: pytest.fail("hashed again"))
     fingerprint(SAM, folder)
 
 
@@ -99,6 +103,47 @@ def test_without_a_network_the_error_comes_at_once(tmp_path: Path, monkeypatch) 
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
     with pytest.raises(PerceptionError, match="HF_HUB_OFFLINE is set"):
         located(known("facebook/sam-vit-huge"), None)
+
+
+@pytest.fixture
+def release(tmp_path: Path, monkeypatch) -> Iterator[str]:
+    """The address of a file of a release, on a server of this machine; the cache is empty."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("NO_PROXY", "127.0.0.1")
+    monkeypatch.setattr(weights, "_probe", lambda file, about: None)
+    (tmp_path / "served").mkdir()
+    (tmp_path / "served" / "net.pt").write_bytes(b"weights")
+    handler = partial(QuietHandler, directory=str(tmp_path / "served"))
+    server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}/net.pt"
+    server.shutdown()
+    server.server_close()
+
+
+class QuietHandler(SimpleHTTPRequestHandler):
+    def log_message(self, *args) -> None:
+        pass
+
+
+def test_a_file_of_a_release_is_downloaded_once(release: str, tmp_path: Path) -> None:
+    digest = hashlib.sha256(b"weights").hexdigest()
+    net = Weights("net.pt", (WeightFile("net.pt", "MIT", sha256=digest[:8], url=release),))
+    path = located(net, None)
+    assert path == tmp_path / "cache/evonav/models/net.pt"
+    assert fingerprint(net, None) == {"net.pt": digest}
+    (tmp_path / "served" / "net.pt").unlink()
+    assert located(net, None) == path
+
+
+def test_a_download_that_is_not_what_was_published_does_not_stay(release: str, tmp_path: Path) -> None:
+    net = Weights("net.pt", (WeightFile("net.pt", "MIT", sha256="bf2d0c1e", url=release),))
+    with pytest.raises(PerceptionError, match=rf"net\.pt could not be fetched from {release}.*published is bf2d0c1e"):
+        located(net, None)
+    assert list((tmp_path / "cache/evonav/models").iterdir()) == []
+    gone = Weights("gone.pt", (WeightFile("gone.pt", "MIT", url=release.replace("net", "gone")),))
+    with pytest.raises(PerceptionError, match=r"gone\.pt could not be fetched .*404"):
+        located(gone, None)
 
 
 def test_the_folder_is_named_by_option_or_variable(tmp_path: Path, monkeypatch) -> None:

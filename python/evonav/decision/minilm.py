@@ -70,8 +70,8 @@ class MiniLm:
         options.intra_op_num_threads = 1  # the processes of a run share the cores; sums are added in one order
         options.inter_op_num_threads = 1
         self._session = InferenceSession(onnx, options, providers=["CPUExecutionProvider"])
-        words = gzip.decompress(VOCABULARY.read_bytes()).decode().splitlines()
-        self._tokenizer = BertWordPieceTokenizer({word: number for number, word in enumerate(words)})
+        pieces = gzip.decompress(VOCABULARY.read_bytes()).decode().splitlines()
+        self._tokenizer = BertWordPieceTokenizer({piece: number for number, piece in enumerate(pieces)})
         self._tokenizer.enable_truncation(MAX_TOKENS)
 
     def tokens(self, text: str) -> list[int]:

@@ -14,10 +14,6 @@ class DatasetMissingError(DatasetError):
     """It was never fetched."""
 
 
-class DatasetToolError(DatasetError):
-    """A program or package that fetching needs is not installed: `prior`, `git` or `git-lfs`."""
-
-
 class DatasetNetworkError(DatasetError):
     """The dataset's host cannot be reached."""
 

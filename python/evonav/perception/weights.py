@@ -6,7 +6,6 @@ SHA-256 is compared with the published one, or, where none is published, with th
 file beside the files keeps.
 """
 
-import hashlib
 import json
 import os
 import socket
@@ -15,8 +14,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from evonav.downloads import download
 from evonav.errors import PerceptionError, StoreError
-from evonav.folders import write_atomically
+from evonav.folders import sha256_of_file, write_atomically
 
 MODELS_VARIABLE = "EVONAV_MODELS"
 LOCK_NAME = "evonav-models.json"
@@ -246,10 +246,10 @@ def _fetched(file: WeightFile, path: Path) -> Path:
 
             repository, _, name = file.name.rpartition("/")
             return Path(hf_hub_download(repository, name))
-        from torch.hub import download_url_to_file
-
-        path.parent.mkdir(parents=True, exist_ok=True)
-        download_url_to_file(file.url, str(path), hash_prefix=file.sha256 or None, progress=False)
+        download(file.url, path)
+        if not (digest := sha256_of_file(path)).startswith(file.sha256):
+            path.unlink()
+            raise ValueError(f"its SHA-256 is {digest}, published is {file.sha256}")
     except ImportError as error:
         raise PerceptionError(f"{file.name} cannot be fetched: pip install 'evonav[torch]' ({error})") from None
     except Exception as error:  # of several clients, each with errors of its own
@@ -269,7 +269,7 @@ def _checked(file: WeightFile, path: Path, folder: Path | None) -> str:
     try:
         stat = path.stat()
         stamp = [stat.st_size, stat.st_mtime_ns]
-        digest = str(entry["sha256"]) if entry.get("stamp") == stamp else _sha256(path)
+        digest = str(entry["sha256"]) if entry.get("stamp") == stamp else sha256_of_file(path)
     except OSError as error:
         raise PerceptionError(f"{path} cannot be read: {error.strerror}") from error
     if not digest.startswith(file.sha256):
@@ -304,11 +304,3 @@ def _write_lock(lock: Path, entries: dict[str, dict[str, object]]) -> None:
         write_atomically(lock, json.dumps(entries, indent=1, sort_keys=True) + "\n")
     except (OSError, StoreError):
         return
-
-
-def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(1 << 20):
-            digest.update(block)
-    return digest.hexdigest()
