@@ -1,4 +1,4 @@
-"""Builds what `evonav.thor` says of assets besides their shape: `python/evonav/thor/data/assets.json`.
+"""Build the AI2-THOR engine's table of asset metadata, `python/evonav/thor/data/assets.json`.
 
     python scripts/build_thor_assets.py DATA [--out python/evonav/thor/data/assets.json]
 
@@ -51,7 +51,7 @@ LEVEL_DEG = 0.5
 
 def main() -> None:
     """Reads DATA, writes the table."""
-    parser = argparse.ArgumentParser(description="Build evonav.thor's facts of assets.")
+    parser = argparse.ArgumentParser(description="Build evonav.thor's table of asset metadata.")
     parser.add_argument("data", type=Path, help="directory with procthor-databases/")
     parser.add_argument("--out", type=Path, default=Path("python/evonav/thor/data/assets.json"))
     arguments = parser.parse_args()

@@ -65,14 +65,14 @@ PHRASES = tuple(
 _OPENERS = frozenset(
     """
     about after among around as at before behind below beneath beside between beyond by during for from in inside into
-    near of off on onto out outside over past per since through till to toward towards under until up upon via with
+    of off on onto out outside over past per since through till to toward towards under until up upon via with
     within without
     how that what when where wherever which who whom whose why
-    likewise so there thus
+    likewise so thus
     """.split()
 )
 # Nor does the docstring of a function begin with one of these, unless it is a property.
-_FUNCTION_OPENERS = _OPENERS | frozenset("whether all another both each every none nothing one those".split())
+_FUNCTION_OPENERS = _OPENERS | frozenset("whether all another both each every none nothing one there those".split())
 _PROPERTIES = frozenset(("property", "cached_property", "setter", "getter"))
 _RUST_NAME = re.compile(r"\b(?:fn|struct|enum|trait|type|const|static|mod|let(?: mut)?)\s+([A-Za-z_]\w*)")
 _RUST_DOC = re.compile(r"^\s*//[/!](?!/) ?(.*)$")

@@ -14,7 +14,7 @@ import pytest
 
 from evonav.house import bundled_houses
 from evonav.thor import edits, objects
-from evonav.thor.asset_metadata import facts_of
+from evonav.thor.asset_metadata import metadata_of_asset
 from evonav.thor.engine import Engine
 
 Json = dict[str, Any]
@@ -53,33 +53,33 @@ def test_records_have_the_fields_of_recorded_ones() -> None:
 
 
 @needs_recorded
-def test_the_script_reproduces_the_bundled_facts(tmp_path: Path) -> None:
+def test_the_script_reproduces_the_bundled_asset_metadata(tmp_path: Path) -> None:
     out = tmp_path / "assets.json"
     subprocess.run([sys.executable, ROOT / "scripts" / "build_thor_assets.py", SHARED, "--out", out], check=True)
     assert out.read_bytes() == (ROOT / "python" / "evonav" / "thor" / "data" / "assets.json").read_bytes()
 
 
 @needs_recorded
-def test_facts_agree_with_what_ai2thor_recorded_of_all_its_rooms() -> None:
+def test_assets_agree_with_what_ai2thor_recorded_of_all_its_rooms() -> None:
     """8,715 records of iTHOR and RoboTHOR; positions follow from the boxes' middles, by the pivots, at any yaw."""
     packed = (SHARED / "procthor-databases" / "ai2thor-object-metadata.json.gz").read_bytes()
     flags = agreed = pivots = 0
     off_m = []
     for record in records_in(json.loads(gzip.decompress(packed))):
-        facts = facts_of(record["assetId"], record["objectType"])
-        if not facts.size_m:
+        asset = metadata_of_asset(record["assetId"], record["objectType"])
+        if not asset.size_m:
             continue
-        ours = [flag in facts.flags for flag in objects.FLAGS]
+        ours = [flag in asset.flags for flag in objects.FLAGS]
         flags += len(ours)
         agreed += sum(a == record[flag] for a, flag in zip(ours, objects.FLAGS, strict=True))
-        assert facts.mass_kg == pytest.approx(record["mass"], abs=1e-3)
-        assert list(facts.materials or ()) == (record["salientMaterials"] or [])
+        assert asset.mass_kg == pytest.approx(record["mass"], abs=1e-3)
+        assert list(asset.materials or ()) == (record["salientMaterials"] or [])
         rotation = record["rotation"]
-        if facts.pivot_m != (0.0, 0.0, 0.0) and abs((rotation["x"] + 180) % 360 - 180) < 0.5 > abs(
+        if asset.pivot_m != (0.0, 0.0, 0.0) and abs((rotation["x"] + 180) % 360 - 180) < 0.5 > abs(
             (rotation["z"] + 180) % 360 - 180
         ):
             centre_m = list(record["axisAlignedBoundingBox"]["center"].values())
-            pivot_m = np.add(centre_m, objects.rotation_of(rotation) @ facts.pivot_m)
+            pivot_m = np.add(centre_m, objects.rotation_of(rotation) @ asset.pivot_m)
             off_m.append(float(np.abs(pivot_m - list(record["position"].values())).max()))
             pivots += 1
     print(f"{agreed} of {flags} flags agree; pivots of {pivots} records: median {np.median(off_m):.5f} m")
@@ -95,12 +95,12 @@ def test_oriented_boxes_are_those_that_ai2thor_recorded() -> None:
     packed = (SHARED / "procthor-databases" / "ai2thor-object-metadata.json.gz").read_bytes()
     off_m = []
     for record in records_in(json.loads(gzip.decompress(packed))):
-        facts, box = facts_of(record["assetId"], record["objectType"]), record["objectOrientedBoundingBox"]
-        if box is None or facts.size_m is None or facts.pivot_m == (0.0, 0.0, 0.0) or record["isOpen"]:
+        asset, box = metadata_of_asset(record["assetId"], record["objectType"]), record["objectOrientedBoundingBox"]
+        if box is None or asset.size_m is None or asset.pivot_m == (0.0, 0.0, 0.0) or record["isOpen"]:
             continue
         turn = objects.rotation_of(record["rotation"])
-        x_m, y_m, z_m = np.subtract(list(record["position"].values()), turn @ facts.pivot_m).tolist()
-        ours_m = objects.oriented_corners((x_m, y_m, z_m), facts.size_m, record["rotation"])
+        x_m, y_m, z_m = np.subtract(list(record["position"].values()), turn @ asset.pivot_m).tolist()
+        ours_m = objects.oriented_corners((x_m, y_m, z_m), asset.size_m, record["rotation"])
         off_m.append(float(np.abs(np.subtract(ours_m, box["cornerPoints"])).max()))
     quantiles_m = np.quantile(off_m, [0.5, 0.9, 0.98])
     print(f"corners of {len(off_m)} boxes: {quantiles_m.round(4)} m off at the 50th, 90th and 98th percentile")
@@ -156,7 +156,7 @@ def test_things_belong_to_the_receptacles_that_recorded_cubes_belong_to() -> Non
             corners_m = np.array(cube["axisAlignedBoundingBox"]["cornerPoints"])
             bottom_m = corners_m[:, 1].min()
             assert ("Floor" in parents) == (bottom_m < reach_m)
-            found = edits.holder_of(
+            found = edits.find_receptacle(
                 bottom_m, corners_m.mean(axis=0), centres_m - 0.5 * sizes_m, centres_m + 0.5 * sizes_m
             )
             agreed += found is not None and receptacles[found]["objectId"] == parents[0]

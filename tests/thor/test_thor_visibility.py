@@ -46,7 +46,7 @@ def test_visible_is_what_is_near_and_in_the_picture(number: int) -> None:
         agent.yaw_deg, agent.horizon_deg = float(rng.integers(0, 24) * 15), float(rng.choice([0.0, 30.0, -15.0]))
         seen = objects.visible_ids(engine.scene, agent, REACH_M)
         frame = simulator.render(agent.pose, rgb=False)
-        pixels = pixels_of(frame, (agent.x_m, agent.z_m), objects.looking(agent))
+        pixels = pixels_of(frame, (agent.x_m, agent.z_m), objects.camera_axes(agent))
         by_id = {objects.object_of_body(engine.scene, i - 1): found for i, found in pixels.items() if i > 0}
         visible += len(seen)
         shown += len(seen & set(by_id))
@@ -81,7 +81,7 @@ def test_views_are_distances_from_the_agent_to_the_pivot() -> None:
     engine = engine_of(1)
     agent = engine.agent
     for record, view in zip(
-        objects.static_records(engine.scene), objects.views(engine.scene, agent, engine.settings), strict=True
+        objects.static_records(engine.scene), objects.object_views(engine.scene, agent, engine.settings), strict=True
     ):
         position = record["position"]
         assert view.distance_m == pytest.approx(math.dist(position.values(), (agent.x_m, agent.y_m, agent.z_m)))

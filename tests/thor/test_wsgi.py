@@ -159,7 +159,7 @@ def test_nobody_there() -> None:
     "host", ["10.0.0.1", "0.0.0.0", "example.org", "192.168.1.2", "::", "", "localhost.example.org"]
 )
 def test_other_machines_are_refused(host) -> None:
-    with pytest.raises(ValueError, match="not an address of this machine"):
+    with pytest.raises(ValueError, match="is not on this machine"):
         Wsgi(host, 80, "t", lambda: False)
 
 

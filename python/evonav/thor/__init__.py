@@ -1,7 +1,7 @@
-"""An AI2-THOR-compatible engine: what `ai2thor.controller.Controller(local_executable_path=...)` starts for Unity.
+"""An AI2-THOR-compatible engine, which `ai2thor.controller.Controller(local_executable_path=...)` starts like Unity.
 
-The `ai2thor` package is not needed here: the engine is a process of its own that speaks its client's wire protocol
-(`fifo`). Degrees live in this package and nowhere below it.
+The engine does not need the `ai2thor` package: it is a separate process that speaks the wire protocol of AI2-THOR's
+client (`transport`). Angles are in degrees in this package and in radians everywhere below it.
 """
 
 import shlex
@@ -16,10 +16,10 @@ __all__ = ["executable"]
 
 
 def executable() -> str:
-    """What to pass as `local_executable_path`: the installed `evonav-thor`, quoted as the client needs it.
+    """Return the value for `local_executable_path`: the installed `evonav-thor`, quoted as the client needs it.
 
     Raises:
-        SimulationError: It is not installed.
+        SimulationError: The program is not installed.
     """
     folders = (Path(sys.executable).parent, Path(sysconfig.get_path("scripts")))
     found = next((str(f / "evonav-thor") for f in folders if (f / "evonav-thor").is_file()), None)
@@ -27,5 +27,5 @@ def executable() -> str:
     if found is None:
         places = ", ".join(dict.fromkeys(str(folder) for folder in folders))
         raise SimulationError(f"evonav-thor is neither in {places} nor on the PATH: install evonav there")
-    # The client splits the path as a shell does.
+    # The client splits the path like a shell.
     return shlex.quote(found)

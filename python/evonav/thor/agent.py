@@ -1,4 +1,4 @@
-"""The agent's body, state and camera, in AI2-THOR's units: metres and degrees."""
+"""Hold the agent's body, state and camera in AI2-THOR's units: metres and degrees."""
 
 import math
 from collections.abc import Mapping
@@ -17,15 +17,15 @@ BODY_Y_M = 0.9009992
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """What an agent mode sets: `InitializeBody` of AI2-THOR's controllers."""
+    """The body of an agent mode, as `InitializeBody` of AI2-THOR's controllers sets it."""
 
     mode: str
     radius_m: float
     height_m: float
     camera_height_m: float
-    """Over the floor, standing."""
+    """Height of the camera above the floor when standing."""
     crouch_m: float
-    """How far the camera sinks."""
+    """Distance by which crouching lowers the camera."""
     vertical_fov_deg: float
     max_upward_deg: float
     max_downward_deg: float
@@ -35,19 +35,19 @@ BODIES = {
     "default": Body("default", 0.2, 1.8, 1.575, 0.675, 90.0, 30.0, 60.0),
     "locobot": Body("locobot", 0.175, 0.9, BODY_Y_M - 0.0312, 0.2206, 60.0, 29.0, 30.0),
 }
-"""By agent mode."""
+"""The bodies by agent mode."""
 
 
 def body_of(agent_mode: str, max_upward_deg: float = 0.0, max_downward_deg: float = 0.0) -> Body:
-    """The body of an agent mode.
+    """Return the body of an agent mode.
 
     Args:
-        agent_mode: Case does not matter.
-        max_upward_deg: Of the default agent's camera; 0 for AI2-THOR's limit. The LoCoBot's own stays.
-        max_downward_deg: Likewise.
+        agent_mode: Name of the mode in any case.
+        max_upward_deg: Limit of the default agent's camera, 0 for AI2-THOR's; the LoCoBot's own limit does not change.
+        max_downward_deg: The same for looking down.
 
     Raises:
-        ActionError: The mode is none of `BODIES`.
+        ActionError: `BODIES` does not contain the mode.
     """
     body = BODIES.get(agent_mode.lower())
     if body is None:
@@ -62,18 +62,18 @@ def body_of(agent_mode: str, max_upward_deg: float = 0.0, max_downward_deg: floa
 
 
 def canonical_deg(angle_deg: float) -> float:
-    """An angle to 1e-4 degrees, so that degrees on the wire and radians inside name the same angle."""
+    """Round an angle to 1e-4 degrees, so that degrees on the wire and radians inside name the same angle."""
     return round(angle_deg, 4) + 0.0
 
 
 def canonical_yaw_deg(yaw_deg: float) -> float:
-    """A yaw in [0, 360), to 1e-4 degrees."""
+    """Return a yaw in [0, 360), rounded to 1e-4 degrees."""
     wrapped_deg = canonical_deg(yaw_deg % 360.0)
     return wrapped_deg if wrapped_deg < 360.0 else 0.0
 
 
 class HousePose(BaseModel):
-    """What a house says of an agent mode's start."""
+    """The start pose that a house gives for an agent mode."""
 
     model_config = ConfigDict(allow_inf_nan=False)
 
@@ -87,10 +87,10 @@ _POSES = TypeAdapter(dict[str, HousePose])
 
 
 def house_poses(house: Mapping[str, Any]) -> dict[str, HousePose]:
-    """`metadata.agentPoses` of a house, by agent mode.
+    """Return `metadata.agentPoses` of a house, by agent mode.
 
     Raises:
-        ActionError: They are malformed.
+        ActionError: The poses are malformed.
     """
     metadata = house.get("metadata")
     poses = metadata.get("agentPoses") if isinstance(metadata, dict) else None
@@ -102,7 +102,7 @@ def house_poses(house: Mapping[str, Any]) -> dict[str, HousePose]:
 
 @dataclass(slots=True)
 class Agent:
-    """Where the agent stands and looks."""
+    """Pose and body of the agent."""
 
     x_m: float = 0.0
     y_m: float = BODY_Y_M
@@ -112,38 +112,38 @@ class Agent:
     is_standing: bool = True
     body: Body = BODIES["default"]
     noise: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
-    """What the LoCoBot's motion noise is drawn from: the same after every `Reset`."""
+    """Source of the LoCoBot's motion noise; every `Reset` restarts it."""
 
     @property
     def pose(self) -> Pose:
-        """The agent's pose as evonav's simulators take it."""
+        """The agent's pose in the form of evonav's simulators."""
         return Pose(self.x_m, self.y_m, self.z_m, self.yaw_rad, math.radians(self.horizon_deg))
 
     @property
     def yaw_rad(self) -> float:
-        """Heading."""
+        """Heading in radians."""
         return math.radians(self.yaw_deg)
 
     @property
     def point_m(self) -> tuple[float, float]:
-        """`(x, z)`."""
+        """Position on the ground plane, `(x, z)`."""
         return (self.x_m, self.z_m)
 
     @property
     def camera_height_m(self) -> float:
-        """Of the camera over the floor: lower when crouching, higher where a forced teleport lifted the agent."""
+        """Height of the camera above the floor: lower when crouching, higher after a forced teleport."""
         sunk_m = 0.0 if self.is_standing else self.body.crouch_m
         return self.body.camera_height_m - sunk_m + (self.y_m - BODY_Y_M)
 
     @property
     def is_locobot(self) -> bool:
-        """Whether it rolls: no steps aside, no crouching, motion noise."""
+        """Whether it is a LoCoBot: no steps aside, no crouching, motion noise."""
         return self.body.mode == "locobot"
 
     def enter(self, house: Mapping[str, Any]) -> None:
-        """Takes the pose that `metadata.agentPoses` of a house gives for its mode; else stays where it is.
+        """Take the pose that `metadata.agentPoses` of a house gives for the agent's mode; without one, stay.
 
-        So does `setAgentPose` of AI2-THOR's `ProceduralTools`; `metadata.agent` is for the caller to teleport to.
+        AI2-THOR's `setAgentPose` in `ProceduralTools` does the same. The client itself teleports to `metadata.agent`.
         """
         pose = house_poses(house).get(self.body.mode)
         if pose is None:

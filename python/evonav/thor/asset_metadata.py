@@ -1,4 +1,4 @@
-"""What AI2-THOR says of an asset besides its shape."""
+"""Read what AI2-THOR records of an asset besides its shape."""
 
 import json
 from collections import Counter
@@ -10,38 +10,38 @@ _Vec3 = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class AssetFacts:
-    """Facts of an asset, as AI2-THOR's records name them; `scripts/build_thor_assets.py` makes the table."""
+class AssetMetadata:
+    """An asset's record in AI2-THOR, besides its shape; `scripts/build_thor_assets.py` makes the table."""
 
     object_type: str
     flags: frozenset[str] = frozenset()
-    """`pickupable`, `openable` and the like, where true."""
+    """Names of the properties that are true: `pickupable`, `openable` and the like."""
     first_states: frozenset[str] = frozenset()
-    """`isOpen`, `isToggled`, `isFilledWithLiquid`, where a new one is so."""
+    """Names of the states that a new object is in: `isOpen`, `isToggled`, `isFilledWithLiquid`."""
     mass_kg: float = 0.0
     materials: tuple[str, ...] | None = None
-    """`salientMaterials`; records that give them give the mass."""
+    """AI2-THOR's `salientMaterials`; a record has a mass only if it has these."""
     size_m: _Vec3 | None = None
-    """Of its box."""
+    """Edges of the asset's box, along its own axes."""
     pivot_m: _Vec3 = field(default=(0.0, 0.0, 0.0))
-    """`position`, seen from the middle of the box in the asset's own frame."""
+    """Offset of `position` from the centre of the box, in the asset's own frame."""
 
     @property
     def is_movable(self) -> bool:
-        """Whether it can be picked up or pushed; the rest has no `objectOrientedBoundingBox`."""
+        """Whether it can be picked up or pushed; other assets have no `objectOrientedBoundingBox`."""
         return not self.flags.isdisjoint(("pickupable", "moveable"))
 
 
-def facts_of(asset_id: str, object_type: str) -> AssetFacts:
-    """Facts of an asset; of one that the table does not hold (Objaverse's), those most common to its type."""
-    return _by_asset().get(asset_id) or _by_type().get(object_type) or AssetFacts(object_type)
+def metadata_of_asset(asset_id: str, object_type: str) -> AssetMetadata:
+    """Return an asset's metadata; for an asset that the table lacks (Objaverse's), what is most common for its type."""
+    return _by_asset().get(asset_id) or _by_type().get(object_type) or AssetMetadata(object_type)
 
 
 @cache
-def _by_asset() -> dict[str, AssetFacts]:
+def _by_asset() -> dict[str, AssetMetadata]:
     text = (resources.files("evonav.thor") / "data" / "assets.json").read_text(encoding="utf-8")
     return {
-        row["id"]: AssetFacts(
+        row["id"]: AssetMetadata(
             row["type"],
             frozenset(row["flags"]),
             frozenset(row.get("states", ())),
@@ -55,16 +55,16 @@ def _by_asset() -> dict[str, AssetFacts]:
 
 
 @cache
-def _by_type() -> dict[str, AssetFacts]:
-    groups: dict[str, list[AssetFacts]] = {}
-    for facts in _by_asset().values():
-        groups.setdefault(facts.object_type, []).append(facts)
+def _by_type() -> dict[str, AssetMetadata]:
+    groups: dict[str, list[AssetMetadata]] = {}
+    for asset in _by_asset().values():
+        groups.setdefault(asset.object_type, []).append(asset)
     return {object_type: _typical(object_type, group) for object_type, group in groups.items()}
 
 
-def _typical(object_type: str, group: list[AssetFacts]) -> AssetFacts:
-    flags, _ = Counter(facts.flags for facts in group).most_common(1)[0]
-    materials, _ = Counter(facts.materials for facts in group).most_common(1)[0]
-    masses_kg = sorted(facts.mass_kg for facts in group)
-    states, _ = Counter(facts.first_states for facts in group).most_common(1)[0]
-    return AssetFacts(object_type, flags, states, masses_kg[len(group) // 2] if materials else 0.0, materials)
+def _typical(object_type: str, group: list[AssetMetadata]) -> AssetMetadata:
+    flags, _ = Counter(asset.flags for asset in group).most_common(1)[0]
+    materials, _ = Counter(asset.materials for asset in group).most_common(1)[0]
+    masses_kg = sorted(asset.mass_kg for asset in group)
+    states, _ = Counter(asset.first_states for asset in group).most_common(1)[0]
+    return AssetMetadata(object_type, flags, states, masses_kg[len(group) // 2] if materials else 0.0, materials)

@@ -1,4 +1,4 @@
-"""Changes of a scene's objects: what moves, what goes, and where things then rest."""
+"""Change a scene's objects: move and remove them, and let them fall."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -10,25 +10,25 @@ from numpy.typing import NDArray
 from evonav.errors import EvonavError
 from evonav.thor import objects
 from evonav.thor.actions.registry import ActionError
-from evonav.thor.asset_metadata import AssetFacts, facts_of
+from evonav.thor.asset_metadata import AssetMetadata, metadata_of_asset
 from evonav.thor.scene import Scene
 from evonav.thor.surfaces import Surfaces, fresh_surfaces
 
 Entry = dict[str, Any]
 
-# Where under things a support is looked for, in their sizes: as the world does for children of the house file.
+# Points below an object where support is searched, in its sizes: those of the world for children in the house file.
 _OUTLINE = 0.35 * np.array([(0, 0), (1, 1), (-1, 1), (-1, -1), (1, -1)])
-# How far recorded things sink into our shapes of what carries them.
+# Recorded objects may sink this far into our shapes of what supports them.
 _DIP_M = 0.06
-# Lower than this over the floor nothing stands on a shelf.
+# Objects below this height above the floor do not stand on a shelf.
 _LEAST_SHELF_M = 0.01
-# Higher than this over a receptacle's box nothing stands on it any more.
+# Objects more than this above a receptacle's box do not stand on it.
 _REACH_M = 0.05
 
 
 @contextmanager
-def edited(scene: Scene) -> Iterator[Entry]:
-    """The house, to be changed; as it was, should what becomes of it be no house."""
+def editing(scene: Scene) -> Iterator[Entry]:
+    """Yield the house for changes, and restore it if the result is not a valid house."""
     house = scene.begin_edit()
     before, disabled = _copied(house.get("objects") or []), dict(scene.disabled)
     try:
@@ -41,10 +41,10 @@ def edited(scene: Scene) -> Iterator[Entry]:
 
 
 def entry_of(scene: Scene, object_id: str) -> Entry:
-    """A house object's entry in the house file.
+    """Return a house object's entry in the house file.
 
     Raises:
-        ActionError: There is no such object, or it is part of the building.
+        ActionError: The object does not exist, or it is part of the building.
     """
     if scene.house is not None:
         for entry, _ in objects.placed_objects(scene.house):
@@ -55,7 +55,7 @@ def entry_of(scene: Scene, object_id: str) -> Entry:
 
 
 def _copied(entries: Sequence[Entry]) -> list[Entry]:
-    """Entries of which poses and children may be changed."""
+    """Copy entries so that poses and children can be changed."""
     return [
         {
             **e,
@@ -67,26 +67,26 @@ def _copied(entries: Sequence[Entry]) -> list[Entry]:
     ]
 
 
-def holders_of(house: Entry) -> dict[str, list[Entry]]:
-    """The list in the house file that holds each entry, by id."""
+def lists_by_id(house: Entry) -> dict[str, list[Entry]]:
+    """Return the list of the house file that contains each entry, by id."""
     lists = [house.setdefault("objects", [])]
     lists += [entry["children"] for entry, _ in objects.placed_objects(house) if entry.get("children")]
     return {entry["id"]: entries for entries in lists for entry in entries}
 
 
-def detach(holders: Mapping[str, list[Entry]], object_id: str) -> Entry:
-    """Takes an entry, with what stands on it, out of the list that holds it."""
-    entries = holders[object_id]
+def detach(lists: Mapping[str, list[Entry]], object_id: str) -> Entry:
+    """Remove an entry, with the objects on it, from its list."""
+    entries = lists[object_id]
     return entries.pop(next(index for index, entry in enumerate(entries) if entry["id"] == object_id))
 
 
-def facts(entry: Mapping[str, Any], object_type: str) -> AssetFacts:
-    """Facts of an entry's asset."""
-    return facts_of(str(entry.get("assetId", "")), object_type)
+def metadata_of_entry(entry: Mapping[str, Any], object_type: str) -> AssetMetadata:
+    """Return the metadata of an entry's asset."""
+    return metadata_of_asset(str(entry.get("assetId", "")), object_type)
 
 
-def put(entry: Entry, centre_m: Sequence[float], rotation: Mapping[str, float]) -> None:
-    """Sets the pose of an entry, which stays there, and moves what stands on it along."""
+def set_pose(entry: Entry, centre_m: Sequence[float], rotation: Mapping[str, float]) -> None:
+    """Set the pose of an entry, where it stays, and move the objects on it along."""
     before_m, turn_before = centre_of(entry), objects.rotation_of(entry["rotation"])
     turn = objects.rotation_of(rotation) @ turn_before.T
     yaw_deg = rotation["y"] - float(entry["rotation"]["y"])
@@ -100,19 +100,19 @@ def put(entry: Entry, centre_m: Sequence[float], rotation: Mapping[str, float]) 
 
 
 def centre_of(entry: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Middle of an entry's box, as the house file has it."""
+    """Return the centre of an entry's box, as the house file has it."""
     return np.array([float(entry["position"][axis]) for axis in "xyz"])
 
 
 def settle(scene: Scene) -> None:
-    """Writes where things rest into the house file, which may have them higher."""
+    """Write the resting heights of objects into the house file, which may have higher ones."""
     bodies = {body.id: body for body in scene.simulator.objects if body.kind == "object"}
     for entry, _ in objects.placed_objects(scene.house or {}):
         entry["position"]["y"] = bodies[entry["id"]].centre_m[1]
 
 
 def drop(scene: Scene, object_ids: Sequence[str]) -> None:
-    """Lets objects fall onto what is under their outlines, lowest first."""
+    """Let objects fall onto what is below their outlines, lowest first."""
     surfaces, falling = fresh_surfaces(scene), set(object_ids)
     bodies = scene.simulator.objects
     order = sorted((body.centre_m[1] - 0.5 * body.size_m[1], index) for index, body in enumerate(bodies))
@@ -123,7 +123,7 @@ def drop(scene: Scene, object_ids: Sequence[str]) -> None:
             fall_m = bottom_m - rest_height_m(surfaces, body.centre_m, body.size_m, ignored=index)
             surfaces.lift(index, -fall_m)
             heights_m[body.id] = body.centre_m[1] - fall_m
-    with edited(scene) as house:
+    with editing(scene) as house:
         for entry, _ in objects.placed_objects(house):
             if entry["id"] in heights_m:
                 entry["position"]["y"] = heights_m[entry["id"]]
@@ -133,16 +133,16 @@ def drop(scene: Scene, object_ids: Sequence[str]) -> None:
 def rest_height_m(
     surfaces: Surfaces, centre_m: Sequence[float], size_m: Sequence[float], ignored: int | None = None
 ) -> float:
-    """Where the bottom of a box comes to rest when it falls: it never rises."""
+    """Return the height at which the bottom of a falling box comes to rest; it never rises."""
     bottom_m = centre_m[1] - 0.5 * size_m[1]
     outline_m = np.array([centre_m[0], centre_m[2]]) + _OUTLINE * np.array([size_m[0], size_m[2]])
     return min(bottom_m, surfaces.height_under_m(outline_m, bottom_m + _DIP_M, ignored))
 
 
-def relate(scene: Scene, object_ids: Sequence[str]) -> None:
-    """Puts entries under the receptacles on which they now are."""
+def update_receptacles(scene: Scene, object_ids: Sequence[str]) -> None:
+    """Put entries below the receptacles on which they now stand."""
     house, moved = scene.house or {}, set(object_ids)
-    records, holders = {record["objectId"]: record for record in objects.static_records(scene)}, holders_of(house)
+    records, lists = {record["objectId"]: record for record in objects.static_records(scene)}, lists_by_id(house)
     placed = [entry for entry, _ in objects.placed_objects(house)]
     receptacles = [entry for entry in placed if records[entry["id"]]["receptacle"]]
     low, high = (np.array([_corner_m(records[e["id"]], side) for e in receptacles]).reshape(-1, 3) for side in (-1, 1))
@@ -151,28 +151,29 @@ def relate(scene: Scene, object_ids: Sequence[str]) -> None:
             own = {child["id"] for child, _ in objects.placed_objects({"objects": [entry]})}
             others = [i for i, receptacle in enumerate(receptacles) if receptacle["id"] not in own]
             bottom_m = _corner_m(records[entry["id"]], -1)[1]
-            found = holder_of(bottom_m, centre_of(entry), low[others], high[others])
-            taken = detach(holders, entry["id"])
+            found = find_receptacle(bottom_m, centre_of(entry), low[others], high[others])
+            taken = detach(lists, entry["id"])
             target = house["objects"] if found is None else receptacles[others[found]].setdefault("children", [])
             target.append(taken)
-            holders[entry["id"]] = target
-    scene.note_relations()
+            lists[entry["id"]] = target
+    scene.mark_receptacles_changed()
 
 
-def holder_of(
+def find_receptacle(
     bottom_m: float, centre_m: NDArray[np.float64], low_m: NDArray[np.float64], high_m: NDArray[np.float64]
 ) -> int | None:
-    """Which of some receptacles a thing stands on or lies in, by boxes alone.
+    """Find the receptacle that an object stands on or lies in, by boxes alone.
 
     Args:
-        bottom_m: Height of the thing's lowest point.
-        centre_m: Middle of the thing.
+        bottom_m: Height of the object's lowest point.
+        centre_m: Centre of the object.
         low_m: `(N, 3)` least corners of the receptacles' boxes.
-        high_m: `(N, 3)` greatest corners.
+        high_m: `(N, 3)` greatest corners of the receptacles' boxes.
 
     Returns:
-        An index; rather one whose top the thing is on than one that it is in (a chair pushed under a table reaches
-        above it), and of several the smallest: the plate, not the table under it.
+        The receptacle's index, or `None`. A receptacle below the object comes before one around it (a chair pushed
+        under a table reaches above the table's seat), and of several the smallest counts: the plate, not the table
+        under it.
     """
     ground_m = centre_m[[0, 2]]
     is_over = ((low_m[:, (0, 2)] <= ground_m) & (ground_m <= high_m[:, (0, 2)])).all(axis=1)

@@ -1,4 +1,4 @@
-"""The engine: does the client's actions one after another and says what the scene then looks like."""
+"""Execute the client's actions one after another."""
 
 import logging
 import traceback
@@ -17,13 +17,13 @@ from evonav.world.camera import CameraView, Images
 from evonav.world.simulator import Frame, SimulatorConfig
 
 _LOG = logging.getLogger("evonav.thor")
-# Characters of an error message.
+# Maximal number of characters of an error message.
 _MAX_MESSAGE = 4000
 _logged: set[tuple[str, int | None]] = set()
 
 
 class Settings(BaseModel):
-    """What `Initialize` sets, by AI2-THOR's names; the client passes its constructor's other keywords through."""
+    """The settings of `Initialize`, by AI2-THOR's names; the client also passes other keywords of its constructor."""
 
     model_config = ConfigDict(extra="allow", allow_inf_nan=False, frozen=True)
 
@@ -49,20 +49,20 @@ class Settings(BaseModel):
 
 
 class Camera(Protocol):
-    """A third-party camera. It is immutable: a change is another camera in its place."""
+    """A third-party camera. It is immutable: a change replaces it."""
 
     def metadata(self) -> dict[str, Any]:
-        """AI2-THOR's `ThirdPartyCameraMetadata`."""
+        """Return AI2-THOR's `ThirdPartyCameraMetadata`."""
         ...
 
     def render(self, scene: Scene, *, rgb: bool, instances: bool) -> Images:
-        """What it sees, in the size of the screen; depth ends at its own far plane."""
+        """Render the camera's view in the size of the screen; depth ends at its own far plane."""
         ...
 
 
 @dataclass(slots=True)
 class Result:
-    """What the last action did."""
+    """The result of the last action."""
 
     action: str = ""
     is_success: bool = True
@@ -73,7 +73,7 @@ class Result:
 
 @dataclass(slots=True)
 class Engine:
-    """One client's engine: a scene, an agent in it, and the images that are asked for."""
+    """One client's engine: a scene, an agent in it, and the requested images."""
 
     width_px: int = 300
     height_px: int = 300
@@ -83,16 +83,16 @@ class Engine:
     cameras: list[Camera] = field(default_factory=list)
     """Third-party cameras, by their ids."""
     map_view: Camera | None = None
-    """What `ToggleMapView` puts in place of the agent's camera."""
+    """The camera that `ToggleMapView` puts in place of the agent's."""
     map_view_size_m: float = -1.0
-    """Half the height of the last map view."""
+    """Half the height of the last map view, in metres."""
     object_filter: frozenset[str] | None = None
-    """Which objects the metadata lists; all without it."""
+    """Ids of the objects that the metadata lists; `None` for all."""
     last: Result = field(default_factory=Result)
 
     @property
     def state(self) -> tuple[object, ...]:
-        """Everything that an event shows, but for the last action: equal states give equal events."""
+        """Everything that an event shows, except the last action: equal states give equal events."""
         agent = self.agent
         return (
             *(self.scene.version, self.width_px, self.height_px, self.settings, self.object_filter),
@@ -103,19 +103,19 @@ class Engine:
 
     @property
     def field_of_view_deg(self) -> float:
-        """Of the agent's camera, vertical."""
+        """Vertical field of view of the agent's camera."""
         return self.scene.config.vertical_fov_deg
 
     @property
     def camera_position_m(self) -> tuple[float, float, float]:
-        """Of the agent's camera."""
+        """Position of the agent's camera, `(x, y, z)`."""
         if self.map_view is not None:
             at = self.map_view.metadata()["position"]
             return (at["x"], at["y"], at["z"])
         return (self.agent.x_m, self.agent.camera_height_m, self.agent.z_m)
 
     def view(self, *, rgb: bool, instances: bool) -> Frame | Images:
-        """What the agent's camera sees, from where crouching, a forced teleport or the map view has brought it."""
+        """Render the agent's camera, which crouching, a forced teleport or the map view may have moved."""
         if self.map_view is not None:
             return self.map_view.render(self.scene, rgb=rgb, instances=instances)
         simulator, pose = self.scene.simulator, self.agent.pose
@@ -126,7 +126,7 @@ class Engine:
         return Frame(camera, intrinsics, *simulator.render_camera(seen, rgb=rgb, instances=instances))
 
     def execute(self, message: Mapping[str, Any]) -> Result:
-        """Does one action. Whatever happens is an answer: a failed action, never an exception."""
+        """Execute one action. Every failure becomes a failed action, never an exception."""
         name = registry.brief(message.get("action", ""))
         try:
             if message.get("agentId", 0) != 0:
@@ -143,7 +143,7 @@ class Engine:
         return self.last
 
     def configure(self) -> None:
-        """Brings the scene's camera and body in line with the settings and the screen."""
+        """Set the scene's camera and body by the settings and the screen."""
         body = self.agent.body
         self.scene.configure(
             SimulatorConfig(
@@ -161,7 +161,7 @@ class Engine:
 
 
 def log_once(error: Exception, problem: str) -> None:
-    """Logs an error of the engine itself with its traceback, the first time that it comes from its line."""
+    """Log an internal error of the engine with its traceback, once for each line that raises."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     if (place.filename, place.lineno) not in _logged:
         _logged.add((place.filename, place.lineno))

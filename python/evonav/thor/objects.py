@@ -1,9 +1,9 @@
-"""Object records: the metadata's `objects`, as AI2-THOR writes them.
+"""Make AI2-THOR's object records: the metadata's `objects`.
 
-Fields, their order of corners and what is listed follow AI2-THOR's source (`ObjectMetadataFromSimObjPhysics`,
+Fields, the order of corners and the listed objects follow AI2-THOR's source (`ObjectMetadataFromSimObjPhysics`,
 `SimObjPhysics`, `ProceduralTools`) and its recorded records. Besides the house's objects AI2-THOR lists doors, windows,
-the floor as a whole (`Floor`, the receptacle), each room's floor, and walls; not ceilings or open-plan walls. It also
-lists parts of furniture (drawers `id___0`), which evonav does not know: their furniture holds what lies in them.
+the floor as a whole (`Floor`, the receptacle), each room's floor, and walls, but no ceilings and no open-plan walls. It
+also lists parts of furniture (drawers `id___0`). Evonav does not know these: the furniture contains what lies in them.
 """
 
 import math
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from evonav.thor.actions.registry import ActionError
 from evonav.thor.agent import Agent
-from evonav.thor.asset_metadata import AssetFacts, facts_of
+from evonav.thor.asset_metadata import AssetMetadata, metadata_of_asset
 from evonav.thor.scene import Scene
 from evonav.world.camera import CameraView
 from evonav.world.embedded import EmbeddedSimulator
@@ -33,8 +33,8 @@ FLAGS = (
     *("receptacle", "toggleable", "breakable", "canFillWithLiquid", "dirtyable", "canBeUsedUp", "cookable"),
     *("isHeatSource", "isColdSource", "sliceable", "openable", "pickupable", "moveable"),
 )
-"""What an asset can do."""
-# State, the flag it needs, and the house file's key for it.
+"""The properties of an asset."""
+# Each row: a state, the flag that it needs, and its key in the house file.
 _STATES = (
     ("isToggled", "toggleable", "isOn"),
     ("isBroken", "breakable", "isBroken"),
@@ -44,57 +44,57 @@ _STATES = (
     ("isCooked", "cookable", "isCooked"),
     ("isSliced", "sliceable", "isSliced"),
 )
-# Where a receptacle trigger box of the floor ends when the house does not say.
+# Upper end of the floor's receptacle trigger box when the house does not give it.
 _FLOOR_REACH_M = 0.7
 
 
-class View(NamedTuple):
-    """What an agent makes of an object."""
+class ObjectView(NamedTuple):
+    """Distance and visibility of an object, seen by an agent."""
 
     distance_m: float
-    """From the agent's position to the object's, in three dimensions."""
+    """Distance in metres from the agent's position to the object's, in three dimensions."""
     is_visible: bool
     is_interactable: bool
 
 
 def static_records(scene: Scene) -> list[Record]:
-    """All fields of all objects; `distance`, `visible` and `isInteractable`, which depend on the agent, are unset.
+    """Return all fields of all objects; `distance`, `visible` and `isInteractable` depend on the agent and are unset.
 
-    Do not change them: they are kept until the scene changes.
+    Do not change the records: they are cached until the scene changes.
     """
     return table_of(scene).records
 
 
-def views(scene: Scene, agent: Agent, settings: Any) -> list[View]:  # noqa: ANN401
-    """What the agent makes of each of `static_records`, in the same order."""
+def object_views(scene: Scene, agent: Agent, settings: Any) -> list[ObjectView]:  # noqa: ANN401
+    """Return the agent's view of each of `static_records`, in the same order."""
     table = table_of(scene)
     distances_m = np.linalg.norm(table.positions_m - (agent.x_m, agent.y_m, agent.z_m), axis=1).tolist()
     seen = visible_ids(scene, agent, float(settings.visibilityDistance))
     return [
-        View(distance_m, record["objectId"] in seen, record["objectId"] in seen)
+        ObjectView(distance_m, record["objectId"] in seen, record["objectId"] in seen)
         for distance_m, record in zip(distances_m, table.records, strict=True)
     ]
 
 
 def records(scene: Scene, agent: Agent, settings: Any) -> list[Record]:  # noqa: ANN401
-    """All fields of all objects."""
+    """Return all fields of all objects."""
     return [
         {**record, "distance": view.distance_m, "visible": view.is_visible, "isInteractable": view.is_interactable}
-        for record, view in zip(static_records(scene), views(scene, agent, settings), strict=True)
+        for record, view in zip(static_records(scene), object_views(scene, agent, settings), strict=True)
     ]
 
 
 class Table(NamedTuple):
-    """All records, and what goes with them."""
+    """All records of a scene, and what is derived with them."""
 
     version: int
     simulator: EmbeddedSimulator | None
-    """Of which it was made."""
+    """The simulator that the table was made from."""
     records: list[Record]
     positions_m: NDArray[np.float64]
-    """`(N, 3)`."""
+    """Positions of the objects, `(N, 3)`."""
     instances: dict[str, int]
-    """Instance id in images, by object id."""
+    """Instance ids in images, by object id."""
     by_body: dict[int, str]
     """Object ids by index of the body."""
 
@@ -103,7 +103,7 @@ _tables: WeakKeyDictionary[Scene, Table] = WeakKeyDictionary()
 
 
 def table_of(scene: Scene) -> Table:
-    """The records of a scene as it now is."""
+    """Return the records of a scene in its present version."""
     table = _tables.get(scene)
     if table is None or table.version != scene.version:
         simulator = None if scene.house is None else scene.simulator
@@ -116,10 +116,10 @@ def table_of(scene: Scene) -> Table:
 
 
 def record_of(scene: Scene, object_id: str) -> Record:
-    """An object's static record.
+    """Return an object's static record.
 
     Raises:
-        ActionError: There is no such object.
+        ActionError: The object does not exist.
     """
     for record in static_records(scene):
         if record["objectId"] == object_id:
@@ -128,14 +128,14 @@ def record_of(scene: Scene, object_id: str) -> Record:
 
 
 def own_size_m(scene: Scene, entry: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Edges of a house object's box along its own axes."""
+    """Return the edges of a house object's box along its own axes."""
     record = record_of(scene, entry["id"])
-    facts = facts_of(str(_given(entry, "assetId", "")), record["objectType"])
-    return np.array(facts.size_m or list(record["axisAlignedBoundingBox"]["size"].values()))
+    asset = metadata_of_asset(str(_value_of(entry, "assetId", "")), record["objectType"])
+    return np.array(asset.size_m or list(record["axisAlignedBoundingBox"]["size"].values()))
 
 
 def bounds_m(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Least and greatest corner of the box around the building."""
+    """Return the least and the greatest corner of the box around the building."""
     bodies = [body for body in scene.simulator.objects if body.kind != "object"]
     half_m = [0.5 * np.array(body.size_m) for body in bodies]
     low = np.min([body.centre_m - half for body, half in zip(bodies, half_m, strict=True)], axis=0)
@@ -144,7 +144,7 @@ def bounds_m(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 def _build(house: Mapping[str, Any], simulator: EmbeddedSimulator | None) -> Table:
-    """Records of all objects, which do not yet say what holds them."""
+    """Make the records of all objects, without their receptacles."""
     found = [
         (index, body) for index, body in enumerate(simulator.objects if simulator else ()) if body.kind != "ceiling"
     ]
@@ -161,7 +161,7 @@ def _build(house: Mapping[str, Any], simulator: EmbeddedSimulator | None) -> Tab
 
 
 def placed_objects(house: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str | None]]:
-    """Entries of a house file's objects, depth first, each with its parent's id."""
+    """Yield the entries of a house file's objects, depth first, each with its parent's id."""
 
     def walk(entries: Sequence[dict[str, Any]], parent_id: str | None) -> Iterator[tuple[dict[str, Any], str | None]]:
         for entry in entries:
@@ -172,7 +172,7 @@ def placed_objects(house: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], s
 
 
 def _relate(house: Mapping[str, Any], records: list[Record]) -> None:
-    """Fills in what holds what: receptacles, and the floor for all that begins lower than its trigger box ends."""
+    """Fill in receptacles and contents; the floor contains all that begins below the top of its trigger box."""
     holders = {entry["id"]: parent_id for entry, parent_id in placed_objects(house)}
     receptacles = {record["objectId"]: record for record in records if record["receptacle"]}
     for record in receptacles.values():
@@ -190,20 +190,20 @@ def _relate(house: Mapping[str, Any], records: list[Record]) -> None:
 
 
 def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
-    facts = facts_of(str(_given(entry, "assetId", "")), body.category)
+    asset = metadata_of_asset(str(_value_of(entry, "assetId", "")), body.category)
     rotation = {axis: float(entry["rotation"][axis]) % 360.0 for axis in "xyz"}
     centre_m = (float(entry["position"]["x"]), body.centre_m[1], float(entry["position"]["z"]))
-    record = _record(entry, body.category, facts, centre_m, rotation)
+    record = _record(entry, body.category, asset, centre_m, rotation)
     record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
-    if facts.is_movable:
-        size_m, turn = (facts.size_m, rotation) if facts.size_m else (body.size_m, None)
+    if asset.is_movable:
+        size_m, turn = (asset.size_m, rotation) if asset.size_m else (body.size_m, None)
         record["objectOrientedBoundingBox"] = {"cornerPoints": oriented_corners(centre_m, size_m, turn)}
     return record
 
 
 def _opening_record(entry: Mapping[str, Any], body: SceneObject, house: Mapping[str, Any]) -> Record:
-    """A door or window: AI2-THOR puts the middle of the closed one at `assetPosition` along `wall0`."""
-    facts = facts_of(str(_given(entry, "assetId", "")), body.category)
+    """Make a door's or window's record: AI2-THOR puts the closed one's centre at `assetPosition` along `wall0`."""
+    asset = metadata_of_asset(str(_value_of(entry, "assetId", "")), body.category)
     wall = next((wall for wall in house["walls"] if wall["id"] == entry.get("wall0")), None)
     centre_m, yaw_deg = body.centre_m, 0.0
     if wall is not None:
@@ -213,7 +213,7 @@ def _opening_record(entry: Mapping[str, Any], body: SceneObject, house: Mapping[
             yaw_rad = math.radians(_wall_yaw_deg(wall))
             x_m, y_m, z_m = (float(start[axis]) for axis in "xyz")
             centre_m = (x_m + along_m * math.cos(yaw_rad), y_m + up_m, z_m - along_m * math.sin(yaw_rad))
-    record = _record(entry, body.category, facts, centre_m, {"x": 0.0, "y": yaw_deg, "z": 0.0})
+    record = _record(entry, body.category, asset, centre_m, {"x": 0.0, "y": yaw_deg, "z": 0.0})
     record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
     return record
 
@@ -223,19 +223,19 @@ def _structure_records(house: Mapping[str, Any], bodies: Mapping[str, SceneObjec
     low = np.min([np.subtract(room.centre_m, np.multiply(room.size_m, 0.5)) for room in rooms], axis=0)
     high = np.max([np.add(room.centre_m, np.multiply(room.size_m, 0.5)) for room in rooms], axis=0)
     level = {"x": 0.0, "y": 0.0, "z": 0.0}
-    floor = AssetFacts("Floor", frozenset({"receptacle"}))
+    floor = AssetMetadata("Floor", frozenset({"receptacle"}))
     record = _record({"id": _floor_id(house)}, "Floor", floor, (0.0, 0.0, 0.0), level)
     record["axisAlignedBoundingBox"] = aligned_box(tuple((0.5 * (low + high)).tolist()), tuple((high - low).tolist()))
     yield record
     for room in rooms:
-        record = _record({"id": room.id}, "Floor", AssetFacts("Floor"), (0.0, 0.0, 0.0), level)
+        record = _record({"id": room.id}, "Floor", AssetMetadata("Floor"), (0.0, 0.0, 0.0), level)
         record["axisAlignedBoundingBox"] = aligned_box(room.centre_m, room.size_m)
         yield record
     for wall in house.get("walls", ()):
         if not wall.get("empty"):
             body = bodies[wall["id"]]
             turn = {"x": 0.0, "y": _wall_yaw_deg(wall), "z": 0.0}
-            record = _record(wall, "Wall", AssetFacts("Wall"), body.centre_m, turn)
+            record = _record(wall, "Wall", AssetMetadata("Wall"), body.centre_m, turn)
             record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
             yield record
 
@@ -243,54 +243,54 @@ def _structure_records(house: Mapping[str, Any], bodies: Mapping[str, SceneObjec
 def _record(
     entry: Mapping[str, Any],
     object_type: str,
-    facts: AssetFacts,
+    asset: AssetMetadata,
     centre_m: _Vec3,
     rotation: dict[str, float],
 ) -> Record:
-    """A record without boxes and relations. `position` is the asset's pivot."""
-    is_openable = "openable" in facts.flags
-    openness = float(_given(entry, "openness", "isOpen" in facts.first_states)) if is_openable else 0.0
-    pivot_m = np.add(centre_m, rotation_of(rotation) @ facts.pivot_m).tolist()
+    """Make a record without boxes and receptacles; its `position` is the asset's pivot."""
+    is_openable = "openable" in asset.flags
+    openness = float(_value_of(entry, "openness", "isOpen" in asset.first_states)) if is_openable else 0.0
+    pivot_m = np.add(centre_m, rotation_of(rotation) @ asset.pivot_m).tolist()
     states = {
-        state: flag in facts.flags and bool(_given(entry, key, state in facts.first_states))
+        state: flag in asset.flags and bool(_value_of(entry, key, state in asset.first_states))
         for state, flag, key in _STATES
     }
     return {
-        "name": str(_given(entry, "name", entry["id"])),
+        "name": str(_value_of(entry, "name", entry["id"])),
         "position": dict(zip("xyz", pivot_m, strict=True)),
         "rotation": rotation,
         "visible": False,
         "isInteractable": False,
-        **{flag: flag in facts.flags for flag in FLAGS},
+        **{flag: flag in asset.flags for flag in FLAGS},
         **states,
         "fillLiquid": entry.get("fillLiquid") if states["isFilledWithLiquid"] else None,
         "temperature": "RoomTemp",
         "isOpen": openness > 0.0,
         "openness": openness,
         "isPickedUp": False,
-        "mass": facts.mass_kg if facts.materials else 0.0,
-        "salientMaterials": list(facts.materials) if facts.materials else None,
-        "receptacleObjectIds": [] if "receptacle" in facts.flags else None,
+        "mass": asset.mass_kg if asset.materials else 0.0,
+        "salientMaterials": list(asset.materials) if asset.materials else None,
+        "receptacleObjectIds": [] if "receptacle" in asset.flags else None,
         "distance": 0.0,
         "objectType": object_type,
         "objectId": entry["id"],
-        "assetId": str(_given(entry, "assetId", "")),
+        "assetId": str(_value_of(entry, "assetId", "")),
         "parentReceptacles": None,
-        "controlledObjects": [] if "toggleable" in facts.flags else None,
+        "controlledObjects": [] if "toggleable" in asset.flags else None,
         "isMoving": False,
         "axisAlignedBoundingBox": None,
         "objectOrientedBoundingBox": None,
     }
 
 
-def _given(entry: Mapping[str, Any], key: str, otherwise: object) -> Any:  # noqa: ANN401
-    """What the house file says; it may say `null` of what it leaves open."""
+def _value_of(entry: Mapping[str, Any], key: str, otherwise: object) -> Any:  # noqa: ANN401
+    """Return the house file's value, or `otherwise` where it has none or `null`."""
     value = entry.get(key)
     return otherwise if value is None else value
 
 
 def rotation_of(euler_deg: Mapping[str, float]) -> NDArray[np.float64]:
-    """Unity's rotation `(3, 3)` of Euler angles: about z, then x, then y. Do not change it."""
+    """Return Unity's rotation `(3, 3)` of Euler angles: about z, then x, then y. Do not change the array."""
     return _rotation(float(euler_deg["x"]), float(euler_deg["y"]), float(euler_deg["z"]))
 
 
@@ -308,7 +308,7 @@ def _rotation(x_deg: float, y_deg: float, z_deg: float) -> NDArray[np.float64]:
 
 
 def aligned_box(centre_m: Sequence[float], size_m: Sequence[float]) -> Record:
-    """`axisAlignedBoundingBox`."""
+    """Return the record of an `axisAlignedBoundingBox`."""
     spans = [(centre + 0.5 * size, centre - 0.5 * size) for centre, size in zip(centre_m, size_m, strict=True)]
     return {
         "cornerPoints": [[x, y, z] for x in spans[0] for y in spans[1] for z in spans[2]],
@@ -317,12 +317,12 @@ def aligned_box(centre_m: Sequence[float], size_m: Sequence[float]) -> Record:
     }
 
 
-# Corners in half edges: the bottom's four around, then the top's.
+# Corners in half edges: four around the bottom, then four around the top.
 _ORIENTED = [(x, y, z) for y in (-0.5, 0.5) for x, z in ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))]
 
 
 def oriented_corners(centre_m: _Vec3, size_m: _Vec3, rotation: Mapping[str, float] | None) -> list[list[float]]:
-    """`cornerPoints` of `objectOrientedBoundingBox`."""
+    """Return the `cornerPoints` of an `objectOrientedBoundingBox`."""
     own_m = np.multiply(_ORIENTED, size_m)
     turned_m = own_m @ rotation_of(rotation).T if rotation else own_m
     corners_m: list[list[float]] = (turned_m + centre_m).tolist()
@@ -343,7 +343,7 @@ def _floor_reach_m(house: Mapping[str, Any]) -> float:
 
 
 def _wall_ends(wall: Mapping[str, Any]) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-    """The two lower corners, in the file's order."""
+    """Return a wall's two lower corners, in the file's order."""
     corners = sorted(wall["polygon"], key=lambda corner: float(corner["y"]))
     return corners[0], corners[1]
 
@@ -354,7 +354,7 @@ def _wall_yaw_deg(wall: Mapping[str, Any]) -> float:
 
 
 def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
-    """Objects that AI2-THOR calls visible, as `EmbeddedSimulator.visible_objects` says."""
+    """Return the ids of the objects that AI2-THOR calls visible, by `EmbeddedSimulator.visible_objects`."""
     if scene.house is None:
         return set()
     simulator, camera = scene.simulator, scene.simulator.intrinsics
@@ -366,15 +366,15 @@ def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
 
 
 def eye_m(agent: Agent) -> _Vec3:
-    """Where the agent's camera is."""
+    """Return the position of the agent's camera."""
     return (agent.x_m, agent.camera_height_m, agent.z_m)
 
 
-def looking(agent: Agent) -> NDArray[np.float64]:
-    """`world_from_camera`, `(3, 3)`: right, up and ahead as columns."""
+def camera_axes(agent: Agent) -> NDArray[np.float64]:
+    """Return `world_from_camera`, `(3, 3)`: right, up and ahead as columns."""
     return rotation_of({"x": agent.horizon_deg, "y": agent.yaw_deg, "z": 0.0})
 
 
 def object_of_body(scene: Scene, body: int) -> str | None:
-    """Id of the object that a body of the simulator is; none of a ceiling."""
+    """Return the id of the object that a body of the simulator belongs to; `None` for a ceiling."""
     return table_of(scene).by_body.get(body)

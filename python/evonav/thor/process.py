@@ -1,4 +1,4 @@
-"""The process `evonav-thor`, which AI2-THOR's client starts in Unity's place."""
+"""Run `evonav-thor`, the process that AI2-THOR's client starts in place of Unity."""
 
 import argparse
 import json
@@ -28,13 +28,13 @@ _USAGE = """%(prog)s is started by AI2-THOR's client, not by hand:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Serves one client until it goes.
+    """Serve one client until it goes.
 
     Args:
-        arguments: Of the command line, as `Controller.unity_command` makes them.
+        arguments: Command-line arguments, as `Controller.unity_command` makes them.
 
     Returns:
-        Exit status: 0 when the client has gone, 1 when it could not be served, 2 without a client.
+        The exit status: 0 when the client has gone, 1 when it could not be served, 2 without a client.
     """
     parent_pid = os.getppid()
     try:
@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _connect_and_serve(options: argparse.Namespace, parent_pid: int) -> int:
-    # Its output is the client's ~/.ai2thor/log/unity.log, which all its engines share.
+    # The client writes this output to ~/.ai2thor/log/unity.log, one file for all its engines.
     logging.basicConfig(
         stream=sys.stderr,
         level=logging.INFO,
@@ -62,7 +62,7 @@ def _connect_and_serve(options: argparse.Namespace, parent_pid: int) -> int:
         _LOG.error("cannot connect: %s", error)
         return 1
     if isinstance(transport, Fifo):
-        # The client sees for itself that a process of the other transport has ended.
+        # Over the other transport, the client notices by itself that the process has ended.
         status = fork_worker(transport)
         if status is not None:
             return status
@@ -84,7 +84,7 @@ class _NoClientError(Exception):
 
 
 def _transport(is_orphan: Callable[[], bool]) -> "Fifo | Wsgi":
-    """What the client's environment asks for."""
+    """Connect as the client's environment demands."""
     variables = {name.removeprefix("AI2THOR_"): value for name, value in os.environ.items()}
     kind = variables.get("SERVER_TYPE")
     try:
@@ -100,7 +100,7 @@ def _transport(is_orphan: Callable[[], bool]) -> "Fifo | Wsgi":
 
 
 def _serve(transport: "Fifo | Wsgi", options: argparse.Namespace) -> None:
-    # Imported with the pipes open: a client whose engine fails before that waits for ever.
+    # Imported after the pipes are open: a client whose engine fails before that waits for ever.
     from evonav.thor.engine import Engine
     from evonav.thor.events.emitter import Emitter
 
@@ -115,18 +115,18 @@ def _serve(transport: "Fifo | Wsgi", options: argparse.Namespace) -> None:
 
 
 def _decoded(body: bytes) -> dict[str, Any]:
-    """A message; one that is none becomes an action without a name, which fails as such."""
+    """Return the message; an unreadable one becomes an action without a name, which fails."""
     try:
         message = json.loads(body)
     except (ValueError, RecursionError) as error:
-        return {"problem": f"the message is no JSON: {error}"}
+        return {"problem": f"the message is not JSON: {error}"}
     if not isinstance(message, dict):
         return {"problem": f"the message is a JSON {type(message).__name__}, not an object"}
     return message
 
 
 def _parser() -> argparse.ArgumentParser:
-    """Unity's arguments; what the engine has no use for (`-screen-quality`, `-force-device-index`) is let through."""
+    """Parse Unity's arguments; those without a use here (`-screen-quality`, `-force-device-index`) are ignored."""
     parser = argparse.ArgumentParser("evonav-thor", usage=_USAGE, add_help=False, allow_abbrev=False)
     parser.add_argument("-screen-width", dest="width", type=int, default=300)
     parser.add_argument("-screen-height", dest="height", type=int, default=300)
@@ -139,7 +139,7 @@ class _Stopped(BaseException):
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
-    # A second one is not to interrupt the ending; of one that came with the first, SIG_IGN would make CPython complain.
+    # A second signal must not interrupt the shutdown. With SIG_IGN, CPython would complain about one already pending.
     for other in (signal.SIGTERM, signal.SIGINT):
         signal.signal(other, lambda *_: None)
     raise _Stopped(number)

@@ -1,4 +1,4 @@
-"""The scene that actions read and change: a ProcTHOR house, and the simulator of it as it now is."""
+"""Hold the scene that actions read and change: a ProcTHOR house and its simulator."""
 
 import copy
 import json
@@ -16,30 +16,30 @@ _versions = count(1)
 
 
 class Scene:
-    """One house. After `begin_edit` it may be changed; the next use of `simulator` builds that anew."""
+    """One house. `begin_edit` allows changes of it; the next use of `simulator` rebuilds the simulator."""
 
     def __init__(self, name: str = "Procedural") -> None:
         self.name = name
         self.house: Document | None = None
         self.config = SimulatorConfig()
         self.version = next(_versions)
-        """Another after every change, and in every scene; what is derived from the house is kept under it."""
+        """Number that is unique to this scene and state; everything derived from the house is cached under it."""
         self.disabled: dict[str, Document] = {}
-        """Objects that were taken out, by id."""
+        """Objects that were removed, by id."""
         self._simulator: EmbeddedSimulator | None = None
 
     def load(self, house: Document) -> None:
-        """Replaces the house.
+        """Replace the house.
 
         Raises:
-            HouseError: It is malformed; the house at hand stays.
+            HouseError: The house is malformed; the present one stays.
         """
         simulator = self._built(house)
         self.house, self._simulator, self.disabled = house, simulator, {}
         self.version = next(_versions)
 
     def begin_edit(self) -> Document:
-        """The house, to be changed in place."""
+        """Return the house, to be changed in place."""
         if self.house is None:
             raise ActionError(f"scene {self.name} holds no house: call CreateHouse first")
         self._simulator = None
@@ -47,26 +47,26 @@ class Scene:
         return self.house
 
     def apply(self, delta_json: str) -> None:
-        """Moves objects as a `HouseDelta` says; only they are built again."""
-        # Another simulator: what was derived from this one is known by it.
+        """Move objects by a `HouseDelta`; only these objects are rebuilt."""
+        # The simulator must be another object, because derived data is cached by its identity.
         simulator = copy.copy(self.simulator)
         simulator.apply(delta_json)
         self.begin_edit()
         self.house, self._simulator = json.loads(simulator.house_json), simulator
 
-    def note_relations(self) -> None:
-        """Says that what stands on what in the house has changed, and nothing that the simulator shows."""
+    def mark_receptacles_changed(self) -> None:
+        """Record that objects stand on other receptacles than before, without a change of the simulator."""
         self.version = next(_versions)
 
     def configure(self, config: SimulatorConfig) -> None:
-        """Sets the agent's camera and body."""
+        """Set the agent's camera and body."""
         if config != self.config:
             self.config, self._simulator = config, None
             self.version = next(_versions)
 
     @property
     def simulator(self) -> EmbeddedSimulator:
-        """Of the house as it now is."""
+        """The simulator of the house in its present version."""
         if self.house is None:
             raise ActionError(f"scene {self.name} holds no house: call CreateHouse first")
         if self._simulator is None:

@@ -1,28 +1,28 @@
-"""What can be spawned: evonav's asset catalogue."""
+"""List the assets that can be spawned: evonav's asset catalogue."""
 
 from functools import cache
 from typing import Any
 
 from evonav import _core
 from evonav.thor.actions.registry import action
-from evonav.thor.asset_metadata import facts_of
+from evonav.thor.asset_metadata import metadata_of_asset
 from evonav.thor.engine import Engine
 
 
 def is_known(asset_id: str) -> bool:
-    """Whether the catalogue holds the asset, and so its size."""
+    """Return whether the catalogue contains the asset, and with it the asset's size."""
     return asset_id in _sizes()
 
 
 @action("GetAssetDatabase")
 def get_asset_database(engine: Engine) -> dict[str, dict[str, Any]]:
-    """Facts of all assets by id, with the keys of the `procthor` package's asset database."""
+    """Return the metadata of all assets by id, with the keys of the `procthor` package's asset database."""
     return _database()
 
 
 @cache
 def _sizes() -> dict[str, tuple[str, tuple[float, float, float]]]:
-    """Category and size in metres, by asset id."""
+    """Return category and size in metres, by asset id."""
     return {asset_id: (category, size_m) for asset_id, category, size_m in _core.assets()}
 
 
@@ -32,7 +32,7 @@ def _database() -> dict[str, dict[str, Any]]:
 
 
 def _entry(asset_id: str, category: str, size_m: tuple[float, float, float]) -> dict[str, Any]:
-    flags = facts_of(asset_id, category).flags
+    flags = metadata_of_asset(asset_id, category).flags
     primary = next((name for flag, name in _PRIMARY if flag in flags), "Static")
     return {
         "assetId": asset_id,

@@ -1,7 +1,7 @@
-"""Third-party cameras, which hang anywhere and follow nobody, and the camera that looks on the whole house from above.
+"""Add and change third-party cameras, and switch the agent's camera to a map view from above.
 
 Parameters, defaults and messages are those of AI2-THOR's `AgentManager.cs` and `getMapViewCameraProperties`. As there,
-a house's ceilings are drawn from below only, so a camera above them looks in. Smoothing (`antiAliasing`) does nothing.
+a house's ceilings are drawn from below only, so a camera above them sees the rooms. `antiAliasing` has no effect.
 """
 
 import math
@@ -24,16 +24,16 @@ Rgb = tuple[int, int, int]
 _Vec3 = tuple[float, float, float]
 
 NEAR_M, FAR_M = 0.1, 20.0
-"""Clip planes of a camera that gives none: the agent's."""
+"""Clip planes of a camera without its own: those of the agent's camera."""
 ORTHOGRAPHIC_SIZE_M = 5.0
-"""Unity's, of an orthographic camera that gives none."""
+"""Unity's default for orthographic cameras."""
 _MAX_M = 1e6
 _MAX_CAMERAS = 64
-# What the renderer can draw; AI2-THOR says "between 0 and 180".
+# The range that the renderer can draw; AI2-THOR's own message states "between 0 and 180".
 _FOV_DEG = (0.6, 177.0)
 _NEAR_M = 1e-4
 
-# Unity's `ColorUtility.TryParseHtmlString`.
+# The colour names of Unity's `ColorUtility.TryParseHtmlString`.
 _COLOURS = {
     "red": (255, 0, 0),
     "cyan": (0, 255, 255),
@@ -61,7 +61,7 @@ _COLOURS = {
 
 
 class PartialVector3(BaseModel):
-    """A vector of which some components stay as they are."""
+    """A vector with components that may be absent; absent ones keep their value."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -72,24 +72,24 @@ class PartialVector3(BaseModel):
 
 @dataclass(frozen=True, slots=True)
 class ThirdPartyCamera:
-    """One camera; a change makes another."""
+    """One camera. It is immutable: a change makes another camera."""
 
     camera_id: int
     position_m: _Vec3
     rotation_deg: _Vec3
-    """Unity's Euler angles: down, to the right, counter-clockwise, the last first."""
+    """Unity's Euler angles in degrees: pitch down, yaw right, roll counter-clockwise; roll is applied first."""
     field_of_view_deg: float
-    """Vertical."""
+    """Vertical field of view in degrees."""
     near_m: float
     far_m: float
     is_orthographic: bool
     orthographic_size_m: float
-    """Half the height of an orthographic picture."""
+    """Half the height of an orthographic image, in metres."""
     skybox: Rgb | None
-    """Colour of what is nothing; None for the renderer's own."""
+    """Colour of the background; `None` for the renderer's own."""
 
     def metadata(self) -> dict[str, Any]:
-        """AI2-THOR's `ThirdPartyCameraMetadata`."""
+        """Return AI2-THOR's `ThirdPartyCameraMetadata`."""
         return {
             "thirdPartyCameraId": self.camera_id,
             "position": _vector(self.position_m),
@@ -98,7 +98,7 @@ class ThirdPartyCamera:
         }
 
     def render(self, scene: Scene, *, rgb: bool, instances: bool) -> Images:
-        """What it sees, in the size of the screen; depth ends at its far plane."""
+        """Render the camera's view in the size of the screen; depth ends at its far plane."""
         view = self._view(scene.config.width_px, scene.config.height_px)
         needs_instances = instances or (rgb and self.skybox is not None)
         depth_m, colours, ids = scene.simulator.render_camera(view, rgb=rgb, instances=needs_instances)
@@ -134,9 +134,9 @@ def add_third_party_camera(
     farClippingPlane: float | None = None,
     antiAliasing: str = "none",
 ) -> None:
-    """Hangs up one more camera, whose images every event then has."""
+    """Add a camera, whose images are part of every later event."""
     if len(engine.cameras) >= _MAX_CAMERAS:
-        raise invalid_operation(f"there are {_MAX_CAMERAS} third-party cameras, and no more are possible")
+        raise invalid_operation(f"there are already {_MAX_CAMERAS} third-party cameras; no more can be added")
     blank = ThirdPartyCamera(
         len(engine.cameras), (0, 0, 0), (0, 0, 0), 90.0, NEAR_M, FAR_M, False, ORTHOGRAPHIC_SIZE_M, None
     )
@@ -167,7 +167,7 @@ def update_third_party_camera(
     nearClippingPlane: float | None = None,
     farClippingPlane: float | None = None,
 ) -> None:
-    """Changes a camera; what is not given stays, but for the clip planes, which become the agent's."""
+    """Change a camera; absent properties keep their value, except the clip planes, which become the agent's."""
     num_cameras = len(engine.cameras)
     if not 0 <= thirdPartyCameraId < num_cameras:
         raise out_of_range(
@@ -191,7 +191,7 @@ def update_third_party_camera(
 
 @action("ToggleMapView")
 def toggle_map_view(engine: Engine) -> None:
-    """Lets the agent's images show the whole house from above, or again what the agent sees (deprecated there too)."""
+    """Switch the agent's images to a view of the whole house from above, or back (deprecated in AI2-THOR too)."""
     if engine.map_view is not None:
         engine.map_view = None
         return
@@ -205,7 +205,7 @@ def toggle_map_view(engine: Engine) -> None:
 
 @action("GetMapViewCameraProperties")
 def get_map_view_camera_properties(engine: Engine) -> dict[str, Any]:
-    """What to add a camera with that sees the whole house from above."""
+    """Return the properties of a camera that sees the whole house from above."""
     bodies = engine.scene.simulator.objects
     ceilings = [body for body in bodies if body.kind == "ceiling"]
     boxes = [
@@ -234,7 +234,7 @@ def _changed(
     orthographic_size_m: float | None,
     clip_m: tuple[float | None, float | None],
 ) -> ThirdPartyCamera:
-    """The camera with new properties, checked as AI2-THOR checks them and as the renderer needs them."""
+    """Return the camera with new properties, checked as AI2-THOR checks them and as the renderer needs them."""
     if not 0 < field_of_view_deg < 180:
         raise out_of_range(f"fieldOfView: {field_of_view_deg:g} must be in 0 < fieldOfView > 0.")
     if not _FOV_DEG[0] <= field_of_view_deg <= _FOV_DEG[1]:
@@ -297,7 +297,7 @@ def _filled(given: PartialVector3 | None, before: _Vec3) -> _Vec3:
 
 
 def _euler_deg(angles_deg: _Vec3) -> _Vec3:
-    """As Unity reads angles back: each in [0, 360), and never tipped over backwards."""
+    """Return angles as Unity reads them back: each in [0, 360), with a pitch of at most 90 degrees."""
     down, right, roll = (angle % 360 for angle in angles_deg)
     if 90 < down < 270:
         down, right, roll = (180 - down) % 360, (right + 180) % 360, (roll + 180) % 360

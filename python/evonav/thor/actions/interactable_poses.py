@@ -1,4 +1,4 @@
-"""Actions that ask from where an object can be used, and where on it something can be put."""
+"""Find poses from which an object can be used, and free points on a receptacle."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from evonav.thor.surfaces import surfaces_of
 Pose = dict[str, float | bool]
 
 _HORIZONS_DEG = (-30.0, 0.0, 30.0, 60.0)
-# A receptacle's surface is looked at on a grid of so many points a side.
+# Number of points along each side of the grid that samples a receptacle's surface.
 _POINTS_A_SIDE = 20
 _NO_LIMIT = 2**31 - 1
 _MAX_TESTS = 100_000
@@ -36,10 +36,10 @@ def get_interactable_poses(
     maxDistance: float | None = None,
     maxPoses: int = _NO_LIMIT,
 ) -> list[Pose]:
-    """Poses, as `TeleportFull` takes them, from which an object is visible.
+    """Return poses, as `TeleportFull` takes them, from which an object is visible.
 
-    Visible as the metadata says it: where AI2-THOR asks for a visibility point within the distance, here something of
-    the object has to be.
+    Visibility is that of the metadata: any part of the object within the distance, not one of AI2-THOR's visibility
+    points.
     """
     agent, settings, step_deg = engine.agent, engine.settings, engine.settings.rotateStepDegrees
     if rotations is not None and 360 % step_deg != 0:
@@ -91,7 +91,7 @@ def get_interactable_poses(
 def positions_from_which_item_is_interactable(
     engine: Engine, *, objectId: str, horizon: float = 30.0, positions: list[Vector3] | None = None
 ) -> dict[str, list[float]]:
-    """`GetInteractablePoses` in AI2-THOR's older form: a list a coordinate, horizons in steps."""
+    """Return `GetInteractablePoses` in AI2-THOR's older form: one list for each coordinate, horizons in steps."""
     if horizon <= 0:
         raise out_of_range("horizon must be > 0.")
     up_deg, down_deg = engine.agent.body.max_upward_deg, engine.agent.body.max_downward_deg
@@ -104,9 +104,9 @@ def positions_from_which_item_is_interactable(
 def get_spawn_coordinates_above_receptacle(
     engine: Engine, *, objectId: str, anywhere: bool = False
 ) -> list[dict[str, float]]:
-    """Points over the upper side of a receptacle where nothing stands, for `PlaceObjectAtPoint`.
+    """Return free points over the upper side of a receptacle, for `PlaceObjectAtPoint`.
 
-    At the height of the receptacle's box: AI2-THOR's are at that of its trigger box, which evonav does not know.
+    They are at the height of the receptacle's box; AI2-THOR uses its trigger box, which evonav does not know.
     """
     scene = engine.scene
     record = objects.record_of(scene, objectId)
@@ -128,7 +128,7 @@ def get_spawn_coordinates_above_receptacle(
 
 
 def _near(record: objects.Record, positions: Sequence[Vector3], reach_m: float) -> list[Vector3]:
-    """Positions from which the object's box is within reach on the ground."""
+    """Return the positions from which the object's box is within reach on the ground plane."""
     box = record["axisAlignedBoundingBox"]
     (x_m, z_m), (half_x_m, half_z_m) = ((box["center"][a] for a in "xz"), (0.5 * box["size"][a] for a in "xz"))
     return [
@@ -139,7 +139,7 @@ def _near(record: objects.Record, positions: Sequence[Vector3], reach_m: float) 
 
 
 def _may_frame(engine: Engine, agent: Agent, record: objects.Record) -> bool:
-    """Whether the sphere around the object's box touches the cone around the picture."""
+    """Return whether the sphere around the object's box touches the cone around the image."""
     box, intrinsics = record["axisAlignedBoundingBox"], engine.scene.simulator.intrinsics
     radius_m = 0.5 * math.hypot(*box["size"].values()) + 1e-6
     to_box_m = [at - eye for at, eye in zip(box["center"].values(), objects.eye_m(agent), strict=True)]
@@ -156,9 +156,9 @@ def _may_frame(engine: Engine, agent: Agent, record: objects.Record) -> bool:
 
 
 def _is_reached(engine: Engine, point_m: tuple[float, float, float], body: int) -> bool:
-    """Whether a point is in the picture, near, and not hidden."""
+    """Return whether a point is in the image, within the visibility distance, and not occluded."""
     eye_m, intrinsics = objects.eye_m(engine.agent), engine.scene.simulator.intrinsics
-    right_m, up_m, ahead_m = (np.subtract(point_m, eye_m) @ objects.looking(engine.agent)).tolist()
+    right_m, up_m, ahead_m = (np.subtract(point_m, eye_m) @ objects.camera_axes(engine.agent)).tolist()
     half = math.tan(0.5 * intrinsics.vertical_fov_rad) * ahead_m
     is_framed = ahead_m > 0 and abs(up_m) < half and abs(right_m) < half * intrinsics.width_px / intrinsics.height_px
     is_near = math.hypot(point_m[0] - eye_m[0], point_m[2] - eye_m[2]) <= engine.settings.visibilityDistance

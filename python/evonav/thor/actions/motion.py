@@ -1,7 +1,7 @@
-"""Actions that move the agent: `Move*`, `Rotate*`, `Look*`, `Stand`, `Crouch`, and those that do nothing.
+"""Move the agent: `Move*`, `Rotate*`, `Look*`, `Stand`, `Crouch`, and the actions that do nothing.
 
-After AI2-THOR's `BaseFPSAgentController`, `PhysicsRemoteFPSAgentController` and `LocobotFPSAgentController`, whose
-messages these are; where those throw, the message starts with the exception's name, as theirs does.
+Based on AI2-THOR's `BaseFPSAgentController`, `PhysicsRemoteFPSAgentController` and `LocobotFPSAgentController`. The
+messages are AI2-THOR's; where its code throws, the message starts with the exception's name, as AI2-THOR's does.
 """
 
 import math
@@ -11,7 +11,7 @@ from evonav.thor.actions.registry import ActionError, ErrorCode, Vector3, action
 from evonav.thor.agent import canonical_deg, canonical_yaw_deg
 from evonav.thor.engine import Engine
 
-# AI2-THOR's parameters about what the agent holds, about other agents, and about the way that arms move.
+# AI2-THOR's parameters for objects in the agent's hand, other agents, and the motion of arms. They have no effect here.
 _UNUSED_IN_TURNS = {
     **dict.fromkeys(("forceAction", "manualInteract", "returnToStart", "disableRendering", "waitForFixedUpdate"), bool),
     **dict.fromkeys(("speed", "fixedDeltaTime"), float),
@@ -25,23 +25,23 @@ _UNUSED_IN_MOVES = {
 
 
 def invalid_operation(message: str) -> ActionError:
-    """What AI2-THOR says of an `InvalidOperationException`."""
+    """Return the error that AI2-THOR reports for an `InvalidOperationException`."""
     return ActionError(f"InvalidOperationException: {message}")
 
 
 def missing_arguments(name: str, *arguments: str) -> ActionError:
-    """What AI2-THOR says of an action that lacks arguments."""
+    """Return the error that AI2-THOR reports for an action that lacks arguments."""
     message = f"action: {name} is missing the following arguments: {','.join(arguments)}"
     return ActionError(message, ErrorCode.MISSING_ARGUMENTS)
 
 
 @action("Pass", "Done", "NoOp", "Stop")
 def pass_(engine: Engine) -> None:
-    """Does nothing."""
+    """Do nothing."""
 
 
 def _mover(right: float, ahead: float) -> Callable[..., None]:
-    """A step in one direction of the agent."""
+    """Return the action that steps in one direction of the agent."""
 
     def move(
         engine: Engine,
@@ -71,7 +71,7 @@ def move_relative(
     z: float = 0.0,
     noise: float = 0.0,
 ) -> None:
-    """A LoCoBot's step of `moveMagnitude * |(x, z)|`, `z` along the heading."""
+    """Move a LoCoBot by `moveMagnitude * |(x, z)|`, with `z` along the heading."""
     if not engine.agent.is_locobot:
         raise ActionError("Invalid action: MoveRelative", ErrorCode.INVALID_ACTION)
     if math.hypot(x, z) <= 1e-5:
@@ -81,7 +81,7 @@ def move_relative(
 
 @action("MoveGlobal")
 def move_global(engine: Engine, *, x: float, z: float) -> None:
-    """A step of the world's `(x, z)`."""
+    """Move the agent by the world's `(x, z)`."""
     _move_by(engine, x, z)
 
 
@@ -92,7 +92,7 @@ def _move_relative(
     noise_m: float,
     leash: tuple[str | None, float],
 ) -> None:
-    """Moves along `direction`, `(right, ahead)`."""
+    """Move the agent along `direction`, `(right, ahead)`."""
     agent, (right, ahead) = engine.agent, direction
     step_m = engine.settings.gridSize if magnitude_m is None else magnitude_m
     if engine.agent.is_locobot:
@@ -109,7 +109,7 @@ def _move_relative(
         ahead = math.copysign(1.0, ahead)
     elif step_m <= 0:
         raise invalid_operation("moveMagnitude must be > 0")
-    # Signed steps rather than signed sines: the same bits as `EmbeddedSimulator.step`.
+    # Signed steps rather than signed sines give the same bits as `EmbeddedSimulator.step`.
     sine, cosine = math.sin(agent.yaw_rad), math.cos(agent.yaw_rad)
     if right:
         _move_by(engine, right * step_m * cosine, -right * step_m * sine, *leash)
@@ -131,7 +131,7 @@ def _move_by(
 
 
 def snapped(engine: Engine, point_m: tuple[float, float]) -> tuple[float, float]:
-    """On the grid through the world's origin, with `snapToGrid`; halves go to the even line, as in C#."""
+    """Return a point moved to the grid through the world's origin, if `snapToGrid`; halves round to even as in C#."""
     if not engine.settings.snapToGrid:
         return point_m
     per_m = 1 / engine.settings.gridSize
@@ -148,7 +148,7 @@ def _why_blocked(engine: Engine, to_m: tuple[float, float], offset_m: tuple[floa
 
 
 def is_within_bounds(engine: Engine, point_m: tuple[float, float]) -> bool:
-    """Whether a point is in the box around the whole scene."""
+    """Return whether a point is in the box around the whole scene."""
     bodies = engine.scene.simulator.objects
     return all(
         min(body.centre_m[axis] - body.size_m[axis] / 2 for body in bodies)
@@ -160,12 +160,12 @@ def is_within_bounds(engine: Engine, point_m: tuple[float, float]) -> bool:
 
 @action("DistanceToObject")
 def distance_to_object(engine: Engine, *, objectId: str) -> float:
-    """From the agent to the object's box, on the ground plane."""
+    """Return the ground-plane distance from the agent to the object's box."""
     return _distance_m(engine, objectId)
 
 
 def _distance_m(engine: Engine, object_id: str) -> float:
-    """From the agent to an object's box, on the ground plane."""
+    """Return the ground-plane distance from the agent to an object's box."""
     body = next((body for body in engine.scene.simulator.objects if body.id == object_id), None)
     if body is None:
         raise ActionError(f"No object with ID {object_id}")
@@ -178,7 +178,7 @@ def _distance_m(engine: Engine, object_id: str) -> float:
 
 
 def _noise_of_move(engine: Engine) -> tuple[float, float]:
-    """Degrees and metres that a LoCoBot's move is off."""
+    """Draw the errors of a LoCoBot's move: degrees and metres."""
     settings, normal = engine.settings, engine.agent.noise.normal
     if not settings.applyActionNoise:
         return 0.0, 0.0
@@ -188,25 +188,25 @@ def _noise_of_move(engine: Engine) -> tuple[float, float]:
 
 
 def vector_text(vector: tuple[float, float, float], digits: int) -> str:
-    """As Unity prints vectors."""
+    """Format a vector as Unity prints it."""
     return "(" + ", ".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in vector) + ")"
 
 
 @action("RotateRight", unused=_UNUSED_IN_TURNS)
 def rotate_right(engine: Engine, *, degrees: float | None = None) -> None:
-    """Turns clockwise seen from above."""
+    """Turn the agent clockwise seen from above."""
     _turn(engine, degrees, 1.0)
 
 
 @action("RotateLeft", unused=_UNUSED_IN_TURNS)
 def rotate_left(engine: Engine, *, degrees: float | None = None) -> None:
-    """Turns counter-clockwise seen from above."""
+    """Turn the agent counter-clockwise seen from above."""
     _turn(engine, degrees, -1.0)
 
 
 @action("Rotate", unused={"manualInteract": bool})
 def rotate(engine: Engine, *, rotation: Vector3, noise: float = 0.0) -> None:
-    """Sets the yaw; turns a LoCoBot by it."""
+    """Set the yaw of the default agent; turn a LoCoBot by it."""
     agent = engine.agent
     base_deg = agent.yaw_deg + noise + _noise_of_turn_deg(engine) if engine.agent.is_locobot else 0.0
     agent.yaw_deg = canonical_yaw_deg(base_deg + rotation.y)
@@ -214,7 +214,7 @@ def rotate(engine: Engine, *, rotation: Vector3, noise: float = 0.0) -> None:
 
 @action("RotateLook")
 def rotate_look(engine: Engine, *, rotation: Vector3 | None = None, horizon: float = 0.0, **_: object) -> None:
-    """Sets yaw and horizon, whatever the limits."""
+    """Set yaw and horizon without regard to the limits."""
     yaw_deg = 0.0 if rotation is None else rotation.y
     engine.agent.yaw_deg, engine.agent.horizon_deg = canonical_yaw_deg(yaw_deg), canonical_deg(horizon)
 
@@ -237,13 +237,13 @@ def _noise_of_turn_deg(engine: Engine) -> float:
 
 
 def _turn_noise_deg(engine: Engine) -> tuple[float, float]:
-    """Mean and standard deviation; 0 stands for AI2-THOR's own, as there."""
+    """Return mean and standard deviation; 0 stands for AI2-THOR's own values, as there."""
     return engine.settings.rotateGaussianMu, engine.settings.rotateGaussianSigma or 0.5
 
 
 @action("LookDown")
 def look_down(engine: Engine, *, degrees: float = 0.0, **_: object) -> None:
-    """Lowers the camera, by 30 degrees unless told."""
+    """Lower the camera, by 30 degrees by default."""
     horizon_deg = engine.agent.horizon_deg + _look_step_deg(engine, "LookDown", degrees)
     limit_deg = engine.agent.body.max_downward_deg
     if round(horizon_deg, 1) > limit_deg:
@@ -254,12 +254,12 @@ def look_down(engine: Engine, *, degrees: float = 0.0, **_: object) -> None:
 
 @action("LookUp")
 def look_up(engine: Engine, *, degrees: float = 0.0, **_: object) -> None:
-    """Raises the camera, by 30 degrees unless told."""
+    """Raise the camera, by 30 degrees by default."""
     horizon_deg = engine.agent.horizon_deg - _look_step_deg(engine, "LookUp", degrees)
     limit_deg = engine.agent.body.max_upward_deg
     if round(-horizon_deg, 1) > limit_deg:
         message = f"can't look up beyond {limit_deg:g} degrees above the forward horizon"
-        # AI2-THOR's own code for both directions.
+        # AI2-THOR has the same code for both directions.
         raise ActionError(message, ErrorCode.LOOK_DOWN_CANT_EXCEED_MIN)
     engine.agent.horizon_deg = canonical_deg(horizon_deg)
 
@@ -276,7 +276,7 @@ def _look_step_deg(engine: Engine, name: str, degrees: float) -> float:
 
 @action("Stand")
 def stand(engine: Engine) -> None:
-    """Raises the camera again."""
+    """Raise the camera to its standing height."""
     _check_can_crouch(engine, "Stand")
     if engine.agent.is_standing:
         raise ActionError("Already standing.")
@@ -285,7 +285,7 @@ def stand(engine: Engine) -> None:
 
 @action("Crouch")
 def crouch(engine: Engine) -> None:
-    """Lowers the camera; the body stays as it is, as in AI2-THOR."""
+    """Lower the camera; the body's height stays, as in AI2-THOR."""
     _check_can_crouch(engine, "Crouch")
     if not engine.agent.is_standing:
         raise ActionError("Already crouching.")

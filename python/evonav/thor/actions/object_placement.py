@@ -1,7 +1,7 @@
-"""Actions that move, remove and restore objects.
+"""Move, remove and restore objects.
 
-There is no physics: what is put somewhere stays, what loses its support falls straight down onto what is under its
-outline, and furniture takes along what stands on it.
+There is no physics. A placed object stays where it is put. An object that loses its support falls straight down onto
+what is below its outline. Furniture carries the objects on it along.
 """
 
 import copy
@@ -18,14 +18,14 @@ from evonav.thor.engine import Engine
 from evonav.thor.scene import Scene
 from evonav.thor.surfaces import fresh_surfaces
 
-# AI2-THOR places things this much over a surface, and lets them fall.
+# AI2-THOR places objects this high above a surface and lets them fall.
 _CLEARANCE_M = 0.005
-# What only touches is not in the way.
+# Boxes that overlap by less than this do not collide.
 _TOUCH_M = 0.001
 
 
 class ObjectPose(BaseModel):
-    """Where an object shall be: its pivot, as records give it."""
+    """A requested pose of an object: that of its pivot, as in the records."""
 
     objectName: str = ""
     position: Vector3 = Field(default_factory=Vector3)
@@ -40,9 +40,9 @@ def set_object_poses(
     placeStationary: bool = True,
     **unused: Any,  # noqa: ANN401
 ) -> None:
-    """Sets the poses of all that can be moved; what can be moved and is not named goes.
+    """Set the poses of all movable objects; a movable object that is not named is removed.
 
-    An object that is named again is copied. With `placeStationary=False` things fall to what is under them.
+    An object that is named again is copied. With `placeStationary=False` objects fall onto what is below them.
     """
     if not objectPoses:
         raise ActionError("objectPoses must have at least one pose")
@@ -54,9 +54,9 @@ def set_object_poses(
         if record["pickupable"] or record["moveable"]
     }
     types = {record["objectId"]: record["objectType"] for record in objects.static_records(scene)}
-    with edits.edited(scene) as house:
-        holders = edits.holders_of(house)
-        loose = {object_id: edits.detach(holders, object_id) for object_id in _outermost_last(house, movable.values())}
+    with edits.editing(scene) as house:
+        lists = edits.lists_by_id(house)
+        loose = {object_id: edits.detach(lists, object_id) for object_id in _outermost_last(house, movable.values())}
         placed: list[str] = []
         for index, pose in enumerate(objectPoses):
             object_id = movable.get(pose.objectName)
@@ -64,7 +64,7 @@ def set_object_poses(
                 mistake = f"No Pickupable or Moveable object of name {pose.objectName} found in scene."
                 continue
             entry = loose[object_id]
-            # What cannot be moved stays behind when what it stands on goes.
+            # An immovable object stays when the object below it moves.
             house["objects"] += entry.pop("children", None) or []
             if object_id in placed:
                 entry = copy.deepcopy(entry)
@@ -79,7 +79,7 @@ def set_object_poses(
                 scene.disabled[object_id] = entry
     if not placeStationary:
         edits.drop(scene, placed)
-    edits.relate(scene, placed)
+    edits.update_receptacles(scene, placed)
     if mistake:
         raise ActionError(mistake)
 
@@ -94,7 +94,7 @@ def place_object_at_point(
     rotation: Vector3 | None = None,
     forceKinematic: bool = False,
 ) -> None:
-    """Puts an object on the surface under a point, if there is room; of several points at the first where there is."""
+    """Put an object on the surface below a point, if it is free; of several points, on the first free one."""
     scene = engine.scene
     if not _is_listed(scene, objectId):
         raise ActionError(f"Cannot find object with id {brief(objectId)}.")
@@ -120,13 +120,13 @@ def teleport_object(
     forceKinematic: bool = False,
     **unused: Any,  # noqa: ANN401
 ) -> None:
-    """Sets an object's pose; from there it falls, unless `forceKinematic`. It may not touch another, unless forced."""
+    """Set an object's pose. It then falls unless `forceKinematic`, and may touch others only with `forceAction`."""
     scene = engine.scene
     record = objects.record_of(scene, objectId)
     edits.settle(scene)
     entry = edits.entry_of(scene, objectId)
     turn = rotation or Vector3(**record["rotation"])
-    with edits.edited(scene):
+    with edits.editing(scene):
         _put_pivot(entry, record["objectType"], position, turn)
         if not forceAction:
             axes = objects.rotation_of(entry["rotation"])
@@ -139,20 +139,20 @@ def teleport_object(
                 raise ActionError(f"{scene.simulator.objects[struck[0]].id} is in the way.")
     if not forceKinematic:
         edits.drop(scene, [part["id"] for part, _ in objects.placed_objects({"objects": [entry]})])
-    edits.relate(scene, [objectId])
+    edits.update_receptacles(scene, [objectId])
 
 
 @action("DisableObject")
 def disable_object(engine: Engine, *, objectId: str) -> None:
-    """Takes an object out of the scene until `EnableObject`; what stood on it falls."""
+    """Remove an object from the scene until `EnableObject`; objects on it fall."""
     if not _is_listed(engine.scene, objectId):
-        raise ActionError("")  # AI2-THOR says no more.
+        raise ActionError("")  # AI2-THOR's message is empty.
     _remove(engine.scene, [objectId])
 
 
 @action("RemoveFromScene")
 def remove_from_scene(engine: Engine, *, objectId: str | None = None, objectIds: list[str] | None = None) -> None:
-    """Takes objects out of the scene; what stood on them falls."""
+    """Remove objects from the scene; objects on them fall."""
     chosen = objectIds if objectIds is not None else [objectId] if objectId is not None else []
     if not chosen:
         raise ActionError("objectIds must not be empty!")
@@ -161,29 +161,29 @@ def remove_from_scene(engine: Engine, *, objectId: str | None = None, objectIds:
 
 @action("DisableAllObjectsOfType", "DisableObjectsOfType")
 def disable_objects_of_type(engine: Engine, *, objectType: str = "", objectId: str = "") -> None:
-    """Takes all objects of a type out of the scene."""
+    """Remove all objects of a type from the scene."""
     chosen = objectType or objectId
     _remove(engine.scene, [r["objectId"] for r in objects.static_records(engine.scene) if r["objectType"] == chosen])
 
 
 @action("EnableObject")
 def enable_object(engine: Engine, *, objectId: str) -> None:
-    """Puts a disabled object back where it was; does nothing to one that is there."""
+    """Put a disabled object back where it was; do nothing if it is not disabled."""
     scene = engine.scene
     if objectId not in scene.disabled:
         if not _is_listed(scene, objectId):
-            raise ActionError("")  # AI2-THOR says no more.
+            raise ActionError("")  # AI2-THOR's message is empty.
         return
-    with edits.edited(scene) as house:
+    with edits.editing(scene) as house:
         entry = scene.disabled.pop(objectId)
         entry["kinematic"] = True
         house["objects"].append(entry)
-    edits.relate(scene, [objectId])
+    edits.update_receptacles(scene, [objectId])
 
 
 @action("MakeAllObjectsMoveable", "MakeAllObjectsStationary")
 def change_physics(engine: Engine) -> None:
-    """Nothing to do where everything is at rest."""
+    """Do nothing: all objects are at rest."""
 
 
 def _is_listed(scene: Scene, object_id: str) -> bool:
@@ -192,12 +192,12 @@ def _is_listed(scene: Scene, object_id: str) -> bool:
 
 def _put_pivot(entry: dict[str, Any], object_type: str, position: Vector3, rotation: Vector3) -> None:
     turn = {"x": rotation.x, "y": rotation.y, "z": rotation.z}
-    offset_m = objects.rotation_of(turn) @ edits.facts(entry, object_type).pivot_m
-    edits.put(entry, np.subtract((position.x, position.y, position.z), offset_m).tolist(), turn)
+    offset_m = objects.rotation_of(turn) @ edits.metadata_of_entry(entry, object_type).pivot_m
+    edits.set_pose(entry, np.subtract((position.x, position.y, position.z), offset_m).tolist(), turn)
 
 
 def _outermost_last(house: dict[str, Any], object_ids: Any) -> list[str]:  # noqa: ANN401
-    """Children before their parents, so that each can be taken alone."""
+    """List children before their parents, so that each can be removed alone."""
     chosen = set(object_ids)
     return [entry["id"] for entry, _ in objects.placed_objects(house) if entry["id"] in chosen][::-1]
 
@@ -215,7 +215,7 @@ def _place_at(scene: Scene, object_id: str, point: Vector3, rotation: Vector3 | 
     surfaces = fresh_surfaces(scene)
     surfaces = surfaces.without(_bodies_of(scene, entry))
     under_m = surfaces.height_under_m(np.array([[point.x, point.z]]), point.y)
-    pivot_m = axes @ edits.facts(entry, objects.record_of(scene, object_id)["objectType"]).pivot_m
+    pivot_m = axes @ edits.metadata_of_entry(entry, objects.record_of(scene, object_id)["objectType"]).pivot_m
     centre_m = np.array([point.x - pivot_m[0], under_m + _CLEARANCE_M + reach_m[1], point.z - pivot_m[2]])
     struck = surfaces.bodies_in_box(centre_m, 0.5 * size_m, axes)
     if struck:
@@ -223,13 +223,13 @@ def _place_at(scene: Scene, object_id: str, point: Vector3, rotation: Vector3 | 
         raise ActionError(f"Spawn area not clear ({name}) is in the way), can't place object at that point")
     if not is_kinematic:
         centre_m[1] = reach_m[1] + edits.rest_height_m(surfaces, centre_m.tolist(), (2.0 * reach_m).tolist())
-    with edits.edited(scene):
-        edits.put(entry, centre_m.tolist(), turn)
-    edits.relate(scene, [object_id])
+    with edits.editing(scene):
+        edits.set_pose(entry, centre_m.tolist(), turn)
+    edits.update_receptacles(scene, [object_id])
 
 
 def _bodies_of(scene: Scene, entry: dict[str, Any]) -> set[int]:
-    """Indices of an object's body and of those of all that stands on it."""
+    """Return the indices of the bodies of an object and of all objects on it."""
     instances = objects.table_of(scene).instances
     return {instances[part["id"]] - 1 for part, _ in objects.placed_objects({"objects": [entry]})}
 
@@ -244,9 +244,9 @@ def _remove(scene: Scene, object_ids: Sequence[str]) -> None:
         edits.entry_of(scene, object_id)
     edits.settle(scene)
     fallen: list[str] = []
-    with edits.edited(scene) as house:
+    with edits.editing(scene) as house:
         for object_id in object_ids:
-            entry = edits.detach(edits.holders_of(house), object_id)
+            entry = edits.detach(edits.lists_by_id(house), object_id)
             children = entry.pop("children", None) or []
             fallen += [child["id"] for child, _ in objects.placed_objects({"objects": children})]
             house["objects"] += children
@@ -254,4 +254,4 @@ def _remove(scene: Scene, object_ids: Sequence[str]) -> None:
     fallen = [object_id for object_id in fallen if object_id not in scene.disabled]
     if fallen:
         edits.drop(scene, fallen)
-        edits.relate(scene, fallen)
+        edits.update_receptacles(scene, fallen)

@@ -1,4 +1,4 @@
-"""Actions that ask what is in the picture, along a ray, or in a receptacle."""
+"""Answer what is in the image, along a ray, or in a receptacle."""
 
 import math
 
@@ -15,18 +15,18 @@ _Vec3 = tuple[float, float, float]
 
 
 def object_at(engine: Engine, x: float, y: float) -> tuple[str, Hit]:
-    """The object at a point of the picture.
+    """Return the object at a point of the image.
 
     Args:
-        engine: Whose agent looks.
-        x: From the left, in widths of the picture.
-        y: From the top, in heights.
+        engine: The engine whose agent looks.
+        x: Distance from the left edge, in widths of the image.
+        y: Distance from the top edge, in heights of the image.
 
     Returns:
-        Its id, and where the ray meets it.
+        The object's id, and where the ray meets it.
 
     Raises:
-        ActionError: The point is outside, or shows nothing that AI2-THOR lists.
+        ActionError: The point is outside the image, or shows nothing that AI2-THOR lists.
     """
     if not (0 <= x <= 1 and 0 <= y <= 1):
         raise out_of_range("x/y must be in [0:1]")
@@ -39,7 +39,7 @@ def object_at(engine: Engine, x: float, y: float) -> tuple[str, Hit]:
 
 @action("GetObjectInFrame")
 def get_object_in_frame(engine: Engine, *, x: float, y: float, checkVisible: bool = False) -> str:
-    """Id of the object at a point of the picture, counted from its upper left corner, 0 to 1."""
+    """Return the id of the object at a point of the image: 0 to 1 from its upper left corner."""
     object_id, _ = object_at(engine, x, y)
     if checkVisible and object_id not in _visible(engine):
         raise invalid_operation(f"target hit ({object_id}) at ({x:g}, {y:g}) is not currently Visible to Agent")
@@ -48,7 +48,7 @@ def get_object_in_frame(engine: Engine, *, x: float, y: float, checkVisible: boo
 
 @action("GetCoordinateFromRaycast")
 def get_coordinate_from_raycast(engine: Engine, *, x: float, y: float) -> dict[str, float]:
-    """Where the ray through a point of the picture ends; the origin if nowhere."""
+    """Return where the ray through a point of the image ends; the origin if it meets nothing."""
     if not (0 <= x <= 1 and 0 <= y <= 1):
         raise out_of_range(f"x and y must be in [0:1] not (x={x:g}, y={y:g}).")
     hit = surfaces_of(engine.scene).cast(*_ray(engine, x, y))
@@ -57,13 +57,13 @@ def get_coordinate_from_raycast(engine: Engine, *, x: float, y: float) -> dict[s
 
 @action("GetObjectHitFromRaycast")
 def get_object_hit_from_raycast(engine: Engine, *, origin: Vector3, destination: Vector3) -> str:
-    """Id of the first object on the way from one point through another."""
+    """Return the id of the first object on the ray from one point through another."""
     return _object_hit(engine, origin, destination)[0]
 
 
 @action("PerformRaycast")
 def perform_raycast(engine: Engine, *, origin: Vector3, destination: Vector3) -> dict[str, object]:
-    """The first object on the way from one point through another, and where."""
+    """Return the first object on the ray from one point through another, and where the ray meets it."""
     object_id, hit = _object_hit(engine, origin, destination)
     return {"objectId": object_id, "hitPoint": _vector(hit.point_m), "hitDistance": hit.distance_m}
 
@@ -72,7 +72,7 @@ def perform_raycast(engine: Engine, *, origin: Vector3, destination: Vector3) ->
 def get_visible_objects(
     engine: Engine, *, maxDistance: float | None = None, visibilityScheme: str | None = None
 ) -> list[str]:
-    """Ids of visible objects, nearest to the camera first; both of AI2-THOR's schemes are one here."""
+    """Return the ids of visible objects, nearest to the camera first; both of AI2-THOR's schemes are the same here."""
     if visibilityScheme is not None and visibilityScheme.lower() not in ("collider", "distance"):
         raise ActionError(
             f"NotImplementedException: Visibility scheme {visibilityScheme} is not implemented. "
@@ -90,23 +90,23 @@ def get_visible_objects(
 
 @action("GetObjectMetadata")
 def get_object_metadata(engine: Engine, *, objectIds: list[str]) -> list[objects.Record]:
-    """Records of some objects; unknown ids are left out."""
+    """Return the records of some objects; unknown ids are left out."""
     by_id = {record["objectId"]: record for record in objects.records(engine.scene, engine.agent, engine.settings)}
     return [by_id[object_id] for object_id in objectIds if object_id in by_id]
 
 
 @action("Contains")
 def contains(engine: Engine, *, objectId: str) -> list[str]:
-    """Ids of what lies in or on a receptacle."""
+    """Return the ids of the objects in or on a receptacle."""
     return list(objects.record_of(engine.scene, objectId)["receptacleObjectIds"] or ())
 
 
 @action("WorldToViewportPoint")
 def world_to_viewport_point(engine: Engine, *, position: Vector3) -> dict[str, float]:
-    """Where a point of the world is in the picture, from its upper left corner, with its depth as z."""
+    """Return a world point's place in the image, from its upper left corner, with its depth as z."""
     half_width, half_height = _half_extents(engine)
     offset_m = np.subtract((position.x, position.y, position.z), objects.eye_m(engine.agent))
-    right_m, up_m, ahead_m = (offset_m @ objects.looking(engine.agent)).tolist()
+    right_m, up_m, ahead_m = (offset_m @ objects.camera_axes(engine.agent)).tolist()
     if ahead_m == 0:
         raise invalid_operation("Point not in viewport.")
     x, y = 0.5 + 0.5 * right_m / (ahead_m * half_width), 0.5 - 0.5 * up_m / (ahead_m * half_height)
@@ -136,12 +136,12 @@ def _object_hit(engine: Engine, origin: Vector3, destination: Vector3) -> tuple[
 def _ray(engine: Engine, x: float, y: float) -> tuple[_Vec3, _Vec3]:
     half_width, half_height = _half_extents(engine)
     own = np.array([(2 * x - 1) * half_width, (1 - 2 * y) * half_height, 1.0])
-    right, up, ahead = (objects.looking(engine.agent) @ own).tolist()
+    right, up, ahead = (objects.camera_axes(engine.agent) @ own).tolist()
     return objects.eye_m(engine.agent), (right, up, ahead)
 
 
 def _half_extents(engine: Engine) -> tuple[float, float]:
-    """Of the picture at distance 1."""
+    """Return half the width and height of the image plane at distance 1."""
     intrinsics = engine.scene.simulator.intrinsics
     half_height = math.tan(0.5 * intrinsics.vertical_fov_rad)
     return half_height * intrinsics.width_px / intrinsics.height_px, half_height

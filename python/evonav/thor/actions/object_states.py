@@ -1,6 +1,6 @@
-"""Actions that change the state of objects: the records show it, the pictures only of doors.
+"""Change the state of objects. Records show all states, images only those of doors.
 
-The shape of furniture is one block, so an open fridge is drawn closed.
+The shape of furniture is one solid block, so an open fridge is drawn closed.
 """
 
 from collections.abc import Collection, Mapping
@@ -26,7 +26,7 @@ def open_object(
     openness: float = 1.0,
     **unused: Any,  # noqa: ANN401
 ) -> None:
-    """Opens an object so far, 0 to 1."""
+    """Open an object to a degree of 0 to 1."""
     record = _target(engine, objectId, x, y, forceAction)
     if not 0 <= openness <= 1:
         raise ActionError("openness must be in [0.0:1.0]")
@@ -44,7 +44,7 @@ def close_object(
     forceAction: bool = False,
     **unused: Any,  # noqa: ANN401
 ) -> None:
-    """Closes an object."""
+    """Close an object."""
     open_object(engine, objectId=objectId, x=x, y=y, forceAction=forceAction, openness=0.0)
 
 
@@ -57,7 +57,7 @@ def toggle_object_on(
     y: float | None = None,
     forceAction: bool = False,
 ) -> None:
-    """Switches an object on."""
+    """Switch an object on."""
     _toggle(engine, _target(engine, objectId, x, y, forceAction), is_on=True)
 
 
@@ -70,25 +70,25 @@ def toggle_object_off(
     y: float | None = None,
     forceAction: bool = False,
 ) -> None:
-    """Switches an object off."""
+    """Switch an object off."""
     _toggle(engine, _target(engine, objectId, x, y, forceAction), is_on=False)
 
 
 @action("DirtyObject")
 def dirty_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
-    """Makes an object dirty."""
+    """Make an object dirty."""
     _flip(engine, _target(engine, objectId, None, None, forceAction), "isDirty", "dirtyable", "CanBeDirty", value=True)
 
 
 @action("CleanObject")
 def clean_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
-    """Makes an object clean."""
+    """Make an object clean."""
     _flip(engine, _target(engine, objectId, None, None, forceAction), "isDirty", "dirtyable", "CanBeDirty", value=False)
 
 
 @action("CookObject")
 def cook_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
-    """Cooks an object."""
+    """Cook an object."""
     _flip(engine, _target(engine, objectId, None, None, forceAction), "isCooked", "cookable", "CanBeCooked", value=True)
 
 
@@ -96,7 +96,7 @@ def cook_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> 
 def fill_object_with_liquid(
     engine: Engine, *, objectId: str, fillLiquid: str = "water", forceAction: bool = False
 ) -> None:
-    """Fills an object with water, coffee or wine."""
+    """Fill an object with water, coffee or wine."""
     if fillLiquid not in ("water", "coffee", "wine"):
         raise ActionError(f"{fillLiquid} is not a valid Liquid Type")
     record = _target(engine, objectId, None, None, forceAction)
@@ -106,17 +106,17 @@ def fill_object_with_liquid(
 
 @action("EmptyLiquidFromObject")
 def empty_liquid_from_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
-    """Empties an object."""
+    """Empty an object."""
     record = _target(engine, objectId, None, None, forceAction)
     _flip(engine, record, "isFilledWithLiquid", "canFillWithLiquid", "CanBeFilled", value=False)
 
 
 class ObjectStates(BaseModel):
-    """Which objects `SetObjectStates` sets, and to what."""
+    """The objects that `SetObjectStates` changes, and their new state."""
 
     objectType: str | None = None
     stateChange: str | None = None
-    """The flag that the objects have to have: `toggleable` and the like."""
+    """The flag that the objects must have: `toggleable` and the like."""
     isOpen: bool = False
     isToggled: bool = False
     isFilledWithLiquid: bool = False
@@ -124,7 +124,7 @@ class ObjectStates(BaseModel):
     isCooked: bool = False
 
 
-# The state that goes with a flag, and the house file's key for it.
+# The state that belongs to a flag, and its key in the house file.
 _SETTABLE = {
     "openable": ("isOpen", "openness"),
     "toggleable": ("isToggled", "isOn"),
@@ -141,7 +141,7 @@ def set_object_states(
     SetObjectStates: ObjectStates,
     **unused: Any,  # noqa: ANN401
 ) -> None:
-    """Sets one state of all objects that have it, or of those of a type; nothing breaks or is cut here."""
+    """Set one state of all objects that have it, or of those of a type; no object breaks or is cut."""
     wanted = SetObjectStates
     if wanted.stateChange is None:
         raise ActionError("SetObjectStates needs a stateChange, and takes an objectType")
@@ -157,14 +157,16 @@ def set_object_states(
     _set(engine.scene, chosen, {key: float(value) if key == "openness" else value})
 
 
-def _target(engine: Engine, object_id: str | None, x: float | None, y: float | None, is_forced: bool) -> objects.Record:
-    """The object that an action is about, by id or by its place in the picture."""
+def _target(
+    engine: Engine, object_id: str | None, x: float | None, y: float | None, force_action: bool
+) -> objects.Record:
+    """Return the object of an action, named by id or by its place in the image."""
     if object_id is None:
         if x is None or y is None:
             raise ActionError("objectId, or x and y, must be given")
         object_id, _ = object_queries.object_at(engine, x, y)
     record = objects.record_of(engine.scene, object_id)
-    if not is_forced:
+    if not force_action:
         seen = objects.visible_ids(engine.scene, engine.agent, engine.settings.visibilityDistance)
         if object_id not in seen:
             raise ActionError("NullReferenceException: Target object not found within the specified visibility.")
@@ -192,8 +194,8 @@ def _flip(engine: Engine, record: objects.Record, state: str, flag: str, name: s
 
 
 def _set(scene: Scene, object_ids: Collection[str], values: Mapping[str, object]) -> None:
-    """Writes into the house file, from which records and pictures come."""
-    with edits.edited(scene) as house:
+    """Write states into the house file, the source of records and images."""
+    with edits.editing(scene) as house:
         for entry in [entry for entry, _ in objects.placed_objects(house)] + [*house.get("doors", ())]:
             if entry["id"] in object_ids:
                 entry.update(values)

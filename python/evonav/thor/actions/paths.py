@@ -1,7 +1,7 @@
-"""Actions that ask for ways: `GetReachablePositions`, `GetShortestPath*`, `ObjectNavExpertAction`.
+"""Find paths: `GetReachablePositions`, `GetShortestPath*`, `ObjectNavExpertAction`.
 
-After AI2-THOR's `BaseFPSAgentController`, whose messages these are. Where AI2-THOR asks its NavMesh, the exact free
-space of evonav's navigation answers.
+Based on AI2-THOR's `BaseFPSAgentController`, whose messages these are. AI2-THOR searches its NavMesh; this engine
+searches the exact free space of evonav's navigation.
 """
 
 import math
@@ -19,18 +19,18 @@ from evonav.thor.engine import Engine
 from evonav.world.camera import project
 
 Point = tuple[float, float]
-"""`(x, z)`."""
+"""`(x, z)` in metres."""
 
 _NAVMESH_Y_M = 0.01
 """Height of the corners of paths, as recorded (0.006 to 0.015 m over flat floors)."""
 _SAMPLE_M = 0.2
-"""How far an end of a path may lie off the free space."""
+"""Largest distance of a path's end from the free space."""
 _ALLOWED_ERROR_M = 1e-4
-"""How far one end of a path may be moved without a complaint, unless told."""
+"""Default for the largest distance that an end of a path may be moved without an error."""
 _MAX_STEPS = 10_000
 _MIN_GRID_M = 0.01
 _MAX_POSITIONS = 250_000
-"""What a second or two finds; AI2-THOR would go on to `maxStepCount / gridSize**2`."""
+"""Limit that is reached in a second or two; AI2-THOR's is `maxStepCount / gridSize**2`."""
 _OFFSETS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 """Steps `(right, ahead)` on the grid, in AI2-THOR's order."""
 
@@ -43,7 +43,7 @@ def get_reachable_positions(
     directionsRelativeAgent: bool = False,
     gridSize: float | None = None,
 ) -> list[dict[str, float]]:
-    """Positions of a grid through the agent that straight steps along the grid lead to, nearest first."""
+    """Return the positions of the grid through the agent that it can reach in straight steps, nearest first."""
     grid_m = gridSize or engine.settings.gridSize
     if grid_m < _MIN_GRID_M:
         raise ActionError(f"GetReachablePositions: gridSize {grid_m:g} is less than {_MIN_GRID_M:g} m")
@@ -60,20 +60,20 @@ def get_reachable_positions(
 
 
 def _walk(engine: Engine, start_m: Point, grid_m: float, is_relative: bool = False) -> Iterator[Point]:
-    """The grid breadth first from a start, which comes first even where the agent does not fit.
+    """Yield the grid's points breadth first, beginning with the start, even where the agent does not fit.
 
-    A point that one neighbour cannot reach may be reached from another; AI2-THOR's flood fill drops it then, which
-    leaves holes that depend on where it started.
+    A point that cannot be reached from one neighbour may be reached from another. AI2-THOR's flood fill drops such
+    points, which leaves holes that depend on the start.
     """
     can_move = engine.scene.simulator.can_move
-    # Multiples of the start, so that a point has the same coordinates by every way to it.
+    # Coordinates are multiples of the start's, so a point has the same ones on every path to it.
     if is_relative:
         sine, cosine = math.sin(engine.agent.yaw_rad) * grid_m, math.cos(engine.agent.yaw_rad) * grid_m
         (right_x, right_z), (ahead_x, ahead_z) = (cosine, -sine), (sine, cosine)
     else:
         (right_x, right_z), (ahead_x, ahead_z) = (grid_m, 0.0), (0.0, grid_m)
     queue, seen = [((0, 0), start_m)], {(0, 0)}
-    for (right, ahead), point_m in queue:  # grows as it goes
+    for (right, ahead), point_m in queue:  # the loop appends to the queue
         yield point_m
         for step in _OFFSETS:
             cell = (right + step[0], ahead + step[1])
@@ -99,7 +99,7 @@ def get_shortest_path_to_point(
     z: float | None = None,
     allowedError: float = _ALLOWED_ERROR_M,
 ) -> dict[str, Any]:
-    """The way from `position` (else from the agent) to `target`, or to `x, y, z` as the client's helper says it."""
+    """Return the path from `position` (default: the agent) to `target`, or to `x, y, z` in the client helper's form."""
     if target is None:
         if x is None or z is None:
             raise motion.missing_arguments("GetShortestPathToPoint", "target")
@@ -117,9 +117,9 @@ def get_shortest_path(
     rotation: Vector3 | None = None,
     allowedError: float = _ALLOWED_ERROR_M,
 ) -> dict[str, Any]:
-    """The way to the first position of the grid from which an agent that looks at the object sees it.
+    """Return the path to the first position of the grid from which an agent that looks at the object sees it.
 
-    `rotation` does not matter: the grid is the world's, and the camera turns to the object.
+    `rotation` has no effect: the grid is aligned with the world, and the camera turns to the object.
     """
     start_m = _start(engine, position)
     return _path_record(_path_to_object(engine, _object(engine, objectType, objectId), start_m, allowedError))
@@ -127,19 +127,19 @@ def get_shortest_path(
 
 @action("VisualizePath")
 def visualize_path(engine: Engine, *, positions: list[Vector3] | None = None, **_: object) -> None:
-    """Draws nothing: a path has no place in the agent's images."""
+    """Do nothing: a path is not drawn into the agent's images."""
     if not positions:
         raise ActionError("ArgumentException: Path cannot be null or empty.")
 
 
 @action("HideVisualizedPath")
 def hide_visualized_path(engine: Engine, *, pathName: str = "PathVisualization") -> None:
-    """Nothing was drawn."""
+    """Do nothing: no path was drawn."""
 
 
 @action("ObjectTypeToObjectIds")
 def object_type_to_object_ids(engine: Engine, *, objectType: str) -> list[str]:
-    """Ids of all objects of a type; spaces and case do not matter."""
+    """Return the ids of all objects of a type; spaces and case do not matter."""
     wanted = objectType.replace(" ", "").lower()
     records = objects.static_records(engine.scene)
     return [record["objectId"] for record in records if record["objectType"].lower() == wanted]
@@ -153,7 +153,7 @@ def object_nav_expert_action(
     objectType: str | None = None,
     position: Vector3 | None = None,
 ) -> str:
-    """The next action on the way to an object, until it is in the picture, or to a position."""
+    """Return the next action towards a position, or towards an object until it is in the image."""
     here_m = engine.agent.point_m
     step_deg = engine.settings.rotateStepDegrees
     record = None
@@ -174,10 +174,10 @@ def object_nav_expert_action(
 
 
 def _look_action(engine: Engine, turns: range, step_deg: float, record: dict[str, Any] | None) -> str:
-    """The first action of the fewest turns and looks that bring the object into the picture."""
+    """Return the first action of the fewest turns and looks that bring the object into the image."""
     agent = engine.agent
     if record is None or _is_framed(engine, agent, record):
-        raise ActionError("")  # AI2-THOR's way to say that nothing is left to do.
+        raise ActionError("")  # AI2-THOR's answer when nothing is left to do.
     level = int(agent.horizon_deg / 30.0)
     ways = [
         (abs(turn) + abs(look - level), turn, look - level)
@@ -194,7 +194,7 @@ def _look_action(engine: Engine, turns: range, step_deg: float, record: dict[str
 
 
 def _is_framed(engine: Engine, agent: Agent, record: dict[str, Any]) -> bool:
-    """Whether a corner of an object's box, or its centre, is within the picture, whatever stands before it."""
+    """Return whether a corner or the centre of an object's box is in the image, occluded or not."""
     box, intrinsics = record["axisAlignedBoundingBox"], engine.scene.simulator.intrinsics
     points_m = np.array([list(box["center"].values()), *box["cornerPoints"]], dtype=np.float64)
     camera = replace(agent.pose, y_m=agent.camera_height_m)
@@ -204,7 +204,7 @@ def _is_framed(engine: Engine, agent: Agent, record: dict[str, Any]) -> bool:
 
 
 def _walk_action(engine: Engine, turns: range, step_deg: float, corner_m: Point) -> str:
-    """Turns to the heading whose step ends nearest to the corner, by rows and columns, or takes that step."""
+    """Return the turn to the heading whose step ends nearest to the corner, by rows and columns, or that step."""
     agent, step_m = engine.agent, engine.settings.gridSize
     best, best_turn = math.inf, 0
     for turn in turns:
@@ -228,7 +228,7 @@ def _start(engine: Engine, position: Vector3 | None) -> Point:
 
 
 def _object(engine: Engine, object_type: str | None, object_id: str | None) -> dict[str, Any]:
-    """The record of the object with an id, or of the only one of a type."""
+    """Return the record of the object with an id, or of the only one of a type."""
     if object_type and not object_id:
         ids = object_type_to_object_ids(engine, objectType=object_type)
         if not ids:
@@ -245,7 +245,7 @@ def _object(engine: Engine, object_type: str | None, object_id: str | None) -> d
 
 
 def _path_to_object(engine: Engine, record: dict[str, Any], start_m: Point, allowed_error_m: float) -> list[Point]:
-    """To the first position of the grid, breadth first, from which the object can be seen."""
+    """Return the path to the first position of the grid, breadth first, from which the object can be seen."""
     settings, object_id = engine.settings, record["objectId"]
     box, reach_m = record["axisAlignedBoundingBox"], settings.visibilityDistance
     for point_m in _walk(engine, start_m, settings.gridSize):
@@ -267,7 +267,7 @@ def _path_to_object(engine: Engine, record: dict[str, Any], start_m: Point, allo
 
 
 def _looking_at(agent: Agent, point_m: Point, target: dict[str, float]) -> Agent:
-    """The agent at a point with its camera on a target."""
+    """Return the agent at a point with its camera on a target."""
     right_m, ahead_m = target["x"] - point_m[0], target["z"] - point_m[1]
     down_m = agent.camera_height_m - target["y"]
     return replace(
@@ -284,17 +284,17 @@ def _seen(engine: Engine, agent: Agent, distance_m: float) -> set[str]:
 
 
 def _path(engine: Engine, start_m: Point, target_m: Point, allowed_error_m: float) -> list[Point]:
-    """Corners of the shortest way, its ends moved to the free space."""
+    """Return the corners of the shortest path, its ends moved to the free space."""
     ends_m = [
         _sampled(engine, point_m, allowed_error_m, name) for point_m, name in ((start_m, "start"), (target_m, "target"))
     ]
-    offsets_m = [math.dist(asked_m, end_m) for asked_m, end_m in zip((start_m, target_m), ends_m, strict=True)]
+    offsets_m = [math.dist(requested_m, end_m) for requested_m, end_m in zip((start_m, target_m), ends_m, strict=True)]
     if min(offsets_m) > allowed_error_m:
-        asked, found = ([_vector(point_m, 3) for point_m in points_m] for points_m in ((start_m, target_m), ends_m))
+        requested, found = ([_vector(point_m, 3) for point_m in points_m] for points_m in ((start_m, target_m), ends_m))
         raise motion.invalid_operation(
             "Closest point on NavMesh was too far from the agent: "
-            f" (startPosition={asked[0]}, closest navmesh position {found[0]}) and"
-            f" (targetPosition={asked[1]}, closest navmesh position {found[1]})."
+            f" (startPosition={requested[0]}, closest navmesh position {found[0]}) and"
+            f" (targetPosition={requested[1]}, closest navmesh position {found[1]})."
         )
     corners_m = _corners(engine, ends_m[0], ends_m[1])
     if not corners_m:
@@ -305,7 +305,7 @@ def _path(engine: Engine, start_m: Point, target_m: Point, allowed_error_m: floa
 
 
 def _sampled(engine: Engine, point_m: Point, allowed_error_m: float, name: str) -> Point:
-    """The free point nearest to an end of a path."""
+    """Return the free point nearest to an end of a path."""
     found = _corners(engine, point_m, point_m)
     if not found or math.dist(found[0], point_m) > max(_SAMPLE_M, allowed_error_m):
         raise motion.invalid_operation(f"No point on NavMesh near {name}Position {_vector(point_m, 2)}.")
@@ -323,5 +323,5 @@ def _vector(point_m: Point, digits: int) -> str:
 
 
 def _path_record(corners_m: list[Point]) -> dict[str, Any]:
-    """As AI2-THOR's formatter writes a NavMeshPath."""
+    """Return a path as AI2-THOR's formatter writes a NavMeshPath."""
     return {"corners": [{"x": x_m, "y": _NAVMESH_Y_M, "z": z_m} for x_m, z_m in corners_m], "status": "PathComplete"}

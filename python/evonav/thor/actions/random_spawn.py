@@ -1,4 +1,4 @@
-"""`InitialRandomSpawn`: things that can be carried go to random free places; the core finds them."""
+"""Move portable objects to random free places: `InitialRandomSpawn`. The core finds the places."""
 
 import copy
 import json
@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from pydantic import BaseModel, ConfigDict, NonNegativeInt
 
 from evonav.thor.actions.registry import ActionError, ErrorCode, action
-from evonav.thor.asset_metadata import facts_of
+from evonav.thor.asset_metadata import metadata_of_asset
 from evonav.thor.engine import Engine
 from evonav.thor.objects import placed_objects
 from evonav.thor.scene import Document
 
 
 class ObjectTypeCount(BaseModel):
-    """How many objects of a type there are to be."""
+    """Requested number of objects of a type."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -38,10 +38,10 @@ def initial_random_spawn(
     allowFloor: bool = False,
     allowMoveable: bool = False,
 ) -> None:
-    """Puts objects at random places on receptacles: the same seed, the same places.
+    """Put objects at random places on receptacles; the same seed gives the same places.
 
-    `placeStationary` changes nothing, since what is put down here neither rolls nor falls over. Of objects that are
-    named, all must find a place.
+    `placeStationary` has no effect: a placed object neither rolls nor falls over. If objects are named, each of them
+    must find a place.
     """
     if numPlacementAttempts <= 0:
         raise ActionError("numPlacementAttempts must be a positive integer.")
@@ -78,10 +78,10 @@ def initial_random_spawn(
 
 
 def _duplicate(house: Document, counts: list[ObjectTypeCount]) -> list[str]:
-    """Adds copies of objects of a type until there are so many; ids of the copies, which have no place yet."""
+    """Copy objects until there are as many of each type as requested; return the ids of the copies, not placed yet."""
     by_type: dict[str, list[Document]] = {}
     for entry, _ in placed_objects(house):
-        by_type.setdefault(facts_of(entry.get("assetId", ""), "").object_type, []).append(entry)
+        by_type.setdefault(metadata_of_asset(entry.get("assetId", ""), "").object_type, []).append(entry)
     copies = [copied for wanted in counts for copied in _copies(by_type.get(wanted.objectType, []), wanted.count)]
     house["objects"].extend(copies)
     return [copied["id"] for copied in copies]
@@ -90,6 +90,6 @@ def _duplicate(house: Document, counts: list[ObjectTypeCount]) -> list[str]:
 def _copies(originals: list[Document], count: int) -> Iterator[Document]:
     for index in range(count - len(originals) if originals else 0):
         original = originals[index % len(originals)]
-        # AI2-THOR's name for a copy.
+        # The copy is named as AI2-THOR names it.
         changes = {"id": f"{original['id']}_copy_{index}", "children": []}
         yield copy.deepcopy({key: value for key, value in original.items() if key != "children"}) | changes

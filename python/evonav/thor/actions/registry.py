@@ -1,7 +1,7 @@
-"""Actions by name: which function does them, and what a wrong argument gets.
+"""Find the function of an action by name, and answer wrong arguments as AI2-THOR does.
 
-AI2-THOR matches an action to a method by the names of its parameters and answers mistakes with an error code, which its
-client turns into a `ValueError`. So does `call`.
+AI2-THOR matches an action to a method by the names of its parameters. It answers mistakes with an error code, which its
+client turns into a `ValueError`. `call` does the same.
 """
 
 import importlib
@@ -16,13 +16,13 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, PydanticUserError, TypeAdapter, ValidationError
 
-# Whose functions register themselves.
+# The functions of these modules register themselves.
 _MODULES = (
     *("session", "motion", "teleport", "paths", "asset_database", "random_spawn", "spawn"),
     *("object_queries", "interactable_poses", "object_placement", "object_states", "cameras"),
 )
 
-# What any action may carry (`DynamicServerAction.AllowedExtraneousParameters`), and what the client may add to it.
+# Keys that any action may contain (`DynamicServerAction.AllowedExtraneousParameters`) or that the client may add.
 _COMMON = frozenset(
     {
         *("action", "sequenceId", "agentId", "renderImage", "renderObjectImage", "renderClassImage"),
@@ -31,7 +31,7 @@ _COMMON = frozenset(
     }
 )
 _ENVELOPE = frozenset({"action", "sequenceId", "agentId", "renderImage"})
-# Characters of a value in a message.
+# Maximal number of characters of a value in a message.
 _BRIEF = 200
 
 Function = TypeVar("Function", bound=Callable[..., object])
@@ -46,11 +46,11 @@ class ErrorCode(str, Enum):
     AMBIGUOUS_ACTION = "AmbiguousAction"
     INVALID_ARGUMENT = "InvalidArgument"
     LOOK_DOWN_CANT_EXCEED_MIN = "LookDownCantExceedMin"
-    """The client does not raise for this one."""
+    """The client raises nothing for this one."""
 
 
 class ActionError(Exception):
-    """An action failed: `lastActionSuccess` is false and `errorMessage` is this message."""
+    """A failed action: `lastActionSuccess` is false and `errorMessage` is this message."""
 
     def __init__(self, message: str, code: ErrorCode = ErrorCode.NONE) -> None:
         super().__init__(message)
@@ -58,7 +58,7 @@ class ActionError(Exception):
 
 
 class Vector3(BaseModel):
-    """Unity's vector on the wire; what is left out is 0, as the client's scalar rotations need."""
+    """Unity's vector on the wire; an absent component is 0, as the client's scalar rotations need."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -71,18 +71,18 @@ class Vector3(BaseModel):
 class _Action:
     function: Callable[..., object]
     is_open: bool
-    """Takes any other keyword too."""
+    """Whether the function takes any other keyword too."""
     required: tuple[str, ...]
     types: dict[str, Any]
-    """Of parameters, by name."""
+    """Types of the parameters, by name."""
     unused: frozenset[str]
-    """Those of `types` that the function is not given."""
+    """Names in `types` that are not passed to the function."""
     adapters: dict[str, TypeAdapter[Any]] = field(default_factory=dict)
-    """Of `types`, made when they are first needed: making them takes longer than most actions."""
+    """Validators of `types`, made on first use: making one takes longer than most actions."""
 
     @property
     def signature(self) -> str:
-        """As AI2-THOR shows it in messages."""
+        """The signature in the form of AI2-THOR's messages."""
         used = [_shown(parameter) for parameter in list(inspect.signature(self.function).parameters.values())[1:]]
         return ", ".join(used + [f"{_type_name(self.types[name])} {name}" for name in sorted(self.unused)])
 
@@ -91,11 +91,11 @@ _ACTIONS: dict[str, _Action] = {}
 
 
 def action(*names: str, unused: Mapping[str, type] = MappingProxyType({})) -> Callable[[Function], Function]:
-    """Registers `function(engine, *, parameters as on the wire) -> actionReturn` under AI2-THOR's names for it.
+    """Register `function(engine, *, parameters as on the wire) -> actionReturn` under AI2-THOR's names for it.
 
     Args:
-        names: Of the action.
-        unused: Types of AI2-THOR's parameters that make no difference here, by name.
+        names: Names of the action.
+        unused: Types of AI2-THOR's parameters that have no effect here, by name.
     """
 
     def register(function: Function) -> Function:
@@ -113,7 +113,7 @@ def action(*names: str, unused: Mapping[str, type] = MappingProxyType({})) -> Ca
 
 
 def action_names() -> tuple[str, ...]:
-    """All that are served, sorted."""
+    """Return the names of all actions, sorted."""
     return tuple(sorted(_served()))
 
 
@@ -123,24 +123,24 @@ def parameter_types(name: str) -> Mapping[str, Any]:
 
 
 def call(engine: object, message: Mapping[str, Any]) -> object:
-    """Does an action.
+    """Execute an action.
 
     Args:
-        engine: What it acts on.
+        engine: The engine that executes it.
         message: The action as the client sent it.
 
     Returns:
-        Its `actionReturn`.
+        The action's `actionReturn`.
 
     Raises:
-        ActionError: It failed; with a code where the request itself was wrong.
+        ActionError: The action failed; the error has a code if the request itself was wrong.
     """
     name = message.get("action")
     found = _served().get(name) if isinstance(name, str) else None
     if found is None:
         problem = message.get("problem") if name is None else None
         raise ActionError(str(problem or f"Invalid action: {brief(name)}"), ErrorCode.INVALID_ACTION)
-    common = _ENVELOPE if found.is_open else _COMMON  # what Initialize sets is there for every action to carry
+    common = _ENVELOPE if found.is_open else _COMMON  # an open action may read what Initialize also sets
     arguments = {key: value for key, value in message.items() if key in found.types or key not in common}
     unknown = [key for key in arguments if key not in found.types and not (found.is_open and key != "engine")]
     if unknown:
@@ -182,12 +182,12 @@ def _adapter(annotation: Any) -> TypeAdapter[Any]:  # noqa: ANN401
     try:
         return TypeAdapter(annotation, config=ConfigDict(allow_inf_nan=False))
     except PydanticUserError:
-        # Models have a configuration of their own.
+        # A model has a configuration of its own.
         return TypeAdapter(annotation)
 
 
 def _invalid(name: str, found: _Action, unknown: list[str], given: list[str]) -> str:
-    """AI2-THOR's words; its users search for them."""
+    """Return AI2-THOR's message for invalid arguments, which its users search for."""
     quoted = [", ".join(f"'{brief(key)}'" for key in keys[:20]) for keys in (unknown, given)]
     return (
         f'\n\tAction: "{name}" called with invalid argument{"s" if len(unknown) > 1 else ""}: {quoted[0]}'
@@ -207,5 +207,5 @@ def _type_name(annotation: object) -> str:
 
 
 def brief(value: object) -> str:
-    """A value for a message, at most some hundred characters of it."""
+    """Abbreviate a value for a message, to about two hundred characters."""
     return value[:_BRIEF] if isinstance(value, str) else reprlib.repr(value)

@@ -1,4 +1,4 @@
-"""The dialogue around the steps: scenes, sizes, settings, houses, and what the metadata lists."""
+"""Set up a session: scenes, houses, settings, image sizes."""
 
 import reprlib
 from dataclasses import replace
@@ -16,20 +16,20 @@ from evonav.thor.events.metadata import Vector, scene_bounds, vector
 from evonav.thor.scene import Document, Scene
 
 SCENES = ("Procedural",)
-"""What `GetScenesInBuild` answers: iTHOR's and RoboTHOR's rooms are Unity scenes, which nothing here can draw."""
+"""Answer of `GetScenesInBuild`. The rooms of iTHOR and RoboTHOR are Unity scenes, which this engine cannot draw."""
 
 NEAR_M = 0.1
-"""The camera's near plane."""
+"""Near plane of the agent's camera, in metres."""
 
 _MAX_PX = 4096
 _MIN_GRID_M = 0.01
-# AI2-THOR renders these; a client that asked for them and got none would fail far from here.
+# Images that AI2-THOR renders and this engine does not. Refused here, since a client without them would fail later.
 _MISSING_IMAGES = ("renderNormalsImage", "renderFlowImage")
 
 
 @action("Reset")
 def reset(engine: Engine, *, sceneName: str = "Procedural") -> None:
-    """Drops the scene and starts an empty one."""
+    """Replace the scene by an empty one."""
     if sceneName not in SCENES:
         raise ActionError(f"scene {sceneName!r} is not in this build, which holds {', '.join(SCENES)}")
     engine.scene, engine.agent, engine.settings = Scene(sceneName), Agent(), Settings()
@@ -40,21 +40,21 @@ def reset(engine: Engine, *, sceneName: str = "Procedural") -> None:
 
 @action("GetScenesInBuild")
 def get_scenes_in_build(engine: Engine) -> list[str]:
-    """Names that `Reset` takes."""
+    """Return the names that `Reset` accepts."""
     return list(SCENES)
 
 
 @action("CreateHouse")
 def create_house(engine: Engine, *, house: Document) -> None:
-    """Loads a ProcTHOR house; the scene stays as it is when that cannot be done."""
+    """Load a ProcTHOR house; the scene stays as it is if that fails."""
     scene = Scene(engine.scene.name)
     scene.configure(engine.scene.config)
-    # ProcTHOR's own generator asks for houses before they have metadata.
+    # ProcTHOR's own generator loads houses that do not have metadata yet.
     house = {"metadata": {}, **house}
     scene.load(house)
     agent = replace(engine.agent)
     try:
-        # What the next event shows: a house that cannot be described is not taken.
+        # The next event shows these records: a house without them is refused here.
         objects.static_records(scene)
         agent.enter(house)
     except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
@@ -63,7 +63,7 @@ def create_house(engine: Engine, *, house: Document) -> None:
 
 
 def check_settings(settings: Settings) -> None:
-    """What AI2-THOR's `Initialize` asks of its arguments, in its words."""
+    """Check settings as AI2-THOR's `Initialize` does, with its messages."""
     if settings.agentCount != 1:
         raise ActionError(f"agentCount {settings.agentCount}: this engine has one agent")
     for name in _MISSING_IMAGES:
@@ -91,7 +91,7 @@ def check_settings(settings: Settings) -> None:
 
 @action("Initialize")
 def initialize(engine: Engine, **settings: Any) -> dict[str, float]:  # noqa: ANN401
-    """Sets the settings; any keyword of the client's constructor may come."""
+    """Set the settings; any keyword of the client's constructor is accepted."""
     try:
         wanted = Settings.model_validate(settings)
     except ValidationError as error:
@@ -106,7 +106,7 @@ def initialize(engine: Engine, **settings: Any) -> dict[str, float]:  # noqa: AN
     try:
         engine.configure()
         if engine.scene.house is not None:
-            # What cannot be drawn so is refused here, not by the next event.
+            # A view that cannot be rendered is refused here, not by the next event.
             engine.view(rgb=False, instances=False)
     except EvonavError:
         engine.settings, engine.agent.body = before
@@ -117,7 +117,7 @@ def initialize(engine: Engine, **settings: Any) -> dict[str, float]:  # noqa: AN
 
 @action("ChangeResolution")
 def change_resolution(engine: Engine, *, x: int, y: int) -> None:
-    """Sets the size of all images."""
+    """Set the size of all images."""
     if not (0 < x <= _MAX_PX and 0 < y <= _MAX_PX):
         raise ActionError(f"ChangeResolution: {x} x {y} is not between 1 x 1 and {_MAX_PX} x {_MAX_PX}")
     engine.width_px, engine.height_px = x, y
@@ -126,12 +126,12 @@ def change_resolution(engine: Engine, *, x: int, y: int) -> None:
 
 @action("ChangeQuality")
 def change_quality(engine: Engine, *, quality: str) -> None:
-    """Does nothing: there is one quality."""
+    """Do nothing: there is one quality."""
 
 
 @action("GetSceneBounds")
 def get_scene_bounds(engine: Engine) -> list[Vector]:
-    """The smallest and the largest corner of the box around everything."""
+    """Return the largest and the smallest corner of the box around everything."""
     bounds = scene_bounds(engine.scene)
     if bounds is None:
         raise ActionError(f"scene {engine.scene.name} holds no house: call CreateHouse first")

@@ -1,4 +1,4 @@
-"""Assets put into the scene one by one, their surfaces, and what of physics the generator asks for."""
+"""Spawn single assets, read their surfaces, and let objects fall."""
 
 import json
 from typing import Any
@@ -11,7 +11,7 @@ from evonav.thor.actions.registry import ActionError, ErrorCode, Vector3, action
 from evonav.thor.engine import Engine
 from evonav.thor.scene import Document, Scene
 
-# Half the side of the floor that stands in for the void of AI2-THOR's empty scene.
+# Half the side of the floor that replaces the void of AI2-THOR's empty scene.
 _STAGE_HALF_M = 5.0
 _ORIGIN = Vector3()
 _LONGEST_STEP_S = 0.05
@@ -26,7 +26,7 @@ def spawn_asset(
     position: Vector3 = _ORIGIN,
     rotation: Vector3 = _ORIGIN,
 ) -> dict[str, str]:
-    """Puts an asset into the scene: `position` is the middle of its box. Nothing is tested for collision."""
+    """Add an asset to the scene without a test for collisions; `position` is the centre of its box."""
     if not is_known(assetId):
         raise ActionError(
             f"Object '{assetId}' is not contained in asset database, you may need to rebuild asset database."
@@ -54,7 +54,7 @@ def spawn_asset(
 def get_in_scene_asset_geometry(
     engine: Engine, *, objectId: str, triangles: bool = False, uv: bool = False, normals: bool = False
 ) -> list[dict[str, Any]]:
-    """The surface of an object where it stands: one mesh, clockwise seen from outside as in Unity."""
+    """Return the surface of an object in place: one mesh, clockwise seen from outside as in Unity."""
     simulator = engine.scene.simulator
     body = next((index for index, known in enumerate(simulator.objects) if known.id == objectId), None)
     if body is None:
@@ -65,7 +65,7 @@ def get_in_scene_asset_geometry(
     faces_m = corners_m[bodies == body]
     mesh: dict[str, Any] = {"name": objectId}
     if normals:
-        # A corner belongs to one face, so that its normal is that face's.
+        # Each corner belongs to one face, so its normal is that face's.
         across = np.cross(faces_m[:, 1] - faces_m[:, 0], faces_m[:, 2] - faces_m[:, 0])
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         vertices_m, faces = faces_m.reshape(-1, 3), np.arange(3 * len(faces_m))
@@ -80,19 +80,19 @@ def get_in_scene_asset_geometry(
 
 @action("SetRandomSeed")
 def set_random_seed(engine: Engine, *, seed: int) -> None:
-    """Seeds the noise of the LoCoBot's motion; other random actions have seeds of their own."""
+    """Seed the noise of the LoCoBot's motion; other random actions have seeds of their own."""
     engine.agent.noise = np.random.default_rng(abs(seed))
 
 
 @action("SetObjectFilter")
 def set_object_filter(engine: Engine, *, objectIds: list[str]) -> None:
-    """Metadata lists only these objects from here on."""
+    """List only these objects in the metadata from now on."""
     engine.object_filter = frozenset(objectIds)
 
 
 @action("ResetObjectFilter")
 def reset_object_filter(engine: Engine) -> None:
-    """Metadata lists all objects again."""
+    """List all objects in the metadata again."""
     engine.object_filter = None
 
 
@@ -100,7 +100,7 @@ def reset_object_filter(engine: Engine) -> None:
 def advance_physics_step(
     engine: Engine, *, timeStep: float = 0.02, simSeconds: float | None = None, allowAutoSimulation: bool = False
 ) -> None:
-    """Brings down what hangs in the air, at once and for good: there is no time in which it falls."""
+    """Let objects without support fall to their resting places, all within this action."""
     if timeStep <= 0 or timeStep > _LONGEST_STEP_S:
         raise ActionError(
             "Please use a timeStep between 0.0f and 0.05f. Larger timeSteps produce inconsistent simulation results."
@@ -114,7 +114,7 @@ def advance_physics_step(
 
 @action("PausePhysicsAutoSim", "UnpausePhysicsAutoSim")
 def pause_physics(engine: Engine) -> None:
-    """Changes nothing: nothing here moves by itself between two actions."""
+    """Do nothing: nothing moves between two actions."""
 
 
 def _house_or_stage(scene: Scene) -> Document:

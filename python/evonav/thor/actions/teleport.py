@@ -1,6 +1,6 @@
-"""Actions that set the agent's pose: `Teleport`, `TeleportFull`.
+"""Set the agent's pose: `Teleport`, `TeleportFull`.
 
-After `teleportFull` and its callers in AI2-THOR's `BaseFPSAgentController` and `PhysicsRemoteFPSAgentController`.
+Based on `teleportFull` and its callers in AI2-THOR's `BaseFPSAgentController` and `PhysicsRemoteFPSAgentController`.
 """
 
 import math
@@ -12,13 +12,13 @@ from evonav.thor.engine import Engine
 
 _FLOAT32_MAX = 3.4028234663852886e38
 _GROUND_M = 0.05
-"""How far over the floor one may teleport and still be set down on it."""
+"""Largest height above the floor from which a teleported agent is set down on it."""
 _FALL_M = 2 * 9.81
-"""How far AI2-THOR's agent falls where there is no floor: one step of its doubled gravity."""
+"""Height that AI2-THOR's agent falls where there is no floor: one step of its doubled gravity."""
 
 
 def out_of_range(message: str) -> ActionError:
-    """What AI2-THOR says of an `ArgumentOutOfRangeException`, whose one argument is a parameter's name."""
+    """Return AI2-THOR's error for an `ArgumentOutOfRangeException`, whose one argument is a parameter's name."""
     reason = f"Specified argument was out of the range of valid values.\nParameter name: {message}"
     return ActionError(f"ArgumentOutOfRangeException: {reason}")
 
@@ -36,7 +36,7 @@ def teleport(
     standing: bool | None = None,
     forceAction: bool = False,
 ) -> None:
-    """Changes what is given of the pose."""
+    """Set the given parts of the pose."""
     agent = engine.agent
     _check_standing(engine, "Teleport", standing)
     at = _position_of("Teleport", position, (x, y, z)) or Vector3(x=agent.x_m, y=agent.y_m, z=agent.z_m)
@@ -58,7 +58,7 @@ def teleport_full(
     standing: bool | None = None,
     forceAction: bool = False,
 ) -> None:
-    """Sets the whole pose; a LoCoBot's has no `standing`, the default agent's must have it."""
+    """Set the whole pose; `standing` is required for the default agent and refused for a LoCoBot."""
     at = _position_of("TeleportFull", position, (x, y, z))
     missing = ["position"] if at is None else []
     _check_standing(engine, "TeleportFull", standing)
@@ -77,7 +77,7 @@ def _check_standing(engine: Engine, name: str, standing: bool | None) -> None:
 def _position_of(
     name: str, position: Vector3 | None, parts: tuple[float | None, float | None, float | None]
 ) -> Vector3 | None:
-    """From a vector or, the older form, from three numbers."""
+    """Return the position from a vector or, in the older form, from three numbers."""
     if position is not None or parts == (None, None, None):
         return position
     x, y, z = parts
@@ -87,13 +87,13 @@ def _position_of(
 
 
 def _teleport(
-    engine: Engine, at: Vector3, rotation: Vector3, horizon_deg: float, is_standing: bool, is_forced: bool
+    engine: Engine, at: Vector3, rotation: Vector3, horizon_deg: float, is_standing: bool, force_action: bool
 ) -> None:
     agent, y_m = engine.agent, at.y
-    # AI2-THOR's numbers are of single precision.
+    # AI2-THOR's numbers have single precision.
     if not all(abs(value) <= _FLOAT32_MAX for value in (at.x, at.y, at.z, rotation.y, horizon_deg)):
         raise out_of_range("Teleport pose has numbers that are not finite in single precision.")
-    if not is_forced:
+    if not force_action:
         _check_pose(engine, at, rotation, horizon_deg)
         y_m = BODY_Y_M
     agent.x_m, agent.y_m, agent.z_m = at.x, y_m, at.z
@@ -102,7 +102,7 @@ def _teleport(
 
 
 def _check_pose(engine: Engine, at: Vector3, rotation: Vector3, horizon_deg: float) -> None:
-    """What AI2-THOR asks of a teleport that is not forced, in its order."""
+    """Check a teleport that is not forced as AI2-THOR does, in the same order."""
     body, point_m, place = engine.agent.body, (at.x, at.z), vector_text((at.x, at.y, at.z), 6)
     if max(abs(rotation.x), abs(rotation.z)) >= 1e-2:
         given = vector_text((rotation.x, rotation.y, rotation.z), 6)

@@ -1,4 +1,4 @@
-"""Colours of instances and classes: AI2-THOR's, the first three bytes of the name's MD5 (`ColorEncoding.cs`)."""
+"""Assign AI2-THOR's colours to instances and classes: the first three bytes of a name's MD5 (`ColorEncoding.cs`)."""
 
 import hashlib
 from collections.abc import Iterable
@@ -20,21 +20,21 @@ class Palette:
 
     version: int
     entries: list[dict[str, object]]
-    """The metadata's `colors`: of classes and of instances, by name."""
+    """The metadata's `colors`: one entry for each class and each instance, by name."""
     instances_rgba: NDArray[np.uint8]
-    """`(1 + bodies, 4)` by instance id; 0 is the background."""
+    """Colours by instance id, shape `(1 + num_bodies, 4)`; row 0 is the background."""
     classes_rgba: NDArray[np.uint8]
-    """Likewise, of each body's class."""
+    """Colours of the bodies' classes, shape `(1 + num_bodies, 4)`; row 0 is the background."""
 
 
 def palette_of(scene: Scene) -> Palette:
-    """Colours of the scene as it now is."""
+    """Return the colours of the scene in its present version."""
     bodies = scene.simulator.objects if scene.house is not None else ()
     names = [instance_name(body) for body in bodies]
     colors = assign([*(body.category for body in bodies), *names])
     entries: list[dict[str, object]] = []
     # The client takes an instance's class from its id, up to the first "|". Ids that do not begin with their class
-    # ("2|0", "small|2|0") are listed under it too, before the entries that its tables by colour and by name keep.
+    # ("2|0", "small|2|0") are also listed under that prefix, before the entries that the client's own tables use.
     for body, name in zip(bodies, names, strict=True):
         if name.split("|")[0] != body.category:
             entries.append({"name": body.category, "color": colors[name]})
@@ -49,12 +49,12 @@ def palette_of(scene: Scene) -> Palette:
 
 
 def instance_name(body: SceneObject) -> str:
-    """Name of a body in the tables; a ceiling has its room's id, as the room's floor has."""
+    """Return a body's name in the colour tables; a ceiling has its room's id, as the room's floor has."""
     return f"Ceiling|{body.id}" if body.kind == "ceiling" else body.id
 
 
 def assign(names: Iterable[str]) -> dict[str, Color]:
-    """One colour a name, no two the same; where MD5 would give one twice, the later name in the alphabet moves."""
+    """Give each name a colour of its own; where two MD5s agree, the alphabetically later name gets another colour."""
     colors: dict[str, Color] = {}
     taken = {_BACKGROUND}
     for name in sorted(set(names)):
@@ -67,7 +67,7 @@ def assign(names: Iterable[str]) -> dict[str, Color]:
 
 
 def _hashed(name: str) -> Color:
-    # An identifier, not a secret. Unity's default encoding is UTF-8; ids from JSON may hold lone surrogates.
+    # The digest is an identifier, not a secret. Unity encodes in UTF-8; ids from JSON may contain lone surrogates.
     digest = hashlib.md5(name.encode("utf-8", "surrogatepass"), usedforsecurity=False).digest()
     return (digest[0], digest[1], digest[2])
 

@@ -1,4 +1,4 @@
-"""Events: what the engine answers to an action, as fields of one message."""
+"""Encode the engine's answer to an action as the fields of one message."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,22 +6,22 @@ from typing import Any
 from evonav.errors import EvonavError
 from evonav.thor.engine import Engine, Result, log_once
 from evonav.thor.events import images
-from evonav.thor.events.images import Kinds
+from evonav.thor.events.images import ImageKinds
 from evonav.thor.events.metadata import MetadataEncoder, patch
 from evonav.thor.scene import Scene
 from evonav.thor.transport.fifo import Field, FieldType
 
 
 class Emitter:
-    """Makes the events of one engine. What has not changed since the last event is not made again."""
+    """Encodes the events of one engine; what has not changed since the last event is reused."""
 
     def __init__(self, engine: Engine, *, has_camera: bool = True, has_patches: bool = True) -> None:
-        """Emits for an engine.
+        """Emit events for an engine.
 
         Args:
-            engine: Whose events.
-            has_camera: False for a client that asked for no graphics.
-            has_patches: Whether the transport knows messages that only say what has changed.
+            engine: The engine whose state the events show.
+            has_camera: `False` for a client that asked for no graphics.
+            has_patches: Whether the transport supports messages that contain only the changes.
         """
         self._engine = engine
         self._has_camera = has_camera
@@ -32,13 +32,15 @@ class Emitter:
         self._images: list[Field] = []
 
     def event(self, message: Mapping[str, Any]) -> list[Field]:
-        """The answer to a message that the engine has executed."""
-        asked = message.get("sequenceId")
-        self._sequence_id = asked if type(asked) is int and abs(asked) < 2**62 else self._sequence_id + 1
+        """Return the event that answers a message which the engine has executed."""
+        sequence_id = message.get("sequenceId")
+        self._sequence_id = (
+            sequence_id if type(sequence_id) is int and abs(sequence_id) < 2**62 else self._sequence_id + 1
+        )
         try:
             return self._event(message)
         except Exception as error:
-            # The house of a scene that cannot be described: the client gets to know, and may load another.
+            # The scene's house cannot be described. The client is informed and may load another house.
             problem = f"the engine cannot show the scene: {type(error).__name__}: {error}"
             if not isinstance(error, EvonavError):
                 log_once(error, problem)
@@ -61,20 +63,20 @@ class Emitter:
         metadata = self._metadata.event(engine, sequence_id=self._sequence_id, has_colors=has_colors)
         return [(FieldType.METADATA, metadata), *self._images]
 
-    def _kinds(self, message: Mapping[str, Any]) -> Kinds | None:
-        """Images to send with this event; `None` for none."""
+    def _kinds(self, message: Mapping[str, Any]) -> ImageKinds | None:
+        """Return the images to send with this event; `None` for none."""
         if not self._has_camera or not message.get("renderImage", True):
             return None
         settings = self._engine.settings
-        return Kinds(
+        return ImageKinds(
             rgb=True,
             depth=settings.renderDepthImage,
-            # Actions may ask for these two once.
+            # An action may request these two images for its own event only.
             instances=settings.renderInstanceSegmentation or message.get("renderInstanceSegmentation") is True,
             classes=settings.renderSemanticSegmentation or message.get("renderSemanticSegmentation") is True,
         )
 
-    def _rendered(self, kinds: Kinds) -> list[Field]:
+    def _rendered(self, kinds: ImageKinds) -> list[Field]:
         engine = self._engine
         if engine.scene.house is None:
             size = (engine.width_px, engine.height_px)

@@ -1,4 +1,4 @@
-"""What cameras see, as AI2-THOR sends it: raw bytes, bottom row first."""
+"""Encode camera images as AI2-THOR sends them: raw bytes, bottom row first."""
 
 from dataclasses import dataclass
 
@@ -11,12 +11,12 @@ from evonav.world.camera import Images
 from evonav.world.simulator import Frame
 
 FAR_M = 20.0
-"""Depth where nothing is within reach of the camera: its far plane."""
+"""Depth in metres where nothing is in reach: the far plane of the agent's camera."""
 
 
 @dataclass(frozen=True, slots=True)
-class Kinds:
-    """Which images are asked for."""
+class ImageKinds:
+    """The kinds of images that an event contains."""
 
     rgb: bool
     depth: bool
@@ -25,7 +25,7 @@ class Kinds:
 
     @property
     def needs_instances(self) -> bool:
-        """Whether instance ids are to be rendered."""
+        """Whether instance ids must be rendered."""
         return self.instances or self.classes
 
 
@@ -36,10 +36,10 @@ _THIRD_PARTY = (
 )
 
 
-def encode(frame: Frame | Images, kinds: Kinds, palette: Palette, *, is_third_party: bool = False) -> list[Field]:
-    """The images of one camera, each with its type."""
+def encode(frame: Frame | Images, kinds: ImageKinds, palette: Palette, *, is_third_party: bool = False) -> list[Field]:
+    """Return the images of one camera, each with its field type."""
     rgb, depth, instances, classes = _THIRD_PARTY if is_third_party else _AGENT
-    far_m = np.inf if is_third_party else FAR_M  # a third-party camera has its own
+    far_m = np.inf if is_third_party else FAR_M  # a third-party camera has a far plane of its own
     fields: list[Field] = []
     if kinds.rgb and frame.rgb is not None:
         fields.append((rgb, np.ascontiguousarray(frame.rgb[::-1])))
@@ -52,8 +52,8 @@ def encode(frame: Frame | Images, kinds: Kinds, palette: Palette, *, is_third_pa
     return fields
 
 
-def blank(width_px: int, height_px: int, kinds: Kinds, *, is_third_party: bool = False) -> list[Field]:
-    """The images of a scene without a house."""
+def blank(width_px: int, height_px: int, kinds: ImageKinds, *, is_third_party: bool = False) -> list[Field]:
+    """Return the images of a scene without a house."""
     rgb, depth, instances, classes = _THIRD_PARTY if is_third_party else _AGENT
     black = np.zeros((height_px, width_px, 4), dtype=np.uint8)
     black[..., 3] = 255
@@ -70,6 +70,6 @@ def blank(width_px: int, height_px: int, kinds: Kinds, *, is_third_party: bool =
 
 
 def _painted(instances: NDArray[np.int32], rgba: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """`(H, W)` pixels of four bytes, bottom row first."""
+    """Return `(H, W)` pixels of four bytes, bottom row first."""
     painted: NDArray[np.uint32] = np.take(rgba.view(np.uint32)[:, 0], instances[::-1])
     return painted

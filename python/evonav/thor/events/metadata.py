@@ -1,6 +1,6 @@
-"""An event's metadata in msgpack, with the fields of AI2-THOR's `MetadataWrapper` (`AgentManager.cs`).
+"""Pack an event's metadata in msgpack, with the fields of AI2-THOR's `MetadataWrapper` (`AgentManager.cs`).
 
-What depends on the scene only, most of it, is packed once a version of the scene, and only if it is listed.
+Most metadata depends on the scene alone. It is packed once for each version of the scene, and only if it is listed.
 """
 
 import struct
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Vector = dict[str, float]
 
-# Keys of a record that depend on the agent, packed; a double follows the first.
+# The packed keys of a record that depend on the agent; a double follows the first.
 _DYNAMIC = ("distance", "visible", "isInteractable")
 _DISTANCE = b"\xa8distance\xcb"
 _NO_YES = (b"\xc2", b"\xc3")
@@ -39,7 +39,7 @@ def _plain(value: object) -> object:
         return value.tolist()
     if isinstance(value, BaseModel):
         return value.model_dump()
-    raise TypeError(f"{type(value).__name__} has no place in metadata")
+    raise TypeError(f"metadata cannot contain a {type(value).__name__}")
 
 
 _PACKER = msgpack.Packer(default=_plain, unicode_errors="replace")
@@ -61,14 +61,14 @@ class MetadataEncoder:
         self._colors = b""
 
     def palette(self, scene: Scene) -> Palette:
-        """Colours of the scene as it now is."""
+        """Return the colours of the scene in its present version."""
         if self._palette.version != scene.version:
             self._palette = palette_of(scene)
             self._colors = _packed(self._palette.entries)
         return self._palette
 
     def event(self, engine: "Engine", *, sequence_id: int, has_colors: bool) -> bytes:
-        """All metadata, packed."""
+        """Return all metadata of an event, packed."""
         scene = engine.scene
         self._refresh(scene)
         colors = b"\xc0"
@@ -90,7 +90,7 @@ class MetadataEncoder:
     def _objects(self, engine: "Engine") -> list[bytes]:
         if engine.object_filter == frozenset():
             return [_ARRAY32.pack(0xDD, 0)]
-        views = objects.views(engine.scene, engine.agent, engine.settings)
+        views = objects.object_views(engine.scene, engine.agent, engine.settings)
         wanted = engine.object_filter
         parts = [b""]
         for i, (record, view) in enumerate(zip(objects.static_records(engine.scene), views, strict=True)):
@@ -112,13 +112,13 @@ class MetadataEncoder:
 
 
 def patch(result: "Result") -> bytes:
-    """What an action that changed nothing says: AI2-THOR's `MetadataPatch`."""
+    """Pack the result of an action that changed nothing: AI2-THOR's `MetadataPatch`."""
     action_return = _packed_return(result)
     return _opened({**_outcome(result), "agentId": 0}, 1) + b"\xacactionReturn" + action_return
 
 
 def agent_fields(engine: "Engine") -> dict[str, Any]:
-    """`MetadataWrapper` without the objects, the colours and the bounds of the scene."""
+    """Return `MetadataWrapper` without the objects, the colours and the bounds of the scene."""
     agent = engine.agent
     position = vector(agent.x_m, agent.y_m, agent.z_m)
     rotation = vector(0.0, agent.yaw_deg, 0.0)
@@ -145,7 +145,7 @@ def agent_fields(engine: "Engine") -> dict[str, Any]:
         "collided": False,
         "collidedObjects": [],
         "inventoryObjects": [],
-        # Nothing is ever held, and there is no arm.
+        # The agent never holds an object and has no arm.
         "heldObjectPose": {
             "position": position,
             "rotation": rotation,
@@ -155,7 +155,7 @@ def agent_fields(engine: "Engine") -> dict[str, Any]:
         "arm": None,
         "colorBounds": None,
         "currentTime": 0.0,
-        # Filled by actions that AI2-THOR keeps for its own demos.
+        # AI2-THOR fills these in actions for its own demos only.
         "flatSurfacesOnGrid": [],
         "distances": [],
         "normals": [],
@@ -172,7 +172,7 @@ def agent_fields(engine: "Engine") -> dict[str, Any]:
 
 
 def vector(x: float, y: float, z: float) -> Vector:
-    """Unity's `Vector3`."""
+    """Return Unity's `Vector3`."""
     return {"x": x, "y": y, "z": z}
 
 
@@ -186,12 +186,12 @@ def _outcome(result: "Result") -> dict[str, Any]:
 
 
 def _packed_return(result: "Result") -> bytes:
-    """What the action returned; the action fails if that cannot be sent."""
+    """Pack what the action returned; fail the action if that cannot be sent."""
     try:
         return _packed(result.action_return)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
         result.is_success, result.action_return = False, None
-        result.error_message = f"{result.action} returned what cannot be sent: {error}"
+        result.error_message = f"{result.action} returned a value that cannot be sent: {error}"
         return b"\xc0"
 
 
@@ -200,14 +200,14 @@ def _static(record: Mapping[str, Any]) -> bytes:
 
 
 def _opened(fields: Mapping[str, Any], num_more: int) -> bytes:
-    """A packed map that `num_more` pairs are to be appended to."""
-    # Maps of 16 pairs and more have a header of three bytes, smaller ones of one.
+    """Return a packed map to which `num_more` pairs can be appended."""
+    # A map of 16 or more pairs has a header of three bytes, a smaller one a header of one byte.
     packed = memoryview(_packed(fields))[3 if len(fields) > 15 else 1 :]
     return _MAP16.pack(0xDE, len(fields) + num_more) + packed
 
 
 def scene_bounds(scene: Scene) -> dict[str, Any] | None:
-    """AI2-THOR's `SceneBounds`: the box around everything."""
+    """Return AI2-THOR's `SceneBounds`, the box around everything; `None` for an empty scene."""
     bodies = scene.simulator.objects if scene.house is not None else ()
     if not bodies:
         return None

@@ -1,7 +1,7 @@
-"""AI2-THOR's FIFO transport: two named pipes that the client makes, messages of typed fields.
+"""Speak AI2-THOR's FIFO transport: messages of typed fields over two named pipes that the client makes.
 
-Framing, of `ai2thor.fifo_server`: a field is a header `!BI` (type, length) and a body; type 255 with length 0 ends the
-message. The client asks with one ACTION field and is answered with METADATA, or METADATA_PATCH, and images.
+Framing, from `ai2thor.fifo_server`: a field is a header `!BI` (type, length) and a body; type 255 with length 0 ends
+the message. The client sends one ACTION field. The answer is METADATA, or METADATA_PATCH, and images.
 """
 
 import errno
@@ -16,25 +16,25 @@ from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-if TYPE_CHECKING:  # NumPy takes longer to import than all else; the pipes are open by then.
+if TYPE_CHECKING:  # NumPy takes longer to import than all the rest; the pipes must be open by then.
     from numpy.typing import NDArray
 
 Body: TypeAlias = "bytes | NDArray[Any]"
-"""Of a field; an array goes out as it lies in memory."""
+"""Body of a field; an array is sent as it lies in memory."""
 
 MAX_MESSAGE_BYTES = 256 * 2**20
-"""Larger than any house; a longer field is a broken header."""
+"""Limit of a field's length: larger than any house, so a longer field means a broken header."""
 
 _HEADER = struct.Struct("!BI")
-# The client opens its end as soon as it has started the process. Who has not by then is dead, even where the engine was
-# adopted too early to notice.
+# The client opens its end as soon as it has started the process. A client that has not done so by then is dead, even if
+# the engine was adopted by another process too early to notice.
 _CONNECT_TIMEOUT_S = 5.0
 _WATCH_MS = 500
-# A client amid a message reads on at once.
+# A client in the middle of a message continues to read at once.
 _STALL_MS = 500
-# Linux's; a whole event fits, so that engine and client change places once a step.
+# Linux's fcntl command. A whole event fits, so engine and client take turns once a step.
 _SET_PIPE_SIZE, _PIPE_BYTES = 1031, 2**20
-# Of one `writev`; POSIX grants 16, Linux 1024.
+# Number of buffers of one `writev`; POSIX allows 16, Linux 1024.
 _MAX_BUFFERS = 256
 
 
@@ -59,31 +59,31 @@ Field: TypeAlias = "tuple[FieldType, Body]"
 
 
 class ClientGone(Exception):  # noqa: N818 - how a session ends
-    """Nobody is at the other end any more."""
+    """The client is not at the other end any more."""
 
 
 class FramingError(Exception):
-    """The client broke the framing; there is no way to find the next message."""
+    """The client broke the framing, so the next message cannot be found."""
 
 
 class Fifo:
     """The engine's ends of both pipes.
 
-    No call outlasts the client by more than a second: a closed pipe wakes every wait, and where something else holds
-    the pipes open (a fork of the client), `is_orphan` tells.
+    No call outlasts the client by more than a second. A closed pipe ends every wait; where another process holds the
+    pipes open (a fork of the client), `is_orphan` ends it.
     """
 
     def __init__(self, server_pipe: Path, client_pipe: Path, is_orphan: Callable[[], bool]) -> None:
-        """Opens the pipes; the client waits for that.
+        """Open the pipes; the client waits for that.
 
         Args:
-            server_pipe: Which the engine writes.
-            client_pipe: Which the engine reads.
+            server_pipe: The pipe that the engine writes.
+            client_pipe: The pipe that the engine reads.
             is_orphan: Whether the process that started the engine is gone.
 
         Raises:
             ClientGone: Nobody reads the server pipe.
-            OSError: A path is no pipe that can be opened.
+            OSError: A path is not a pipe that can be opened.
         """
         self.is_orphan = is_orphan
         self._pending = bytearray()
@@ -94,17 +94,17 @@ class Fifo:
         self._in = os.open(client_pipe, os.O_RDONLY | os.O_NONBLOCK)
 
     def receive(self) -> bytes:
-        """The next action, as JSON.
+        """Return the next action, as JSON.
 
         Raises:
-            ClientGone: There is none.
-            FramingError: The bytes are no message.
+            ClientGone: The client is gone, so there is no action.
+            FramingError: The bytes are not a message.
         """
         body: bytes | None = None
         while True:
             kind, num_bytes = _HEADER.unpack(self._read(_HEADER.size, is_start=body is None))
             if kind == FieldType.END_OF_MESSAGE and num_bytes == 0 and body is not None:
-                if self.is_orphan():  # a client that never pauses keeps `_wait` from asking
+                if self.is_orphan():  # `_wait` does not check it for a client that never pauses
                     raise ClientGone("the process that started the engine is gone")
                 return body
             if kind != FieldType.ACTION or body is not None:
@@ -114,10 +114,10 @@ class Fifo:
             body = self._read(num_bytes)
 
     def send(self, fields: Iterable[Field]) -> None:
-        """Sends one message.
+        """Send one message.
 
         Raises:
-            ClientGone: Nobody reads it.
+            ClientGone: The client does not read the message.
         """
         self._is_sending = True
         buffers: list[memoryview] = []
@@ -129,9 +129,10 @@ class Fifo:
         self._is_sending = False
 
     def close(self) -> None:
-        """Closes both pipes, and wakes a client that waits for an answer.
+        """Close both pipes, and wake a client that waits for an answer.
 
-        Its reader takes a closed pipe for a slow one and waits for its timeout, 100 s; at an empty message it raises.
+        The client takes a closed pipe for a slow engine and waits for its timeout, 100 s. An empty message makes it
+        raise.
         """
         if self._is_sending:
             self.break_off()
@@ -142,14 +143,14 @@ class Fifo:
         os.close(self._in)
 
     def stop_reading(self) -> None:
-        """Closes the client's pipe alone, so that a client that writes sees that nobody else reads it."""
+        """Close the client's pipe alone, so that a client that writes sees that no other process reads it."""
         os.close(self._in)
 
     def break_off(self) -> None:
-        """Wakes a client wherever in a message it waits.
+        """Wake a client wherever in a message it waits.
 
-        Zeros complete any field; more of them are a header of no type, at which it raises. An end of the message would
-        be taken for the end of a good one.
+        Zeros complete any field. More zeros are a header of an unknown type, at which the client raises. The end of a
+        message would make the client accept a broken message.
         """
         poll = select.poll()
         poll.register(self._out, select.POLLOUT)
@@ -161,7 +162,7 @@ class Fifo:
         deadline_s = time.monotonic() + _CONNECT_TIMEOUT_S
         while time.monotonic() < deadline_s:
             try:
-                # Blocking, it would wait for a client that may be dead.
+                # A blocking call would wait for a client that may be dead.
                 return os.open(path, os.O_WRONLY | os.O_NONBLOCK)
             except OSError as error:
                 if error.errno != errno.ENXIO:
@@ -202,7 +203,7 @@ class Fifo:
                 buffers[0] = buffers[0][num_sent:]
 
     def _wait(self, file: int, event: int) -> None:
-        """Until `file` is ready; a pipe without a reader is an error on its writing end, whatever we wait for."""
+        """Wait until `file` is ready; a pipe without a reader is always an error on its writing end."""
         poll = select.poll()
         poll.register(self._out, 0)
         poll.register(file, event)

@@ -1,8 +1,8 @@
-"""Sees to it that `evonav-thor` never goes without a word.
+"""Make sure that the client notices the end of `evonav-thor`.
 
-AI2-THOR's client takes the end of its pipe for an engine that is slow, and waits for its timeout, 100 s. So the process
-that it starts serves nothing: it forks the worker that does, keeps the pipe open, and breaks off the message of a
-worker that was killed. Killed itself, it is missed by the worker, which says goodbye.
+AI2-THOR's client takes a closed pipe for a slow engine and waits for its timeout, 100 s. So the process that the client
+starts does not serve it. It forks a worker that does, keeps the pipe open, and breaks off the message of a worker that
+was killed. If the supervisor itself is killed, the worker notices and ends the session.
 """
 
 import os
@@ -13,23 +13,23 @@ from contextlib import suppress
 from evonav.thor.transport.fifo import Fifo
 
 _WATCH_MS = 500
-# For the worker to finish its action and say goodbye.
+# Time for the worker to finish its action and close its pipes.
 _GRACE_MS = 3000
 
 
 def fork_worker(fifo: Fifo) -> int | None:
-    """Forks: returns in both processes, in the supervisor only when the worker has ended.
+    """Fork a worker; return in both processes, in the supervisor only when the worker has ended.
 
-    A worker that was killed takes the supervisor with it, by the same signal.
+    If the worker was killed, the supervisor ends by the same signal.
 
     Args:
-        fifo: Open, and from now on the worker's.
+        fifo: The open transport; from now on the worker's.
 
     Returns:
-        Exit status of the worker; None in the worker, which is to serve.
+        The worker's exit status; `None` in the worker, which must serve the client.
     """
     supervisor_pid = os.getpid()
-    # Nothing is ever written here: the end of the worker closes it.
+    # Nothing is ever written to this pipe: the end of the worker closes it.
     ended, lifeline = os.pipe()
     worker_pid = os.fork()
     if worker_pid == 0:
@@ -44,7 +44,7 @@ def fork_worker(fifo: Fifo) -> int | None:
         while not poll.poll(_WATCH_MS) and not fifo.is_orphan():
             pass
     finally:
-        # Also where a signal ends the supervisor.
+        # A signal that ends the supervisor comes here too.
         status = _end(worker_pid, poll)
     if status < 0:
         fifo.break_off()
@@ -55,7 +55,7 @@ def fork_worker(fifo: Fifo) -> int | None:
 
 
 def _end(worker_pid: int, poll: select.poll) -> int:
-    """Status of the worker, minus the signal's number if one killed it; asks it to end if it has not."""
+    """Return the worker's status, minus the signal's number if one killed it; first end a worker that still runs."""
     for number in (signal.SIGTERM, signal.SIGKILL):
         if not poll.poll(0):
             os.kill(worker_pid, number)

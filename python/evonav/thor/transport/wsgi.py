@@ -1,7 +1,7 @@
-"""AI2-THOR's WSGI transport: the engine posts each event to the client's HTTP server, which answers with an action.
+"""Speak AI2-THOR's WSGI transport: post each event to the client's HTTP server, which answers with an action.
 
-Of `ai2thor.wsgi_server`: `POST /train`, a multipart form with the fields `metadata` (JSON) and `token`, and the images
-as files. The answer, JSON, comes when the client takes its next step, so the engine waits in the request.
+The form, from `ai2thor.wsgi_server`: `POST /train`, multipart, with the fields `metadata` (JSON) and `token`, and the
+images as files. The JSON answer comes when the client takes its next step, so the engine waits in the request.
 """
 
 import http.client
@@ -27,28 +27,28 @@ _NAMES = {
     FieldType.THIRD_PARTY_CLASSES: "image_thirdParty_classes",
 }
 _WATCH_MS = 500
-# For what the client does at once: taking the connection, and sending the rest of an answer it began.
+# Time for what the client does at once: accepting the connection, and sending the rest of an answer.
 _TIMEOUT_S = 10.0
 
 
 class Wsgi:
-    """The engine's side of the exchange, with the methods of `Fifo`."""
+    """The engine's side of the connection, with the methods of `Fifo`."""
 
     def __init__(self, host: str, port: int, token: str, is_orphan: Callable[[], bool]) -> None:
-        """Takes the address; nothing is sent yet.
+        """Store the address; nothing is sent yet.
 
         Args:
-            host: Of the client's server; this machine.
-            port: Likewise.
-            token: Sent with each event: the client refuses those of other engines.
+            host: Address of the client's server, on this machine.
+            port: Port of the client's server.
+            token: Secret sent with each event: the client refuses events of other engines.
             is_orphan: Whether the process that started the engine is gone.
 
         Raises:
-            ValueError: The address is not of this machine.
+            ValueError: The address is not on this machine.
         """
         if not is_loopback(host):
             message = (
-                f"{host} is not an address of this machine alone (127.0.0.1, ::1, localhost): nothing is sent there"
+                f"the client's address {host} is not on this machine (127.0.0.1, ::1, localhost): nothing is sent there"
             )
             raise ValueError(message)
         self._token = token
@@ -56,10 +56,10 @@ class Wsgi:
         self._connection = http.client.HTTPConnection(host, port, timeout=_TIMEOUT_S)
 
     def send(self, fields: Iterable[Field]) -> None:
-        """Posts one event.
+        """Post one event.
 
         Raises:
-            ClientGone: Nobody takes it.
+            ClientGone: The client does not accept the event.
         """
         boundary = secrets.token_hex(16)
         body = _form(fields, self._token, boundary)
@@ -70,11 +70,11 @@ class Wsgi:
             raise ClientGone(f"the client takes no event: {error}") from error
 
     def receive(self) -> bytes:
-        """The next action, as JSON: the answer to the event.
+        """Return the next action, as JSON: the answer to the event.
 
         Raises:
-            ClientGone: There is none.
-            FramingError: The client refused the event, or its answer is none.
+            ClientGone: The client is gone, so there is no action.
+            FramingError: The client refused the event, or its answer is not an action.
         """
         try:
             self._wait()
@@ -92,11 +92,11 @@ class Wsgi:
         return body
 
     def close(self) -> None:
-        """Closes the connection; a client that waits for an event sees that the process has ended."""
+        """Close the connection; a client that waits for an event sees that the process has ended."""
         self._connection.close()
 
     def _wait(self) -> None:
-        """Until the client answers: for as long as it likes, if it is there."""
+        """Wait until the client answers, as long as it exists."""
         socket = self._connection.sock
         if socket is None:
             raise ClientGone("the client closed the connection")
@@ -108,7 +108,7 @@ class Wsgi:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether an address is this machine's own and nobody else's."""
+    """Return whether an address belongs to this machine alone."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -116,7 +116,7 @@ def is_loopback(host: str) -> bool:
 
 
 def _is_goodbye(body: bytes) -> bool:
-    """Whether the message is the one that `Server.stop` sends: no action at all."""
+    """Return whether the message is the one that `Server.stop` sends, which has no action."""
     if len(body) > 64:
         return False
     try:
@@ -127,7 +127,7 @@ def _is_goodbye(body: bytes) -> bool:
 
 
 def _form(fields: Iterable[Field], token: str, boundary: str) -> bytes:
-    """A multipart form, its headers spelled as the client's own parser needs them."""
+    """Return a multipart form, with headers spelled as the client's parser needs them."""
     parts: list[bytes] = []
 
     def add(kind: str, disposition: str, content: bytes) -> None:
@@ -150,9 +150,9 @@ def _form(fields: Iterable[Field], token: str, boundary: str) -> bytes:
 
 
 def _json_of(packed: Body) -> bytes:
-    """Metadata, which the engine packs for the FIFO transport, as JSON."""
+    """Return metadata, which the engine packs for the FIFO transport, as JSON."""
     metadata = msgpack.unpackb(packed, strict_map_key=False, unicode_errors="surrogatepass")
     try:
         return to_json(metadata, inf_nan_mode="constants")
-    except ValueError:  # half of a surrogate pair, which JSON can say and UTF-8 cannot
+    except ValueError:  # half of a surrogate pair, which JSON can express and UTF-8 cannot
         return json.dumps(metadata, separators=(",", ":")).encode()
