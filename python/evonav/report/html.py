@@ -20,10 +20,10 @@ from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import VIEW_DIR, map_css, map_name, outcome_words, stage_svg
 from evonav.report.maps.svg import slug
 from evonav.report.page import packed, page_environment, policy, text_of
+from evonav.report.replay_pages import ListedPage, listed_pages, viewer_css, viewer_js
 from evonav.report.run import Run, StageOutcome, Task, load_run
 from evonav.report.run_figures import run_figures
 from evonav.report.telling import telling_episodes
-from evonav.report.viewer import ListedPage, listed_pages, viewer_css, viewer_js
 from evonav.significance import Interval
 
 MAX_OPEN_STAGES = 400

@@ -3,12 +3,10 @@
 What is drawn comes from `evonav.evaluation.traced`; no agent, model or task is read here.
 """
 
-import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from markupsafe import Markup
 
@@ -17,13 +15,14 @@ from evonav.evaluation.records import StageMap, StageRecord
 from evonav.evaluation.traced import TracedStage
 from evonav.report.maps.floor_plan import Frame, floors, furniture, item_labels, labels, structure
 from evonav.report.maps.legend import ENTRIES, legend_html
-from evonav.report.maps.stage_map import map_css, outcome_words, page_name, task_frame
+from evonav.report.maps.stage_map import outcome_words, page_name, task_frame
 from evonav.report.maps.svg import cm
 from evonav.report.maps.trajectory import change, end_mark, ring, start_mark, target_mark
 from evonav.report.page import page_environment, policy, text_of
+from evonav.report.replay_pages import LIST_NAME, ListedPage, listed_pages, page_code, viewer_css, viewer_js
 from evonav.report.viewer_data import PageData
 
-INDEX_NAME, LIST_NAME = "index.html", "pages.json"
+INDEX_NAME = "index.html"
 MAX_PAGE_BYTES = 10_000_000
 """An episode whose page would be larger is written a stage a page."""
 _SHARED_MARKS = ("start", "end, success", "end, no success", "target", "where it stood in stage 1", "success radius")
@@ -41,27 +40,6 @@ class StageDrawing:
     change: Markup
     target: Markup
     ends: Markup
-
-
-@dataclass(frozen=True, slots=True)
-class ListedPage:
-    """A page in the list beside the pages."""
-
-    agent: str
-    task_id: str
-    href: str
-    stages: list[list[Any]]
-    """Number, state and words."""
-    differs: bool
-    records_sha256: str
-    """Of the episode's records that it shows."""
-    code: str
-    """Digest of the page's own style and script."""
-
-    @property
-    def is_current(self) -> bool:
-        """Whether the page is what would be written now."""
-        return self.code == _code()
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,37 +102,12 @@ def write_index(pages: Iterable[WrittenPage], out_dir: Path, run_name: str) -> P
     for page in pages:
         stages = [[record.stage, record.state.value, outcome_words(record)] for record in page.stages]
         name = page.path.name
-        rows[name] = ListedPage(page.agent, page.task_id, name, stages, page.differs, page.records_sha256, _code())
+        rows[name] = ListedPage(page.agent, page.task_id, name, stages, page.differs, page.records_sha256, page_code())
     ordered = sorted(rows.values(), key=lambda row: (row.task_id, row.agent, row.stages[0][0]))
     _save(out_dir / LIST_NAME, json.dumps([asdict(row) for row in ordered], indent=1) + "\n")
     css = text_of("report.css")
     template = page_environment().get_template("viewer_index.html.j2")
     return _save(out_dir / INDEX_NAME, template.render(name=run_name, rows=ordered, css=css, policy=policy((css,))))
-
-
-def listed_pages(view_dir: Path) -> list[ListedPage]:
-    """Pages that are there; a list that cannot be read, or is another version's, is empty."""
-    try:
-        rows = json.loads((view_dir / LIST_NAME).read_text(encoding="utf-8"))
-        pages = [ListedPage(**row) for row in rows]
-        # Names from a file: only those of this folder.
-        return [page for page in pages if page.stages and page.href in {path.name for path in view_dir.iterdir()}]
-    except (OSError, ValueError, TypeError):
-        return []
-
-
-def viewer_css() -> Markup:
-    """The style of an episode's page."""
-    return text_of("report.css") + map_css() + text_of("viewer.css")
-
-
-def viewer_js() -> Markup:
-    """The script of an episode's page."""
-    return text_of("viewer.js")
-
-
-def _code() -> str:
-    return hashlib.sha256((viewer_css() + viewer_js() + text_of("viewer.html.j2")).encode()).hexdigest()
 
 
 def _tabs(stages: Sequence[TracedStage], here: Sequence[TracedStage]) -> list[tuple[str, int, str, int]]:
