@@ -18,7 +18,7 @@ from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, Decisi
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.store import RunStore
-from evonav.parallel_local import one_thread_each
+from evonav.parallel.local import one_thread_each
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.pose import Pose

@@ -14,12 +14,12 @@ from pathlib import Path
 
 from test_engine import CONFIG
 
-from evonav import folders
 from evonav.errors import StoreError
 from evonav.evaluation import engine
 from evonav.evaluation.engine import evaluate, task_files
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.workers import EpisodeWork
+from evonav.parallel.pool import folders
 
 AGENT = "random-walk"
 KILL, FAIL, FAIL_ALL = 1, 2, 3

@@ -19,7 +19,7 @@ from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind
 from evonav.evaluation.store import RunStore
-from evonav.folders import writing
+from evonav.parallel.folders import writing
 from evonav.report.run import load_run
 
 TOY = Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator")

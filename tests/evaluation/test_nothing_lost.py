@@ -14,13 +14,13 @@ from power_loss import Disk, read_log
 from test_engine import CONFIG
 from toy_house import EPISODES, write_tasks
 
-from evonav import folders
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.store import RunStore
-from evonav.folders import write_atomically, writing
+from evonav.parallel.folders import write_atomically, writing
+from evonav.parallel.pool import folders
 
 HERE = Path(__file__).parent
 ONE_THREAD = dict.fromkeys(("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")

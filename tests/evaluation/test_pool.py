@@ -17,7 +17,7 @@ from evonav.evaluation.engine import RunConfig, RunRequest, evaluate, evaluate_a
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import ErrorKind
 from evonav.evaluation.store import RunStore
-from evonav.parallel import Resources
+from evonav.parallel.pool import Resources
 
 HERE = Path(__file__).parent
 AGENT = "nearest-frontier"

@@ -4,9 +4,9 @@ import sys
 
 import pytest
 
-from evonav import parallel
 from evonav.errors import InvalidArgumentError
-from evonav.parallel import EngineError, Job, WorkerLostError, WorkerPool, open_pool
+from evonav.parallel.pool import EngineError, Job, WorkerLostError, WorkerPool, open_pool
+from evonav.parallel.pool import pool as parallel
 
 
 def make_echo(settings, alive):

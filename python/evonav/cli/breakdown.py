@@ -26,7 +26,7 @@ def breakdown(
     """Shows rates by kind of stage, each with n and a 95% interval by house."""
     from rich.console import Console
 
-    from evonav.folders import write_atomically
+    from evonav.parallel.folders import write_atomically
     from evonav.report import breakdown as made
     from evonav.report.figures import check_figure, write_plots
     from evonav.report.sides import read_sides

@@ -62,7 +62,7 @@ def _write(
     import json as json_text
     from collections.abc import Callable
 
-    from evonav.folders import write_atomically
+    from evonav.parallel.folders import write_atomically
     from evonav.report import compare_words as words
     from evonav.report.compare import comparison_json
     from evonav.report.compare_page import comparison_page, comparison_plot

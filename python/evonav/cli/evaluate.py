@@ -210,7 +210,7 @@ def _evaluate(
     **crew: Any,  # noqa: ANN401 - of `evaluate`
 ) -> "list[AgentSummary]":
     from evonav.evaluation.engine import evaluate
-    from evonav.parallel import Resources
+    from evonav.parallel.pool import Resources
 
     with interruptible(out):
         with status("Starting the simulator"):

@@ -16,7 +16,7 @@ def measures(
     """Shows success by several definitions, stale entries believed, memory, and what a stage costs."""
     from rich.console import Console
 
-    from evonav.folders import write_atomically
+    from evonav.parallel.folders import write_atomically
     from evonav.report.measures_tables import measures_tables
 
     names = None if agents is None else [name.strip() for name in agents.split(",") if name.strip()]

@@ -33,7 +33,7 @@ def paper(
     from rich.console import Console
 
     from evonav.errors import StoreError
-    from evonav.folders import write_atomically
+    from evonav.parallel.folders import write_atomically
     from evonav.report.paper import paper_markdown, paper_tables, power_table
     from evonav.report.paper_latex import paper_latex
     from evonav.report.run import load_run

@@ -19,8 +19,8 @@ from evonav.evaluation.running import Progress, Run, TaskFile, run_all
 from evonav.evaluation.sessions import note_session
 from evonav.evaluation.store import FILE_NAME, RunStore
 from evonav.evaluation.workers import WORK, EpisodeJob, Setup
-from evonav.folders import check_same_run, write_atomically, writing
-from evonav.parallel import EngineName, Resources, open_pool
+from evonav.parallel.folders import check_same_run, write_atomically, writing
+from evonav.parallel.pool import EngineName, Resources, open_pool
 from evonav.perception.words import word_of
 from evonav.tasks.files import task_roots
 from evonav.tasks.subsets import subset_roots

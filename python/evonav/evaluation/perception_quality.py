@@ -30,8 +30,8 @@ from evonav.evaluation.perception_rows import Matched, Rows
 from evonav.evaluation.perception_tour import tour
 from evonav.evaluation.protocol import EpisodeCase
 from evonav.evaluation.running import TaskFile
-from evonav.folders import check_same_run, writing
-from evonav.parallel import Job, answers, open_pool
+from evonav.parallel.folders import check_same_run, writing
+from evonav.parallel.pool import Job, answers, open_pool
 from evonav.perception import Percept, Perception, StageScene
 from evonav.sensors.observation import Detections
 from evonav.world.pose import Pose
@@ -204,7 +204,7 @@ def _claim_models(header: Header, specs: Sequence[PerceptionSpec], out: Path, si
 
 
 def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
-    """The function from a job to its record, as `evonav.parallel` calls it."""
+    """The function from a job to its record, as `evonav.parallel.pool` calls it."""
     values = json.loads(settings)
     config = TourConfig(**values["config"])
     simulator = Backend(simulator=values["simulator"]).make_simulator()

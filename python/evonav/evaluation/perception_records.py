@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from evonav.errors import StoreError
-from evonav.folders import write_atomically
+from evonav.parallel.folders import write_atomically
 
 HEADER_NAME = "perception.json"
 RECORD_DIR = "records"

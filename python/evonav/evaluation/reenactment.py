@@ -142,7 +142,7 @@ def _checkable(record: StageRecord) -> str:
 
 
 def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
-    """What a worker of `evonav.parallel` does: a job is a task's folder and records, its answer the differences.
+    """What a worker of `evonav.parallel.pool` does: a job is a task's folder and records, its answer the differences.
 
     Args:
         settings: `protocol`, `simulator` and `simulator_options`, as JSON.

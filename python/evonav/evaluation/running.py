@@ -16,7 +16,7 @@ from evonav.evaluation.protocol import (
 from evonav.evaluation.records import EndState, ErrorKind, StageFailure, StageRecord
 from evonav.evaluation.store import RunStore
 from evonav.evaluation.workers import RETRIED, EpisodeJob, Setup, read_news
-from evonav.parallel import Answer, Job, Pool
+from evonav.parallel.pool import Answer, Job, Pool
 
 
 @dataclass(frozen=True, slots=True)

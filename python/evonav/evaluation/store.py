@@ -23,7 +23,7 @@ from evonav.errors import StoreError
 from evonav.evaluation.costs import StageCosts
 from evonav.evaluation.measures import MEASURES_VERSION, kept_measures
 from evonav.evaluation.records import SCHEMA_VERSION, EndState, ErrorKind, StageFailure, StageMap, StageRecord
-from evonav.folders import is_on_network, sync_folder
+from evonav.parallel.folders import is_on_network, sync_folder
 
 FILE_NAME = "records.sqlite"
 _ADD_FAILURE = (

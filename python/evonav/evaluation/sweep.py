@@ -36,8 +36,8 @@ from evonav.evaluation.engine import (
 from evonav.evaluation.settings import Books, SpendingSettings, try_decisions
 from evonav.evaluation.store import FILE_NAME, RunStore
 from evonav.evaluation.sweep_file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
-from evonav.folders import write_atomically, writing
-from evonav.parallel import Resources
+from evonav.parallel.folders import write_atomically, writing
+from evonav.parallel.pool import Resources
 
 SWEEP_NAME, RUNS_NAME = "sweep.json", "runs"
 SCHEMA_VERSION = 1

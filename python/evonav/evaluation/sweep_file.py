@@ -23,7 +23,7 @@ from evonav.evaluation.settings import (
     SimulatorSettings,
 )
 from evonav.evaluation.sweep_words import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed, loaded
-from evonav.parallel import EngineName
+from evonav.parallel.pool import EngineName
 from evonav.tasks.subsets import SubsetError, parse_subset
 
 BUNDLED = "bundled"

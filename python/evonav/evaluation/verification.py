@@ -20,7 +20,7 @@ from evonav.evaluation.privileged import YARDSTICKS
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState, StageRecord
 from evonav.evaluation.submission import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
-from evonav.parallel import Job, answers, open_pool
+from evonav.parallel.pool import Job, answers, open_pool
 
 MAX_WORDS = 5
 """Findings told of one check; the others are counted."""

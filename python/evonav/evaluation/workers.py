@@ -1,4 +1,4 @@
-"""What a worker of `evonav.parallel` does in an evaluation: an episode a job, told stage by stage.
+"""What a worker of `evonav.parallel.pool` does in an evaluation: an episode a job, told stage by stage.
 
 Agents run in processes of their own (`agent_process.py`), unless they are yardsticks or it is switched off. A worker
 that dies or hangs costs its episode, not the run.
@@ -212,7 +212,7 @@ def _attempt(case: EpisodeCase, job: EpisodeJob, workplace: Workplace) -> Genera
 
 
 class EpisodeWork:
-    """A worker's, as `evonav.parallel` calls it. Cells of a sweep share it: each setup has a workplace."""
+    """A worker's, as `evonav.parallel.pool` calls it. Cells of a sweep share it: each setup has a workplace."""
 
     def __init__(self, _settings: str, alive: Callable[[], None]) -> None:
         self._alive = alive

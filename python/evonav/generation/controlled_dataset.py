@@ -9,14 +9,14 @@ from pathlib import Path
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError, TaskError
-from evonav.folders import sha256_of_file, writing
 from evonav.generation.controlled import ControlledOptions, generate_arms
 from evonav.generation.engine import Workforce
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.worker import PARTIAL_NAME, is_whole, outcome_of, worker_of
 from evonav.house import House
 from evonav.house.files import HouseText, HouseTexts
-from evonav.parallel import Job, answers, open_pool
+from evonav.parallel.folders import sha256_of_file, writing
+from evonav.parallel.pool import Job, answers, open_pool
 from evonav.tasks.controlled import ControlledRecord, tasks_of, write_controlled
 from evonav.tasks.dataset import (
     DatasetRecord,
@@ -112,7 +112,7 @@ def _job(index: int, houses: Sequence[HouseText], options: ControlledOptions) ->
 
 
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
-    """The function from a house to its `Outcome`, as `evonav.parallel` calls it.
+    """The function from a house to its `Outcome`, as `evonav.parallel.pool` calls it.
 
     Args:
         settings: `{"out": ..., "options": ...}`.

@@ -16,12 +16,12 @@ from pathlib import Path
 
 from evonav._core import __version__
 from evonav.errors import HouseError, InvalidArgumentError, TaskError
-from evonav.folders import sha256_of_file, writing
 from evonav.generation.house_order import house_order, wanted_of
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.worker import PARTIAL_NAME, WORK, GenerationOptions, is_whole, outcome_of
 from evonav.house.files import HouseTexts, named_set
-from evonav.parallel import Answer, EngineName, Job, Pool, open_pool
+from evonav.parallel.folders import sha256_of_file, writing
+from evonav.parallel.pool import Answer, EngineName, Job, Pool, open_pool
 from evonav.tasks.dataset import (
     DATASET_NAME,
     DatasetRecord,

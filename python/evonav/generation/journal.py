@@ -13,8 +13,8 @@ from typing import Any, get_args
 from pydantic import NonNegativeInt, ValidationError
 
 from evonav.errors import StoreError
-from evonav.folders import check_same_run, write_atomically
-from evonav.parallel import FailureKind
+from evonav.parallel.folders import check_same_run, write_atomically
+from evonav.parallel.pool import FailureKind
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.records import Record, Sha256
 

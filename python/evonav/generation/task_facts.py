@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 
 from evonav.errors import HouseError, TaskError
 from evonav.house import House
-from evonav.parallel import Answer, Job, answers, open_pool
+from evonav.parallel.pool import Answer, Job, answers, open_pool
 from evonav.tasks.manifest import PublicStage, Task, TaskHeader
 from evonav.tasks.oracle import Evolution, OracleStage
 from evonav.tasks.records import parse_record, read_file, read_gzip
@@ -259,7 +259,7 @@ def read_all_facts(roots: Sequence[Path], *, num_workers: int = 1) -> Iterator[T
 
 
 def make_reader(_settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
-    """The function from a JSON list of folders to their facts, or `{"error": ...}`, as `evonav.parallel` calls it."""
+    """Return the function from a JSON list of folders to their facts, or `{"error": ...}`."""
 
     def read(text: str) -> str:
         found = []

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import EvonavError, HouseError, InvalidArgumentError, SimulationError, StoreError, TaskError
-from evonav.folders import put_folder, sha256_of_file
 from evonav.generation.journal import Outcome
 from evonav.generation.pipeline import TaskRejectedError, generate_task, short_name
 from evonav.house import House
-from evonav.parallel import Answer
+from evonav.parallel.folders import put_folder, sha256_of_file
+from evonav.parallel.pool import Answer
 from evonav.tasks import write_task
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import GenerationParameters, Task
@@ -63,7 +63,7 @@ class GenerationOptions:
 
 
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
-    """The function from a house to its `Outcome`, as `evonav.parallel` calls it.
+    """The function from a house to its `Outcome`, as `evonav.parallel.pool` calls it.
 
     Args:
         settings: `{"out": ..., "options": ...}`.

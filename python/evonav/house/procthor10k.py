@@ -14,8 +14,8 @@ from typing import Literal, NamedTuple
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from evonav.errors import InvalidArgumentError
-from evonav.folders import sha256_of_file
 from evonav.house.dataset_errors import DatasetCorruptError, DatasetMissingError
+from evonav.parallel.folders import sha256_of_file
 
 Split = Literal["train", "val", "test"]
 

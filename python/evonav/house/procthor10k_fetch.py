@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 from evonav.downloads import TIMEOUT_S, download
 from evonav.errors import StoreError
-from evonav.folders import sha256_of_file, write_atomically
 from evonav.house.dataset_errors import (
     DatasetAccessError,
     DatasetCorruptError,
@@ -36,6 +35,7 @@ from evonav.house.procthor10k import (
     dataset_folder,
     read_manifest,
 )
+from evonav.parallel.folders import sha256_of_file, write_atomically
 
 COMMITS = f"https://api.github.com/repos/allenai/{NAME}/commits"
 """Say which commit a tag or a branch is."""

@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 from evonav.downloads import download
 from evonav.errors import PerceptionError, StoreError
-from evonav.folders import sha256_of_file, write_atomically
+from evonav.parallel.folders import sha256_of_file, write_atomically
 
 MODELS_VARIABLE = "EVONAV_MODELS"
 LOCK_NAME = "evonav-models.json"

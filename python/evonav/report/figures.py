@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.folders import write_atomically
+from evonav.parallel.folders import write_atomically
 from evonav.report.line_chart import COLOURS
 from evonav.report.panels import Panel, paper_panels
 from evonav.report.plots import CurvePlot, GapPlot, GroupPlot, Plot, gap_range, group_range, plot_svg

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from evonav.evaluation.perception_other_scores import measure_values
 from evonav.evaluation.perception_records import read_header, read_records
 from evonav.evaluation.perception_scores import Scores, differences, scores
-from evonav.folders import write_atomically
+from evonav.parallel.folders import write_atomically
 from evonav.report.line_chart import PLOT_CSS
 from evonav.report.page import page_environment, policy, text_of
 from evonav.report.perception_figures import confusion_figures, feature_figures, perception_figures

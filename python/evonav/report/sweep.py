@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.evaluation.sweep_row import AXES, STATES, SweepRow
-from evonav.folders import write_atomically
+from evonav.parallel.folders import write_atomically
 from evonav.report.tables import Table, percent
 
 

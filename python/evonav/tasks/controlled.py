@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeInt, PositiveInt
 
 from evonav.errors import TaskError
-from evonav.folders import write_atomically
+from evonav.parallel.folders import write_atomically
 from evonav.tasks.dataset import HouseRejection, SourceFile
 from evonav.tasks.manifest import GenerationParameters, TaskId
 from evonav.tasks.records import Id, Probability, Record, parse_record, read_file, record_bytes

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeInt, PositiveInt
 
 from evonav.errors import StoreError, TaskError
-from evonav.folders import write_atomically
+from evonav.parallel.folders import write_atomically
 from evonav.tasks.manifest import GenerationParameters, Task, TaskId
 from evonav.tasks.records import Id, Record, Sha256, field_error, parse_record, read_file, record_bytes, sha256_of
 

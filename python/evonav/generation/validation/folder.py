@@ -9,7 +9,7 @@ from pathlib import Path
 from evonav.errors import TaskError
 from evonav.generation.validation.problems import Problem, Report
 from evonav.generation.validation.task import validate_files
-from evonav.parallel import Answer, Job, answers, open_pool
+from evonav.parallel.pool import Answer, Job, answers, open_pool
 from evonav.tasks.dataset import DATASET_NAME, check_dataset, read_dataset
 from evonav.tasks.files import task_roots
 
@@ -84,7 +84,7 @@ def validate_folder(
 
 
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
-    """The function from a task's folder to its `Report`, as `evonav.parallel` calls it."""
+    """The function from a task's folder to its `Report`, as `evonav.parallel.pool` calls it."""
     allow = bool(json.loads(settings)["allow_unknown_assets"])
     return lambda root: validate_files(root, allow_unknown_assets=allow).model_dump_json()
 

@@ -8,7 +8,7 @@ from typing import Any
 from PIL import Image
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.folders import write_atomically
+from evonav.parallel.folders import write_atomically
 
 SUFFIXES = (".svg", ".png", ".pdf")
 ZOOM = 3

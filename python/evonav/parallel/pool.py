@@ -125,13 +125,13 @@ def open_pool(
     if ray_address is not None and engine != "ray":
         raise InvalidArgumentError(f"a Ray address is for engine ray, not {engine}")
     if engine == "ray":
-        from evonav.parallel_ray import RayHost
+        from evonav.parallel.ray import RayHost
 
         host = RayHost(work, settings, num_workers, ray_address, resources or Resources())
         return WorkerPool(host, min(num_workers, host.max_workers), timeout_s, max_losses)
     if num_workers == 0:
         return InlinePool(work, settings)
-    from evonav.parallel_local import ProcessHost
+    from evonav.parallel.local import ProcessHost
 
     return WorkerPool(ProcessHost(work, settings), num_workers, timeout_s, max_losses)
 

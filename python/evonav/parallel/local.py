@@ -1,4 +1,4 @@
-"""Workers of `evonav.parallel` as processes of this machine."""
+"""Workers of `evonav.parallel.pool` as processes of this machine."""
 
 import multiprocessing
 import os
@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from types import ModuleType
 
-from evonav.parallel import Pulse, Worker, WorkerLostError, end_work, load_work, steps
+from evonav.parallel.pool import Pulse, Worker, WorkerLostError, end_work, load_work, steps
 
 END_TIMEOUT_S = 5.0
 """For a worker to end what it has started, before it is killed."""

@@ -1,4 +1,4 @@
-"""Workers of `evonav.parallel` as Ray actors: on this machine, or on a cluster whose nodes have evonav installed."""
+"""Run workers of `evonav.parallel.pool` as Ray actors, on this machine or on a cluster whose nodes have evonav."""
 
 import math
 import os
@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any
 
 from evonav.errors import InvalidArgumentError
-from evonav.parallel import (
+from evonav.parallel.pool import (
     START_TIMEOUT_S,
     EngineError,
     Pulse,
@@ -32,7 +32,7 @@ class RayHost:
         """Joins a cluster, or begins one on this machine, unless this process is in one.
 
         Args:
-            work: As for `evonav.parallel.open_pool`.
+            work: As for `evonav.parallel.pool.open_pool`.
             settings: Likewise.
             num_workers: For which a cluster that is begun has CPUs.
             address: Of the cluster to join.
