@@ -16,10 +16,10 @@ from evonav.evaluation.backend import Backend
 from evonav.evaluation.engine import RunConfig, TaskFile, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import StageRecord
-from evonav.evaluation.reenactment import reenact
 from evonav.evaluation.store import RunStore
-from evonav.evaluation.submission import MAX_RATIO, About, SubmissionError, SubmissionFile, pack
-from evonav.evaluation.verification import verify
+from evonav.submission.pack import MAX_RATIO, About, SubmissionError, SubmissionFile, pack
+from evonav.submission.rescore import reenact
+from evonav.submission.verify import verify
 
 SELF_REPORTED = (
     r"agent",

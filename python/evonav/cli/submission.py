@@ -8,7 +8,7 @@ import typer
 from evonav.cli.options import Limit, Subset, Tasks, Workers, count_of
 
 if TYPE_CHECKING:
-    from evonav.evaluation.verification import Verdict
+    from evonav.submission.verify import Verdict
 
 EXIT_REJECTED = 1
 
@@ -24,7 +24,7 @@ def pack(
     description: Annotated[str, typer.Option(help="Model, prompts, training data: what a reader should know.")] = "",
 ) -> None:
     """Packs a run's records, configuration and task checksums into one file for a leaderboard."""
-    from evonav.evaluation.submission import SUFFIX, About, pack
+    from evonav.submission.pack import SUFFIX, About, pack
 
     run = run.absolute()
     target = out or run.with_name(run.name + SUFFIX)
@@ -56,7 +56,7 @@ def verify(
 
     from evonav.evaluation.datasets import bundled_tasks
     from evonav.evaluation.engine import task_files
-    from evonav.evaluation.verification import verdict_json, verify
+    from evonav.submission.verify import verdict_json, verify
 
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")

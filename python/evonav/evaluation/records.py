@@ -215,7 +215,7 @@ class ActionRecord(_Record):
 class SensingRecord(_Record):
     """What the agent was granted of its sensors and its motion in a stage, colours apart.
 
-    With the actions, all that it takes to carry them out again (`evonav.evaluation.reenactment`).
+    With the actions, all that it takes to carry them out again (`evonav.submission.rescore`).
     """
 
     first_round: tuple[int, float]

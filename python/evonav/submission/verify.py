@@ -19,8 +19,8 @@ from evonav.evaluation.metrics import stage_soft_spl, stage_spl
 from evonav.evaluation.privileged import YARDSTICKS
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState, StageRecord
-from evonav.evaluation.submission import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
 from evonav.parallel.pool import Job, answers, open_pool
+from evonav.submission.pack import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
 
 MAX_WORDS = 5
 """Findings told of one check; the others are counted."""
@@ -245,7 +245,7 @@ def _reenact(
         for record in mine:
             episodes.setdefault((agent, record.task_id), []).append(record)
     names = list(episodes)
-    work = "evonav.evaluation.reenactment:work"
+    work = "evonav.submission.rescore:work"
     with open_pool(work, json.dumps(settings), num_workers=num_workers, timeout_s=EPISODE_TIMEOUT_S) as pool:
         jobs = (
             Job(number, _episode_text(known[task_id].path, mine))
