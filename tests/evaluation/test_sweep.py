@@ -20,7 +20,7 @@ from evonav.decision.mock_answers import mock_answer
 from evonav.errors import EvonavError, StoreError
 from evonav.evaluation.metrics import rates
 from evonav.evaluation.store import RunStore
-from evonav.evaluation.sweep_summary import sweep_rows
+from evonav.sweeps.summary import sweep_rows
 from vlm_stub import KEY, serving
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "sweeps"

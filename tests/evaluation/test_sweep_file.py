@@ -7,9 +7,9 @@ import jsonschema
 import pytest
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.sweep import cells_of, chosen
-from evonav.evaluation.sweep_file import read_sweep, sweep_schema
-from evonav.evaluation.sweep_words import loaded
+from evonav.sweeps.file import read_sweep, sweep_schema
+from evonav.sweeps.run import cells_of, chosen
+from evonav.sweeps.shorthand import loaded
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "sweeps"
 SMALL = 'agents = ["fu"]\ntasks = ["bundled:2"]\n'

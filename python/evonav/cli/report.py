@@ -33,7 +33,7 @@ def report(
     maps: Annotated[bool, typer.Option("--maps", help="Write every stage's map as a file too, maps/*.svg.")] = False,
 ) -> None:
     """Writes a run's or a sweep's report: HTML with tables, maps, and episodes round by round (docs/report.md)."""
-    from evonav.evaluation.sweep import SWEEP_NAME
+    from evonav.sweeps.run import SWEEP_NAME
 
     if (run / SWEEP_NAME).is_file():
         typer.echo(f"report: {_report_sweep(run, out, _count(replays or 'none'), tasks, exchanges, maps)}")
@@ -60,9 +60,9 @@ def _report_sweep(
 ) -> Path:
     """A report a cell that has records, and a page that leads to them."""
     from evonav.evaluation.store import FILE_NAME
-    from evonav.evaluation.sweep import RUNS_NAME
-    from evonav.report.sweep import sweep_tables
-    from evonav.report.sweep_page import write_sweep_page
+    from evonav.sweeps.page import write_sweep_page
+    from evonav.sweeps.run import RUNS_NAME
+    from evonav.sweeps.tables import sweep_tables
 
     tables = sweep_tables(write_sweep_summary(sweep))
     reports = []

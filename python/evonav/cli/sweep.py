@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from evonav.evaluation.engine import TaskFile
-    from evonav.evaluation.sweep import Cell, CellRun
-    from evonav.evaluation.sweep_file import SweepFile
-    from evonav.evaluation.sweep_row import SweepRow
+    from evonav.sweeps.file import SweepFile
+    from evonav.sweeps.row import SweepRow
+    from evonav.sweeps.run import Cell, CellRun
 
 
 def sweep(
@@ -54,8 +54,8 @@ def sweep(
         return
     if file is None:
         raise typer.BadParameter("name a sweep file, such as examples/sweeps/noise.toml")
-    from evonav.evaluation.sweep import cell_runs, cells_of, chosen, task_sets
-    from evonav.evaluation.sweep_file import read_sweep
+    from evonav.sweeps.file import read_sweep
+    from evonav.sweeps.run import cell_runs, cells_of, chosen, task_sets
 
     flags = {
         "workers": workers,
@@ -92,7 +92,7 @@ def _run(
 ) -> None:
     """Runs what is missing; an interrupt leaves a summary of what there is."""
     from evonav.cli.sweep_display import SweepProgress, Teller, showing
-    from evonav.evaluation.sweep import run_sweep
+    from evonav.sweeps.run import run_sweep
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
@@ -129,8 +129,8 @@ def write_sweep_summary(out: Path) -> "list[SweepRow]":
     Raises:
         StoreError: There is no sweep, or it cannot be read or written.
     """
-    from evonav.evaluation.sweep_summary import sweep_json, sweep_rows
-    from evonav.report.sweep import write_sweep_files
+    from evonav.sweeps.summary import sweep_json, sweep_rows
+    from evonav.sweeps.tables import write_sweep_files
 
     rows = sweep_rows(out)
     write_sweep_files(out, rows, sweep_json(out, rows))
@@ -144,7 +144,7 @@ def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
         Whether a stage of the selected cells is.
     """
     from evonav.cli.decision_options import print_spending
-    from evonav.report.sweep import sweep_tables
+    from evonav.sweeps.tables import sweep_tables
 
     rows = write_sweep_summary(out)
     for table in sweep_tables(rows):
@@ -167,8 +167,8 @@ def _print_plan(
 
     from evonav.cli.display import status
     from evonav.evaluation.backend import check_agent_name
-    from evonav.evaluation.sweep import cell_runs
-    from evonav.evaluation.sweep_cost import cell_estimate
+    from evonav.sweeps.cost import cell_estimate
+    from evonav.sweeps.run import cell_runs
 
     for agent in dict.fromkeys(agent for cell in cells for agent in cell.agents):
         check_agent_name(agent, is_in_process=asked.in_process)
@@ -202,7 +202,7 @@ def _print_plan(
 def _print_schema() -> None:
     import json
 
-    from evonav.evaluation.sweep_file import sweep_schema
+    from evonav.sweeps.file import sweep_schema
 
     typer.echo(json.dumps(sweep_schema(), indent=2))
 

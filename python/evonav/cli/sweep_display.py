@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from evonav.evaluation.engine import Progress
-    from evonav.evaluation.sweep import Cell, CellRun
+    from evonav.sweeps.run import Cell, CellRun
 
 COST_EVERY_S = 2.0
 MAX_ROWS = 16

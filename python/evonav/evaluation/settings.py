@@ -1,6 +1,6 @@
 """A simulator, a decision model and agents' processes as people write them down, and what a run makes of them.
 
-The command line and sweep files (`evonav.evaluation.sweep`) say the same things in the same words, and go this one way
+The command line and sweep files (`evonav.sweeps.run`) say the same things in the same words, and go this one way
 to a `Backend`.
 """
 

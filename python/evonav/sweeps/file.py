@@ -22,8 +22,8 @@ from evonav.evaluation.settings import (
     Settings,
     SimulatorSettings,
 )
-from evonav.evaluation.sweep_words import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed, loaded
 from evonav.parallel.pool import EngineName
+from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed, loaded
 from evonav.tasks.subsets import SubsetError, parse_subset
 
 BUNDLED = "bundled"

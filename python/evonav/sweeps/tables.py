@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from evonav.evaluation.sweep_row import AXES, STATES, SweepRow
 from evonav.parallel.folders import write_atomically
 from evonav.report.tables import Table, percent
+from evonav.sweeps.row import AXES, STATES, SweepRow
 
 
 def write_sweep_files(out: Path, rows: Sequence[SweepRow], content: Mapping[str, Any]) -> None:

@@ -13,9 +13,9 @@ from evonav.evaluation.engine import SUMMARY_NAME, write_summary
 from evonav.evaluation.metrics import Rates, rates
 from evonav.evaluation.records import StageRecord
 from evonav.evaluation.store import FILE_NAME, RunStore
-from evonav.evaluation.sweep import RUNS_NAME, read_claim
-from evonav.evaluation.sweep_row import AXES, STATES, SweepRow
 from evonav.significance import Interval
+from evonav.sweeps.row import AXES, STATES, SweepRow
+from evonav.sweeps.run import RUNS_NAME, read_claim
 
 
 def sweep_rows(out: Path) -> list[SweepRow]:

@@ -3,7 +3,7 @@
     OUT/sweep.json      what the folder is for: settings, cells, and what makes their runs the same
     OUT/runs/CELL/      a run like any other: `evonav report`, `view`, `compare` work on it
     OUT/spending.sqlite what models cost, over all cells
-    OUT/summary.*       every cell and agent, see `evonav.evaluation.sweep_summary`
+    OUT/summary.*       every cell and agent, see `evonav.sweeps.summary`
 
 A cell's name depends on the cell alone, so that a file may gain agents and values, and the folder goes on.
 """
@@ -35,9 +35,9 @@ from evonav.evaluation.engine import (
 )
 from evonav.evaluation.settings import Books, SpendingSettings, try_decisions
 from evonav.evaluation.store import FILE_NAME, RunStore
-from evonav.evaluation.sweep_file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
 from evonav.parallel.folders import write_atomically, writing
 from evonav.parallel.pool import Resources
+from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
 
 SWEEP_NAME, RUNS_NAME = "sweep.json", "runs"
 SCHEMA_VERSION = 1

@@ -6,8 +6,8 @@ from pathlib import Path
 from evonav.decision.account import Usage
 from evonav.evaluation.estimate import estimate_run
 from evonav.evaluation.settings import SpendingSettings
-from evonav.evaluation.sweep import CellRun
-from evonav.evaluation.sweep_file import SweepFile
+from evonav.sweeps.file import SweepFile
+from evonav.sweeps.run import CellRun
 
 
 @dataclass(frozen=True, slots=True)

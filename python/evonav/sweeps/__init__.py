@@ -1,0 +1,1 @@
+"""Run many evaluations from one file and compare them."""
