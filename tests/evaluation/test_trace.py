@@ -21,8 +21,8 @@ from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig, as_errored
 from evonav.evaluation.records import EndState, ErrorKind
 from evonav.evaluation.store import RunStore
-from evonav.evaluation.trace import RunReplay
-from evonav.evaluation.traced import EXPLORED, FREE
+from evonav.replay.replay import RunReplay
+from evonav.replay.types import EXPLORED, FREE
 
 TOY = Backend(cases="toy_house:load_case", simulator="test_trace:colour_simulator")
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))

@@ -15,10 +15,10 @@ from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.settings import PerceptionSettings
 from evonav.evaluation.store import RunStore
-from evonav.evaluation.trace import RunReplay
 from evonav.perception import StageScene, weights
 from evonav.perception.predicted import predicted_perception
 from evonav.perception.vocabulary import PROCTHOR_TYPES
+from evonav.replay.replay import RunReplay
 from evonav.tasks.public import StageInput
 from evonav.world.embedded import EmbeddedSimulator
 

@@ -13,7 +13,7 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import load_case
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.store import RunStore
-from evonav.report.recording import check_recording
+from evonav.replay.rerun_export import check_recording
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig

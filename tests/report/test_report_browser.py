@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.records import EndState, StageError, StageRecord
-from evonav.evaluation.trace import RunReplay
-from evonav.evaluation.traced import TracedStage
+from evonav.replay.pages import write_episode
+from evonav.replay.replay import RunReplay
+from evonav.replay.types import TracedStage
 from evonav.report import html, write_report
 from evonav.report.maps.stage_map import page_name
-from evonav.report.viewer import write_episode
 
 HERE = Path(__file__).parent
 PROBE = (HERE / "report_probe.js").read_text("utf-8")

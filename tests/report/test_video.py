@@ -11,12 +11,12 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.trace import RunReplay
-from evonav.evaluation.traced import TracedStage
+from evonav.replay.replay import RunReplay
+from evonav.replay.types import TracedStage
+from evonav.replay.video import write_video
+from evonav.replay.video_frames import LEFTS, MAP_SIZE, SIZE, TOP, episode_frame, stage_frames
 from evonav.report.canvas import MapCanvas, colour, font, plain, wrapped
 from evonav.report.maps.floor_plan import Frame
-from evonav.report.video import write_video
-from evonav.report.video_frames import LEFTS, MAP_SIZE, SIZE, TOP, episode_frame, stage_frames
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +108,7 @@ def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path, monkeypa
         write_video([], tmp_path / "x.gif", fps=float("nan"))
     with pytest.raises(InvalidArgumentError, match="`stages` is empty"):
         write_video([], tmp_path / "x.gif")
-    monkeypatch.setattr("evonav.report.video.MAX_ANIMATION_FRAMES", 2)
+    monkeypatch.setattr("evonav.replay.video.MAX_ANIMATION_FRAMES", 2)
     with pytest.raises(InvalidArgumentError, match="name fewer stages"):
         write_video([[Image.new("RGB", (640, 360))] * 3], tmp_path / "x.gif")
     real = builtins.__import__

@@ -21,14 +21,14 @@ from evonav.cli import app
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.records import EndState
 from evonav.evaluation.store import RunStore
-from evonav.evaluation.trace import RunReplay
-from evonav.evaluation.traced import TracedEntry, TracedMap, TracedRound, TracedStage, Truth
+from evonav.replay.page_data import PageData, cells_text
+from evonav.replay.pages import write_episode
+from evonav.replay.replay import RunReplay
+from evonav.replay.types import TracedEntry, TracedMap, TracedRound, TracedStage, Truth
 from evonav.report.html import write_report
 from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import page_name
 from evonav.report.maps.svg import cm
-from evonav.report.viewer import write_episode
-from evonav.report.viewer_data import PageData, cells_text
 
 
 @pytest.fixture(scope="module")
@@ -281,7 +281,7 @@ def test_one_stage_and_pages_a_stage(
     assert result.exit_code == 0, result.output
     (path,) = (tmp_path / "a").glob("*_stage2.html")
     assert [stage["k"] for stage in data_of(path)["stages"]] == [2]
-    monkeypatch.setattr("evonav.report.viewer.MAX_PAGE_BYTES", 1000)
+    monkeypatch.setattr("evonav.replay.pages.MAX_PAGE_BYTES", 1000)
     pages = write_episode(stages, tmp_path / "b", budget=9, success_radius_m=2.0)
     assert [page.path.name for page in pages] == [page_name(task_id, "fu", k + 1) for k in range(len(stages))]
     for number, page in enumerate(pages, start=1):

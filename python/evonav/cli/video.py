@@ -12,8 +12,8 @@ from evonav.cli.view import task_path
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from evonav.evaluation.trace import RunReplay
-    from evonav.evaluation.traced import TracedStage
+    from evonav.replay.replay import RunReplay
+    from evonav.replay.types import TracedStage
 
 Task = Annotated[str | None, typer.Argument(help="Id of a task of the run; default: the most telling one.")]
 Agent = Annotated[str | None, typer.Option(help="Agent of the run; default: of the most telling episode.")]
@@ -41,8 +41,8 @@ def video(
     exchanges: Exchanges = None,
 ) -> None:
     """Films an episode: views, the agent's map and memory, and the truth side by side (docs/video.md)."""
-    from evonav.report.video import check_video, write_video
-    from evonav.report.video_frames import episode_frame, stage_frames
+    from evonav.replay.video import check_video, write_video
+    from evonav.replay.video_frames import episode_frame, stage_frames
 
     check_video(out, fps or ROUNDS_FPS, width)
     replay, agent, stages, success_radius_m = _replayed(run, task, agent, stage, tasks, exchanges, VIEW_PX)
@@ -72,7 +72,7 @@ def rerun(
     exchanges: Exchanges = None,
 ) -> None:
     """Writes an episode as a recording for rerun's viewer: one scene with views, map, memory and truth (.rrd)."""
-    from evonav.report.recording import check_recording, write_recording
+    from evonav.replay.rerun_export import check_recording, write_recording
 
     check_recording(out)
     _, agent, (stages, shown), radius_m = _replayed(
@@ -96,7 +96,7 @@ def _replayed(
 ) -> "tuple[RunReplay, str, tuple[list[TracedStage], list[TracedStage]], float]":
     """An episode, run again: its replay, agent, stages up to the last one asked for and those asked for, radius."""
     from evonav.errors import InvalidArgumentError
-    from evonav.evaluation.trace import RunReplay
+    from evonav.replay.replay import RunReplay
     from evonav.report.run import load_run
     from evonav.report.telling import telling_episodes
 

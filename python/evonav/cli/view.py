@@ -11,8 +11,8 @@ from evonav.cli.options import RunFolder
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from evonav.replay.pages import WrittenPage
     from evonav.report.run import Run
-    from evonav.report.viewer import WrittenPage
 
 
 def view(
@@ -82,9 +82,9 @@ def replay_pages(
     out: Path | None = None,
 ) -> "tuple[list[WrittenPage], Path]":
     """Replays these episodes (agent, task) of a run, and writes their pages and the index; the rest as `make_pages`."""
-    from evonav.evaluation.trace import RunReplay
+    from evonav.replay.pages import write_episode, write_index
+    from evonav.replay.replay import RunReplay
     from evonav.report.maps.stage_map import VIEW_DIR
-    from evonav.report.viewer import write_episode, write_index
 
     replay = RunReplay(found.run_dir, task_path(found.run_dir, tasks), exchanges)
     out_dir = out or found.run_dir / VIEW_DIR

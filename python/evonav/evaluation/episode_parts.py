@@ -13,7 +13,7 @@ from evonav.world.simulator import Simulator
 
 
 class EpisodeObserver(Protocol):
-    """Looks on as an episode runs (`evonav.evaluation.trace`); nothing of it reaches agent or record.
+    """Looks on as an episode runs (`evonav.replay.replay`); nothing of it reaches agent or record.
 
     What it raises as `AgentFailedError` fails the stage as if the agent had.
     """

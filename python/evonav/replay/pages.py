@@ -1,6 +1,6 @@
 """The pages of `evonav view`: an episode round by round, one self-contained HTML file each, and their index.
 
-What is drawn comes from `evonav.evaluation.traced`; no agent, model or task is read here.
+What is drawn comes from `evonav.replay.types`; no agent, model or task is read here.
 """
 
 import json
@@ -12,7 +12,8 @@ from markupsafe import Markup
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records import StageMap, StageRecord
-from evonav.evaluation.traced import TracedStage
+from evonav.replay.page_data import PageData
+from evonav.replay.types import TracedStage
 from evonav.report.maps.floor_plan import Frame, floors, furniture, item_labels, labels, structure
 from evonav.report.maps.legend import ENTRIES, legend_html
 from evonav.report.maps.stage_map import outcome_words, page_name, task_frame
@@ -20,7 +21,6 @@ from evonav.report.maps.svg import cm
 from evonav.report.maps.trajectory import change, end_mark, ring, start_mark, target_mark
 from evonav.report.page import page_environment, policy, text_of
 from evonav.report.replay_pages import LIST_NAME, ListedPage, listed_pages, page_code, viewer_css, viewer_js
-from evonav.report.viewer_data import PageData
 
 INDEX_NAME = "index.html"
 MAX_PAGE_BYTES = 10_000_000

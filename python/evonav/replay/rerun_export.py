@@ -14,10 +14,10 @@ from PIL import Image
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records import StageMap, StageRecord
-from evonav.evaluation.traced import BLOCKED, TracedMap, TracedRound, TracedStage, TracedView
+from evonav.replay.page_data import choice_words, evaluator_words
+from evonav.replay.types import BLOCKED, TracedMap, TracedRound, TracedStage, TracedView
 from evonav.report.causes import sentence
 from evonav.report.maps.stage_map import outcome_words
-from evonav.report.viewer_data import choice_words, evaluator_words
 from evonav.tasks.language import noun_of
 
 SUFFIX = ".rrd"

@@ -26,9 +26,9 @@ from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
 from evonav.evaluation.rollout import Episode
 from evonav.evaluation.settings import EXCHANGES_NAME
 from evonav.evaluation.store import RunStore
-from evonav.evaluation.traced import TracedRound, TracedStage
-from evonav.evaluation.tracer import Loss, Tracer
 from evonav.perception.weights import MODELS_VARIABLE
+from evonav.replay.recorder import Loss, Tracer
+from evonav.replay.types import TracedRound, TracedStage
 
 
 def _near(run_dir: Path, task_id: str) -> str:

@@ -1,4 +1,4 @@
-"""A replayed episode as plain data: what `evonav.evaluation.tracer` tells and pages show.
+"""A replayed episode as plain data: what `evonav.replay.recorder` tells and pages show.
 
 What the agent believes and what the evaluator alone knows are fields apart: `TracedEntry.truth`, `StageRecord.target`,
 `StageRecord.transition` and every `is_stale` are the evaluator's.

@@ -19,7 +19,7 @@ from evonav.decision.questions.question import Question
 from evonav.evaluation.protocol import AgentFailedError, StageOutcome
 from evonav.evaluation.record_parts import STALE_MARGIN_M, distance_to_box_m, entry_record, pose_record
 from evonav.evaluation.records import ErrorKind, RoundRecord
-from evonav.evaluation.traced import (
+from evonav.replay.types import (
     BLOCKED,
     EXPLORED,
     FREE,

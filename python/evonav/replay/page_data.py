@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.evaluation.records import EndState, RoundRecord, StageMap, StageRecord
-from evonav.evaluation.traced import (
+from evonav.replay.types import (
     TracedEntry,
     TracedFrontier,
     TracedMap,

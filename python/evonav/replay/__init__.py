@@ -1,0 +1,1 @@
+"""Replay recorded episodes for the viewer, for film and for rerun."""
