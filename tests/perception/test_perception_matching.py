@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.perception_matching import (
+from evonav.perception import Percept
+from evonav.perception_benchmark.average_precision import interpolated, resampled
+from evonav.perception_benchmark.matching import (
     IGNORED,
     NONE,
     intersections_over_union,
@@ -20,9 +22,7 @@ from evonav.evaluation.perception_matching import (
     same_labels,
     true_objects,
 )
-from evonav.evaluation.perception_precision import interpolated, resampled
-from evonav.evaluation.perception_rows import check_percept
-from evonav.perception import Percept
+from evonav.perception_benchmark.rows import check_percept
 from evonav.sensors.observation import Detections
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics, SceneObject

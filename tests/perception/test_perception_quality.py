@@ -16,13 +16,13 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import task_files
-from evonav.evaluation.perception_estimates import Houses
-from evonav.evaluation.perception_quality import PerceptionSpec, TourConfig, measure
-from evonav.evaluation.perception_records import read_record, read_records, record_path
-from evonav.evaluation.perception_scores import differences, scores
-from evonav.evaluation.perception_tour import tour
-from evonav.report.perception_page import write_perception_report
-from evonav.report.perception_tables import perception_tables
+from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
+from evonav.perception_benchmark.estimates import Houses
+from evonav.perception_benchmark.page import write_perception_report
+from evonav.perception_benchmark.records import read_record, read_records, record_path
+from evonav.perception_benchmark.scores import differences, scores
+from evonav.perception_benchmark.tables import perception_tables
+from evonav.perception_benchmark.tour import tour
 from evonav.significance import percentile_interval
 
 SPECS = [

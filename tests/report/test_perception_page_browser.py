@@ -8,9 +8,9 @@ from browser import Chromium, needs_browser
 
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import task_files
-from evonav.evaluation.perception_quality import PerceptionSpec, TourConfig, measure
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.report.perception_page import write_perception_report
+from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
+from evonav.perception_benchmark.page import write_perception_report
 
 pytestmark = needs_browser
 

@@ -62,9 +62,9 @@ def perception(
     from evonav.evaluation.backend import Backend
     from evonav.evaluation.datasets import bundled_tasks
     from evonav.evaluation.engine import task_files
-    from evonav.evaluation.perception_quality import PerceptionSpec, TourConfig, measure
-    from evonav.report.perception_page import write_perception_report
-    from evonav.report.perception_tables import perception_tables
+    from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
+    from evonav.perception_benchmark.page import write_perception_report
+    from evonav.perception_benchmark.tables import perception_tables
 
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from evonav.evaluation.perception_matching import IGNORED, NONE, TrueObjects
-from evonav.evaluation.perception_rows import Matched
+from evonav.perception_benchmark.matching import IGNORED, NONE, TrueObjects
+from evonav.perception_benchmark.rows import Matched
 from evonav.sensors.observation import Detections
 
 RIGHT, MISLABELLED, ALONE = (64, 132, 255), (255, 150, 30), (235, 60, 200)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.perception_matching import (
+from evonav.perception import Percept
+from evonav.perception_benchmark.matching import (
     IGNORED,
     NONE,
     Matches,
@@ -20,7 +21,7 @@ from evonav.evaluation.perception_matching import (
     median_depths_m,
     same_labels,
 )
-from evonav.evaluation.perception_records import (
+from evonav.perception_benchmark.records import (
     DISTANCE_BINS_M,
     NUM_COSINE_BINS,
     DepthSums,
@@ -29,7 +30,6 @@ from evonav.evaluation.perception_records import (
     PoseRows,
     TrueRows,
 )
-from evonav.perception import Percept
 from evonav.world.simulator import Frame, SceneObject
 
 MAX_FEATURES = 400

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.evaluation.perception_estimates import Estimate, Group, Houses, estimate
-from evonav.evaluation.perception_records import DISTANCE_BINS_M, NUM_COSINE_BINS, MemoryState, TaskRecord
+from evonav.perception_benchmark.estimates import Estimate, Group, Houses, estimate
+from evonav.perception_benchmark.records import DISTANCE_BINS_M, NUM_COSINE_BINS, MemoryState, TaskRecord
 
 NUM_CONFIDENCE_BINS = 10
 _STARTS = tuple(f"{low:g}" for low in DISTANCE_BINS_M)

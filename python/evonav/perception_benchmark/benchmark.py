@@ -12,10 +12,15 @@ from typing import Any
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.backend import Backend
-from evonav.evaluation.perception_matching import TrueObjects, true_objects
-from evonav.evaluation.perception_memory import JudgedMemory
-from evonav.evaluation.perception_picture import side_by_side
-from evonav.evaluation.perception_records import (
+from evonav.evaluation.protocol import EpisodeCase
+from evonav.evaluation.running import TaskFile
+from evonav.parallel.folders import check_same_run, writing
+from evonav.parallel.pool import Job, answers, open_pool
+from evonav.perception import Percept, Perception, StageScene
+from evonav.perception_benchmark.matching import TrueObjects, true_objects
+from evonav.perception_benchmark.memory import JudgedMemory
+from evonav.perception_benchmark.picture import side_by_side
+from evonav.perception_benchmark.records import (
     NUM_CHECKPOINTS,
     Header,
     MemoryState,
@@ -26,18 +31,13 @@ from evonav.evaluation.perception_records import (
     write_header,
     write_record,
 )
-from evonav.evaluation.perception_rows import Matched, Rows
-from evonav.evaluation.perception_tour import tour
-from evonav.evaluation.protocol import EpisodeCase
-from evonav.evaluation.running import TaskFile
-from evonav.parallel.folders import check_same_run, writing
-from evonav.parallel.pool import Job, answers, open_pool
-from evonav.perception import Percept, Perception, StageScene
+from evonav.perception_benchmark.rows import Matched, Rows
+from evonav.perception_benchmark.tour import tour
 from evonav.sensors.observation import Detections
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Simulator
 
-WORK = "evonav.evaluation.perception_quality:make_worker"
+WORK = "evonav.perception_benchmark.benchmark:make_worker"
 TASK_TIMEOUT_S = 3600.0
 """Without a sign of life; a place of a tour is one."""
 AGENT = "fu"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.evaluation.perception_records import TaskRecord
+from evonav.perception_benchmark.records import TaskRecord
 from evonav.significance import Interval, percentile_interval, resampled_counts
 
 NUM_RESAMPLES = 2000

@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from evonav.evaluation.perception_estimates import Estimate
-from evonav.evaluation.perception_precision import RECALLS
-from evonav.evaluation.perception_records import NUM_COSINE_BINS
-from evonav.evaluation.perception_scores import Scores
-from evonav.report.perception_charts import Axes, ConfusionRow, Curve, confusion_chart, square_chart
+from evonav.perception_benchmark.average_precision import RECALLS
+from evonav.perception_benchmark.charts import Axes, ConfusionRow, Curve, confusion_chart, square_chart
+from evonav.perception_benchmark.estimates import Estimate
+from evonav.perception_benchmark.records import NUM_COSINE_BINS
+from evonav.perception_benchmark.scores import Scores
 from evonav.report.plots import Dots, GroupPlot, plot_svg
 from evonav.significance import Interval
 

@@ -7,14 +7,14 @@ from typing import Any
 
 from markupsafe import Markup
 
-from evonav.evaluation.perception_other_scores import measure_values
-from evonav.evaluation.perception_records import read_header, read_records
-from evonav.evaluation.perception_scores import Scores, differences, scores
 from evonav.parallel.folders import write_atomically
+from evonav.perception_benchmark.other_scores import measure_values
+from evonav.perception_benchmark.plots import confusion_figures, feature_figures, perception_figures
+from evonav.perception_benchmark.records import read_header, read_records
+from evonav.perception_benchmark.scores import Scores, differences, scores
+from evonav.perception_benchmark.tables import perception_csv, perception_tables
 from evonav.report.line_chart import PLOT_CSS
 from evonav.report.page import page_environment, policy, text_of
-from evonav.report.perception_figures import confusion_figures, feature_figures, perception_figures
-from evonav.report.perception_tables import perception_csv, perception_tables
 
 REPORT_NAME = "report.html"
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import StoreError
-from evonav.evaluation import perception_other_scores as other
-from evonav.evaluation.perception_estimates import Estimate, Group, Houses, estimate
-from evonav.evaluation.perception_matching import IGNORED, IOU_LIMIT, NONE
-from evonav.evaluation.perception_precision import interpolated, resampled
-from evonav.evaluation.perception_records import DISTANCE_BINS_M, TaskRecord
+from evonav.perception_benchmark import other_scores as other
+from evonav.perception_benchmark.average_precision import interpolated, resampled
+from evonav.perception_benchmark.estimates import Estimate, Group, Houses, estimate
+from evonav.perception_benchmark.matching import IGNORED, IOU_LIMIT, NONE
+from evonav.perception_benchmark.records import DISTANCE_BINS_M, TaskRecord
 
 NUM_AP_RESAMPLES = 300
 SIZE_LIMITS = (32 * 32 / (640 * 480), 96 * 96 / (640 * 480))

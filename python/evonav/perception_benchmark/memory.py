@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from evonav.agents.agent import EntryBelief
-from evonav.evaluation.perception_matching import NONE, TrueObjects, main_objects
-from evonav.evaluation.perception_records import MemoryState
 from evonav.evaluation.witness import EVIDENCE_RANGE_M, held_by
 from evonav.memory.objects import ObjectMap
 from evonav.perception import Percept
+from evonav.perception_benchmark.matching import NONE, TrueObjects, main_objects
+from evonav.perception_benchmark.records import MemoryState
 from evonav.sensors.observation import View, VisibleOccupancy
 from evonav.world.simulator import Frame, SceneObject
 

@@ -4,8 +4,8 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 
-from evonav.evaluation.perception_estimates import Estimate, Group
-from evonav.evaluation.perception_scores import COMPARED, COMPARED_MEMORY, Scores, differences
+from evonav.perception_benchmark.estimates import Estimate, Group
+from evonav.perception_benchmark.scores import COMPARED, COMPARED_MEMORY, Scores, differences
 from evonav.report.tables import NONE, Table
 
 MAX_CATEGORIES, MAX_CONFUSIONS = 8, 4

@@ -1,0 +1,1 @@
+"""Measure perceptions against the truth."""
