@@ -205,8 +205,8 @@ def test_runs_with_walks_are_handed_in_and_verified(tmp_path):
     from typer.testing import CliRunner
 
     from evonav.cli import app
+    from evonav.controlled.generate import ControlledOptions, generate_arms
     from evonav.evaluation.engine import evaluate, task_files
-    from evonav.generation.controlled import ControlledOptions, generate_arms
     from evonav.house import bundled_houses
     from evonav.tasks import write_task
     from evonav.tasks.manifest import GenerationParameters

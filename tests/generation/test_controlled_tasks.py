@@ -9,14 +9,14 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.controlled.dataset import generate_controlled
+from evonav.controlled.generate import ControlledOptions, generate_arms
+from evonav.controlled.layout import read_controlled, tasks_of
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.generation import TaskRejectedError, generate_task
-from evonav.generation.controlled import ControlledOptions, generate_arms
-from evonav.generation.controlled_dataset import generate_controlled
 from evonav.generation.validation import validate_files, validate_task
 from evonav.house import bundled_houses
 from evonav.tasks import load_task, write_task
-from evonav.tasks.controlled import read_controlled, tasks_of
 from evonav.tasks.files import task_roots
 from evonav.tasks.manifest import GenerationParameters
 

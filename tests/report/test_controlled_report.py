@@ -9,16 +9,16 @@ from made_up_run import OLD_TABLE_M, entry, stage_map, stage_record
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.controlled.analysis import MEASURES, load_analysis, pair_tables, signed, split_of
+from evonav.controlled.claims import claims
+from evonav.controlled.layout import Arm, ControlledRecord, run_of, write_controlled
+from evonav.controlled.page import write_controlled_report
+from evonav.controlled.paired_maps import load_rollouts, pair_svg, telling_pairs
+from evonav.controlled.rates import Crossover, _crossing, by_rate, crossover
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records import EndState, TransitionRecord
 from evonav.evaluation.store import RunStore
 from evonav.paired import mcnemar
-from evonav.report.controlled import MEASURES, load_analysis, pair_tables, signed, split_of
-from evonav.report.controlled_claims import claims
-from evonav.report.controlled_page import write_controlled_report
-from evonav.report.controlled_rates import Crossover, _crossing, by_rate, crossover
-from evonav.report.rollouts import load_rollouts, pair_svg, telling_pairs
-from evonav.tasks.controlled import Arm, ControlledRecord, run_of, write_controlled
 from evonav.tasks.dataset import SourceFile
 from evonav.tasks.manifest import GenerationParameters
 

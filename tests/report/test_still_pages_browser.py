@@ -10,8 +10,8 @@ from test_controlled_report import ARMS, PAIRS, write_analysis
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.controlled.page import write_controlled_report
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.report.controlled_page import write_controlled_report
 
 pytestmark = needs_browser
 

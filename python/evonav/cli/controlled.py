@@ -56,9 +56,9 @@ def generate(
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
     """Makes the same tasks in several arms that differ in one thing alone; run again to resume."""
+    from evonav.controlled.dataset import generate_controlled
+    from evonav.controlled.generate import ControlledOptions
     from evonav.generation.config import read_parameters
-    from evonav.generation.controlled import ControlledOptions
-    from evonav.generation.controlled_dataset import generate_controlled
     from evonav.generation.engine import Workforce
 
     options = ControlledOptions(
@@ -104,11 +104,11 @@ def evaluate(
     agent_timeout: AgentTimeout = None,
 ) -> None:
     """Runs agents in every arm, into DIRECTORY/runs/ARM; run again to resume, or to add agents."""
+    from evonav.controlled.evaluate import evaluate_controlled
+    from evonav.controlled.layout import read_controlled
     from evonav.evaluation.agent_process import AgentHosting
     from evonav.evaluation.backend import Backend
-    from evonav.evaluation.controlled import evaluate_controlled
     from evonav.evaluation.engine import RunConfig
-    from evonav.tasks.controlled import read_controlled
 
     record = read_controlled(directory)
     num_workers = count_of(workers)
@@ -149,8 +149,8 @@ def report(
     """Prints the tables, and writes them, the figures and a page of all pairs."""
     from rich.console import Console
 
-    from evonav.report.controlled import load_analysis
-    from evonav.report.controlled_page import tables_of, write_controlled_report
+    from evonav.controlled.analysis import load_analysis
+    from evonav.controlled.page import tables_of, write_controlled_report
 
     console = Console()
     for table in tables_of(load_analysis(directory)):
@@ -166,9 +166,9 @@ def picture(
     agent: Annotated[str, typer.Option(help="Whose rollouts.")] = "fu",
 ) -> None:
     """Draws one agent in one pair: Fixed on the left, Not Fixed on the right."""
+    from evonav.controlled.analysis import load_analysis
+    from evonav.controlled.paired_maps import telling_pairs, write_pair
     from evonav.errors import InvalidArgumentError
-    from evonav.report.controlled import load_analysis
-    from evonav.report.rollouts import telling_pairs, write_pair
 
     analysis = load_analysis(directory)
     if agent not in analysis.agents:

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, moved_keys, p_words, signed
 from evonav.paired import PairedEffect
-from evonav.report.controlled import BASELINE, MEASURES, Analysis, moved_keys, p_words, signed
 from evonav.report.tables import Table
 
 MEMORY_AGENTS = ("fu", "ftu", "3d-mem", "msgnav")

@@ -8,8 +8,9 @@ from itertools import islice, pairwise
 from pathlib import Path
 
 from evonav._core import __version__
+from evonav.controlled.generate import ControlledOptions, generate_arms
+from evonav.controlled.layout import ControlledRecord, tasks_of, write_controlled
 from evonav.errors import InvalidArgumentError, TaskError
-from evonav.generation.controlled import ControlledOptions, generate_arms
 from evonav.generation.engine import Workforce
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.worker import PARTIAL_NAME, is_whole, outcome_of, worker_of
@@ -17,7 +18,6 @@ from evonav.house import House
 from evonav.house.files import HouseText, HouseTexts
 from evonav.parallel.folders import sha256_of_file, writing
 from evonav.parallel.pool import Job, answers, open_pool
-from evonav.tasks.controlled import ControlledRecord, tasks_of, write_controlled
 from evonav.tasks.dataset import (
     DatasetRecord,
     HouseRejection,
@@ -29,7 +29,7 @@ from evonav.tasks.files import read_house, task_roots
 from evonav.tasks.manifest import Task, TaskHeader
 from evonav.tasks.records import parse_record, read_file
 
-WORK = "evonav.generation.controlled_dataset:make_worker"
+WORK = "evonav.controlled.dataset:make_worker"
 
 
 @dataclass(frozen=True, slots=True)

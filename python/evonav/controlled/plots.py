@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from evonav.controlled.analysis import MEASURES, Analysis, Measure
+from evonav.controlled.rates import by_rate
 from evonav.errors import StoreError
 from evonav.paired import cluster_means
 from evonav.report.charts import chart_css
-from evonav.report.controlled import MEASURES, Analysis, Measure
-from evonav.report.controlled_rates import by_rate
 from evonav.report.figures import _matplotlib
 from evonav.report.line_chart import COLOURS, Line, line_chart
 from evonav.report.maps.svg import escape, join, title

@@ -1,11 +1,11 @@
-"""Runs every arm of a controlled analysis (`evonav.tasks.controlled`), each into an ordinary run folder."""
+"""Runs every arm of a controlled analysis (`evonav.controlled.layout`), each into an ordinary run folder."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from evonav.controlled.layout import read_controlled, run_of, tasks_of
 from evonav.evaluation.engine import Progress, RunConfig, RunRequest, evaluate_all, task_files
 from evonav.evaluation.metrics import AgentSummary
-from evonav.tasks.controlled import read_controlled, run_of, tasks_of
 
 
 def evaluate_controlled(

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, Key, Measure, effect_cells
 from evonav.paired import cluster_means
-from evonav.report.controlled import BASELINE, MEASURES, Analysis, Key, Measure, effect_cells
 from evonav.report.tables import Table, percent
 from evonav.significance import Interval
 

@@ -6,19 +6,9 @@ from typing import Any
 
 from markupsafe import Markup
 
-from evonav.errors import StoreError
-from evonav.report.causes import sentence
-from evonav.report.controlled import BASELINE, MEASURES, Analysis, Key, load_analysis, pair_tables
-from evonav.report.controlled_claims import claim_table
-from evonav.report.controlled_figures import bars_svg, lines_svg, write_figures
-from evonav.report.controlled_rates import rate_tables
-from evonav.report.maps.floor_plan import furniture, ground, labels, moving_ids
-from evonav.report.maps.legend import legend
-from evonav.report.maps.stage_map import map_css, outcome_words
-from evonav.report.maps.svg import join, slug
-from evonav.report.maps.trajectory import change, rounds
-from evonav.report.page import page_environment, picture_uri, policy, text_of
-from evonav.report.rollouts import (
+from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, Key, load_analysis, pair_tables
+from evonav.controlled.claims import claim_table
+from evonav.controlled.paired_maps import (
     REASONS,
     Rollout,
     arm_words,
@@ -30,6 +20,16 @@ from evonav.report.rollouts import (
     telling_pairs,
     walk_and_course,
 )
+from evonav.controlled.plots import bars_svg, lines_svg, write_figures
+from evonav.controlled.rates import rate_tables
+from evonav.errors import StoreError
+from evonav.report.causes import sentence
+from evonav.report.maps.floor_plan import furniture, ground, labels, moving_ids
+from evonav.report.maps.legend import legend
+from evonav.report.maps.stage_map import map_css, outcome_words
+from evonav.report.maps.svg import join, slug
+from evonav.report.maps.trajectory import change, rounds
+from evonav.report.page import page_environment, picture_uri, policy, text_of
 from evonav.report.tables import Table
 
 PAGE_NAME = "index.html"

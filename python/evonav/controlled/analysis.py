@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from evonav.controlled.layout import ControlledRecord, read_controlled, run_of
 from evonav.errors import StoreError
 from evonav.evaluation.measures import StageRow, stage_rows
 from evonav.evaluation.metrics import SUCCESS_RADIUS_M
@@ -16,7 +17,6 @@ from evonav.paired import PairedEffect, paired_effect
 from evonav.report.run import PAPER_ORDER
 from evonav.report.tables import NONE, Table
 from evonav.significance import Interval
-from evonav.tasks.controlled import ControlledRecord, read_controlled, run_of
 
 BASELINE = "stage-reset"
 """What forgets everything: against it memory is judged."""

@@ -16,10 +16,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from evonav.controlled.layout import Arm, Kind
 from evonav.errors import InvalidArgumentError
 from evonav.generation.pipeline import GivenStage, TaskRejectedError, generate_task
 from evonav.house import House
-from evonav.tasks.controlled import Arm, Kind
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.files import checksums_of
 from evonav.tasks.manifest import Control, GenerationParameters, Task

@@ -1,0 +1,1 @@
+"""Measure what one change does, all else being equal: the Fixed / Not Fixed analysis."""
