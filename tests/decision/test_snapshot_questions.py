@@ -9,12 +9,8 @@ from evonav.decision.prompts import Picture, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.questions.frontier_update import ChooseQuestion
 from evonav.decision.questions.question import AnswerError
-from evonav.decision.questions.three_d_mem import (
-    PrefilterQuestion,
-    SnapshotCandidate,
-    SnapshotChoice,
-    SnapshotQuestion,
-)
+from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotQuestion
+from evonav.decision.questions.three_d_mem_candidates import SnapshotCandidate, SnapshotChoice
 from evonav.decision.text_match import TextMatch
 from evonav.tasks.public import StageInput
 

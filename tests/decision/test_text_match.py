@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.questions.frontier_update import ChooseQuestion, Sighting, VerifyQuestion
-from evonav.decision.questions.question import AnswerError
+from evonav.decision.questions.question import AnswerError, Question
 from evonav.decision.ranking import rank_by_feature, rank_entries
 from evonav.decision.text_match import TextMatch
+from evonav.errors import DecisionError
 from evonav.tasks.public import StageInput
 
 
@@ -111,3 +112,23 @@ def test_entries_are_ranked_by_the_cosine_of_their_features_where_they_have_some
     goal = np.array([1.0, 0.0], np.float32)
     features = [np.array(one, np.float32) for one in ((0.0, 1.0), (0.6, 0.8), (1.0, 0.0), (0.6, 0.8))]
     assert rank_by_feature(goal, [*features, None], [1, 9, 3, 4, 0]) == [2, 3, 1, 0, 4]
+
+
+class Unruled(VerifyQuestion):
+    """A question of somebody else's agent, which says nothing of rules."""
+
+    by_rule = Question.by_rule
+
+
+class Ruled(VerifyQuestion):
+    """One that brings its own."""
+
+    def by_rule(self, matcher):
+        return True, "as always"
+
+
+def test_every_question_answers_by_a_rule_of_its_own():
+    reply = TextMatch().answer(Ruled(MUG_GOAL, MUG_ON_TABLE, [], 0.1))
+    assert (reply.answer, reply.text) == (True, "yes\nas always")
+    with pytest.raises(DecisionError, match="no rule for Unruled: ask a model"):
+        TextMatch().answer(Unruled(MUG_GOAL, MUG_ON_TABLE, [], 0.1))

@@ -17,11 +17,10 @@ from evonav.decision.questions.unigoal_scene import (
     LayoutQuestion,
     RelationLinesQuestion,
     RoomQuestion,
-    Verdict,
 )
 from evonav.decision.text_match import TextMatch
 from evonav.memory.goal_graph import GoalEdge, GoalGraph
-from evonav.memory.object_graph import Group, SceneEdge, SceneNode
+from evonav.memory.object_graph import Group, SceneEdge, SceneNode, Verdict
 from evonav.memory.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES
 from evonav.tasks.public import StageInput
 

@@ -28,14 +28,8 @@ from evonav.agents.navigator import Navigator, NavigatorConfig
 from evonav.agents.visible_viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
 from evonav.decision.asking import Asker
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.decision.questions.msgnav import (
-    ArrivalQuestion,
-    FrontierImagesQuestion,
-    GraphObject,
-    GraphQuestion,
-    PastChoice,
-    SubgraphQuestion,
-)
+from evonav.decision.questions.msgnav import ArrivalQuestion, FrontierImagesQuestion, GraphQuestion, SubgraphQuestion
+from evonav.decision.questions.msgnav_candidates import GraphObject, PastChoice
 from evonav.decision.questions.question import DecisionModel
 from evonav.decision.text_match import TextMatch
 from evonav.memory import Frontier

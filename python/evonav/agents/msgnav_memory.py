@@ -9,7 +9,7 @@ from evonav.agents.navigator import Navigator
 from evonav.decision.language import canonical, similarity
 from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import ObjectCandidate
-from evonav.decision.questions.msgnav import GraphImage, GraphObject, SeenObject
+from evonav.decision.questions.msgnav_candidates import GraphImage, GraphObject, SeenObject
 from evonav.memory.clouds import ViewClouds, clouds_of
 from evonav.memory.scene_graph import SceneGraph
 from evonav.memory.views import StoredView, pixels_of

@@ -11,7 +11,8 @@ from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.asking import Asker
 from evonav.decision.questions.candidates import ObjectCandidate
 from evonav.decision.questions.question import DecisionModel
-from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotCandidate, SnapshotQuestion
+from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotQuestion
+from evonav.decision.questions.three_d_mem_candidates import SnapshotCandidate
 from evonav.decision.text_match import TextMatch
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry

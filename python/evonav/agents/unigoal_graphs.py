@@ -9,7 +9,6 @@ from evonav.decision.language import ROOMS, canonical
 from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import ObjectCandidate
 from evonav.decision.questions.unigoal import (
-    NO_CATEGORY,
     CategoryQuestion,
     DecomposeQuestion,
     DescribeQuestion,
@@ -25,7 +24,7 @@ from evonav.decision.questions.unigoal_scene import (
 )
 from evonav.memory.goal_graph import GoalGraph, Match, MatchMode, match_graphs, similarity_transform
 from evonav.memory.object_graph import Group, ObjectGraph, ObjectGraphConfig, SceneNode
-from evonav.memory.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES, WORD_OF_TYPE
+from evonav.memory.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES, NO_CATEGORY, WORD_OF_TYPE
 from evonav.sensors.observation import View
 from evonav.tasks.public import StageInput
 

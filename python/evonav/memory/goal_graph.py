@@ -12,6 +12,9 @@ MatchMode = Literal["code", "paper"]
 """`code`: names of scene nodes carry a number, as released, so that they never equal a goal's word; `paper`: captions
 are compared."""
 
+MAX_GOAL_NODES = 5
+"""Largest number of objects that a goal graph has."""
+
 _ON = frozenset({"on", "atop", "upon", "in", "inside", "within"})
 _UNDER = frozenset({"under", "below", "beneath", "underneath"})
 _NEAR = frozenset({"next", "near", "nearby", "beside", "by", "close", "adjacent", "alongside", "against"})

@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from evonav.memory.objects import ObjectMap, ObjectMapConfig
 from evonav.memory.vocabulary import WORD_OF_LABEL, relabelled
@@ -85,6 +86,19 @@ class Group:
             math.fsum(node.ground_m[0] for node in self.nodes) / num,
             math.fsum(node.ground_m[1] for node in self.nodes) / num,
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The model's decision about a node or an edge of the scene graph."""
+
+    action: Literal["keep", "rename", "delete"]
+    word: str = ""
+    """The new caption or relation."""
+
+    def __str__(self) -> str:
+        """Return the verdict as answers spell it."""
+        return f"rename to {self.word}" if self.action == "rename" else self.action
 
 
 class ObjectGraph:

@@ -45,6 +45,9 @@ MAP_CATEGORIES = (
 )
 """All that the map's detector knows."""
 
+NO_CATEGORY = "none"
+"""What a goal's category is called that the detector does not know."""
+
 WORD_OF_TYPE: dict[str, str] = {
     "DiningTable": "table",
     "CoffeeTable": "table",

@@ -1,6 +1,7 @@
 """What questions offer to choose from."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,3 +44,11 @@ class FrontierCandidate:
     """Distance from the agent."""
     image: Pixels | None = field(default=None, compare=False, repr=False)
     """Towards it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of a question's objects or frontiers."""
+
+    kind: Literal["object", "frontier"]
+    index: int

@@ -3,23 +3,17 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import ClassVar
 
+from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.questions.candidates import Choice, FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.decision.questions.question import AnswerError, ClosedQuestion, YesNoQuestion, first_line
 from evonav.decision.questions.wording import goal_parts, merged, titled
+from evonav.decision.rules import frontier_update as rules
 from evonav.tasks.public import StageInput
 
 _CHOICE = re.compile(r"(object|frontier)\s+(\d+)\b[.:]?", re.IGNORECASE)
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """One of a question's candidates."""
-
-    kind: Literal["object", "frontier"]
-    index: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +78,10 @@ class ChooseQuestion(ClosedQuestion[Choice]):
             *(Choice("frontier", index) for index in range(len(self.frontiers))),
         ]
 
+    def by_rule(self, matcher: Matcher) -> tuple[Choice, str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.choose(matcher, self)
+
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
@@ -126,3 +124,7 @@ class VerifyQuestion(YesNoQuestion):
             )
         )
         return Prompt.of(*merged(parts))
+
+    def by_rule(self, matcher: Matcher) -> tuple[bool, str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.verify(matcher, self)

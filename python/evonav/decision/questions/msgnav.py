@@ -6,10 +6,12 @@ Images are at most 512 px (`MsgNavConfig`); evonav's views have 300 px, so that 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
+from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.questions.msgnav_candidates import GraphChoice, GraphImage, GraphObject, PastChoice
 from evonav.decision.questions.question import (
     AnswerError,
     ClosedQuestion,
@@ -19,6 +21,7 @@ from evonav.decision.questions.question import (
     lines_of,
 )
 from evonav.decision.questions.wording import goal_parts, merged, titled
+from evonav.decision.rules import msgnav as rules
 from evonav.tasks.public import StageInput
 
 _ID = re.compile(r"(?:object\s+)?(\d+)[.,:;]?", re.IGNORECASE)
@@ -26,22 +29,6 @@ _OBJECT = re.compile(r"object\s+(\d+)[.]?", re.IGNORECASE)
 _IMAGE = re.compile(r"image\s+(\d+)\s*,\s*([^,.;:\n]*[^\s,.;:])[.]?", re.IGNORECASE)
 _EXPLORE = re.compile(r"continue\s+exploration[.]?", re.IGNORECASE)
 _FRONTIER = re.compile(r"frontier\s+(\d+)[.]?", re.IGNORECASE)
-
-
-@dataclass(frozen=True, slots=True)
-class GraphObject:
-    """A node of the scene graph."""
-
-    candidate: ObjectCandidate
-    room: str
-    """`others` where it cannot be told."""
-    neighbour_ids: tuple[int, ...] = ()
-    """Entries one edge away, ascending."""
-
-    @property
-    def entry_id(self) -> int:
-        """Of the object memory."""
-        return self.candidate.entry_id
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,54 +84,9 @@ class SubgraphQuestion(Question[tuple[int, ...]]):
         """Any other object alone."""
         return [(node.entry_id,) for node in self.objects if (node.entry_id,) != answer]
 
-
-@dataclass(frozen=True, slots=True)
-class SeenObject:
-    """A detection of an image."""
-
-    label: str
-    entry_id: int | None
-    """The entry that it is of; `None` if it is of none, as what is far away."""
-    area_px: int
-    centre_m: Point2 | None
-    """`(x, z)`; `None` if it has no depth."""
-
-
-@dataclass(frozen=True, slots=True)
-class GraphImage:
-    """A kept view, on edges of the graph or of this round."""
-
-    view_id: int
-    is_egocentric: bool
-    """Of this round."""
-    seen: Sequence[SeenObject]
-    """For models that do not look at it. Not part of the prompt."""
-    pixels: Pixels | None = field(default=None, compare=False, repr=False)
-
-
-@dataclass(frozen=True, slots=True)
-class PastChoice:
-    """What was chosen in an earlier round of this stage, and has come to nothing."""
-
-    round: int
-    kind: Literal["object", "image", "explore"]
-    id: int = -1
-    """Of the entry or the view."""
-    category: str = ""
-    """What was to be in the image."""
-    place_m: Point2 | None = None
-    """`(x, z)` of what was not the goal. Not part of the prompt."""
-
-
-@dataclass(frozen=True, slots=True)
-class GraphChoice:
-    """An object of the graph, something in an image, or none of it."""
-
-    kind: Literal["object", "image", "explore"]
-    id: int = -1
-    """Of the entry, or number of the image."""
-    category: str = ""
-    """What to go to in the image."""
+    def by_rule(self, matcher: Matcher) -> tuple[tuple[int, ...], str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.select(matcher, self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,6 +179,10 @@ class GraphQuestion(Question[GraphChoice]):
         what = "an image that is not shown now" if number is None else f"image {number}"
         return f"Round {choice.round + 1}: chose {what}, {choice.category} - not correct."
 
+    def by_rule(self, matcher: Matcher) -> tuple[GraphChoice, str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.choose(matcher, self)
+
 
 def _object_line(node: GraphObject) -> str:
     x_m, y_m, z_m = node.candidate.centre_m
@@ -282,6 +228,10 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
         """Places in the list."""
         return range(len(self.frontiers))
 
+    def by_rule(self, matcher: Matcher) -> tuple[int, str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.explore(matcher, self)
+
 
 @dataclass(frozen=True, slots=True)
 class ArrivalQuestion(YesNoQuestion):
@@ -314,3 +264,7 @@ class ArrivalQuestion(YesNoQuestion):
             )
         )
         return Prompt.of(*merged(parts))
+
+    def by_rule(self, matcher: Matcher) -> tuple[bool, str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.arrive(matcher, self)

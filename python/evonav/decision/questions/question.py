@@ -8,11 +8,14 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, Protocol, TypeVar
 
 from evonav.decision.prompts import Prompt
 from evonav.errors import DecisionError
 from evonav.tasks.public import StageInput
+
+if TYPE_CHECKING:
+    from evonav.decision.matching import Matcher
 
 A = TypeVar("A")
 """What an answer means."""
@@ -76,6 +79,18 @@ class Question(ABC, Generic[A]):
     def alternatives(self, answer: A) -> Sequence[A]:
         """The other valid answers, in a fixed order: what a model that errs could have said."""
         return ()
+
+    def by_rule(self, matcher: "Matcher") -> tuple[A, str]:
+        """Return the text matcher's answer and the reason for it.
+
+        Args:
+            matcher: Compares goals with what the agent remembers.
+
+        Raises:
+            AnswerError: Nothing fits, and there is nothing to choose.
+            DecisionError: The question has no rule.
+        """
+        raise DecisionError(f"the text matcher has no rule for {type(self).__name__}: ask a model")
 
 
 class ClosedQuestion(Question[A]):

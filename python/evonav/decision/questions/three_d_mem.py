@@ -5,10 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Part, Prompt, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
+from evonav.decision.questions.three_d_mem_candidates import SnapshotCandidate, SnapshotChoice
 from evonav.decision.questions.wording import goal_parts, merged, titled
+from evonav.decision.rules import three_d_mem as rules
 from evonav.tasks.public import StageInput
 
 _OBJECT = re.compile(r"snapshot\s+(\d+)\s*,\s*object\s+(\d+)\b[.:]?", re.IGNORECASE)
@@ -69,23 +72,9 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
         others = tuple(name for name in self.class_names if name not in answer)[: self.max_kept]
         return [names for names in dict.fromkeys((answer[1:], others)) if names != answer]
 
-
-@dataclass(frozen=True, slots=True)
-class SnapshotCandidate:
-    """A kept view, and those of the objects it stands for whose class the prefilter kept."""
-
-    view_id: int
-    objects: Sequence[ObjectCandidate]
-    """Never empty; with crops from this very view."""
-    image: Pixels | None = field(default=None, compare=False, repr=False)
-
-
-@dataclass(frozen=True, slots=True)
-class SnapshotChoice:
-    """An object of a snapshot, or, without a snapshot, a frontier; indices of the question."""
-
-    snapshot: int | None
-    index: int
+    def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.prefilter(matcher, self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,3 +148,7 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
             ),
             *(SnapshotChoice(None, index) for index in range(len(self.frontiers))),
         ]
+
+    def by_rule(self, matcher: Matcher) -> tuple[SnapshotChoice, str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.choose_snapshot(matcher, self)

@@ -6,16 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Picture, Prompt, Text
 from evonav.decision.questions.candidates import Pixels
 from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
-from evonav.memory.goal_graph import GoalEdge, GoalGraph
+from evonav.decision.rules import unigoal as rules
+from evonav.memory.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph
+from evonav.memory.vocabulary import NO_CATEGORY
 from evonav.tasks.public import StageInput
 
-MAX_GOAL_NODES = 5
 _LIST = re.compile(r"\[([^\[\]]*)\]\.?")
 _RELATION = re.compile(r"(?P<a>.+?) and (?P<b>.+?): (?P<rest>.+)")
-NO_CATEGORY = "none"
 
 
 def relation_line(a: str, b: str, subject: str, relation: str, object_: str) -> str:
@@ -68,6 +69,10 @@ class DescribeQuestion(Question[str]):
         """The sentence."""
         return answer
 
+    def by_rule(self, matcher: Matcher) -> tuple[str, str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.describe(matcher, self)
+
 
 @dataclass(frozen=True, slots=True)
 class ObjectsQuestion(Question[tuple[str, ...]]):
@@ -102,6 +107,10 @@ class ObjectsQuestion(Question[tuple[str, ...]]):
     def words(self, answer: tuple[str, ...]) -> str:
         """`[a, b, ...]`."""
         return f"[{', '.join(answer)}]"
+
+    def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.objects(matcher, self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +154,10 @@ class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
         """A line an edge."""
         lines = [relation_line(e.subject, e.object, e.subject, e.relation, e.object) for e in answer]
         return "\n".join(lines) or "none"
+
+    def by_rule(self, matcher: Matcher) -> tuple[tuple[GoalEdge, ...], str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.goal_relations(matcher, self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +221,10 @@ class DecomposeQuestion(Question[tuple[GoalGraph, ...]]):
         """A JSON text."""
         return {"type": "string"}
 
+    def by_rule(self, matcher: Matcher) -> tuple[tuple[GoalGraph, ...], str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.decompose(matcher, self)
+
 
 def _json_of(graph: GoalGraph) -> str:
     edges = [[edge.subject, edge.relation, edge.object] for edge in graph.edges]
@@ -249,3 +266,7 @@ class CategoryQuestion(ClosedQuestion[str]):
     def choices(self) -> Sequence[str]:
         """The categories, and `none`."""
         return (*self.categories, NO_CATEGORY)
+
+    def by_rule(self, matcher: Matcher) -> tuple[str, str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.category(matcher, self)

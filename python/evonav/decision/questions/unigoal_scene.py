@@ -4,14 +4,16 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
+from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.candidates import Point2
 from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.questions.unigoal import parse_relation, relation_line
+from evonav.decision.rules import unigoal as rules
 from evonav.memory.goal_graph import GoalGraph
-from evonav.memory.object_graph import Group, SceneEdge, SceneNode
+from evonav.memory.object_graph import Group, SceneEdge, SceneNode, Verdict
 from evonav.tasks.public import StageInput
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
@@ -67,6 +69,10 @@ class RelationLinesQuestion(Question[tuple[str, ...]]):
         num = len(self.pairs)
         return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
 
+    def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.scene_relations(matcher, self)
+
 
 @dataclass(frozen=True, slots=True)
 class RoomQuestion(ClosedQuestion[str]):
@@ -102,6 +108,10 @@ class RoomQuestion(ClosedQuestion[str]):
     def choices(self) -> Sequence[str]:
         """The rooms."""
         return self.rooms
+
+    def by_rule(self, matcher: Matcher) -> tuple[str, str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.room(matcher, self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +161,10 @@ class GroupScoreQuestion(Question[float]):
         """The other end of the scale."""
         return [0.0 if answer >= 0.5 else 1.0]
 
+    def by_rule(self, matcher: Matcher) -> tuple[float, str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.group_score(matcher, self)
+
 
 @dataclass(frozen=True, slots=True)
 class LayoutQuestion(Question[Mapping[str, Point2]]):
@@ -198,18 +212,9 @@ class LayoutQuestion(Question[Mapping[str, Point2]]):
         num = len(self.subgraph.nodes)
         return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
 
-
-@dataclass(frozen=True, slots=True)
-class Verdict:
-    """What becomes of a node or an edge."""
-
-    action: Literal["keep", "rename", "delete"]
-    word: str = ""
-    """The new caption or relation."""
-
-    def __str__(self) -> str:
-        """As answers put it."""
-        return f"rename to {self.word}" if self.action == "rename" else self.action
+    def by_rule(self, matcher: Matcher) -> tuple[Mapping[str, Point2], str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.layout(matcher, self)
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,3 +271,7 @@ class CorrectionQuestion(Question[tuple[Verdict, ...]]):
         """So many lines."""
         num = len(self.nodes) + len(self.edges)
         return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
+
+    def by_rule(self, matcher: Matcher) -> tuple[tuple[Verdict, ...], str]:
+        """Return the text matcher's answer and the reason for it."""
+        return rules.correct(matcher, self)

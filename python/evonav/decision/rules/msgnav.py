@@ -5,24 +5,26 @@ agent sees by the points of the last rounds' detections; size, form and colour a
 """
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from evonav.decision.language import Goal, canonical, similarity
 from evonav.decision.matching import Matcher, gap_m
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.decision.questions.msgnav import (
-    ArrivalQuestion,
-    FrontierImagesQuestion,
-    GraphChoice,
-    GraphQuestion,
-    SubgraphQuestion,
-)
+from evonav.decision.questions.msgnav_candidates import GraphChoice
 from evonav.decision.questions.question import AnswerError
 from evonav.decision.ranking import rank_entries
 
+if TYPE_CHECKING:
+    from evonav.decision.questions.msgnav import (
+        ArrivalQuestion,
+        FrontierImagesQuestion,
+        GraphQuestion,
+        SubgraphQuestion,
+    )
 
-def select(matcher: Matcher, question: SubgraphQuestion) -> tuple[tuple[int, ...], str]:
+
+def select(matcher: Matcher, question: "SubgraphQuestion") -> tuple[tuple[int, ...], str]:
     """Entries whose label the instruction speaks of; then others, one a label, none beside one that is chosen.
 
     Raises:
@@ -47,7 +49,7 @@ def select(matcher: Matcher, question: SubgraphQuestion) -> tuple[tuple[int, ...
     return tuple(chosen), f"of {len(question.objects)} objects those that have most to do with a {goal.noun}"
 
 
-def choose(matcher: Matcher, question: GraphQuestion) -> tuple[GraphChoice, str]:
+def choose(matcher: Matcher, question: "GraphQuestion") -> tuple[GraphChoice, str]:
     """An object that the instruction fits and that was not wrong before; else what only an image shows; else explore.
 
     With no frontier or hardly a round left anything of the right category will do, and then what the goal should be
@@ -81,7 +83,7 @@ def choose(matcher: Matcher, question: GraphQuestion) -> tuple[GraphChoice, str]
 
 
 def _unmapped(
-    matcher: Matcher, goal: Goal, question: GraphQuestion, around: Sequence[ObjectCandidate]
+    matcher: Matcher, goal: Goal, question: "GraphQuestion", around: Sequence[ObjectCandidate]
 ) -> GraphChoice | None:
     """The largest detection of the goal's category that is of no entry, and by no place that is known already."""
     known_m = [candidate.ground_m for candidate in around if matcher.names_goal(goal, candidate)]
@@ -105,7 +107,7 @@ def _unmapped(
     return GraphChoice("image", -number, canonical(label))
 
 
-def explore(matcher: Matcher, question: FrontierImagesQuestion) -> tuple[int, str]:
+def explore(matcher: Matcher, question: "FrontierImagesQuestion") -> tuple[int, str]:
     """The cheapest frontier."""
     goal = matcher.parsed(question.goal)
     costs_m = [matcher.frontier_cost_m(goal, frontier, question.surroundings) for frontier in question.frontiers]
@@ -113,7 +115,7 @@ def explore(matcher: Matcher, question: FrontierImagesQuestion) -> tuple[int, st
     return index, f"costs {costs_m[index]:.1f} m"
 
 
-def arrive(matcher: Matcher, question: ArrivalQuestion) -> tuple[bool, str]:
+def arrive(matcher: Matcher, question: "ArrivalQuestion") -> tuple[bool, str]:
     """Found if the goal's category was seen at the place, and what is said of it holds among what was seen.
 
     With no frontier or hardly a round left the category is enough.
@@ -129,11 +131,3 @@ def arrive(matcher: Matcher, question: ArrivalQuestion) -> tuple[bool, str]:
     held = max(matcher.relations_held(goal, seen, question.seen) for seen in here)
     is_last_chance = question.num_frontiers == 0 or question.num_rounds_left <= config.hurry_rounds
     return held >= config.min_relations or is_last_chance, f"{goal.noun} seen here, {held:.0%} of what is said fits"
-
-
-RULES: dict[type, Callable[[Matcher, Any], tuple[Any, str]]] = {
-    SubgraphQuestion: select,
-    GraphQuestion: choose,
-    FrontierImagesQuestion: explore,
-    ArrivalQuestion: arrive,
-}

@@ -4,33 +4,32 @@ Relations of scene nodes are judged by their boxes, not guessed from their names
 what a node is and whether it is there, no box can tell.
 """
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from evonav.decision.language import Goal, canonical, parse_goal
 from evonav.decision.matching import ROOM_SIGNS, Matcher, gap_m
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.decision.questions.unigoal import (
-    MAX_GOAL_NODES,
-    NO_CATEGORY,
-    CategoryQuestion,
-    DecomposeQuestion,
-    DescribeQuestion,
-    GoalRelationsQuestion,
-    ObjectsQuestion,
-)
-from evonav.decision.questions.unigoal_scene import (
-    CorrectionQuestion,
-    GroupScoreQuestion,
-    LayoutQuestion,
-    RelationLinesQuestion,
-    RoomQuestion,
-    Verdict,
-)
-from evonav.memory.goal_graph import GoalEdge, GoalGraph, relation_kind
-from evonav.memory.object_graph import SceneNode
-from evonav.memory.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES
+from evonav.memory.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph, relation_kind
+from evonav.memory.object_graph import SceneNode, Verdict
+from evonav.memory.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 from evonav.tasks.public import StageInput
+
+if TYPE_CHECKING:
+    from evonav.decision.questions.unigoal import (
+        CategoryQuestion,
+        DecomposeQuestion,
+        DescribeQuestion,
+        GoalRelationsQuestion,
+        ObjectsQuestion,
+    )
+    from evonav.decision.questions.unigoal_scene import (
+        CorrectionQuestion,
+        GroupScoreQuestion,
+        LayoutQuestion,
+        RelationLinesQuestion,
+        RoomQuestion,
+    )
 
 _CATEGORY_OF_NOUN = {
     **{canonical(category): category for category in MAP_CATEGORIES},
@@ -41,19 +40,19 @@ _BESIDE_M = 0.7
 """How far from what it is next to the layout puts a thing."""
 
 
-def describe(_: Matcher, question: DescribeQuestion) -> tuple[str, str]:
+def describe(_: Matcher, question: "DescribeQuestion") -> tuple[str, str]:
     """The category alone: rules are blind."""
     return f"the {canonical(question.goal.category)}", "images are not looked at"
 
 
-def objects(matcher: Matcher, question: ObjectsQuestion) -> tuple[tuple[str, ...], str]:
+def objects(matcher: Matcher, question: "ObjectsQuestion") -> tuple[tuple[str, ...], str]:
     """What to find, and what it is said to be on or near."""
     goal = _parsed(matcher, question.goal, question.text)
     nouns = (goal.noun, *(relation.noun for relation in goal.relations if relation.kind != "in"))
     return tuple(dict.fromkeys(nouns))[:MAX_GOAL_NODES], "read by rule"
 
 
-def goal_relations(matcher: Matcher, question: GoalRelationsQuestion) -> tuple[tuple[GoalEdge, ...], str]:
+def goal_relations(matcher: Matcher, question: "GoalRelationsQuestion") -> tuple[tuple[GoalEdge, ...], str]:
     """All that is said of the target."""
     goal = _parsed(matcher, question.goal, question.text)
     said = {"on": "on", "near": "next to"}
@@ -65,7 +64,7 @@ def goal_relations(matcher: Matcher, question: GoalRelationsQuestion) -> tuple[t
     return tuple(dict.fromkeys(edges)), "read by rule"
 
 
-def decompose(_: Matcher, question: DecomposeQuestion) -> tuple[tuple[GoalGraph, ...], str]:
+def decompose(_: Matcher, question: "DecomposeQuestion") -> tuple[tuple[GoalGraph, ...], str]:
     """Connected components, the target's first."""
     graph = question.graph
     left, parts = list(graph.nodes), []
@@ -87,13 +86,13 @@ def decompose(_: Matcher, question: DecomposeQuestion) -> tuple[tuple[GoalGraph,
     return tuple(parts), "connected components"
 
 
-def category(_: Matcher, question: CategoryQuestion) -> tuple[str, str]:
+def category(_: Matcher, question: "CategoryQuestion") -> tuple[str, str]:
     """The category that the target's noun goes under."""
     found = _CATEGORY_OF_NOUN.get(canonical(question.target), NO_CATEGORY)
     return (found if found in question.categories else NO_CATEGORY), "looked up"
 
 
-def scene_relations(matcher: Matcher, question: RelationLinesQuestion) -> tuple[tuple[str, ...], str]:
+def scene_relations(matcher: Matcher, question: "RelationLinesQuestion") -> tuple[tuple[str, ...], str]:
     """By boxes: on, under, next to, or apart."""
     known: dict[int, ObjectCandidate] = {}
     for pair in question.pairs:
@@ -102,7 +101,7 @@ def scene_relations(matcher: Matcher, question: RelationLinesQuestion) -> tuple[
     return tuple(_relation(matcher, known[a.id], known[b.id]) for a, b in question.pairs), "judged by boxes"
 
 
-def room(matcher: Matcher, question: RoomQuestion) -> tuple[str, str]:
+def room(matcher: Matcher, question: "RoomQuestion") -> tuple[str, str]:
     """The room that the instruction names; else the one that the target mostly stands in; else the first."""
     said = matcher.parsed(question.goal).room
     usual = next((kind for kind, signs in ROOM_SIGNS.items() if canonical(question.subgraph.nodes[0]) in signs), None)
@@ -112,7 +111,7 @@ def room(matcher: Matcher, question: RoomQuestion) -> tuple[str, str]:
     return question.rooms[0], "nothing tells"
 
 
-def group_score(matcher: Matcher, question: GroupScoreQuestion) -> tuple[float, str]:
+def group_score(matcher: Matcher, question: "GroupScoreQuestion") -> tuple[float, str]:
     """How well the best member's word fits the goal, and a little for the right room."""
     goal = matcher.parsed(question.goal)
     score = max(matcher.label_score(goal, node.caption) for node in question.group.nodes)
@@ -122,7 +121,7 @@ def group_score(matcher: Matcher, question: GroupScoreQuestion) -> tuple[float, 
     return round(min(1.0, score), 3), "words compared"
 
 
-def layout(_: Matcher, question: LayoutQuestion) -> tuple[Mapping[str, Point2], str]:
+def layout(_: Matcher, question: "LayoutQuestion") -> tuple[Mapping[str, Point2], str]:
     """Known objects where they are; what is on one of them there, what is next to it a step off, towards the others."""
     at = {word: node.ground_m for word, node in question.anchors.items()}
     mean = (sum(x for x, _ in at.values()) / len(at), sum(z for _, z in at.values()) / len(at))
@@ -140,7 +139,7 @@ def layout(_: Matcher, question: LayoutQuestion) -> tuple[Mapping[str, Point2], 
     return {word: (round(x, 3), round(z, 3)) for word, (x, z) in places.items()}, "from known places"
 
 
-def correct(matcher: Matcher, question: CorrectionQuestion) -> tuple[tuple[Verdict, ...], str]:
+def correct(matcher: Matcher, question: "CorrectionQuestion") -> tuple[tuple[Verdict, ...], str]:
     """Relations as boxes have them now: they grow after an edge was made."""
     known = {node.id: _candidate(node) for node in question.nodes}
     verdicts = [Verdict("keep")] * len(question.nodes)
@@ -181,17 +180,3 @@ def _beside(place: Point2, towards: Point2, kind: str) -> Point2:
     if length == 0.0:
         return (place[0] + _BESIDE_M, place[1])
     return (place[0] + _BESIDE_M * dx / length, place[1] + _BESIDE_M * dz / length)
-
-
-RULES: dict[type, Callable[[Matcher, Any], tuple[Any, str]]] = {
-    DescribeQuestion: describe,
-    ObjectsQuestion: objects,
-    GoalRelationsQuestion: goal_relations,
-    DecomposeQuestion: decompose,
-    CategoryQuestion: category,
-    RelationLinesQuestion: scene_relations,
-    RoomQuestion: room,
-    GroupScoreQuestion: group_score,
-    LayoutQuestion: layout,
-    CorrectionQuestion: correct,
-}
