@@ -21,9 +21,9 @@ from evonav.decision.text_match import TextMatch
 from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import task_file
+from evonav.evaluation.episode.episode import Episode
+from evonav.evaluation.episode.sensors import Sensors
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
-from evonav.evaluation.rollout import Episode
-from evonav.evaluation.sensing import Sensors
 from evonav.perception import Perception, StageScene
 from evonav.report.run import PAPER_ORDER
 from evonav.sensors.observation import Observation

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 
 from evonav.agents.agent import NavigateTo, Sensing, Stop, ViewSchedule
-from evonav.evaluation import motion
 from evonav.evaluation.backend import make_agent
+from evonav.evaluation.episode import motion
+from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.measures import measures_of
 from evonav.evaluation.metrics import summarise
 from evonav.evaluation.protocol import EpisodeCase, ForcedWalk, ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind, StageRecord
-from evonav.evaluation.rollout import Episode
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.pose import Pose
 

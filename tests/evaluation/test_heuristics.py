@@ -14,9 +14,9 @@ from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.agents.stage_reset import StageReset, StageResetConfig
 from evonav.agents.viewpoint import widest_direction_rad
 from evonav.decision.scripted import Scripted
+from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import EndState
-from evonav.evaluation.rollout import Episode
 from evonav.memory import ObjectMap
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy

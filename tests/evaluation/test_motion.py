@@ -12,10 +12,10 @@ from toy_house import ToySimulator, episode_case
 from evonav.agents.agent import NavigateTo, Sensing, ViewSchedule
 from evonav.agents.viewpoint import observation_point
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.cases import _turned_corners, room_at, stage_map
-from evonav.evaluation.motion import Planner, length_outside_m, navigate, polyline_length_m, waypoints
+from evonav.evaluation.episode.motion import Planner, length_outside_m, navigate, polyline_length_m, waypoints
+from evonav.evaluation.episode.sensors import view_yaws_rad
+from evonav.evaluation.episode.spec import _turned_corners, room_at, stage_map
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.sensing import view_yaws_rad
 from evonav.sensors.observation import MapFrame
 from evonav.world.pose import Pose
 from evonav.world.simulator import OccupancyGrid
@@ -130,8 +130,8 @@ def test_the_observation_point_is_free(seed, x_m, z_m):
 
 def test_a_pose_that_is_taken_is_snapped_and_recorded():
     from evonav.evaluation.backend import make_agent
+    from evonav.evaluation.episode.episode import Episode
     from evonav.evaluation.protocol import EpisodeCase
-    from evonav.evaluation.rollout import Episode
     from evonav.perception.ground_truth import GroundTruthPerception
 
     case = episode_case("toy-static")

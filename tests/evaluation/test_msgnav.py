@@ -10,9 +10,9 @@ from evonav.agents.msgnav import MsgNav, MsgNavConfig
 from evonav.agents.visible_viewpoint import visible_viewpoint
 from evonav.decision.questions.msgnav import GraphQuestion
 from evonav.decision.scripted import Scripted
+from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import EndState
-from evonav.evaluation.rollout import Episode
 from evonav.memory import ObjectMap
 from evonav.memory.scene_graph import SceneGraph
 from evonav.perception.ground_truth import GroundTruthPerception

@@ -13,10 +13,10 @@ from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_case, write_tas
 from evonav.agents.agent import NavigateTo, Sensing
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
-from evonav.evaluation.privileged import PrivilegedAgent
+from evonav.evaluation.episode.episode import Episode
+from evonav.evaluation.episode.oracle_baselines import PrivilegedAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState
-from evonav.evaluation.rollout import Episode
 from evonav.perception.ground_truth import GroundTruthPerception
 
 CODE = (type, types.ModuleType, types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.FrameType)

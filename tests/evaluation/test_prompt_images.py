@@ -12,8 +12,8 @@ from evonav.decision.scripted import Scripted
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import task_file
+from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.rollout import Episode
 
 TASK = "bundled-0086-0279d6-s0"
 MARGIN_PX = 20

@@ -11,9 +11,9 @@ from evonav.agents.frontier_update import FrontierUpdate
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.episode.episode import Episode
+from evonav.evaluation.episode.sensors import Sensors
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
-from evonav.evaluation.rollout import Episode
-from evonav.evaluation.sensing import Sensors
 from evonav.house import bundled_houses
 from evonav.memory import ObjectMap
 from evonav.memory.bev import BevMap

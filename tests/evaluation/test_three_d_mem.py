@@ -11,9 +11,9 @@ from evonav.agents.agent import NavigateTo
 from evonav.agents.three_d_mem import NO_ANSWER, NOTHING_LEFT, ThreeDMem, ThreeDMemConfig
 from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotQuestion
 from evonav.decision.scripted import Scripted
+from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import EndState
-from evonav.evaluation.rollout import Episode
 from evonav.memory import ObjectMap
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
 from evonav.perception.ground_truth import GroundTruthPerception

@@ -15,9 +15,9 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 
 from evonav.agents.agent import AgentAction, Move, NavigateTo, Sensing, Stop
 from evonav.errors import InvalidArgumentError, TaskError
-from evonav.evaluation.cases import episode_case
+from evonav.evaluation.episode.episode import Episode
+from evonav.evaluation.episode.spec import episode_case
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.rollout import Episode
 from evonav.gym import ACTIONS, ENV_ID, OBSERVATIONS, LifelongNavEnv, NavConfig, vocabulary
 from evonav.gym.spaces import waypoint_m
 from evonav.perception.ground_truth import GroundTruthPerception

@@ -82,7 +82,7 @@ def options(
 def list_agents() -> None:
     """Lists agents and yardsticks by name."""
     from evonav.agents.registry import agent_descriptions
-    from evonav.evaluation.privileged import YARDSTICKS
+    from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 
     yardsticks = {name: f"yardstick: {kind.description}" for name, kind in YARDSTICKS.items()}
     for name, description in {**agent_descriptions(), **yardsticks}.items():

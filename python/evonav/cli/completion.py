@@ -7,7 +7,7 @@ from typing import Any
 def agents(incomplete: str) -> list[str]:
     """Names of agents; after a comma, further ones."""
     from evonav.agents.registry import agent_descriptions
-    from evonav.evaluation.privileged import YARDSTICKS
+    from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 
     before, comma, last = incomplete.rpartition(",")
     taken = before.split(",")

@@ -17,10 +17,10 @@ from evonav.evaluation.agent_probe import Probe
 from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.privileged import YARDSTICKS
+from evonav.evaluation.episode.episode import Episode
+from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import ErrorKind, StageRecord
-from evonav.evaluation.rollout import Episode
 
 PROTOCOL = ProtocolConfig(max_rounds=10, max_actions=40)
 """Shorter than an evaluation's."""

@@ -12,7 +12,7 @@ from evonav.agents.registry import BUILT_IN, agent_descriptions, agent_factory, 
 from evonav.decision.questions.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.agent_process import DecisionSpec, check_importable
-from evonav.evaluation.privileged import YARDSTICKS, yardstick
+from evonav.evaluation.episode.oracle_baselines import YARDSTICKS, yardstick
 from evonav.evaluation.protocol import EpisodeCase
 from evonav.perception import Perception
 from evonav.world.simulator import Simulator
@@ -159,7 +159,7 @@ def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
 
 def load_case(path: Path) -> EpisodeCase:
     """A task on disk."""
-    from evonav.evaluation.cases import episode_case
+    from evonav.evaluation.episode.spec import episode_case
     from evonav.tasks import load_task
 
     return episode_case(load_task(path))

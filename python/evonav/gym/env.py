@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.agents.agent import Move, NavigateTo, Sensing
-from evonav.evaluation import motion
+from evonav.evaluation.episode import motion
 from evonav.gym import spaces
 from evonav.gym.config import ACTIONS, NavConfig
 from evonav.gym.source import NavTask, TaskSource

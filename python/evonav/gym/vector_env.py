@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from evonav import _core
 from evonav.agents.agent import Sensing
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation import motion
+from evonav.evaluation.episode import motion
 from evonav.gym import spaces
 from evonav.gym.config import STOP, NavConfig
 from evonav.gym.env import as_row, oracle_info

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from evonav.agents.agent import EntryBelief
-from evonav.evaluation.witness import EVIDENCE_RANGE_M, held_by
+from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M, held_by
 from evonav.memory.objects import ObjectMap
 from evonav.perception import Percept
 from evonav.perception_benchmark.matching import NONE, TrueObjects, main_objects

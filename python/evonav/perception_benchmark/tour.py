@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from evonav.evaluation.cases import room_at, stage_map
+from evonav.evaluation.episode.spec import room_at, stage_map
 from evonav.evaluation.protocol import EpisodeCase
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator

@@ -20,10 +20,10 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.differences import record_differences
 from evonav.evaluation.engine import agent_seed, perception_seed
-from evonav.evaluation.episode_parts import LOSSES
+from evonav.evaluation.episode.episode import Episode
+from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records import EndState, ErrorKind, StageMap, StageRecord
-from evonav.evaluation.rollout import Episode
 from evonav.evaluation.settings import EXCHANGES_NAME
 from evonav.evaluation.store import RunStore
 from evonav.perception.weights import MODELS_VARIABLE

@@ -15,8 +15,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.metrics import paired_differences, summarise, summary_json
-from evonav.evaluation.privileged import YARDSTICKS
 from evonav.evaluation.records import EndState, StageRecord
 from evonav.evaluation.store import RunStore
 

@@ -15,8 +15,8 @@ from pydantic import ValidationError
 
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.engine import TaskFile
+from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.metrics import stage_soft_spl, stage_spl
-from evonav.evaluation.privileged import YARDSTICKS
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records import EndState, StageRecord
 from evonav.parallel.pool import Job, answers, open_pool

@@ -125,7 +125,7 @@ impl Lone {
         self.world.navigation().distances_m(self.goal_m, &[[x, z]])[0]
     }
 
-    /// As `evonav.evaluation.motion` plans: the target, else free cells that lie nearer to it
+    /// As `evonav.evaluation.episode.motion` plans: the target, else free cells that lie nearer to it
     /// than any position of the grid if that is out of its reach, else that position.
     fn plan(&self, target_m: Vec2) -> Option<Vec<Vec2>> {
         let [x, _, z] = self.pose.position_m;

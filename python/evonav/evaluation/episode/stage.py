@@ -16,18 +16,20 @@ from evonav.agents.agent import (
     Sensing,
     Stop,
 )
-from evonav.evaluation import motion
-from evonav.evaluation.cases import room_at, stage_map
 from evonav.evaluation.costs import Stopwatch
-from evonav.evaluation.episode_parts import (
+from evonav.evaluation.episode import motion
+from evonav.evaluation.episode.observer import (
     EpisodeObserver,
     HasOwnProcess,
     StageFailedError,
     blame,
     traceback_of,
 )
+from evonav.evaluation.episode.oracle_baselines import Sighting, privileges_of
+from evonav.evaluation.episode.sensors import Sensors, map_frame
+from evonav.evaluation.episode.spec import room_at, stage_map
+from evonav.evaluation.episode.staleness import Witness, Witnessed
 from evonav.evaluation.metrics import stage_soft_spl, stage_spl
-from evonav.evaluation.privileged import Sighting, privileges_of
 from evonav.evaluation.protocol import (
     EpisodeCase,
     ForcedWalk,
@@ -44,8 +46,6 @@ from evonav.evaluation.records import (
     StageMap,
     StageRecord,
 )
-from evonav.evaluation.sensing import Sensors, map_frame
-from evonav.evaluation.witness import Witness, Witnessed
 from evonav.perception import Perception, StageScene
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import TaskInfo

@@ -1,0 +1,1 @@
+"""Run one agent through the stages of one task."""
