@@ -18,8 +18,8 @@ from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, TaskFile, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records import StageRecord
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import StageRecord
+from evonav.evaluation.records.store import RunStore
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator
 

@@ -7,7 +7,7 @@ import pytest
 
 from evonav.cli import main
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 
 ONE = "--agents shortest-path --limit 1 --workers 0"
 

@@ -14,7 +14,7 @@ from evonav.decision.mock_answers import mock_answer
 from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.vlm import VlmClient, VlmConfig
 from evonav.decision.vlm_errors import VlmError
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 from vlm_stub import KEY, check_request, serving
 
 COMMON = ("--agents", "fu", "--limit", "1", "--workers", "0", "--in-process")

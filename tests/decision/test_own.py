@@ -15,7 +15,7 @@ from evonav.decision.questions.question import AnswerError, Question, Reply
 from evonav.decision.vlm_decision import VlmDecision
 from evonav.decision.vlm_errors import VlmError
 from evonav.errors import DecisionError, InvalidArgumentError
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -18,7 +18,7 @@ from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 from vlm_stub import check_strict
 
 NUM_OF_A_KIND = 12

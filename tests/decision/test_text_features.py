@@ -15,7 +15,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 
 needs_weights = pytest.mark.skipif(not minilm.is_installed(), reason="needs the extra evonav[text]")
 

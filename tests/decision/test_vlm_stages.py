@@ -16,8 +16,8 @@ from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records import EndState, StageRecord
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, StageRecord
+from evonav.evaluation.records.store import RunStore
 from vlm_stub import KEY, Stub, check_request, images_in, serving
 
 AGENTS = ["fu", "ftu"]

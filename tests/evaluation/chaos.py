@@ -17,7 +17,7 @@ from collections import Counter
 from contextlib import closing, suppress
 from pathlib import Path
 
-from evonav.evaluation.store import FILE_NAME, RunStore
+from evonav.evaluation.records.store import FILE_NAME, RunStore
 
 VICTIMS = {"driver": None, "worker": "multiprocessing.spawn", "agent": "evonav.agents.serving"}
 

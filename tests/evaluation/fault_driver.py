@@ -17,7 +17,7 @@ from test_engine import CONFIG
 from evonav.errors import StoreError
 from evonav.evaluation import engine
 from evonav.evaluation.engine import evaluate, task_files
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.workers import EpisodeWork
 from evonav.parallel.pool import folders
 

@@ -1,6 +1,6 @@
 """Records made up by hand for tests of measures. Never results."""
 
-from evonav.evaluation.records import (
+from evonav.evaluation.records.schema import (
     ActionRecord,
     EndState,
     EntryRecord,

@@ -28,8 +28,8 @@ from evonav.evaluation.agent_process import (
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import AgentFailedError, ProtocolConfig
-from evonav.evaluation.records import EndState, ErrorKind
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, ErrorKind
+from evonav.evaluation.records.store import RunStore
 from evonav.report import write_report
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.tasks.public import StageInput, TaskInfo

@@ -4,11 +4,11 @@ from evonav.agents import wire
 from evonav.decision.account import Account, Price, Usage
 from evonav.decision.metered import Metered
 from evonav.decision.questions.question import Reply
-from evonav.evaluation.costs import Stopwatch
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import evaluate, task_files
 from evonav.evaluation.measures import stage_rows
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.costs import Stopwatch
+from evonav.evaluation.records.store import RunStore
 
 
 class Client:

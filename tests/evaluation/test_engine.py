@@ -17,8 +17,8 @@ from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records import EndState, ErrorKind
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, ErrorKind
+from evonav.evaluation.records.store import RunStore
 from evonav.parallel.folders import writing
 from evonav.report.run import load_run
 

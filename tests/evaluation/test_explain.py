@@ -3,8 +3,8 @@ from made_up_stage import entry, made_up_record, taken
 
 from evonav.evaluation.explain import COSTS, MEASURES, MEMORY, STALENESS, SUCCESS, explain
 from evonav.evaluation.measures import stage_rows
-from evonav.evaluation.records import EndState, StaleEntryRecord
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, StaleEntryRecord
+from evonav.evaluation.records.store import RunStore
 from evonav.report.measures_tables import measures_table, measures_tables
 
 
@@ -30,7 +30,7 @@ def run_dir(tmp_path):
 
 
 def memory():
-    from evonav.evaluation.records import MemoryRecord
+    from evonav.evaluation.records.schema import MemoryRecord
 
     return MemoryRecord(num_entries=2, num_right=1, num_held=1, num_seen=4, num_seen_held=1, position_error_m=0.1)
 

@@ -16,7 +16,7 @@ from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.measures import measures_of
 from evonav.evaluation.metrics import summarise
 from evonav.evaluation.protocol import EpisodeCase, ForcedWalk, ProtocolConfig
-from evonav.evaluation.records import EndState, ErrorKind, StageRecord
+from evonav.evaluation.records.schema import EndState, ErrorKind, StageRecord
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.pose import Pose
 

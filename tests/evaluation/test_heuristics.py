@@ -16,7 +16,7 @@ from evonav.agents.viewpoint import widest_direction_rad
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy

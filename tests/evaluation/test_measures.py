@@ -5,10 +5,10 @@ from dataclasses import fields
 import pytest
 from made_up_stage import entry, made_up_record, taken
 
-from evonav.evaluation.costs import StageCosts
 from evonav.evaluation.measures import StageRow, measures_of, stage_rows
-from evonav.evaluation.records import EndState, MemoryRecord, MovedObjectRecord, StaleEntryRecord
-from evonav.evaluation.store import FILE_NAME, RunStore
+from evonav.evaluation.records.costs import StageCosts
+from evonav.evaluation.records.schema import EndState, MemoryRecord, MovedObjectRecord, StaleEntryRecord
+from evonav.evaluation.records.store import FILE_NAME, RunStore
 
 
 def memory(num_entries=4, num_right=3, num_held=2, num_seen=4, num_seen_held=1):

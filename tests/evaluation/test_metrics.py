@@ -19,8 +19,8 @@ from evonav.evaluation.metrics import (
     summarise,
 )
 from evonav.evaluation.protocol import as_errored
-from evonav.evaluation.records import EndState, ErrorKind
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, ErrorKind
+from evonav.evaluation.records.store import RunStore
 from evonav.significance import widened_tail, wilson
 
 LENGTHS = st.floats(0.0, 100.0)

@@ -12,7 +12,7 @@ from evonav.decision.questions.msgnav import GraphQuestion
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
 from evonav.memory.scene_graph import SceneGraph
 from evonav.perception.ground_truth import GroundTruthPerception

@@ -18,7 +18,7 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 from evonav.parallel.folders import write_atomically, writing
 from evonav.parallel.pool import folders
 

@@ -16,7 +16,7 @@ from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import PrivilegedAgent
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.perception.ground_truth import GroundTruthPerception
 
 CODE = (type, types.ModuleType, types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.FrameType)

@@ -104,7 +104,7 @@ def test_its_questions_reach_a_model_of_ones_own(installed, tmp_path):
     options = ("--decision", "contrary_model:Contrary", "--limit", 1, "--workers", 1, "--out", tmp_path / "run")
     done = evonav("evaluate", "--agent", "asking", *options, PYTHONPATH=path)
     assert done.returncode == 0, done.stdout + done.stderr
-    from evonav.evaluation.store import RunStore
+    from evonav.evaluation.records.store import RunStore
 
     with RunStore(tmp_path / "run") as store:
         last = list(store.records("asking"))[-1].trace[-1].counters

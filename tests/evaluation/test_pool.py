@@ -15,8 +15,8 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.engine import RunConfig, RunRequest, evaluate, evaluate_all, task_files
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records import ErrorKind
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import ErrorKind
+from evonav.evaluation.records.store import RunStore
 from evonav.parallel.pool import Resources
 
 HERE = Path(__file__).parent

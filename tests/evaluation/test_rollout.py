@@ -9,7 +9,7 @@ from toy_house import ToySimulator, episode_case
 from evonav.evaluation.backend import make_agent
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.perception.ground_truth import GroundTruthPerception
 
 

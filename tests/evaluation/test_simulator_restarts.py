@@ -8,8 +8,8 @@ from toy_house import write_tasks
 
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.engine import NUM_RETRIES, RunConfig, evaluate, task_files
-from evonav.evaluation.records import EndState, ErrorKind
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, ErrorKind
+from evonav.evaluation.records.store import RunStore
 from evonav.report.run import load_run
 
 AGENT = "random-walk"  # what it does depends on all that it did before

@@ -19,7 +19,7 @@ from evonav.decision.ledger import Ledger
 from evonav.decision.mock_answers import mock_answer
 from evonav.errors import EvonavError, StoreError
 from evonav.evaluation.metrics import rates
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 from evonav.sweeps.summary import sweep_rows
 from vlm_stub import KEY, serving
 

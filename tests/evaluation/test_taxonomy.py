@@ -1,7 +1,7 @@
 import pytest
 from made_up_stage import entry, made_up_record, taken
 
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.taxonomy import Cause, cause_of
 
 FAR_M = (0.0, 0.8, 4.0)

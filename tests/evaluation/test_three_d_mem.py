@@ -13,7 +13,7 @@ from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotQue
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
 from evonav.perception.ground_truth import GroundTruthPerception

@@ -19,8 +19,8 @@ from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig, as_errored
-from evonav.evaluation.records import EndState, ErrorKind
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, ErrorKind
+from evonav.evaluation.records.store import RunStore
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import EXPLORED, FREE
 

@@ -21,7 +21,7 @@ from evonav.decision.scripted import Scripted
 from evonav.decision.text_match import TextMatch
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.memory.goal_graph import GoalEdge, GoalGraph
 from evonav.memory.object_graph import SceneNode
 from evonav.perception.ground_truth import GroundTruthPerception

@@ -5,7 +5,7 @@ import pytest
 
 from evonav.agents.agent import EntryBelief
 from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M, Witness, Witnessed, held_by, shows_place
-from evonav.evaluation.records import Relocation
+from evonav.evaluation.records.schema import Relocation
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics, SceneObject
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from evonav.evaluation.protocol import EpisodeCase, StageCase
-from evonav.evaluation.records import Relocation, TargetRecord, TransitionRecord
+from evonav.evaluation.records.schema import Relocation, TargetRecord, TransitionRecord
 from evonav.tasks.public import StageInput
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Frame, Intrinsics, OccupancyGrid, SceneObject, SimulatorConfig

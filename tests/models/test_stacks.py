@@ -13,8 +13,8 @@ from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.settings import PerceptionSettings
-from evonav.evaluation.store import RunStore
 from evonav.perception import StageScene, weights
 from evonav.perception.predicted import predicted_perception
 from evonav.perception.vocabulary import PROCTHOR_TYPES

@@ -12,7 +12,7 @@ from evonav.errors import StoreError
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import evaluate, task_files
 from evonav.evaluation.measures import stage_rows
-from evonav.evaluation.store import FILE_NAME, RunStore
+from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.report.run import load_run
 
 AGENTS = ("fu", "random-walk", "nearest-frontier", "stay-still")

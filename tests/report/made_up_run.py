@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from evonav.evaluation.records import (
+from evonav.evaluation.records.schema import (
     ActionRecord,
     EndState,
     EntryRecord,
@@ -21,7 +21,7 @@ from evonav.evaluation.records import (
     TargetRecord,
     TransitionRecord,
 )
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 
 WriteRun = Callable[..., Path]
 

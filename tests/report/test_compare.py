@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records import EndState
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState
+from evonav.evaluation.records.store import RunStore
 from evonav.report import compare_words as words
 from evonav.report.compare import Comparison, compare, comparison_json
 from evonav.report.export import csv_cell

@@ -16,8 +16,8 @@ from evonav.controlled.page import write_controlled_report
 from evonav.controlled.paired_maps import load_rollouts, pair_svg, telling_pairs
 from evonav.controlled.rates import Crossover, _crossing, by_rate, crossover
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records import EndState, TransitionRecord
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, TransitionRecord
+from evonav.evaluation.records.store import RunStore
 from evonav.paired import mcnemar
 from evonav.tasks.dataset import SourceFile
 from evonav.tasks.manifest import GenerationParameters

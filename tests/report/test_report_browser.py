@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.records import EndState, StageError, StageRecord
+from evonav.evaluation.records.schema import EndState, StageError, StageRecord
 from evonav.replay.pages import write_episode
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import TracedStage

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.report.maps.floor_plan import label_point
 from evonav.report.maps.stage_map import file_css, map_css, stage_svg
 from evonav.report.maps.strip import most_telling, write_strip

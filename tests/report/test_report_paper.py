@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.evaluation.metrics import PairedDifference
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.report import paper
 from evonav.report.line_chart import Line, line_chart
 from evonav.report.mechanisms import cause_share_table, counter_table, deeds_of, end_table, success_by_group

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.evaluation.records import ObjectFootprint
+from evonav.evaluation.records.schema import ObjectFootprint
 from evonav.generation import GenerationParameters, generate_task
 from evonav.house import House, bundled_houses
 from evonav.report.maps.floor_plan import Frame, item_labels, label_point

@@ -19,8 +19,8 @@ from viewer_run import MARKUP
 
 from evonav.cli import app
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.records import EndState
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState
+from evonav.evaluation.records.store import RunStore
 from evonav.replay.page_data import PageData, cells_text
 from evonav.replay.pages import write_episode
 from evonav.replay.replay import RunReplay

@@ -22,7 +22,7 @@ from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostEr
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 from evonav.house import bundled_houses
 from evonav.world import ai2thor
 from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator

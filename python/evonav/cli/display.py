@@ -67,7 +67,7 @@ def print_failures(run: Path) -> None:
     """How often attempts at stages have failed, if any has, and where to read why."""
     from collections import Counter
 
-    from evonav.evaluation.store import RunStore
+    from evonav.evaluation.records.store import RunStore
 
     with RunStore(run) as store:
         failures = store.failures()

@@ -13,7 +13,7 @@ def failures(
     brief: Annotated[bool, typer.Option("--brief", help="Without tracebacks.")] = False,
 ) -> None:
     """Lists the attempts at stages that failed, those tried again included, with their tracebacks."""
-    from evonav.evaluation.store import RunStore
+    from evonav.evaluation.records.store import RunStore
 
     with RunStore(run) as store:
         rows = [row for row in store.failures() if agent in (None, row.agent)]

@@ -59,7 +59,7 @@ def _report_sweep(
     sweep: Path, out: Path | None, num_replays: int | None, tasks: Path | None, exchanges: Path | None, has_maps: bool
 ) -> Path:
     """A report a cell that has records, and a page that leads to them."""
-    from evonav.evaluation.store import FILE_NAME
+    from evonav.evaluation.records.store import FILE_NAME
     from evonav.sweeps.page import write_sweep_page
     from evonav.sweeps.run import RUNS_NAME
     from evonav.sweeps.tables import sweep_tables

@@ -228,7 +228,7 @@ def duration(seconds: float) -> str:
 
 def _recorded(run_dir: Path, agents: "Sequence[str]") -> "Counter[str]":
     """Stages with a record, by end state."""
-    from evonav.evaluation.store import FILE_NAME, RunStore
+    from evonav.evaluation.records.store import FILE_NAME, RunStore
 
     if not (run_dir / FILE_NAME).exists():
         return Counter()

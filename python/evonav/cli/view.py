@@ -115,7 +115,7 @@ def task_path(run: Path, tasks: Path | None) -> "Callable[[str], Path]":
     """
     from evonav.errors import TaskError
     from evonav.evaluation.datasets import bundled_tasks
-    from evonav.evaluation.store import RunStore
+    from evonav.evaluation.records.store import RunStore
 
     with RunStore(run) as store:
         noted = store.meta("tasks_dir")

@@ -11,8 +11,8 @@ from evonav.controlled.layout import ControlledRecord, read_controlled, run_of
 from evonav.errors import StoreError
 from evonav.evaluation.measures import StageRow, stage_rows
 from evonav.evaluation.metrics import SUCCESS_RADIUS_M
-from evonav.evaluation.records import StageRecord
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import StageRecord
+from evonav.evaluation.records.store import RunStore
 from evonav.paired import PairedEffect, paired_effect
 from evonav.report.run import PAPER_ORDER
 from evonav.report.tables import NONE, Table

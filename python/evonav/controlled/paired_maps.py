@@ -8,8 +8,8 @@ from pathlib import Path
 from evonav.controlled.analysis import SPLITS, Analysis, Key, has_moved_far, split_of
 from evonav.controlled.layout import run_of
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records import EndState, StageMap, StageRecord
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
+from evonav.evaluation.records.store import RunStore
 from evonav.report.causes import sentence
 from evonav.report.maps.files import check_picture, write_picture
 from evonav.report.maps.floor_plan import Frame, ground, labels

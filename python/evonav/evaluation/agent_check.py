@@ -20,7 +20,7 @@ from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
-from evonav.evaluation.records import ErrorKind, StageRecord
+from evonav.evaluation.records.schema import ErrorKind, StageRecord
 
 PROTOCOL = ProtocolConfig(max_rounds=10, max_actions=40)
 """Shorter than an evaluation's."""

@@ -29,7 +29,7 @@ from evonav.agents.serving import LENGTH
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.agent_channel import OutputLog, SharedBlock
 from evonav.evaluation.protocol import AgentFailedError
-from evonav.evaluation.records import ErrorKind
+from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo

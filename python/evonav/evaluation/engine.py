@@ -14,10 +14,10 @@ from evonav.evaluation.agent_process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.backend import Backend, check_agent_name
 from evonav.evaluation.metrics import AgentSummary, paired_differences, summarise, summary_json
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
+from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.running import Progress, Run, TaskFile, run_all
 from evonav.evaluation.sessions import note_session
-from evonav.evaluation.store import FILE_NAME, RunStore
 from evonav.evaluation.workers import WORK, EpisodeJob, Setup
 from evonav.parallel.folders import check_same_run, write_atomically, writing
 from evonav.parallel.pool import EngineName, Resources, open_pool

@@ -11,12 +11,12 @@ from dataclasses import asdict, dataclass, fields
 from itertools import groupby, pairwise
 from typing import TYPE_CHECKING, Any
 
-from evonav.evaluation.costs import StageCosts
-from evonav.evaluation.records import EndState, MemoryRecord, RoundRecord, StageRecord
+from evonav.evaluation.records.costs import StageCosts
+from evonav.evaluation.records.schema import EndState, MemoryRecord, RoundRecord, StageRecord
 from evonav.evaluation.taxonomy import cause_of
 
 if TYPE_CHECKING:
-    from evonav.evaluation.store import RunStore
+    from evonav.evaluation.records.store import RunStore
 
 MEASURES_VERSION = 2
 """Raised whenever a measure changes: measures kept under another version are derived again from their records."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import StoreError
-from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.significance import Interval, percentile_interval, wilson
 
 SUCCESS_RADIUS_M = 2.0

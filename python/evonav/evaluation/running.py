@@ -13,8 +13,8 @@ from evonav.evaluation.protocol import (
     as_not_run,
     unknown_case,
 )
-from evonav.evaluation.records import EndState, ErrorKind, StageFailure, StageRecord
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, ErrorKind, StageFailure, StageRecord
+from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.workers import RETRIED, EpisodeJob, Setup, read_news
 from evonav.parallel.pool import Answer, Job, Pool
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav import __version__
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 
 KEY = "sessions"
 MAX_SESSIONS = 50

@@ -256,7 +256,7 @@ class DecisionSettings(Settings):
     def _keeping(self, run_dir: Path) -> dict[str, Any]:
         """Where exchanges are kept, and what is had from there."""
         from evonav.decision.exchanges import ExchangeStore
-        from evonav.evaluation.store import FILE_NAME
+        from evonav.evaluation.records.store import FILE_NAME
 
         mode = self.mode or "auto"
         if mode == "live":

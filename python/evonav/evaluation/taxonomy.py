@@ -6,7 +6,7 @@ Definitions, in the order in which they are tried, are in docs/measures.md.
 import math
 from enum import Enum
 
-from evonav.evaluation.records import EndState, EntryRecord, ErrorKind, StageRecord
+from evonav.evaluation.records.schema import EndState, EntryRecord, ErrorKind, StageRecord
 
 NEAR_TARGET_M = 1.0
 """Ground-plane distance within which an entry of the goal's category is taken for the target's."""

@@ -21,12 +21,12 @@ from evonav.agents import wire
 from evonav.agents.agent import Agent, AgentAction, Sensing
 from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.backend import Backend, make_agent
-from evonav.evaluation.costs import StageCosts
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
-from evonav.evaluation.records import ErrorKind, RoundRecord, StageFailure, StageMap, StageRecord
+from evonav.evaluation.records.costs import StageCosts
+from evonav.evaluation.records.schema import ErrorKind, RoundRecord, StageFailure, StageMap, StageRecord
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.simulator import Simulator

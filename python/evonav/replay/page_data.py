@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.evaluation.records import EndState, RoundRecord, StageMap, StageRecord
+from evonav.evaluation.records.schema import EndState, RoundRecord, StageMap, StageRecord
 from evonav.replay.types import (
     TracedEntry,
     TracedFrontier,

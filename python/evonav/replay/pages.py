@@ -11,7 +11,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records import StageMap, StageRecord
+from evonav.evaluation.records.schema import StageMap, StageRecord
 from evonav.replay.page_data import PageData
 from evonav.replay.types import TracedStage
 from evonav.report.maps.floor_plan import Frame, floors, furniture, item_labels, labels, structure

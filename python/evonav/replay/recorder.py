@@ -17,8 +17,8 @@ from evonav.decision.prompts import Picture
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.questions.question import Question
 from evonav.evaluation.protocol import AgentFailedError, StageOutcome
-from evonav.evaluation.record_parts import STALE_MARGIN_M, distance_to_box_m, entry_record, pose_record
-from evonav.evaluation.records import ErrorKind, RoundRecord
+from evonav.evaluation.records.convert import STALE_MARGIN_M, distance_to_box_m, entry_record, pose_record
+from evonav.evaluation.records.schema import ErrorKind, RoundRecord
 from evonav.replay.types import (
     BLOCKED,
     EXPLORED,

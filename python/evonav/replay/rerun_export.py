@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records import StageMap, StageRecord
+from evonav.evaluation.records.schema import StageMap, StageRecord
 from evonav.replay.page_data import choice_words, evaluator_words
 from evonav.replay.types import BLOCKED, TracedMap, TracedRound, TracedStage, TracedView
 from evonav.report.causes import sentence

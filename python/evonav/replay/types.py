@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.evaluation.records import EntryRecord, Point2, Point3, PoseRecord, RoundRecord, StageMap, StageRecord
+from evonav.evaluation.records.schema import EntryRecord, Point2, Point3, PoseRecord, RoundRecord, StageMap, StageRecord
 
 UNKNOWN, FREE, BLOCKED, EXPLORED = 0, 1, 2, 3
 """Values of `TracedMap.cells`; explored cells are free ones that were seen from close by."""

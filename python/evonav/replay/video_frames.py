@@ -6,7 +6,7 @@ from io import BytesIO
 import numpy as np
 from PIL import Image, ImageDraw
 
-from evonav.evaluation.records import EndState, StageMap
+from evonav.evaluation.records.schema import EndState, StageMap
 from evonav.replay.page_data import choice_words, evaluator_words
 from evonav.replay.types import TracedEntry, TracedRound, TracedStage
 from evonav.report.canvas import Colour, MapCanvas, colour, font, plain, wrapped

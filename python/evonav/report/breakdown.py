@@ -8,7 +8,7 @@ import numpy as np
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.measures import StageRow
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 from evonav.paired import cluster_means
 from evonav.report.compare import MODES, STRATA, check_measure
 from evonav.report.compare_words import RATES, measure_name

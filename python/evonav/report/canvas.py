@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from evonav.evaluation.records import ObjectFootprint, Relocation, StageMap
+from evonav.evaluation.records.schema import ObjectFootprint, Relocation, StageMap
 from evonav.report.maps.floor_plan import FLAT_CATEGORIES, FLOORS, Frame
 from evonav.report.maps.stage_map import map_css
 from evonav.report.maps.svg import cm

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.report.causes import sentence
 from evonav.report.maps.floor_plan import Frame, furniture, ground, item_labels, labels, moving_ids
 from evonav.report.maps.stage_map import change_words, outcome_words, task_frame

@@ -1,6 +1,6 @@
 """How a stage ended, in words. What is what is decided in `evonav.evaluation.taxonomy`."""
 
-from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.taxonomy import Cause, cause_of
 from evonav.tasks.language import noun_of
 

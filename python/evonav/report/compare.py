@@ -15,7 +15,7 @@ import numpy as np
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.measures import StageRow
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.paired import PairedEffect, holm, mcnemar, paired_effects
 from evonav.report.causes import WORDS, Cause
 from evonav.report.maps.stage_map import VIEW_DIR, page_name

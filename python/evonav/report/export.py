@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import StoreError
-from evonav.evaluation import costs, measures
+from evonav.evaluation import measures
 from evonav.evaluation.measures import StageRow, stage_rows
-from evonav.evaluation.records import RoundRecord
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import RoundRecord, costs
+from evonav.evaluation.records.store import RunStore
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 """What a spreadsheet takes for the start of a formula."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.perception.words import word_of
 from evonav.report.run import Run
 

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable
 
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.report import tables
 from evonav.report.breakdown import breakdown_table
 from evonav.report.run import Run

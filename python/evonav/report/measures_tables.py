@@ -5,7 +5,7 @@ from pathlib import Path
 
 from evonav.evaluation.explain import MEASURES, Explained, explain
 from evonav.evaluation.measures import StageRow, stage_rows
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 from evonav.report.tables import NONE, Table
 
 TITLES = {

@@ -4,7 +4,7 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.report.causes import WORDS, Cause
 from evonav.report.run import Run
 from evonav.report.tables import NONE, Table, percent

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import StoreError
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.store import RunStore
 from evonav.report.export import ROUND_COLUMNS, round_table, stage_columns, stage_table
 
 Columns = dict[str, list[Any]]

@@ -13,8 +13,8 @@ from pydantic import ValidationError
 
 from evonav.errors import StoreError
 from evonav.evaluation.metrics import AgentSummary, PairedDifference, paired_differences, summarise
-from evonav.evaluation.records import EndState, StageMap, StageRecord
-from evonav.evaluation.store import FailureRow, RunStore
+from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
+from evonav.evaluation.records.store import FailureRow, RunStore
 from evonav.report.causes import Cause, cause_of
 from evonav.report.maps.stage_map import success_radius_of
 

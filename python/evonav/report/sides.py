@@ -7,7 +7,7 @@ from typing import Any
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.measures import StageRow, stage_rows
-from evonav.evaluation.store import FILE_NAME, RunStore
+from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.report.run import agents_in_order
 
 

@@ -16,7 +16,7 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from evonav.evaluation.metrics import AgentSummary, PairedDifference, Rates, rates
-from evonav.evaluation.records import StageRecord
+from evonav.evaluation.records.schema import StageRecord
 from evonav.report.causes import WORDS, Cause, cause_of
 from evonav.significance import Interval
 

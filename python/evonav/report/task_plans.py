@@ -5,8 +5,15 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from evonav.evaluation.plans import door_ends, house_map, image_uri, target_record, transition_record, true_footprints
-from evonav.evaluation.records import ObjectFootprint, RoomFootprint, StageMap
+from evonav.evaluation.records.floor_plan import (
+    door_ends,
+    house_map,
+    image_uri,
+    target_record,
+    transition_record,
+    true_footprints,
+)
+from evonav.evaluation.records.schema import ObjectFootprint, RoomFootprint, StageMap
 from evonav.house import House
 from evonav.report.maps.floor_plan import (
     FLAT_CATEGORIES,

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable
 
-from evonav.evaluation.records import StageMap
+from evonav.evaluation.records.schema import StageMap
 from evonav.tasks.language import noun_of
 from evonav.tasks.oracle import Evolution, OracleStage
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.report.causes import Cause
 from evonav.report.run import Run, StageOutcome
 

@@ -18,7 +18,7 @@ from evonav.evaluation.engine import TaskFile
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.metrics import stage_soft_spl, stage_spl
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records import EndState, StageRecord
+from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.submission.pack import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
 

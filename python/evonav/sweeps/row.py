@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from evonav.evaluation.records import EndState
+from evonav.evaluation.records.schema import EndState
 from evonav.significance import Interval
 
 AXES = ("simulator", "perception", "decision", "tasks", "seed")

@@ -33,8 +33,8 @@ from evonav.evaluation.engine import (
     run_identity,
     task_files,
 )
+from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.settings import Books, SpendingSettings, try_decisions
-from evonav.evaluation.store import FILE_NAME, RunStore
 from evonav.parallel.folders import write_atomically, writing
 from evonav.parallel.pool import Resources
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet

@@ -11,8 +11,8 @@ from typing import Any
 
 from evonav.evaluation.engine import SUMMARY_NAME, write_summary
 from evonav.evaluation.metrics import Rates, rates
-from evonav.evaluation.records import StageRecord
-from evonav.evaluation.store import FILE_NAME, RunStore
+from evonav.evaluation.records.schema import StageRecord
+from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.significance import Interval
 from evonav.sweeps.row import AXES, STATES, SweepRow
 from evonav.sweeps.run import RUNS_NAME, read_claim

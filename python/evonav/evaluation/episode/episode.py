@@ -9,11 +9,11 @@ from dataclasses import replace
 from time import process_time
 
 from evonav.agents.agent import Agent
-from evonav.evaluation.costs import LEVELS, Stopwatch
 from evonav.evaluation.episode.observer import LOSSES, EpisodeObserver, HasOwnProcess
 from evonav.evaluation.episode.stage import Carried, Participants, StageRun
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome, as_not_run
-from evonav.evaluation.records import ErrorKind, StageRecord
+from evonav.evaluation.records.costs import LEVELS, Stopwatch
+from evonav.evaluation.records.schema import ErrorKind, StageRecord
 from evonav.perception import Perception
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator

@@ -14,7 +14,7 @@ from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.agents.registry import new_agent
 from evonav.decision.questions.question import DecisionModel
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records import Point3
+from evonav.evaluation.records.schema import Point3
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
 

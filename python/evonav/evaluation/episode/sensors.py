@@ -4,8 +4,8 @@ import math
 from dataclasses import replace
 
 from evonav.agents.agent import Sensing, ViewSchedule
-from evonav.evaluation.costs import Stopwatch
 from evonav.evaluation.episode.staleness import Witness
+from evonav.evaluation.records.costs import Stopwatch
 from evonav.perception import Percept, Perception, StageScene
 from evonav.sensors.observation import MapFrame, Observation, View
 from evonav.sensors.visibility import visible_occupancy

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from evonav.evaluation.plans import house_map, image_uri, target_record, transition_record
 from evonav.evaluation.protocol import EpisodeCase, ForcedWalk, StageCase
-from evonav.evaluation.records import ObjectFootprint, Point2, StageMap
+from evonav.evaluation.records.floor_plan import house_map, image_uri, target_record, transition_record
+from evonav.evaluation.records.schema import ObjectFootprint, Point2, StageMap
 from evonav.house import House
 from evonav.tasks import Task
 from evonav.tasks.oracle import OracleStage

@@ -16,7 +16,6 @@ from evonav.agents.agent import (
     Sensing,
     Stop,
 )
-from evonav.evaluation.costs import Stopwatch
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.observer import (
     EpisodeObserver,
@@ -36,8 +35,9 @@ from evonav.evaluation.protocol import (
     ProtocolConfig,
     as_errored,
 )
-from evonav.evaluation.record_parts import action_record, entry_record, pose_record, sensing_record
-from evonav.evaluation.records import (
+from evonav.evaluation.records.convert import action_record, entry_record, pose_record, sensing_record
+from evonav.evaluation.records.costs import Stopwatch
+from evonav.evaluation.records.schema import (
     EndState,
     EntryRecord,
     ErrorKind,

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.agents.agent import EntryBelief
-from evonav.evaluation.record_parts import STALE_MARGIN_M, distance_to_box_m
-from evonav.evaluation.records import MemoryRecord, MovedObjectRecord, Relocation, StaleEntryRecord
+from evonav.evaluation.records.convert import STALE_MARGIN_M, distance_to_box_m
+from evonav.evaluation.records.schema import MemoryRecord, MovedObjectRecord, Relocation, StaleEntryRecord
 from evonav.world.simulator import Frame, SceneObject
 
 EVIDENCE_RANGE_M = 3.5

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evonav.evaluation.records import ObjectFootprint, RoomFootprint, StageMap
+from evonav.evaluation.records.schema import ObjectFootprint, RoomFootprint, StageMap
 from evonav.report.maps.svg import Point, cm, escape, join, polyline, title
 from evonav.tasks.language import noun_of
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records import EndState, StageMap, StageRecord
-from evonav.evaluation.store import RunStore
+from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
+from evonav.evaluation.records.store import RunStore
 from evonav.report.causes import sentence
 from evonav.report.maps.files import check_picture, write_picture
 from evonav.report.maps.floor_plan import Frame

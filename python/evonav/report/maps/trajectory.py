@@ -4,7 +4,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 
-from evonav.evaluation.records import (
+from evonav.evaluation.records.schema import (
     EndState,
     EntryRecord,
     ObjectFootprint,

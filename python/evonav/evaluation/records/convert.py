@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from evonav.agents.agent import AgentAction, EntryBelief, Move, NavigateTo, Sensing
-from evonav.evaluation.records import ActionRecord, EntryRecord, Point3, PoseRecord, SensingRecord
+from evonav.evaluation.records.schema import ActionRecord, EntryRecord, Point3, PoseRecord, SensingRecord
 from evonav.world.pose import Pose
 from evonav.world.simulator import SceneObject
 

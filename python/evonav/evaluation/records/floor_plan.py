@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from evonav.evaluation.records import (
+from evonav.evaluation.records.schema import (
     ObjectFootprint,
     Opening,
     OpeningKind,

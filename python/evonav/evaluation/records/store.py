@@ -20,9 +20,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.evaluation.costs import StageCosts
 from evonav.evaluation.measures import MEASURES_VERSION, kept_measures
-from evonav.evaluation.records import SCHEMA_VERSION, EndState, ErrorKind, StageFailure, StageMap, StageRecord
+from evonav.evaluation.records.costs import StageCosts
+from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, StageFailure, StageMap, StageRecord
 from evonav.parallel.folders import is_on_network, sync_folder
 
 FILE_NAME = "records.sqlite"

@@ -1,0 +1,1 @@
+"""Define, convert and store what a run records of each stage."""
