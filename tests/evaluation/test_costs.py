@@ -6,7 +6,7 @@ from evonav.decision.metered import Metered
 from evonav.decision.questions.question import Reply
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.engine import evaluate, task_files
-from evonav.evaluation.measures import stage_rows
+from evonav.evaluation.metrics.stage_metrics import stage_rows
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.store import RunStore
 

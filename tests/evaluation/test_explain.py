@@ -1,8 +1,8 @@
 import pytest
 from made_up_stage import entry, made_up_record, taken
 
-from evonav.evaluation.explain import COSTS, MEASURES, MEMORY, STALENESS, SUCCESS, explain
-from evonav.evaluation.measures import stage_rows
+from evonav.evaluation.metrics.aggregate import COSTS, MEASURES, MEMORY, STALENESS, SUCCESS, explain
+from evonav.evaluation.metrics.stage_metrics import stage_rows
 from evonav.evaluation.records.schema import EndState, StaleEntryRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.measures_tables import measures_table, measures_tables

@@ -13,8 +13,8 @@ from evonav.agents.agent import NavigateTo, Sensing, Stop, ViewSchedule
 from evonav.evaluation.backend import make_agent
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.measures import measures_of
-from evonav.evaluation.metrics import summarise
+from evonav.evaluation.metrics.navigation import summarise
+from evonav.evaluation.metrics.stage_metrics import measures_of
 from evonav.evaluation.protocol import EpisodeCase, ForcedWalk, ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageRecord
 from evonav.perception.ground_truth import GroundTruthPerception

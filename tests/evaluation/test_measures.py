@@ -5,7 +5,7 @@ from dataclasses import fields
 import pytest
 from made_up_stage import entry, made_up_record, taken
 
-from evonav.evaluation.measures import StageRow, measures_of, stage_rows
+from evonav.evaluation.metrics.stage_metrics import StageRow, measures_of, stage_rows
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import EndState, MemoryRecord, MovedObjectRecord, StaleEntryRecord
 from evonav.evaluation.records.store import FILE_NAME, RunStore

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from toy_house import episode_case
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics import (
+from evonav.evaluation.metrics.navigation import (
     bootstrap_means,
     paired_differences,
     rates,

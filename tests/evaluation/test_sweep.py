@@ -18,7 +18,7 @@ from evonav.cli import app
 from evonav.decision.ledger import Ledger
 from evonav.decision.mock_answers import mock_answer
 from evonav.errors import EvonavError, StoreError
-from evonav.evaluation.metrics import rates
+from evonav.evaluation.metrics.navigation import rates
 from evonav.evaluation.records.store import RunStore
 from evonav.sweeps.summary import sweep_rows
 from vlm_stub import KEY, serving

@@ -1,8 +1,8 @@
 import pytest
 from made_up_stage import entry, made_up_record, taken
 
+from evonav.evaluation.metrics.failure_causes import Cause, cause_of
 from evonav.evaluation.records.schema import EndState
-from evonav.evaluation.taxonomy import Cause, cause_of
 
 FAR_M = (0.0, 0.8, 4.0)
 

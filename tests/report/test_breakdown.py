@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.metrics import rates
+from evonav.evaluation.metrics.navigation import rates
 from evonav.evaluation.records.schema import EndState
 from evonav.report.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
 from evonav.report.figures import write_plots

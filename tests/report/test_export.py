@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import evonav
 from evonav.cli import app
 from evonav.errors import StoreError
-from evonav.evaluation.measures import StageRow
+from evonav.evaluation.metrics.stage_metrics import StageRow
 from evonav.report.export import ROUND_COLUMNS, round_table, stage_columns, stage_table, write_table
 
 

@@ -13,7 +13,7 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.evaluation.metrics import PairedDifference
+from evonav.evaluation.metrics.navigation import PairedDifference
 from evonav.evaluation.records.schema import EndState
 from evonav.report import paper
 from evonav.report.line_chart import Line, line_chart

@@ -9,7 +9,7 @@ import pytest
 from made_up_run import WriteRun
 from rich.console import Console
 
-from evonav.evaluation.metrics import PairedDifference, paired_differences, summarise
+from evonav.evaluation.metrics.navigation import PairedDifference, paired_differences, summarise
 from evonav.report import tables
 from evonav.report.run import load_run
 

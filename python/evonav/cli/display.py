@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from evonav.evaluation.engine import Progress
-    from evonav.evaluation.metrics import AgentSummary
+    from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.generation.engine import GenerationProgress
 
 

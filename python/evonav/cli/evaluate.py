@@ -61,7 +61,7 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from evonav.evaluation.agent_process import AgentHosting
     from evonav.evaluation.backend import Backend
     from evonav.evaluation.engine import RunConfig, TaskFile
-    from evonav.evaluation.metrics import AgentSummary
+    from evonav.evaluation.metrics.navigation import AgentSummary
 
 NUM_RETRIES = 2
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from evonav.controlled.layout import read_controlled, run_of, tasks_of
 from evonav.evaluation.engine import Progress, RunConfig, RunRequest, evaluate_all, task_files
-from evonav.evaluation.metrics import AgentSummary
+from evonav.evaluation.metrics.navigation import AgentSummary
 
 
 def evaluate_controlled(

@@ -12,7 +12,7 @@ from evonav._core import __version__
 from evonav.errors import InvalidArgumentError, TaskError
 from evonav.evaluation.agent_process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.backend import Backend, check_agent_name
-from evonav.evaluation.metrics import AgentSummary, paired_differences, summarise, summary_json
+from evonav.evaluation.metrics.navigation import AgentSummary, paired_differences, summarise, summary_json
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import FILE_NAME, RunStore

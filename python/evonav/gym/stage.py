@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from evonav.evaluation.metrics import stage_soft_spl, stage_spl
+from evonav.evaluation.metrics.navigation import stage_soft_spl, stage_spl
 from evonav.gym.config import STEP_COST, SUCCESS_REWARD, NavConfig
 from evonav.world.pose import Pose
 

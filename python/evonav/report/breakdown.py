@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.measures import StageRow
+from evonav.evaluation.metrics.stage_metrics import StageRow
 from evonav.evaluation.records.store import RunStore
 from evonav.paired import cluster_means
 from evonav.report.compare import MODES, STRATA, check_measure

@@ -1,7 +1,7 @@
-"""How a stage ended, in words. What is what is decided in `evonav.evaluation.taxonomy`."""
+"""How a stage ended, in words. What is what is decided in `evonav.evaluation.metrics.failure_causes`."""
 
+from evonav.evaluation.metrics.failure_causes import Cause, cause_of
 from evonav.evaluation.records.schema import EndState, StageRecord
-from evonav.evaluation.taxonomy import Cause, cause_of
 from evonav.tasks.language import noun_of
 
 __all__ = ["WORDS", "Cause", "cause_of", "sentence"]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.measures import StageRow
+from evonav.evaluation.metrics.stage_metrics import StageRow
 from evonav.evaluation.records.schema import EndState
 from evonav.paired import PairedEffect, holm, mcnemar, paired_effects
 from evonav.report.causes import WORDS, Cause

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import StoreError
-from evonav.evaluation import measures
-from evonav.evaluation.measures import StageRow, stage_rows
+from evonav.evaluation.metrics.navigation import stage_metrics as measures
+from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
 from evonav.evaluation.records.schema import RoundRecord, costs
 from evonav.evaluation.records.store import RunStore
 

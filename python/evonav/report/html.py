@@ -9,7 +9,7 @@ from typing import Any
 from markupsafe import Markup
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics import AgentSummary
+from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.report import tables
 from evonav.report.cards import TaskView, filter_data, task_view
 from evonav.report.causes import WORDS, Cause

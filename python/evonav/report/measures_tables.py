@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from evonav.evaluation.explain import MEASURES, Explained, explain
-from evonav.evaluation.measures import StageRow, stage_rows
+from evonav.evaluation.metrics.aggregate import MEASURES, Explained, explain
+from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
 from evonav.evaluation.records.store import RunStore
 from evonav.report.tables import NONE, Table
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from evonav.evaluation.metrics import AgentSummary, PairedDifference, Rates
+from evonav.evaluation.metrics.navigation import AgentSummary, PairedDifference, Rates
 from evonav.paired import DETECTABLE_Z, power
 from evonav.report.run import PAPER_ORDER, Run
 from evonav.report.tables import NONE, Table, percent, points, verdict

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from evonav.evaluation.metrics import AgentSummary, Rates
+from evonav.evaluation.metrics.navigation import AgentSummary, Rates
 from evonav.report.paper import (
     NUM_NOT_RELOCATED,
     NUM_RELOCATED,

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics import AgentSummary, PairedDifference, paired_differences, summarise
+from evonav.evaluation.metrics.navigation import AgentSummary, PairedDifference, paired_differences, summarise
 from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
 from evonav.evaluation.records.store import FailureRow, RunStore
 from evonav.report.causes import Cause, cause_of

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.measures import StageRow, stage_rows
+from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.report.run import agents_in_order
 

@@ -15,7 +15,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from evonav.evaluation.metrics import AgentSummary, PairedDifference, Rates, rates
+from evonav.evaluation.metrics.navigation import AgentSummary, PairedDifference, Rates, rates
 from evonav.evaluation.records.schema import StageRecord
 from evonav.report.causes import WORDS, Cause, cause_of
 from evonav.significance import Interval

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
-from evonav.evaluation.metrics import paired_differences, summarise, summary_json
+from evonav.evaluation.metrics.navigation import paired_differences, summarise, summary_json
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
 

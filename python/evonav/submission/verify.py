@@ -16,7 +16,7 @@ from pydantic import ValidationError
 from evonav.evaluation.backend import Backend
 from evonav.evaluation.engine import TaskFile
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
-from evonav.evaluation.metrics import stage_soft_spl, stage_spl
+from evonav.evaluation.metrics.navigation import stage_soft_spl, stage_spl
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.parallel.pool import Job, answers, open_pool

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.evaluation.engine import SUMMARY_NAME, write_summary
-from evonav.evaluation.metrics import Rates, rates
+from evonav.evaluation.metrics.navigation import Rates, rates
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.significance import Interval

@@ -28,7 +28,7 @@ from evonav.evaluation.episode.oracle_baselines import Sighting, privileges_of
 from evonav.evaluation.episode.sensors import Sensors, map_frame
 from evonav.evaluation.episode.spec import room_at, stage_map
 from evonav.evaluation.episode.staleness import Witness, Witnessed
-from evonav.evaluation.metrics import stage_soft_spl, stage_spl
+from evonav.evaluation.metrics.navigation import stage_soft_spl, stage_spl
 from evonav.evaluation.protocol import (
     EpisodeCase,
     ForcedWalk,

@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.evaluation.measures import MEASURES_VERSION, kept_measures
+from evonav.evaluation.metrics.stage_metrics import MEASURES_VERSION, kept_measures
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, StageFailure, StageMap, StageRecord
 from evonav.parallel.folders import is_on_network, sync_folder
@@ -50,7 +50,7 @@ _TABLES = {
 }
 
 # Later than the first runs of this schema version: a run without them is read as if they were empty.
-# Measures are derived from the record (`evonav.evaluation.measures`), so that tables need no traces.
+# Measures are derived from the record (`evonav.evaluation.metrics.stage_metrics`), so that tables need no traces.
 _LATER = {
     "measures": """(
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 
-from evonav.evaluation.metrics import SUCCESS_RADIUS_M
+from evonav.evaluation.metrics.navigation import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
 from evonav.report.causes import sentence
 from evonav.report.maps.floor_plan import Frame, frame_of, ground, item_labels, labels

@@ -11,9 +11,9 @@ from dataclasses import asdict, dataclass, fields
 from itertools import groupby, pairwise
 from typing import TYPE_CHECKING, Any
 
+from evonav.evaluation.metrics.failure_causes import cause_of
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import EndState, MemoryRecord, RoundRecord, StageRecord
-from evonav.evaluation.taxonomy import cause_of
 
 if TYPE_CHECKING:
     from evonav.evaluation.records.store import RunStore

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from evonav.evaluation.measures import StageRow
+from evonav.evaluation.metrics.stage_metrics import StageRow
 from evonav.significance import Interval
 
 NUM_RESAMPLES = 10_000

@@ -1,0 +1,1 @@
+"""Compute success, SPL and all other metrics from records."""
