@@ -16,8 +16,8 @@ import numpy as np
 from evonav.agents.agent import AgentAction, Sensing, Stop
 from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, DecisionSpec, RemoteAgent
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.parallel.local import one_thread_each
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.tasks.public import StageInput, TaskInfo

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from benches.table import Row, compare
 from evonav import _core
-from evonav.evaluation.backend import Backend
+from evonav.evaluation.run.components import Backend
 from evonav.house import bundled_houses
 from evonav.perception import Perception, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception

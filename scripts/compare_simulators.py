@@ -14,18 +14,18 @@ from pathlib import Path
 
 import numpy as np
 
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, TaskFile, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, TaskFile, evaluate, task_files
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator
 
 EMBEDDED = Backend()
 THOR = Backend(
-    simulator="evonav.evaluation.backend:ai2thor_simulator",
+    simulator="evonav.evaluation.run.components:ai2thor_simulator",
     simulator_options={"executable": "evonav"},
     host_options={"timeout_s": 60.0},
 )

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from evonav.evaluation.backend import load_case
 from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.run.components import load_case
 from evonav.perception import StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.noise_config import noise_presets

@@ -16,7 +16,7 @@ import numpy as np
 from evonav.decision.language import parse_goal
 from evonav.decision.matching import Matcher
 from evonav.decision.text_features import similarity_of_label
-from evonav.evaluation.backend import load_case
+from evonav.evaluation.run.components import load_case
 from evonav.tasks.language import noun_of
 from evonav.world.embedded import EmbeddedSimulator
 

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from results import PAGE, pooled_tasks, run_agents, spread, with_part
 
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.records.schema import EndState, StageRecord
+from evonav.evaluation.run.components import Backend
 from evonav.paired import PairedEffect, paired_effect
 from evonav.perception.words import read_word
 from evonav.report.line_chart import Line, line_chart

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from evonav.evaluation.agent_process import AgentHosting
-from evonav.evaluation.backend import Backend
-from evonav.evaluation.engine import Progress, RunConfig, TaskFile, evaluate, task_files
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import Progress, RunConfig, TaskFile, evaluate, task_files
 from evonav.report.findings import effort_table
 from evonav.report.line_chart import Line, line_chart
 from evonav.report.mechanisms import STRATA, cause_share_table, counter_table, deeds_of, end_table, success_by_group

@@ -8,11 +8,11 @@ from evonav.decision.ledger import Ledger
 from evonav.decision.mock_answers import mock_answer
 from evonav.decision.pacing import Pace
 from evonav.decision.vlm_errors import VlmError
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
-from evonav.evaluation.estimate import estimate_run, ratio_error
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.cost_estimate import estimate_run, ratio_error
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from vlm_stub import serving
 
 

@@ -14,12 +14,12 @@ from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.question import AnswerError, Question, Reply
 from evonav.decision.scripted import Scripted
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.tasks.public import StageInput
 
 GOAL = StageInput(1, "Mug", "Find the mug.", "Find the mug.", "Find the mug.", np.zeros((1, 1, 3), np.uint8))

@@ -13,9 +13,9 @@ from evonav.decision.ranking import rank_by_text
 from evonav.decision.text_features import similarity_of_label, text_feature
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 
 needs_weights = pytest.mark.skipif(not minilm.is_installed(), reason="needs the extra evonav[text]")
 

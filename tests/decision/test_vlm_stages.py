@@ -12,12 +12,12 @@ import pytest
 from evonav.decision.exchanges import ExchangeStore
 from evonav.decision.mock_answers import mock_answer
 from evonav.decision.mock_vlm import FAULTS, MockReply, faulty, without_schemas
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from vlm_stub import KEY, Stub, check_request, images_in, serving
 
 AGENTS = ["fu", "ftu"]

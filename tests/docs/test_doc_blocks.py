@@ -15,9 +15,9 @@ from build_docs import ROOT, links, pages
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.evaluation.backend import check_agent_name
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import evaluate, task_files
+from evonav.evaluation.run.components import check_agent_name
+from evonav.evaluation.run.run import evaluate, task_files
 from evonav.house import bundled_houses
 
 BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)

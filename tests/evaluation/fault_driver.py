@@ -15,10 +15,10 @@ from pathlib import Path
 from test_engine import CONFIG
 
 from evonav.errors import StoreError
-from evonav.evaluation import engine
-from evonav.evaluation.engine import evaluate, task_files
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.workers import EpisodeWork
+from evonav.evaluation.run import run as engine
+from evonav.evaluation.run.run import evaluate, task_files
+from evonav.evaluation.run.worker import EpisodeWork
 from evonav.parallel.pool import folders
 
 AGENT = "random-walk"

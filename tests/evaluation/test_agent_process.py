@@ -26,10 +26,10 @@ from evonav.evaluation.agent_process import (
     check_importable,
 )
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import AgentFailedError, ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.report import write_report
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.tasks.public import StageInput, TaskInfo
@@ -211,8 +211,8 @@ def test_a_task_that_breaks_during_a_run_costs_its_stages_alone(tmp_path, num_wo
 ENDED = """
 import sys
 from pathlib import Path
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
-from evonav.evaluation.backend import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.components import Backend
 
 if __name__ == "__main__":
     root = Path(sys.argv[1])

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app, main
-from evonav.evaluation import engine
+from evonav.evaluation.run import run as engine
 
 
 def run(*arguments):

@@ -5,10 +5,10 @@ from evonav.decision.account import Account, Price, Usage
 from evonav.decision.metered import Metered
 from evonav.decision.questions.question import Reply
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import evaluate, task_files
 from evonav.evaluation.metrics.stage_metrics import stage_rows
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.run import evaluate, task_files
 
 
 class Client:

@@ -13,12 +13,12 @@ from toy_house import write_tasks
 
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.evaluation.agent_process import AgentHosting
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.parallel.folders import writing
 from evonav.report.run import load_run
 
@@ -252,9 +252,9 @@ def test_a_run_is_read_as_of_one_moment_while_it_is_written(tasks, tmp_path, mon
 INTERRUPTED = """
 import sys
 from pathlib import Path
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.evaluation.agent_process import AgentHosting
-from evonav.evaluation.backend import Backend
+from evonav.evaluation.run.components import Backend
 from evonav.evaluation.protocol import ProtocolConfig
 
 if __name__ == "__main__":

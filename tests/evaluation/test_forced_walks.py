@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 
 from evonav.agents.agent import NavigateTo, Sensing, Stop, ViewSchedule
-from evonav.evaluation.backend import make_agent
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.metrics.navigation import summarise
 from evonav.evaluation.metrics.stage_metrics import measures_of
 from evonav.evaluation.protocol import EpisodeCase, ForcedWalk, ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageRecord
+from evonav.evaluation.run.components import make_agent
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.pose import Pose
 
@@ -206,7 +206,7 @@ def test_runs_with_walks_are_handed_in_and_verified(tmp_path):
 
     from evonav.cli import app
     from evonav.controlled.generate import ControlledOptions, generate_arms
-    from evonav.evaluation.engine import evaluate, task_files
+    from evonav.evaluation.run.run import evaluate, task_files
     from evonav.house import bundled_houses
     from evonav.tasks import write_task
     from evonav.tasks.manifest import GenerationParameters

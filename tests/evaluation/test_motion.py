@@ -129,9 +129,9 @@ def test_the_observation_point_is_free(seed, x_m, z_m):
 
 
 def test_a_pose_that_is_taken_is_snapped_and_recorded():
-    from evonav.evaluation.backend import make_agent
     from evonav.evaluation.episode.episode import Episode
     from evonav.evaluation.protocol import EpisodeCase
+    from evonav.evaluation.run.components import make_agent
     from evonav.perception.ground_truth import GroundTruthPerception
 
     case = episode_case("toy-static")

@@ -15,10 +15,10 @@ from test_engine import CONFIG
 from toy_house import EPISODES, write_tasks
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.backend import Backend
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.parallel.folders import write_atomically, writing
 from evonav.parallel.pool import folders
 
@@ -133,8 +133,8 @@ CHEAP = RunConfig(
 DRIVER = """
 import sys
 from pathlib import Path
-from evonav.evaluation.backend import Backend
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 
 config = RunConfig(

@@ -11,12 +11,12 @@ import pytest
 from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_case, write_tasks
 
 from evonav.agents.agent import NavigateTo, Sensing
-from evonav.evaluation.backend import Backend
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import PrivilegedAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.perception.ground_truth import GroundTruthPerception
 
 CODE = (type, types.ModuleType, types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.FrameType)

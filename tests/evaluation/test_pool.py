@@ -12,11 +12,11 @@ from test_engine import CONFIG, texts
 from toy_house import write_tasks
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.backend import Backend
-from evonav.evaluation.engine import RunConfig, RunRequest, evaluate, evaluate_all, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate, evaluate_all, task_files
 from evonav.parallel.pool import Resources
 
 HERE = Path(__file__).parent

@@ -9,11 +9,11 @@ from evonav.agents.fail_then_update import FailThenUpdate, FailThenUpdateConfig
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.questions.frontier_update import ChooseQuestion, VerifyQuestion
 from evonav.decision.scripted import Scripted
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import task_file
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import task_file
 
 TASK = "bundled-0086-0279d6-s0"
 MARGIN_PX = 20

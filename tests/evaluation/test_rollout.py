@@ -6,10 +6,10 @@ from itertools import pairwise
 import pytest
 from toy_house import ToySimulator, episode_case
 
-from evonav.evaluation.backend import make_agent
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
+from evonav.evaluation.run.components import make_agent
 from evonav.perception.ground_truth import GroundTruthPerception
 
 

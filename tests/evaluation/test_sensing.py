@@ -8,12 +8,12 @@ from toy_house import ToySimulator, stage_case
 
 from evonav.agents.agent import Sensing
 from evonav.agents.frontier_update import FrontierUpdate
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.house import bundled_houses
 from evonav.memory import ObjectMap
 from evonav.memory.bev import BevMap

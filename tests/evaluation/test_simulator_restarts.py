@@ -6,10 +6,10 @@ import pytest
 from test_engine import CONFIG, records, texts
 from toy_house import write_tasks
 
-from evonav.evaluation.backend import Backend
-from evonav.evaluation.engine import NUM_RETRIES, RunConfig, evaluate, task_files
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import NUM_RETRIES, RunConfig, evaluate, task_files
 from evonav.report.run import load_run
 
 AGENT = "random-walk"  # what it does depends on all that it did before

@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.backend import Backend
-from evonav.evaluation.engine import RunConfig, TaskFile, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, TaskFile, evaluate, task_files
 from evonav.submission.pack import MAX_RATIO, About, SubmissionError, SubmissionFile, pack
 from evonav.submission.rescore import reenact
 from evonav.submission.verify import verify

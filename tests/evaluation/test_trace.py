@@ -15,12 +15,12 @@ from toy_house import CHAIR_AWAY, OBJECTS, make_simulator, write_tasks
 from evonav.agents.frontier_update import FrontierUpdate
 from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig, as_errored
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import EXPLORED, FREE
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from evonav.errors import PerceptionError, StoreError
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.settings import PerceptionSettings
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.perception import StageScene, weights
 from evonav.perception.predicted import predicted_perception
 from evonav.perception.vocabulary import PROCTHOR_TYPES

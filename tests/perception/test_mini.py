@@ -11,12 +11,12 @@ import pytest
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.settings import PerceptionSettings
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.perception import mini
 from evonav.perception.detector import DetectorView
 from evonav.perception.mini import MiniDetector

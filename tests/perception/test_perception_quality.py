@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import task_files
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import task_files
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
 from evonav.perception_benchmark.estimates import Houses
 from evonav.perception_benchmark.page import write_perception_report
@@ -26,7 +26,7 @@ from evonav.perception_benchmark.tour import tour
 from evonav.significance import percentile_interval
 
 SPECS = [
-    PerceptionSpec("gt", "evonav.evaluation.backend:ground_truth"),
+    PerceptionSpec("gt", "evonav.evaluation.run.components:ground_truth"),
     *(PerceptionSpec(name, f"erring_perceptions:{name}") for name in ("missing_a_third", "confusing", "deep")),
 ]
 CONFIG = TourConfig(views_per_room=6, num_houses=2)

@@ -10,12 +10,12 @@ import scripted_models
 from scripted_models import ColourEmbedder, scripted_perception
 
 from evonav.errors import InvalidArgumentError, PerceptionError, StoreError
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.settings import PerceptionSettings
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.house import bundled_houses
 from evonav.memory.vocabulary import CATEGORY_OF_TYPE, WORD_OF_LABEL, category_image, relabelled
 from evonav.perception.detector import Found, nothing_found

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from evonav import _core
-from evonav.evaluation.backend import load_case
 from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.run.components import load_case
 from evonav.perception import Percept, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.noise_config import NoiseConfig, noise_presets

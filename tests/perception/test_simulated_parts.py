@@ -8,8 +8,8 @@ import pytest
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.backend import load_case
 from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.run.components import load_case
 from evonav.perception.confusion import read_confusion
 from evonav.perception.noise_config import NoiseConfig, noise_presets
 from evonav.perception.simulated import noisy_perception

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.settings import PerceptionSettings
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.settings import PerceptionSettings
 
 
 def records(out: Path, word: str, num_workers: int) -> list[str]:

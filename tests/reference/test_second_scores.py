@@ -10,9 +10,9 @@ from second_scores import table
 
 from evonav.errors import StoreError
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import evaluate, task_files
 from evonav.evaluation.metrics.stage_metrics import stage_rows
 from evonav.evaluation.records.store import FILE_NAME, RunStore
+from evonav.evaluation.run.run import evaluate, task_files
 from evonav.report.run import load_run
 
 AGENTS = ("fu", "random-walk", "nearest-frontier", "stay-still")

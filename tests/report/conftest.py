@@ -3,11 +3,11 @@ from pathlib import Path
 import pytest
 from made_up_run import WriteRun, entry, record_run, stage_record
 
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 
 
 @pytest.fixture

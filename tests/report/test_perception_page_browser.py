@@ -7,7 +7,7 @@ import pytest
 from browser import Chromium, needs_browser
 
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import task_files
+from evonav.evaluation.run.run import task_files
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
 from evonav.perception_benchmark.page import write_perception_report
@@ -36,7 +36,7 @@ def smuggling():
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("perceptions")
     specs = [
-        PerceptionSpec("gt", "evonav.evaluation.backend:ground_truth"),
+        PerceptionSpec("gt", "evonav.evaluation.run.components:ground_truth"),
         PerceptionSpec(f"mine:{SMUGGLED}", f"{__name__}:smuggling"),
     ]
     with bundled_tasks() as folder:

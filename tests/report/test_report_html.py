@@ -12,10 +12,10 @@ from made_up_run import WriteRun, record_run, stage_record
 
 from evonav.errors import StoreError
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageError, StageRecord
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.report import findings, html, tables, write_report
 from evonav.report.facts import reproduction
 from evonav.report.run import load_run

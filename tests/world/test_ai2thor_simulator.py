@@ -20,9 +20,9 @@ import pytest
 
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import RunConfig, evaluate, task_files
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.house import bundled_houses
 from evonav.world import ai2thor
 from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator

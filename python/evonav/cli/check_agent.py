@@ -28,7 +28,7 @@ def check_agent(
 
     from evonav.cli.display import status
     from evonav.evaluation.agent_check import check_agent
-    from evonav.evaluation.backend import Backend
+    from evonav.evaluation.run.components import Backend
 
     with TemporaryDirectory() as folder, status(f"Running {agent}"):  # a model's exchanges are kept between episodes
         backend = with_decisions(

@@ -25,7 +25,7 @@ from evonav.cli.options import (
 )
 
 if TYPE_CHECKING:  # the command must start fast
-    from evonav.evaluation.engine import Progress
+    from evonav.evaluation.run.run import Progress
 
 EXIT_INCOMPLETE = 3
 
@@ -107,12 +107,12 @@ def evaluate(
     from evonav.controlled.evaluate import evaluate_controlled
     from evonav.controlled.layout import read_controlled
     from evonav.evaluation.agent_process import AgentHosting
-    from evonav.evaluation.backend import Backend
-    from evonav.evaluation.engine import RunConfig
+    from evonav.evaluation.run.components import Backend
+    from evonav.evaluation.run.run import RunConfig
 
     record = read_controlled(directory)
     num_workers = count_of(workers)
-    module = "evonav.evaluation.backend"
+    module = "evonav.evaluation.run.components"
     backend = Backend(simulator=f"{module}:lenient_simulator") if record.allow_unknown_assets else Backend()
     backend = with_perception(backend, perception)
     backend = with_decisions(backend, decisions, out=directory, seed=seed, num_workers=num_workers)

@@ -14,9 +14,9 @@ import typer
 if TYPE_CHECKING:  # the command must start fast
     from collections.abc import Iterator, Sequence
 
-    from evonav.evaluation.backend import Backend
-    from evonav.evaluation.engine import RunConfig, TaskFile
-    from evonav.evaluation.settings import DecisionSettings
+    from evonav.evaluation.run.components import Backend
+    from evonav.evaluation.run.run import RunConfig, TaskFile
+    from evonav.evaluation.run.settings import DecisionSettings
 
 MODEL_VARIABLE = "EVONAV_VLM_MODEL"
 _SETTINGS = {"decision": "kind", "vlm_mode": "mode", "request_timeout": "request_timeout_s"}
@@ -136,7 +136,7 @@ def decision_settings(options: DecisionOptions) -> "DecisionSettings":
     from evonav.decision.noisy import NoiseRates
     from evonav.decision.rates import read_rates
     from evonav.errors import InvalidArgumentError
-    from evonav.evaluation.settings import DecisionSettings
+    from evonav.evaluation.run.settings import DecisionSettings
 
     default = DecisionOptions()
     given: dict[str, Any] = {
@@ -168,7 +168,7 @@ def with_decisions(
         DecisionError: The model cannot be asked from here: no key, no package.
         StoreError: The exchanges cannot be opened.
     """
-    from evonav.evaluation.settings import Books, SpendingSettings, try_decisions
+    from evonav.evaluation.run.settings import Books, SpendingSettings, try_decisions
 
     settings = decision_settings(options)
     spending = SpendingSettings(options.prices, options.max_cost)
@@ -183,7 +183,7 @@ def with_decisions(
 @contextmanager
 def spelled_as_options() -> "Iterator[None]":
     """Names the option where a setting makes no sense."""
-    from evonav.evaluation.settings import SettingError
+    from evonav.evaluation.run.settings import SettingError
 
     options = {name: option for option, name in _SETTINGS.items()}
     options |= {name: f"thor_{name.partition('_')[0 if name != 'x_display' else 2]}" for name in _THOR}
@@ -208,8 +208,8 @@ def print_estimate(
     from evonav.cli.display import progress
     from evonav.decision.account import Usage
     from evonav.decision.counting import OUTPUT_TOKENS
-    from evonav.evaluation.estimate import estimate_run
-    from evonav.evaluation.settings import SpendingSettings
+    from evonav.evaluation.run.cost_estimate import estimate_run
+    from evonav.evaluation.run.settings import SpendingSettings
 
     price = SpendingSettings(options.prices).price(options.model or "")
     with progress() as show:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from evonav.evaluation.engine import Progress
     from evonav.evaluation.metrics.navigation import AgentSummary
+    from evonav.evaluation.run.run import Progress
     from evonav.generation.engine import GenerationProgress
 
 

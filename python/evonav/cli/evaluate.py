@@ -59,9 +59,9 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from collections.abc import Iterator, Sequence
 
     from evonav.evaluation.agent_process import AgentHosting
-    from evonav.evaluation.backend import Backend
-    from evonav.evaluation.engine import RunConfig, TaskFile
     from evonav.evaluation.metrics.navigation import AgentSummary
+    from evonav.evaluation.run.components import Backend
+    from evonav.evaluation.run.run import RunConfig, TaskFile
 
 NUM_RETRIES = 2
 
@@ -178,7 +178,7 @@ def _tasks(
 ) -> "Iterator[list[TaskFile]]":
     """The tasks of a run: given, generated into the run's folder, or bundled."""
     from evonav.evaluation.datasets import bundled_tasks, make_tasks
-    from evonav.evaluation.engine import task_file, task_files
+    from evonav.evaluation.run.run import task_file, task_files
 
     with ExitStack() as stack:
         if houses is not None:
@@ -209,7 +209,7 @@ def _evaluate(
     num_gpus: float = 0.0,
     **crew: Any,  # noqa: ANN401 - of `evaluate`
 ) -> "list[AgentSummary]":
-    from evonav.evaluation.engine import evaluate
+    from evonav.evaluation.run.run import evaluate
     from evonav.parallel.pool import Resources
 
     with interruptible(out):
@@ -229,7 +229,7 @@ def _evaluate(
 
 
 def _config(seed: int, backend: "Backend", decisions: DecisionOptions, out: Path, num_workers: int) -> "RunConfig":
-    from evonav.evaluation.engine import RunConfig
+    from evonav.evaluation.run.run import RunConfig
 
     backend = with_decisions(backend, decisions, out=out, seed=seed, num_workers=num_workers)
     config = RunConfig(seed=seed, backend=backend)
@@ -244,7 +244,7 @@ def _hosting(in_process: bool, timeout_s: float, memory_mb: int | None) -> "Agen
 
 def _backend(simulator: SimulatorName, **options: Any) -> "Backend":  # noqa: ANN401 - of `SimulatorSettings`
     """The simulator of the options; those that were not given are left to it."""
-    from evonav.evaluation.settings import SimulatorSettings
+    from evonav.evaluation.run.settings import SimulatorSettings
 
     with spelled_as_options():
         return SimulatorSettings(kind=simulator.value, **options).backend()

@@ -10,7 +10,7 @@ import typer
 from evonav.cli import completion
 
 if TYPE_CHECKING:  # the command must start fast
-    from evonav.evaluation.backend import Backend
+    from evonav.evaluation.run.components import Backend
 
 EXIT_INCOMPLETE = 3
 HEURISTICS = "fu,stage-reset,ftu"
@@ -161,7 +161,7 @@ def with_perception(backend: "Backend", word: str, models: Path | None = None, d
     Raises:
         InvalidArgumentError: There is no such perception, or one of its keys makes no sense.
     """
-    from evonav.evaluation.settings import PerceptionSettings
+    from evonav.evaluation.run.settings import PerceptionSettings
 
     given = {"models": models and str(models.absolute()), "device": device}
     options = {key: value for key, value in given.items() if value is not None}

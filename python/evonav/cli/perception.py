@@ -59,9 +59,9 @@ def perception(
     from rich import progress as bars
     from rich.console import Console
 
-    from evonav.evaluation.backend import Backend
     from evonav.evaluation.datasets import bundled_tasks
-    from evonav.evaluation.engine import task_files
+    from evonav.evaluation.run.components import Backend
+    from evonav.evaluation.run.run import task_files
     from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
     from evonav.perception_benchmark.page import write_perception_report
     from evonav.perception_benchmark.tables import perception_tables
@@ -92,7 +92,7 @@ def perception(
                 task_files(tasks or bundled, limit, subset),
                 out,
                 config=TourConfig(views_per_room, houses, seed),
-                simulator=f"evonav.evaluation.backend:{name}",
+                simulator=f"evonav.evaluation.run.components:{name}",
                 num_workers=count_of(workers),
                 on_progress=lambda done, num, latest: bar.update(
                     line, completed=done, total=num, description=latest or "tours"

@@ -55,7 +55,7 @@ def verify(
     from rich.progress import Progress
 
     from evonav.evaluation.datasets import bundled_tasks
-    from evonav.evaluation.engine import task_files
+    from evonav.evaluation.run.run import task_files
     from evonav.submission.verify import verdict_json, verify
 
     if limit is not None and subset is not None:

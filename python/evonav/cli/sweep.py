@@ -13,7 +13,7 @@ from evonav.cli.options import EXIT_INCOMPLETE, EngineOption, count_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from evonav.evaluation.engine import TaskFile
+    from evonav.evaluation.run.run import TaskFile
     from evonav.sweeps.file import SweepFile
     from evonav.sweeps.row import SweepRow
     from evonav.sweeps.run import Cell, CellRun
@@ -166,7 +166,7 @@ def _print_plan(
     from rich.table import Table
 
     from evonav.cli.display import status
-    from evonav.evaluation.backend import check_agent_name
+    from evonav.evaluation.run.components import check_agent_name
     from evonav.sweeps.cost import cell_estimate
     from evonav.sweeps.run import cell_runs
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
-    from evonav.evaluation.engine import Progress
+    from evonav.evaluation.run.run import Progress
     from evonav.sweeps.run import Cell, CellRun
 
 COST_EVERY_S = 2.0

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from evonav.controlled.layout import read_controlled, run_of, tasks_of
-from evonav.evaluation.engine import Progress, RunConfig, RunRequest, evaluate_all, task_files
 from evonav.evaluation.metrics.navigation import AgentSummary
+from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_all, task_files
 
 
 def evaluate_controlled(

@@ -1,4 +1,4 @@
-"""What makes decision models, by import path: see `evonav.evaluation.backend.Backend.decision`.
+"""What makes decision models, by import path: see `evonav.evaluation.run.components.Backend.decision`.
 
 Options are JSON. Those that decide what is answered are `decision_options`, part of what makes runs the same; those on
 how the model is reached are `decision_host_options`. A key is neither: it is read from the environment.

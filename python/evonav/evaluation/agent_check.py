@@ -15,12 +15,12 @@ from evonav.agents.agent import Agent, Sensing
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.evaluation.agent_probe import Probe
 from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, RemoteAgent
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
+from evonav.evaluation.run.components import Backend
 
 PROTOCOL = ProtocolConfig(max_rounds=10, max_actions=40)
 """Shorter than an evaluation's."""

@@ -11,9 +11,9 @@ from typing import Any
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.protocol import EpisodeCase
-from evonav.evaluation.running import TaskFile
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.scheduler import TaskFile
 from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.perception import Percept, Perception, StageScene
@@ -107,7 +107,7 @@ def measure(
     out: Path,
     *,
     config: TourConfig | None = None,
-    simulator: str = "evonav.evaluation.backend:embedded_simulator",
+    simulator: str = "evonav.evaluation.run.components:embedded_simulator",
     num_workers: int = 1,
     on_progress: Callable[[int, int, str], None] = lambda *_: None,
 ) -> Measured:

@@ -17,15 +17,15 @@ from pathlib import Path
 from evonav.agents.registry import imported
 from evonav.decision.own import own_model
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.backend import Backend, make_agent
-from evonav.evaluation.engine import agent_seed, perception_seed
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records.json_diff import record_differences
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageMap, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.settings import EXCHANGES_NAME
+from evonav.evaluation.run.components import Backend, make_agent
+from evonav.evaluation.run.run import agent_seed, perception_seed
+from evonav.evaluation.run.settings import EXCHANGES_NAME
 from evonav.perception.weights import MODELS_VARIABLE
 from evonav.replay.recorder import Loss, Tracer
 from evonav.replay.types import TracedRound, TracedStage

@@ -21,11 +21,11 @@ from evonav.agents.agent import (
     ViewSchedule,
 )
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records.json_diff import record_differences
 from evonav.evaluation.records.schema import ActionRecord, EntryRecord, StageRecord
+from evonav.evaluation.run.components import Backend
 from evonav.perception import Percept, StageScene
 from evonav.sensors.observation import Detections, Observation
 from evonav.tasks.public import StageInput, TaskInfo

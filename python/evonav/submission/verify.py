@@ -13,12 +13,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from evonav.evaluation.backend import Backend
-from evonav.evaluation.engine import TaskFile
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.metrics.navigation import stage_soft_spl, stage_spl
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import TaskFile
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.submission.pack import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
 

@@ -4,15 +4,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evonav.decision.account import Usage
-from evonav.evaluation.estimate import estimate_run
-from evonav.evaluation.settings import SpendingSettings
+from evonav.evaluation.run.cost_estimate import estimate_run
+from evonav.evaluation.run.settings import SpendingSettings
 from evonav.sweeps.file import SweepFile
 from evonav.sweeps.run import CellRun
 
 
 @dataclass(frozen=True, slots=True)
 class CellEstimate:
-    """Of all agents of a cell, see `evonav.evaluation.estimate`."""
+    """Of all agents of a cell, see `evonav.evaluation.run.cost_estimate`."""
 
     num_requests: float
     input_tokens: float

@@ -13,9 +13,9 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.settings import (
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.settings import (
     DecisionSettings,
     PerceptionSettings,
     SettingError,

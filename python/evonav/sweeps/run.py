@@ -21,9 +21,10 @@ from evonav._core import __version__
 from evonav.decision.ledger import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.agent_process import AgentHosting
-from evonav.evaluation.backend import Backend
 from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.engine import (
+from evonav.evaluation.records.store import FILE_NAME, RunStore
+from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.run import (
     NUM_RETRIES,
     Progress,
     RunConfig,
@@ -33,8 +34,7 @@ from evonav.evaluation.engine import (
     run_identity,
     task_files,
 )
-from evonav.evaluation.records.store import FILE_NAME, RunStore
-from evonav.evaluation.settings import Books, SpendingSettings, try_decisions
+from evonav.evaluation.run.settings import Books, SpendingSettings, try_decisions
 from evonav.parallel.folders import write_atomically, writing
 from evonav.parallel.pool import Resources
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet

@@ -9,10 +9,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from evonav.evaluation.engine import SUMMARY_NAME, write_summary
 from evonav.evaluation.metrics.navigation import Rates, rates
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import FILE_NAME, RunStore
+from evonav.evaluation.run.run import SUMMARY_NAME, write_summary
 from evonav.significance import Interval
 from evonav.sweeps.row import AXES, STATES, SweepRow
 from evonav.sweeps.run import RUNS_NAME, read_claim

@@ -15,7 +15,7 @@ from evonav.evaluation.protocol import (
 )
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageFailure, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.workers import RETRIED, EpisodeJob, Setup, read_news
+from evonav.evaluation.run.worker import RETRIED, EpisodeJob, Setup, read_news
 from evonav.parallel.pool import Answer, Job, Pool
 
 

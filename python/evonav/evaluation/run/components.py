@@ -40,11 +40,11 @@ class NeedsMeans(Protocol):
 class Backend:
     """Import paths (`module:function`) of what an episode needs."""
 
-    cases: str = "evonav.evaluation.backend:load_case"
+    cases: str = "evonav.evaluation.run.components:load_case"
     """Takes a task's directory, returns an `EpisodeCase`."""
-    simulator: str = "evonav.evaluation.backend:embedded_simulator"
+    simulator: str = "evonav.evaluation.run.components:embedded_simulator"
     """Makes a `Simulator`."""
-    perception: str = "evonav.evaluation.backend:ground_truth"
+    perception: str = "evonav.evaluation.run.components:ground_truth"
     """Makes a `Perception`."""
     perception_options: Mapping[str, Any] = field(default_factory=dict)
     """Keywords for `perception`, as JSON."""

@@ -20,18 +20,18 @@ from typing import Any
 from evonav.agents import wire
 from evonav.agents.agent import Agent, AgentAction, Sensing
 from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, RemoteAgent
-from evonav.evaluation.backend import Backend, make_agent
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord, StageFailure, StageMap, StageRecord
+from evonav.evaluation.run.components import Backend, make_agent
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.simulator import Simulator
 
-WORK = "evonav.evaluation.workers:EpisodeWork"
+WORK = "evonav.evaluation.run.worker:EpisodeWork"
 RETRIED = (ErrorKind.HARNESS, ErrorKind.SIMULATOR_LOST, *LOSSES)
 """Failures that another attempt may not have; an exception of an agent's or of a simulator's is the same again."""
 MAX_WORKPLACES = 2

@@ -11,14 +11,14 @@ from typing import Any
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError, TaskError
 from evonav.evaluation.agent_process import IS_SUPPORTED, LOG_NAME, AgentHosting
-from evonav.evaluation.backend import Backend, check_agent_name
 from evonav.evaluation.metrics.navigation import AgentSummary, paired_differences, summarise, summary_json
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import FILE_NAME, RunStore
-from evonav.evaluation.running import Progress, Run, TaskFile, run_all
-from evonav.evaluation.sessions import note_session
-from evonav.evaluation.workers import WORK, EpisodeJob, Setup
+from evonav.evaluation.run.components import Backend, check_agent_name
+from evonav.evaluation.run.provenance import note_session
+from evonav.evaluation.run.scheduler import Progress, Run, TaskFile, run_all
+from evonav.evaluation.run.worker import WORK, EpisodeJob, Setup
 from evonav.parallel.folders import check_same_run, write_atomically, writing
 from evonav.parallel.pool import EngineName, Resources, open_pool
 from evonav.perception.words import word_of

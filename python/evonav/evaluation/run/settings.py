@@ -14,7 +14,7 @@ from pydantic import ConfigDict, Field
 from evonav.decision.ledger import LEDGER_NAME
 from evonav.decision.vlm import Mode
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.backend import Backend
+from evonav.evaluation.run.components import Backend
 from evonav.perception.words import PREDICTED, read_word
 from evonav.tasks.records import Record
 
@@ -29,7 +29,7 @@ STAGE_TIMEOUT_S, VLM_STAGE_TIMEOUT_S = 900.0, 4 * 3600.0
 ANSWER_TIMEOUT_S, VLM_ANSWER_TIMEOUT_S = 600.0, 3600.0
 """Of an agent, for a round; one whose model is asked several times in it takes its time."""
 
-_BACKENDS = "evonav.evaluation.backend"
+_BACKENDS = "evonav.evaluation.run.components"
 _HOST = ("gpu_device", "x_display", "timeout_s")
 """Of a simulator's settings: this machine's means, not part of what makes runs the same."""
 _MEANS = ("models", "device")

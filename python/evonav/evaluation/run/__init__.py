@@ -1,0 +1,1 @@
+"""Schedule the episodes of a run on workers and commit their results."""
