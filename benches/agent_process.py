@@ -14,8 +14,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from evonav.agents.agent import AgentAction, Sensing, Stop
-from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, DecisionSpec, RemoteAgent
 from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, DecisionSpec, RemoteAgent
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.parallel.local import one_thread_each

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from evonav.evaluation.agent_process import AgentHosting
+from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import Progress, RunConfig, TaskFile, evaluate, task_files
 from evonav.report.findings import effort_table

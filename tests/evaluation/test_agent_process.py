@@ -17,7 +17,8 @@ from toy_house import write_tasks
 
 from evonav.agents.registry import BUILT_IN
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.agent_process import (
+from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.hosting.process import (
     LOG_NAME,
     AgentHosting,
     AgentProcesses,
@@ -25,7 +26,6 @@ from evonav.evaluation.agent_process import (
     RemoteAgent,
     check_importable,
 )
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import AgentFailedError, ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore

@@ -12,8 +12,8 @@ import pytest
 from toy_house import write_tasks
 
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
-from evonav.evaluation.agent_process import AgentHosting
 from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
@@ -253,7 +253,7 @@ INTERRUPTED = """
 import sys
 from pathlib import Path
 from evonav.evaluation.run.run import RunConfig, evaluate, task_files
-from evonav.evaluation.agent_process import AgentHosting
+from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.protocol import ProtocolConfig
 

@@ -106,7 +106,7 @@ def evaluate(
     """Runs agents in every arm, into DIRECTORY/runs/ARM; run again to resume, or to add agents."""
     from evonav.controlled.evaluate import evaluate_controlled
     from evonav.controlled.layout import read_controlled
-    from evonav.evaluation.agent_process import AgentHosting
+    from evonav.evaluation.hosting.process import AgentHosting
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunConfig
 

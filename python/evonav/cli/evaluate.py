@@ -58,7 +58,7 @@ from evonav.cli.view import make_pages
 if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
     from collections.abc import Iterator, Sequence
 
-    from evonav.evaluation.agent_process import AgentHosting
+    from evonav.evaluation.hosting.process import AgentHosting
     from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunConfig, TaskFile
@@ -237,7 +237,7 @@ def _config(seed: int, backend: "Backend", decisions: DecisionOptions, out: Path
 
 
 def _hosting(in_process: bool, timeout_s: float, memory_mb: int | None) -> "AgentHosting":
-    from evonav.evaluation.agent_process import AgentHosting
+    from evonav.evaluation.hosting.process import AgentHosting
 
     return AgentHosting(is_in_process=in_process, timeout_s=timeout_s, memory_mb=memory_mb)
 

@@ -20,8 +20,8 @@ from typing import Any
 from evonav._core import __version__
 from evonav.decision.ledger import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
-from evonav.evaluation.agent_process import AgentHosting
 from evonav.evaluation.datasets import bundled_tasks
+from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import (

@@ -11,8 +11,8 @@ from evonav.agents.agent import Agent
 from evonav.agents.registry import BUILT_IN, agent_descriptions, agent_factory, new_agent
 from evonav.decision.questions.question import DecisionModel
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.agent_process import DecisionSpec, check_importable
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS, yardstick
+from evonav.evaluation.hosting.process import DecisionSpec, check_importable
 from evonav.evaluation.protocol import EpisodeCase
 from evonav.perception import Perception
 from evonav.world.simulator import Simulator

@@ -10,7 +10,7 @@ from typing import Any
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError, TaskError
-from evonav.evaluation.agent_process import IS_SUPPORTED, LOG_NAME, AgentHosting
+from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.metrics.navigation import AgentSummary, paired_differences, summarise, summary_json
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState

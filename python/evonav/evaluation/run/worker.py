@@ -19,10 +19,10 @@ from typing import Any
 
 from evonav.agents import wire
 from evonav.agents.agent import Agent, AgentAction, Sensing
-from evonav.evaluation.agent_process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
+from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord, StageFailure, StageMap, StageRecord

@@ -1,0 +1,1 @@
+"""Run agents in processes of their own."""
