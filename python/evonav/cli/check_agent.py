@@ -27,7 +27,7 @@ def check_agent(
     from rich.text import Text
 
     from evonav.cli.display import status
-    from evonav.evaluation.agent_check import check_agent
+    from evonav.evaluation.contract.check import check_agent
     from evonav.evaluation.run.components import Backend
 
     with TemporaryDirectory() as folder, status(f"Running {agent}"):  # a model's exchanges are kept between episodes

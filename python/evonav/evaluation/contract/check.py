@@ -13,7 +13,7 @@ from typing import Any, Literal
 from evonav.agents import wire
 from evonav.agents.agent import Agent, Sensing
 from evonav.agents.registry import agent_factory, new_agent
-from evonav.evaluation.agent_probe import Probe
+from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS

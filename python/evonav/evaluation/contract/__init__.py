@@ -1,0 +1,1 @@
+"""Check an agent against the contract of `evonav.agents.agent`."""
