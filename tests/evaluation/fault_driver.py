@@ -19,7 +19,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run import run as engine
 from evonav.evaluation.run.run import evaluate, task_files
 from evonav.evaluation.run.worker import EpisodeWork
-from evonav.parallel.pool import folders
+from evonav.parallel import folders
 
 AGENT = "random-walk"
 KILL, FAIL, FAIL_ALL = 1, 2, 3

@@ -19,8 +19,8 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.parallel import folders
 from evonav.parallel.folders import write_atomically, writing
-from evonav.parallel.pool import folders
 
 HERE = Path(__file__).parent
 ONE_THREAD = dict.fromkeys(("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")

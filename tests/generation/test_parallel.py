@@ -5,8 +5,8 @@ import sys
 import pytest
 
 from evonav.errors import InvalidArgumentError
+from evonav.parallel import pool as parallel
 from evonav.parallel.pool import EngineError, Job, WorkerLostError, WorkerPool, open_pool
-from evonav.parallel.pool import pool as parallel
 
 
 def make_echo(settings, alive):

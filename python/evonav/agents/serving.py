@@ -1,8 +1,8 @@
 """The life of an agent's process: it makes agents of one name and answers for them until the evaluator hangs up.
 
-Started by `evonav.evaluation.hosting.process`. Requests are pickled (they come from the evaluator, who is trusted), with
-arrays in one block of shared memory from which they are copied, so that an agent may keep and change them. Answers are
-JSON. The process is given no path of a task and imports nothing that reads one.
+Started by `evonav.evaluation.hosting.process`. Requests are pickled (they come from the evaluator, who is trusted),
+with arrays in one block of shared memory from which they are copied, so that an agent may keep and change them. Answers
+are JSON. The process is given no path of a task and imports nothing that reads one.
 """
 
 import ctypes

@@ -11,9 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.navigation import stage_metrics as measures
+from evonav.evaluation.metrics import stage_metrics as measures
 from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
-from evonav.evaluation.records.schema import RoundRecord, costs
+from evonav.evaluation.records import costs
+from evonav.evaluation.records.schema import RoundRecord
 from evonav.evaluation.records.store import RunStore
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
