@@ -23,7 +23,7 @@ from evonav.perception.words import read_word
 from evonav.report.line_chart import Line, line_chart
 from evonav.report.paper import PAPER, PaperResult
 from evonav.report.run import PAPER_ORDER, Run, load_run
-from evonav.report.tables import NONE, Table, percent
+from evonav.report.tables.table import NONE, Table, percent
 from evonav.significance import Interval
 
 PERCEPTIONS = (

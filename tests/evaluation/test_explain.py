@@ -5,7 +5,7 @@ from evonav.evaluation.metrics.aggregate import COSTS, MEASURES, MEMORY, STALENE
 from evonav.evaluation.metrics.stage_metrics import stage_rows
 from evonav.evaluation.records.schema import EndState, StaleEntryRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.report.measures_tables import measures_table, measures_tables
+from evonav.report.tables.metric_tables import measures_table, measures_tables
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@ import pytest
 from made_up_run import entry, stage_record
 
 from evonav.evaluation.records.schema import EndState, EntryRecord
-from evonav.report.causes import Cause, cause_of, sentence
+from evonav.report.tables.causes import Cause, cause_of, sentence
 
 AT_TARGET_M = (2.3, 0.8, 2.0)
 ELSEWHERE_M = (8.0, 0.8, 1.0)

@@ -16,9 +16,11 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageError, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate, task_files
-from evonav.report import findings, html, tables, write_report
-from evonav.report.facts import reproduction
+from evonav.report import html, write_report
 from evonav.report.run import load_run
+from evonav.report.tables import run_tables as findings
+from evonav.report.tables import table as tables
+from evonav.report.tables.run_metadata import reproduction
 
 VOID = {"meta", "input", "br", "link", "img"}
 

@@ -10,8 +10,8 @@ from made_up_run import WriteRun
 from rich.console import Console
 
 from evonav.evaluation.metrics.navigation import PairedDifference, paired_differences, summarise
-from evonav.report import tables
 from evonav.report.run import load_run
+from evonav.report.tables import table as tables
 
 
 def test_rates_are_those_of_the_metrics(write_run: WriteRun) -> None:

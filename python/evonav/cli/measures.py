@@ -17,7 +17,7 @@ def measures(
     from rich.console import Console
 
     from evonav.parallel.folders import write_atomically
-    from evonav.report.measures_tables import measures_tables
+    from evonav.report.tables.metric_tables import measures_tables
 
     names = None if agents is None else [name.strip() for name in agents.split(",") if name.strip()]
     tables = [table for table in measures_tables(run, names) if table.rows]

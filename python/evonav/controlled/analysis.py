@@ -15,7 +15,7 @@ from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.paired import PairedEffect, paired_effect
 from evonav.report.run import PAPER_ORDER
-from evonav.report.tables import NONE, Table
+from evonav.report.tables.table import NONE, Table
 from evonav.significance import Interval
 
 BASELINE = "stage-reset"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, moved_keys, p_words, signed
 from evonav.paired import PairedEffect
-from evonav.report.tables import Table
+from evonav.report.tables.table import Table
 
 MEMORY_AGENTS = ("fu", "ftu", "3d-mem", "msgnav")
 """Agents of the paper's figure that keep object entries."""

@@ -23,14 +23,14 @@ from evonav.controlled.paired_maps import (
 from evonav.controlled.plots import bars_svg, lines_svg, write_figures
 from evonav.controlled.rates import rate_tables
 from evonav.errors import StoreError
-from evonav.report.causes import sentence
 from evonav.report.maps.floor_plan import furniture, ground, labels, moving_ids
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import map_css, outcome_words
 from evonav.report.maps.svg import join, slug
 from evonav.report.maps.trajectory import change, rounds
 from evonav.report.page import page_environment, picture_uri, policy, text_of
-from evonav.report.tables import Table
+from evonav.report.tables.causes import sentence
+from evonav.report.tables.table import Table
 
 PAGE_NAME = "index.html"
 PAIRS_DIR, PICTURES_DIR = "pairs", "rollouts"

@@ -10,13 +10,13 @@ from evonav.controlled.layout import run_of
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.report.causes import sentence
 from evonav.report.maps.files import check_picture, write_picture
 from evonav.report.maps.floor_plan import Frame, ground, labels
 from evonav.report.maps.legend import legend_row
 from evonav.report.maps.stage_map import change_words, file_css, outcome_words, success_radius_of, task_frame
 from evonav.report.maps.svg import arrow_head, cm, escape, join, polyline, simplified, text_lines, title
 from evonav.report.maps.trajectory import change, course
+from evonav.report.tables.causes import sentence
 
 PANEL_PX, GAP_PX, HEAD_PX, FOOT_PX, IMAGE_PX = 560, 20, 96, 58, 84
 ARM_WORDS = {"fixed": "Fixed", "evolved": "Not Fixed"}

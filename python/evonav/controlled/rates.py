@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, Key, Measure, effect_cells
 from evonav.paired import cluster_means
-from evonav.report.tables import Table, percent
+from evonav.report.tables.table import Table, percent
 from evonav.significance import Interval
 
 NUM_RESAMPLES = 10_000

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from evonav.perception_benchmark.estimates import Estimate, Group
 from evonav.perception_benchmark.scores import COMPARED, COMPARED_MEMORY, Scores, differences
-from evonav.report.tables import NONE, Table
+from evonav.report.tables.table import NONE, Table
 
 MAX_CATEGORIES, MAX_CONFUSIONS = 8, 4
 INTERVALS = "[..]: 95% interval, bootstrap by house."

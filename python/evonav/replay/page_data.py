@@ -25,10 +25,10 @@ from evonav.replay.types import (
     TracedStage,
     Truth,
 )
-from evonav.report.causes import sentence
 from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import change_words, outcome_words
 from evonav.report.maps.svg import clean, cm, polyline, simplified
+from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
 _DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"

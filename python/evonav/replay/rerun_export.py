@@ -16,8 +16,8 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import StageMap, StageRecord
 from evonav.replay.page_data import choice_words, evaluator_words
 from evonav.replay.types import BLOCKED, TracedMap, TracedRound, TracedStage, TracedView
-from evonav.report.causes import sentence
 from evonav.report.maps.stage_map import outcome_words
+from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
 SUFFIX = ".rrd"

@@ -10,10 +10,10 @@ from evonav.evaluation.records.schema import EndState, StageMap
 from evonav.replay.page_data import choice_words, evaluator_words
 from evonav.replay.types import TracedEntry, TracedRound, TracedStage
 from evonav.report.canvas import Colour, MapCanvas, colour, font, plain, wrapped
-from evonav.report.causes import sentence
 from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
 from evonav.report.maps.svg import cm
+from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
 SIZE = (1280, 720)

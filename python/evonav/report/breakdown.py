@@ -16,7 +16,7 @@ from evonav.report.export import csv_text
 from evonav.report.line_chart import Line
 from evonav.report.plots import CurvePlot, Dots, GroupPlot, Plot
 from evonav.report.sides import Side
-from evonav.report.tables import NONE, Table
+from evonav.report.tables.table import NONE, Table
 from evonav.significance import Interval
 
 RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)

@@ -10,11 +10,7 @@ from markupsafe import Markup
 
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import AgentSummary
-from evonav.report import tables
 from evonav.report.cards import TaskView, filter_data, task_view
-from evonav.report.causes import WORDS, Cause
-from evonav.report.facts import failure_groups, reproduction, run_facts, task_digests
-from evonav.report.findings import latex_tables, markdown_tables, run_tables, statements
 from evonav.report.line_chart import PLOT_CSS
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import VIEW_DIR, map_css, map_name, outcome_words, stage_svg
@@ -23,6 +19,10 @@ from evonav.report.page import packed, page_environment, policy, text_of
 from evonav.report.replay_pages import ListedPage, listed_pages, viewer_css, viewer_js
 from evonav.report.run import Run, StageOutcome, Task, load_run
 from evonav.report.run_figures import run_figures
+from evonav.report.tables import table as tables
+from evonav.report.tables.causes import WORDS, Cause
+from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
+from evonav.report.tables.run_tables import latex_tables, markdown_tables, run_tables, statements
 from evonav.report.telling import telling_episodes
 from evonav.significance import Interval
 

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from evonav.evaluation.records.schema import EndState, StageRecord
-from evonav.report.causes import WORDS, Cause
 from evonav.report.run import Run
-from evonav.report.tables import NONE, Table, percent
+from evonav.report.tables.causes import WORDS, Cause
+from evonav.report.tables.table import NONE, Table, percent
 
 STRATA = {"stage_1": "stage 1", "relocated": "relocated", "not_relocated": "not relocated"}
 """The paper's, in words."""

@@ -12,7 +12,7 @@ from typing import Literal
 from evonav.evaluation.metrics.navigation import AgentSummary, PairedDifference, Rates
 from evonav.paired import DETECTABLE_Z, power
 from evonav.report.run import PAPER_ORDER, Run
-from evonav.report.tables import NONE, Table, percent, points, verdict
+from evonav.report.tables.table import NONE, Table, percent, points, verdict
 from evonav.significance import wilson
 
 Perception = Literal["gt", "prediction"]

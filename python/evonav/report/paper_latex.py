@@ -13,7 +13,7 @@ from evonav.report.paper import (
     Perception,
 )
 from evonav.report.run import Run
-from evonav.report.tables import latex_text, percent
+from evonav.report.tables.table import latex_text, percent
 
 NAMES = {
     "unigoal": "UniGoal",

@@ -15,8 +15,8 @@ from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import AgentSummary, PairedDifference, paired_differences, summarise
 from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
 from evonav.evaluation.records.store import FailureRow, RunStore
-from evonav.report.causes import Cause, cause_of
 from evonav.report.maps.stage_map import success_radius_of
+from evonav.report.tables.causes import Cause, cause_of
 
 PAPER_ORDER = ("unigoal", "3d-mem", "msgnav", "fu", "stage-reset", "ftu")
 """Agents in the order of the paper's tables."""

@@ -7,7 +7,7 @@ from evonav.report.breakdown import Breakdown, breakdown, breakdown_plot
 from evonav.report.plots import Gap, GapPlot, Plot, plot_svg
 from evonav.report.run import Run
 from evonav.report.sides import Side, read_sides
-from evonav.report.tables import verdict
+from evonav.report.tables.table import verdict
 
 PLOTTED = ("stratum", "mode", "path-length", "earlier-stages", "radius")
 TABLED = ("path-length", "room-count", "radius")

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState
-from evonav.report.causes import Cause
 from evonav.report.run import Run, StageOutcome
+from evonav.report.tables.causes import Cause
 
 
 def most_telling(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[str, list[int]]:

@@ -7,7 +7,7 @@ from urllib.parse import quote
 
 from evonav.errors import StoreError
 from evonav.report.page import page_environment, policy, text_of
-from evonav.report.tables import Table
+from evonav.report.tables.table import Table
 
 
 def write_sweep_page(out_dir: Path, name: str, tables: Sequence[Table], reports: Sequence[tuple[str, Path]]) -> Path:

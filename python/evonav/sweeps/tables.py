@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.parallel.folders import write_atomically
-from evonav.report.tables import Table, percent
+from evonav.report.tables.table import Table, percent
 from evonav.sweeps.row import AXES, STATES, SweepRow
 
 

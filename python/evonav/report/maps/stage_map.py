@@ -6,10 +6,10 @@ from importlib.resources import files
 
 from evonav.evaluation.metrics.navigation import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
-from evonav.report.causes import sentence
 from evonav.report.maps.floor_plan import Frame, frame_of, ground, item_labels, labels
 from evonav.report.maps.svg import escape, slug
 from evonav.report.maps.trajectory import change, course
+from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
 STAGE_WIDTH_PX = 900

@@ -6,7 +6,6 @@ from pathlib import Path
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.report.causes import sentence
 from evonav.report.maps.files import check_picture, write_picture
 from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.legend import legend_row
@@ -20,6 +19,7 @@ from evonav.report.maps.stage_map import (
 )
 from evonav.report.maps.svg import escape, join, text_lines
 from evonav.report.run import load_run
+from evonav.report.tables.causes import sentence
 from evonav.report.telling import most_telling
 
 PANEL_PX = 360

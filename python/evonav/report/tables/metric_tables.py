@@ -6,7 +6,7 @@ from pathlib import Path
 from evonav.evaluation.metrics.aggregate import MEASURES, Explained, explain
 from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
 from evonav.evaluation.records.store import RunStore
-from evonav.report.tables import NONE, Table
+from evonav.report.tables.table import NONE, Table
 
 TITLES = {
     "success": "Success, by several definitions",

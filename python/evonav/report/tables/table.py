@@ -17,7 +17,7 @@ from rich.text import Text
 
 from evonav.evaluation.metrics.navigation import AgentSummary, PairedDifference, Rates, rates
 from evonav.evaluation.records.schema import StageRecord
-from evonav.report.causes import WORDS, Cause, cause_of
+from evonav.report.tables.causes import WORDS, Cause, cause_of
 from evonav.significance import Interval
 
 NONE = "–"

@@ -1,0 +1,1 @@
+"""Lay out tables as text, Markdown, HTML and LaTeX."""
