@@ -17,8 +17,9 @@ from evonav.evaluation.records.schema import EndState, StageError, StageRecord
 from evonav.replay.pages import write_episode
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import TracedStage
-from evonav.report import html, write_report
+from evonav.report import write_report
 from evonav.report.maps.stage_map import page_name
+from evonav.report.pages import run_page as html
 
 HERE = Path(__file__).parent
 PROBE = (HERE / "report_probe.js").read_text("utf-8")

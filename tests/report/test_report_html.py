@@ -16,7 +16,8 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageError, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate, task_files
-from evonav.report import html, write_report
+from evonav.report import write_report
+from evonav.report.pages import run_page as html
 from evonav.report.run import load_run
 from evonav.report.tables import run_tables as findings
 from evonav.report.tables import table as tables

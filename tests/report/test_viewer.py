@@ -25,10 +25,10 @@ from evonav.replay.page_data import PageData, cells_text
 from evonav.replay.pages import write_episode
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import TracedEntry, TracedMap, TracedRound, TracedStage, Truth
-from evonav.report.html import write_report
 from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import page_name
 from evonav.report.maps.svg import cm
+from evonav.report.pages.run_page import write_report
 
 
 @pytest.fixture(scope="module")

@@ -103,8 +103,8 @@ def _replay(run: "Run", num: int | None, tasks: Path | None, exchanges: Path | N
     """Makes the pages of the most telling episodes that have none of these records yet."""
     from evonav.errors import EvonavError
     from evonav.report.maps.stage_map import VIEW_DIR
-    from evonav.report.replay_pages import listed_pages
-    from evonav.report.telling import telling_episodes
+    from evonav.report.pages.highlights import telling_episodes
+    from evonav.report.pages.replays import listed_pages
 
     there = {
         (page.agent, page.task_id): page.records_sha256

@@ -97,8 +97,8 @@ def _replayed(
     """An episode, run again: its replay, agent, stages up to the last one asked for and those asked for, radius."""
     from evonav.errors import InvalidArgumentError
     from evonav.replay.replay import RunReplay
+    from evonav.report.pages.highlights import telling_episodes
     from evonav.report.run import load_run
-    from evonav.report.telling import telling_episodes
 
     try:
         wanted = {int(number) for number in stage.split(",")} if stage else None

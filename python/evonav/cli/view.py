@@ -60,8 +60,8 @@ def make_pages(
         exchanges: File of a model's answers.
         out: Where to write.
     """
+    from evonav.report.pages.highlights import most_telling
     from evonav.report.run import load_run
-    from evonav.report.telling import most_telling
 
     found = load_run(run)
     agents = agents or found.agents

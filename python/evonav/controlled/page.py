@@ -28,7 +28,7 @@ from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import map_css, outcome_words
 from evonav.report.maps.svg import join, slug
 from evonav.report.maps.trajectory import change, rounds
-from evonav.report.page import page_environment, picture_uri, policy, text_of
+from evonav.report.pages.template import page_environment, picture_uri, policy, text_of
 from evonav.report.tables.causes import sentence
 from evonav.report.tables.table import Table
 

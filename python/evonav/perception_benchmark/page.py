@@ -14,7 +14,7 @@ from evonav.perception_benchmark.records import read_header, read_records
 from evonav.perception_benchmark.scores import Scores, differences, scores
 from evonav.perception_benchmark.tables import perception_csv, perception_tables
 from evonav.report.line_chart import PLOT_CSS
-from evonav.report.page import page_environment, policy, text_of
+from evonav.report.pages.template import page_environment, policy, text_of
 
 REPORT_NAME = "report.html"
 

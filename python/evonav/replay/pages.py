@@ -19,8 +19,8 @@ from evonav.report.maps.legend import ENTRIES, legend_html
 from evonav.report.maps.stage_map import outcome_words, page_name, task_frame
 from evonav.report.maps.svg import cm
 from evonav.report.maps.trajectory import change, end_mark, ring, start_mark, target_mark
-from evonav.report.page import page_environment, policy, text_of
-from evonav.report.replay_pages import LIST_NAME, ListedPage, listed_pages, page_code, viewer_css, viewer_js
+from evonav.report.pages.replays import LIST_NAME, ListedPage, listed_pages, page_code, viewer_css, viewer_js
+from evonav.report.pages.template import page_environment, policy, text_of
 
 INDEX_NAME = "index.html"
 MAX_PAGE_BYTES = 10_000_000

@@ -1,7 +1,7 @@
 """Tables, maps and pages made from the records of a run, and from nothing else."""
 
-from evonav.report.html import write_report
 from evonav.report.maps.strip import write_strip
+from evonav.report.pages.run_page import write_report
 from evonav.report.run import Run, load_run
 
 __all__ = ["Run", "load_run", "write_report", "write_strip"]

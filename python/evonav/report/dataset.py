@@ -7,7 +7,7 @@ from markupsafe import Markup
 
 from evonav.errors import StoreError
 from evonav.report.charts import chart_css, figure_svg, legend_svg, panel_svg
-from evonav.report.page import page_environment, policy, text_of
+from evonav.report.pages.template import page_environment, policy, text_of
 from evonav.report.panels import other_panels, paper_panels
 from evonav.tasks.records import record_bytes
 from evonav.tasks.statistics import Estimate, Measure, TaskStatistics

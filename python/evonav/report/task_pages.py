@@ -12,7 +12,7 @@ from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import file_css, map_css
 from evonav.report.maps.svg import escape, join, slug
 from evonav.report.maps.task_legend import task_legend
-from evonav.report.page import page_environment, policy, text_of
+from evonav.report.pages.template import page_environment, policy, text_of
 from evonav.report.task_plans import (
     TaskDrawing,
     after_svg,

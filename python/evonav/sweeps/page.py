@@ -6,7 +6,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from evonav.errors import StoreError
-from evonav.report.page import page_environment, policy, text_of
+from evonav.report.pages.template import page_environment, policy, text_of
 from evonav.report.tables.table import Table
 
 

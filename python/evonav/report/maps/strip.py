@@ -18,9 +18,9 @@ from evonav.report.maps.stage_map import (
     task_frame,
 )
 from evonav.report.maps.svg import escape, join, text_lines
+from evonav.report.pages.highlights import most_telling
 from evonav.report.run import load_run
 from evonav.report.tables.causes import sentence
-from evonav.report.telling import most_telling
 
 PANEL_PX = 360
 GAP_PX = 18

@@ -10,20 +10,20 @@ from markupsafe import Markup
 
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import AgentSummary
-from evonav.report.cards import TaskView, filter_data, task_view
 from evonav.report.line_chart import PLOT_CSS
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import VIEW_DIR, map_css, map_name, outcome_words, stage_svg
 from evonav.report.maps.svg import slug
-from evonav.report.page import packed, page_environment, policy, text_of
-from evonav.report.replay_pages import ListedPage, listed_pages, viewer_css, viewer_js
+from evonav.report.pages.highlights import telling_episodes
+from evonav.report.pages.replays import ListedPage, listed_pages, viewer_css, viewer_js
+from evonav.report.pages.task_cards import TaskView, filter_data, task_view
+from evonav.report.pages.template import packed, page_environment, policy, text_of
 from evonav.report.run import Run, StageOutcome, Task, load_run
 from evonav.report.run_figures import run_figures
 from evonav.report.tables import table as tables
 from evonav.report.tables.causes import WORDS, Cause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
 from evonav.report.tables.run_tables import latex_tables, markdown_tables, run_tables, statements
-from evonav.report.telling import telling_episodes
 from evonav.significance import Interval
 
 MAX_OPEN_STAGES = 400
