@@ -1,7 +1,7 @@
 """Two agents on the same stages: difference, interval, p and what could have been detected. All by house.
 
 Stages of a house share its floor plan, and those of a task a memory: they are not independent, so every resample and
-every permutation takes a house whole. Nothing here knows records; see `evonav.report.compare` for those.
+every permutation takes a house whole. Nothing here knows records; see `evonav.report.compare.compare` for those.
 """
 
 import math

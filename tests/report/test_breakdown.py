@@ -11,12 +11,12 @@ from evonav.cli import app
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import rates
 from evonav.evaluation.records.schema import EndState
-from evonav.report.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
+from evonav.report.compare.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
+from evonav.report.compare.selection import read_sides
 from evonav.report.figures import write_plots
 from evonav.report.plots import CurvePlot, Gap, GapPlot, gap_range, plot_svg, ticks
 from evonav.report.run import load_run
 from evonav.report.run_figures import run_figures
-from evonav.report.sides import read_sides
 from evonav.report.tables import run_tables
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -11,11 +11,11 @@ from evonav.cli import app
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
-from evonav.report import compare_words as words
-from evonav.report.compare import Comparison, compare, comparison_json
+from evonav.report.compare import wording as words
+from evonav.report.compare.compare import Comparison, compare, comparison_json
+from evonav.report.compare.selection import read_sides
 from evonav.report.export import csv_cell
 from evonav.report.maps.stage_map import VIEW_DIR, page_name
-from evonav.report.sides import read_sides
 
 SUCCESS = EndState.SUCCESS
 
@@ -155,7 +155,7 @@ def test_text_of_a_run_is_only_text_in_every_file(tmp_path: Path) -> None:
     evil = '=cmd|"/c calc"!A1<script>alert(1)</script>'
     run = lettered_run(tmp_path / "run", {evil: "sf" * 6, "fu": "ss" * 6})
     found = compare(read_sides([str(run)]))
-    from evonav.report.compare_page import comparison_page
+    from evonav.report.compare.page import comparison_page
 
     assert "<script" not in comparison_page(found)
     for row in csv.reader(io.StringIO(words.comparison_csv(found))):

@@ -27,9 +27,9 @@ def breakdown(
     from rich.console import Console
 
     from evonav.parallel.folders import write_atomically
-    from evonav.report import breakdown as made
+    from evonav.report.compare import breakdown as made
+    from evonav.report.compare.selection import read_sides
     from evonav.report.figures import check_figure, write_plots
-    from evonav.report.sides import read_sides
 
     if figure is not None and figure.suffix.lower() != ".svg":
         check_figure(figure)

@@ -8,7 +8,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from evonav.report.compare import Comparison
+    from evonav.report.compare.compare import Comparison
 
 
 def compare(
@@ -32,9 +32,9 @@ def compare(
     """Compares agents stage by stage: differences with 95% interval and p, by stratum and mode, and what flipped."""
     from rich.console import Console
 
-    from evonav.report import compare_words as words
     from evonav.report.compare import compare as compare_sides
-    from evonav.report.sides import read_sides
+    from evonav.report.compare import wording as words
+    from evonav.report.compare.selection import read_sides
 
     found = compare_sides(
         read_sides(sides), measures=measure or [], baseline=baseline, allow_differences=allow_differences
@@ -63,9 +63,9 @@ def _write(
     from collections.abc import Callable
 
     from evonav.parallel.folders import write_atomically
-    from evonav.report import compare_words as words
-    from evonav.report.compare import comparison_json
-    from evonav.report.compare_page import comparison_page, comparison_plot
+    from evonav.report.compare import wording as words
+    from evonav.report.compare.compare import comparison_json
+    from evonav.report.compare.page import comparison_page, comparison_plot
     from evonav.report.figures import write_plots
 
     written = []

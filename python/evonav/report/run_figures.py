@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from evonav.report.breakdown import Breakdown, breakdown, breakdown_plot
+from evonav.report.compare.breakdown import Breakdown, breakdown, breakdown_plot
+from evonav.report.compare.selection import Side, read_sides
 from evonav.report.plots import Gap, GapPlot, Plot, plot_svg
 from evonav.report.run import Run
-from evonav.report.sides import Side, read_sides
 from evonav.report.tables.table import verdict
 
 PLOTTED = ("stratum", "mode", "path-length", "earlier-stages", "radius")

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from evonav.evaluation.records.schema import EndState
-from evonav.report.breakdown import breakdown_table
+from evonav.report.compare.breakdown import breakdown_table
 from evonav.report.run import Run
 from evonav.report.run_figures import run_breakdowns
 from evonav.report.tables import table as tables

@@ -17,8 +17,8 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.stage_metrics import StageRow
 from evonav.evaluation.records.schema import EndState
 from evonav.paired import PairedEffect, holm, mcnemar, paired_effects
+from evonav.report.compare.selection import Side, config_differences
 from evonav.report.maps.stage_map import VIEW_DIR, page_name
-from evonav.report.sides import Side, config_differences
 from evonav.report.tables.causes import WORDS, Cause
 
 MEASURES = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_success": "strict SR"}

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from evonav.report import compare_words as words
-from evonav.report.compare import Comparison, Flip
+from evonav.report.compare import wording as words
+from evonav.report.compare.compare import Comparison, Flip
 from evonav.report.line_chart import PLOT_CSS
 from evonav.report.pages.template import page_environment, policy, text_of
 from evonav.report.plots import Gap, GapPlot, plot_svg

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from evonav.paired import LEAST_CLUSTERS, LEVEL, PairedEffect
-from evonav.report.compare import MEASURES, STRATA, Comparison, Flip
+from evonav.report.compare.compare import MEASURES, STRATA, Comparison, Flip
 from evonav.report.export import csv_text
 from evonav.report.tables.table import NONE, Table
 from evonav.significance import Interval

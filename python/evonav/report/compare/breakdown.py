@@ -10,12 +10,12 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.stage_metrics import StageRow
 from evonav.evaluation.records.store import RunStore
 from evonav.paired import cluster_means
-from evonav.report.compare import MODES, STRATA, check_measure
-from evonav.report.compare_words import RATES, measure_name
+from evonav.report.compare.compare import MODES, STRATA, check_measure
+from evonav.report.compare.selection import Side
+from evonav.report.compare.wording import RATES, measure_name
 from evonav.report.export import csv_text
 from evonav.report.line_chart import Line
 from evonav.report.plots import CurvePlot, Dots, GroupPlot, Plot
-from evonav.report.sides import Side
 from evonav.report.tables.table import NONE, Table
 from evonav.significance import Interval
 

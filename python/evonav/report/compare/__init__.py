@@ -1,0 +1,1 @@
+"""Compare agents stage by stage and show where they differ."""
