@@ -21,7 +21,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.paired import PairedEffect, paired_effect
 from evonav.perception.words import read_word
 from evonav.report.line_chart import Line, line_chart
-from evonav.report.paper import PAPER, PaperResult
+from evonav.report.paper.tables import PAPER, PaperResult
 from evonav.report.run import PAPER_ORDER, Run, load_run
 from evonav.report.tables.table import NONE, Table, percent
 from evonav.significance import Interval

@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.evaluation.metrics.navigation import PairedDifference
 from evonav.evaluation.records.schema import EndState
-from evonav.report import paper
 from evonav.report.line_chart import Line, line_chart
 from evonav.report.mechanisms import cause_share_table, counter_table, deeds_of, end_table, success_by_group
+from evonav.report.paper import tables as paper
 from evonav.report.run import load_run
 
 # Tables 1 and 2 of the paper as printed: SR, SPL, SR of relocated and of not relocated targets.

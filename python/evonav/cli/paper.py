@@ -9,7 +9,7 @@ import typer
 from evonav.cli.options import RunFolder
 
 if TYPE_CHECKING:
-    from evonav.report.paper import Perception
+    from evonav.report.paper.tables import Perception
     from evonav.report.run import Run
 
 
@@ -34,8 +34,8 @@ def paper(
 
     from evonav.errors import StoreError
     from evonav.parallel.folders import write_atomically
-    from evonav.report.paper import paper_markdown, paper_tables, power_table
-    from evonav.report.paper_latex import paper_latex
+    from evonav.report.paper.latex import paper_latex
+    from evonav.report.paper.tables import paper_markdown, paper_tables, power_table
     from evonav.report.run import load_run
 
     loaded = load_run(run)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from evonav.evaluation.metrics.navigation import AgentSummary, Rates
-from evonav.report.paper import (
+from evonav.report.paper.tables import (
     NUM_NOT_RELOCATED,
     NUM_RELOCATED,
     NUM_STAGES,
