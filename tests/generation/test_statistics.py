@@ -17,7 +17,7 @@ from evonav.generation.statistics import statistics_of, statistics_of_folders
 from evonav.generation.task_facts import expected_evolutions, facts_of_task, read_all_facts
 from evonav.house import bundled_houses
 from evonav.report import figures
-from evonav.report.dataset import write_dataset_report
+from evonav.report.tasks.dataset_page import write_dataset_report
 from evonav.tasks import Task, load_tasks
 from evonav.tasks.records import parse_record
 from evonav.tasks.statistics import TaskStatistics

@@ -16,9 +16,9 @@ from evonav.generation import GenerationParameters, generate_task
 from evonav.house import House, bundled_houses
 from evonav.report.maps.floor_plan import Frame, item_labels, label_point
 from evonav.report.maps.svg import cm
-from evonav.report.task_pages import stage_svg, write_task_page
-from evonav.report.task_plans import TaskDrawing, _groups, change_frame, task_drawing
-from evonav.report.task_words import changed_words, move_rows
+from evonav.report.tasks.floor_plans import TaskDrawing, _groups, change_frame, task_drawing
+from evonav.report.tasks.pages import stage_svg, write_task_page
+from evonav.report.tasks.wording import changed_words, move_rows
 from evonav.tasks import Task, write_task
 from evonav.tasks.oracle import StateChange
 

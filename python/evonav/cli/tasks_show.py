@@ -22,7 +22,7 @@ def show(
 ) -> None:
     """Draws tasks with their hidden changes: a page a task, or a gallery of a data set. It tells the answers."""
     from evonav.report.maps.files import SUFFIXES
-    from evonav.report.task_pages import write_gallery, write_stage_picture, write_task_page
+    from evonav.report.tasks.pages import write_gallery, write_stage_picture, write_task_page
     from evonav.tasks import load_tasks
 
     one = _one_task(folder, task, stage)

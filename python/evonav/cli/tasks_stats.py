@@ -32,8 +32,8 @@ def stats(
     """Prints and plots statistics of tasks beside the paper's figures."""
     from evonav.cli.display import status
     from evonav.generation.statistics import statistics_of_folders
-    from evonav.report.dataset import write_dataset_report
     from evonav.report.figures import check_figure, write_figure
+    from evonav.report.tasks.dataset_page import write_dataset_report
 
     if figure is not None:
         check_figure(figure)

@@ -13,7 +13,7 @@ from evonav.report.maps.stage_map import file_css, map_css
 from evonav.report.maps.svg import escape, join, slug
 from evonav.report.maps.task_legend import task_legend
 from evonav.report.pages.template import page_environment, policy, text_of
-from evonav.report.task_plans import (
+from evonav.report.tasks.floor_plans import (
     TaskDrawing,
     after_svg,
     before_svg,
@@ -23,7 +23,7 @@ from evonav.report.task_plans import (
     task_drawing,
     thumbnail_svg,
 )
-from evonav.report.task_words import changed_words, move_rows, stage_facts
+from evonav.report.tasks.wording import changed_words, move_rows, stage_facts
 from evonav.tasks import Task
 
 INDEX_NAME = "index.html"
