@@ -8,7 +8,7 @@ from .errors import (
     StoreError,
     TaskError,
 )
-from .evaluation.agent_check import check_agent
+from .evaluation.contract.check import check_agent
 from .report.notebook import load
 
 __all__ = [

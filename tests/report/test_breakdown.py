@@ -17,7 +17,7 @@ from evonav.report.figures import write_plots
 from evonav.report.plots import CurvePlot, Gap, GapPlot, gap_range, plot_svg, ticks
 from evonav.report.run import load_run
 from evonav.report.run_figures import run_figures
-from evonav.report.tables import run_tables
+from evonav.report.tables.run_tables import run_tables
 
 SVG = "{http://www.w3.org/2000/svg}"
 

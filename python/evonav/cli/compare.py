@@ -32,8 +32,8 @@ def compare(
     """Compares agents stage by stage: differences with 95% interval and p, by stratum and mode, and what flipped."""
     from rich.console import Console
 
-    from evonav.report.compare import compare as compare_sides
     from evonav.report.compare import wording as words
+    from evonav.report.compare.compare import compare as compare_sides
     from evonav.report.compare.selection import read_sides
 
     found = compare_sides(
