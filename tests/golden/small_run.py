@@ -52,19 +52,16 @@ UNSTABLE = {"backend", "config", "evonav", "generator", "git", "identity", "mode
 Digests = dict[str, str]
 
 
-def small_run(folder: Path) -> Digests:
-    """Writes runs, tasks, a sweep, a pack and a perception report below `folder`, and returns their digests."""
-    found: Digests = {}
-    for name, make in _PARTS.items():
-        for key, digest in make(folder / name):
-            found[f"{name}/{key}"] = digest
-    return found
+def digests_of(part: str, folder: Path) -> Digests:
+    """Writes one of `PARTS` below `folder`, and returns its digests."""
+    return {f"{part}/{key}": digest for key, digest in PARTS[part](folder / part)}
 
 
-def differences(found: Digests) -> list[str]:
-    """Names of digests that are new, gone or other than the committed ones."""
-    committed = json.loads(DIGESTS.read_text(encoding="utf-8"))
-    return sorted(key for key in committed.keys() | found.keys() if committed.get(key) != found.get(key))
+def differences(part: str, found: Digests) -> list[str]:
+    """Names of a part's digests that are new, gone or other than the committed ones."""
+    known = json.loads(DIGESTS.read_text(encoding="utf-8"))
+    names = {key for key in known if key.startswith(f"{part}/")} | found.keys()
+    return sorted(key for key in names if known.get(key) != found.get(key))
 
 
 def _six_agents(out: Path) -> Iterator[tuple[str, str]]:
@@ -171,7 +168,7 @@ _READERS: dict[str, Callable[[bytes], str]] = {
     ".gz": lambda content: _of_json(json.loads(gzip.decompress(content))),
     ".png": _of_image,
 }
-_PARTS: dict[str, Callable[[Path], Iterator[tuple[str, str]]]] = {
+PARTS: dict[str, Callable[[Path], Iterator[tuple[str, str]]]] = {
     "six-agents": _six_agents,
     "imperfect": _imperfect,
     "generation": _generation,
@@ -184,11 +181,12 @@ _PARTS: dict[str, Callable[[Path], Iterator[tuple[str, str]]]] = {
 def main() -> None:
     """Prints the differences, or accepts them."""
     with tempfile.TemporaryDirectory() as folder:
-        found = small_run(Path(folder))
+        found = {part: digests_of(part, Path(folder)) for part in PARTS}
     if "--write" in sys.argv[1:]:
-        DIGESTS.write_text(json.dumps(found, indent=0, sort_keys=True) + "\n", encoding="utf-8")
+        merged = {key: digest for digests in found.values() for key, digest in digests.items()}
+        DIGESTS.write_text(json.dumps(merged, indent=0, sort_keys=True) + "\n", encoding="utf-8")
     else:
-        print(*differences(found), sep="\n")
+        print(*(key for part, digests in found.items() for key in differences(part, digests)), sep="\n")
 
 
 if __name__ == "__main__":
