@@ -21,8 +21,8 @@ from evonav.decision.questions.unigoal_scene import (
 from evonav.decision.text_match import TextMatch
 from evonav.memory.goal_graph import GoalEdge, GoalGraph
 from evonav.memory.object_graph import Group, SceneEdge, SceneNode, Verdict
-from evonav.memory.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES
 from evonav.tasks.public import StageInput
+from evonav.tasks.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES
 
 TEXT = "Please navigate to the small red chair in the bedroom next to the bed and the dining table."
 GOAL = StageInput(1, "Chair", TEXT, TEXT, TEXT, np.zeros((300, 300, 3), np.uint8))

@@ -9,9 +9,9 @@ import pytest
 from evonav.decision.language import canonical
 from evonav.memory.goal_graph import GoalEdge, GoalGraph, is_edge_in, match_graphs, relation_kind, similarity_transform
 from evonav.memory.object_graph import ObjectGraph, SceneEdge, SceneNode
-from evonav.memory.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, WORD_OF_TYPE, category_image, relabelled
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.tasks.language import noun_of
+from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, WORD_OF_TYPE, category_image, relabelled
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 

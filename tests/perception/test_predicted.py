@@ -17,7 +17,6 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.house import bundled_houses
-from evonav.memory.vocabulary import CATEGORY_OF_TYPE, WORD_OF_LABEL, category_image, relabelled
 from evonav.perception.detector import Found, nothing_found
 from evonav.perception.filters import FilterConfig
 from evonav.perception.predicted import PredictedPerception, StackPerception, predicted_perception
@@ -33,6 +32,7 @@ from evonav.perception.vocabulary import (
 )
 from evonav.perception.words import read_word
 from evonav.sensors.observation import Detections
+from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, WORD_OF_LABEL, category_image, relabelled
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics

@@ -32,9 +32,9 @@ from evonav.decision.text_match import TextMatch
 from evonav.memory.bev import BevConfig, BevMap, Cells
 from evonav.memory.object_graph import SceneNode
 from evonav.memory.occupancy import BLOCKED, FREE
-from evonav.memory.vocabulary import MAP_CATEGORIES, category_image
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.vocabulary import MAP_CATEGORIES, category_image
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action
 

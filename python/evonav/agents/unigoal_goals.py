@@ -7,8 +7,8 @@ import numpy as np
 
 from evonav.agents.unigoal_planner import UniGoalPlanner
 from evonav.memory.bev import BevMap, Cells
-from evonav.memory.vocabulary import CATEGORY_OF_TYPE
 from evonav.sensors.observation import View
+from evonav.tasks.vocabulary import CATEGORY_OF_TYPE
 from evonav.world.pose import Pose
 
 Point2 = tuple[float, float]

@@ -24,9 +24,9 @@ from evonav.decision.questions.unigoal_scene import (
 )
 from evonav.memory.goal_graph import GoalGraph, Match, MatchMode, match_graphs, similarity_transform
 from evonav.memory.object_graph import Group, ObjectGraph, ObjectGraphConfig, SceneNode
-from evonav.memory.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES, NO_CATEGORY, WORD_OF_TYPE
 from evonav.sensors.observation import View
 from evonav.tasks.public import StageInput
+from evonav.tasks.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES, NO_CATEGORY, WORD_OF_TYPE
 
 Point2 = tuple[float, float]
 MatchStage = Literal["zero", "partial", "perfect"]

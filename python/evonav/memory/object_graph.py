@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from evonav.memory.objects import ObjectMap, ObjectMapConfig
-from evonav.memory.vocabulary import WORD_OF_LABEL, relabelled
 from evonav.sensors.observation import View
+from evonav.tasks.vocabulary import WORD_OF_LABEL, relabelled
 
 Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]

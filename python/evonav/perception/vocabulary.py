@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Literal
 
 from evonav.decision.language import canonical
-from evonav.memory.vocabulary import MAP_CATEGORIES
 from evonav.tasks.language import noun_of
+from evonav.tasks.vocabulary import MAP_CATEGORIES
 
 VocabularyName = Literal["procthor", "scannet200", "coco-unigoal", "dino-unigoal"]
 

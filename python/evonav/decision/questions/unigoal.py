@@ -12,8 +12,8 @@ from evonav.decision.questions.candidates import Pixels
 from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.rules import unigoal as rules
 from evonav.memory.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph
-from evonav.memory.vocabulary import NO_CATEGORY
 from evonav.tasks.public import StageInput
+from evonav.tasks.vocabulary import NO_CATEGORY
 
 _LIST = re.compile(r"\[([^\[\]]*)\]\.?")
 _RELATION = re.compile(r"(?P<a>.+?) and (?P<b>.+?): (?P<rest>.+)")

@@ -12,8 +12,8 @@ from evonav.decision.matching import ROOM_SIGNS, Matcher, gap_m
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
 from evonav.memory.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph, relation_kind
 from evonav.memory.object_graph import SceneNode, Verdict
-from evonav.memory.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 from evonav.tasks.public import StageInput
+from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 
 if TYPE_CHECKING:
     from evonav.decision.questions.unigoal import (
