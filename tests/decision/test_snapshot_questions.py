@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
-from evonav.decision.questions.frontier_update import ChooseQuestion
 from evonav.decision.questions.question import AnswerError
 from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotQuestion
 from evonav.decision.questions.three_d_mem_candidates import SnapshotCandidate, SnapshotChoice

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from evonav.agents.frontier_update import FrontierUpdate, FrontierUpdateConfig
+from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
 from evonav.decision import minilm
 from evonav.decision.questions.candidates import ObjectCandidate
 from evonav.decision.ranking import rank_by_text

@@ -8,10 +8,10 @@ import pytest
 from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 
 from evonav.agents.explorer import Explorer, ExplorerConfig
-from evonav.agents.fail_then_update import FailThenUpdate, FailThenUpdateConfig
-from evonav.agents.frontier_update import FrontierUpdate, FrontierUpdateConfig
+from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
+from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
+from evonav.agents.frontier_update.stage_reset import StageReset, StageResetConfig
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
-from evonav.agents.stage_reset import StageReset, StageResetConfig
 from evonav.agents.viewpoint import widest_direction_rad
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode

@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from evonav.agents.fail_then_update import FailThenUpdate, FailThenUpdateConfig
+from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
+from evonav.agents.frontier_update.questions import ChooseQuestion, VerifyQuestion
 from evonav.decision.prompts import Picture, Text
-from evonav.decision.questions.frontier_update import ChooseQuestion, VerifyQuestion
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.episode.episode import Episode

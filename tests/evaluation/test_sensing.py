@@ -7,7 +7,7 @@ import pytest
 from toy_house import ToySimulator, stage_case
 
 from evonav.agents.agent import Sensing
-from evonav.agents.frontier_update import FrontierUpdate
+from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 from toy_house import CHAIR_AWAY, OBJECTS, make_simulator, write_tasks
 
-from evonav.agents.frontier_update import FrontierUpdate
+from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.datasets import bundled_tasks

@@ -18,9 +18,18 @@ ENTRY_POINT_GROUP = "evonav.agents"
 """A package adds agents by naming classes (or functions that make one) in this entry-point group."""
 
 BUILT_IN: dict[str, tuple[str, str]] = {
-    "fu": ("evonav.agents.frontier_update:FrontierUpdate", "Frontier-Update: rebuilds its map when it is contradicted"),
-    "stage-reset": ("evonav.agents.stage_reset:StageReset", "Frontier-Update that forgets everything at each stage"),
-    "ftu": ("evonav.agents.fail_then_update:FailThenUpdate", "Frontier-Update that checks its target on arrival"),
+    "fu": (
+        "evonav.agents.frontier_update.agent:FrontierUpdate",
+        "Frontier-Update: rebuilds its map when it is contradicted",
+    ),
+    "stage-reset": (
+        "evonav.agents.frontier_update.stage_reset:StageReset",
+        "Frontier-Update that forgets everything at each stage",
+    ),
+    "ftu": (
+        "evonav.agents.frontier_update.fail_then_update:FailThenUpdate",
+        "Frontier-Update that checks its target on arrival",
+    ),
     "3d-mem": ("evonav.agents.three_d_mem:ThreeDMem", "3D-Mem: chooses among snapshots and frontiers, forgets nothing"),
     "msgnav": ("evonav.agents.msgnav:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
     "unigoal": ("evonav.agents.unigoal:UniGoal", "UniGoal as released: single actions, detector, nearest frontiers"),

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
-from evonav.agents.frontier_update import FrontierUpdate
+from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.agents.registry import new_agent
 from evonav.decision.questions.question import DecisionModel

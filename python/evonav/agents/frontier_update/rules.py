@@ -8,7 +8,7 @@ from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import Choice
 
 if TYPE_CHECKING:
-    from evonav.decision.questions.frontier_update import ChooseQuestion, VerifyQuestion
+    from evonav.agents.frontier_update.questions import ChooseQuestion, VerifyQuestion
 
 
 def choose(matcher: Matcher, question: "ChooseQuestion") -> tuple[Choice, str]:

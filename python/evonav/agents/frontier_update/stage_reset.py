@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from evonav.agents.agent import AgentAction, NavigateTo
-from evonav.agents.frontier_update import FrontierUpdate, FrontierUpdateConfig
+from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
 from evonav.agents.navigator import Navigator
 from evonav.agents.viewpoint import widest_direction_rad
 from evonav.decision.questions.question import DecisionModel

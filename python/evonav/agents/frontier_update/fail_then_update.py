@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from evonav.agents.frontier_update import FrontierUpdate, FrontierUpdateConfig
+from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
+from evonav.agents.frontier_update.questions import Sighting, VerifyQuestion
 from evonav.decision.questions.candidates import Point3
-from evonav.decision.questions.frontier_update import Sighting, VerifyQuestion
 from evonav.decision.questions.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.views import pixels_of

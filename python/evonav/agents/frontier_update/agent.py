@@ -7,12 +7,12 @@ from typing import Any, Literal
 
 from evonav.agents.agent import AgentAction, Belief, EntryBelief, RoundDiagnostics, Sensing, Stop
 from evonav.agents.explorer import nearest_frontier
+from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.asking import Asker
 from evonav.decision.matching import Matcher
 from evonav.decision.minilm import encoder
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.decision.questions.frontier_update import ChooseQuestion
 from evonav.decision.questions.question import DecisionModel
 from evonav.decision.ranking import rank_by_feature, rank_by_text, rank_entries
 from evonav.decision.text_match import TextMatch
