@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evonav.agents.frontier_update.questions import ChooseQuestion
+from evonav.agents.three_d_mem.candidates import SnapshotCandidate, SnapshotChoice
+from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.questions.question import AnswerError
-from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotQuestion
-from evonav.decision.questions.three_d_mem_candidates import SnapshotCandidate, SnapshotChoice
 from evonav.decision.text_match import TextMatch
 from evonav.tasks.public import StageInput
 

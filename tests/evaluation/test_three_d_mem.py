@@ -8,8 +8,8 @@ import pytest
 from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, stage_case
 
 from evonav.agents.agent import NavigateTo
-from evonav.agents.three_d_mem import NO_ANSWER, NOTHING_LEFT, ThreeDMem, ThreeDMemConfig
-from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotQuestion
+from evonav.agents.three_d_mem.agent import NO_ANSWER, NOTHING_LEFT, ThreeDMem, ThreeDMemConfig
+from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig

@@ -3,7 +3,7 @@
 import math
 from types import SimpleNamespace
 
-from evonav.memory.snapshots import SnapshotMemory
+from evonav.agents.three_d_mem.memory import SnapshotMemory
 from evonav.memory.views import Seen, StoredView, ViewStore
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics

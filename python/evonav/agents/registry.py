@@ -30,7 +30,10 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.frontier_update.fail_then_update:FailThenUpdate",
         "Frontier-Update that checks its target on arrival",
     ),
-    "3d-mem": ("evonav.agents.three_d_mem:ThreeDMem", "3D-Mem: chooses among snapshots and frontiers, forgets nothing"),
+    "3d-mem": (
+        "evonav.agents.three_d_mem.agent:ThreeDMem",
+        "3D-Mem: chooses among snapshots and frontiers, forgets nothing",
+    ),
     "msgnav": ("evonav.agents.msgnav:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
     "unigoal": ("evonav.agents.unigoal:UniGoal", "UniGoal as released: single actions, detector, nearest frontiers"),
     "unigoal-paper": ("evonav.agents.unigoal:UniGoalAsPublished", "UniGoal as published: the graphs do match"),

@@ -2,13 +2,13 @@
 
 from typing import TYPE_CHECKING
 
+from evonav.agents.three_d_mem.candidates import SnapshotChoice
 from evonav.decision.choosing import choose_candidate
 from evonav.decision.matching import Matcher
-from evonav.decision.questions.three_d_mem_candidates import SnapshotChoice
 from evonav.decision.ranking import rank_entries
 
 if TYPE_CHECKING:
-    from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotQuestion
+    from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
 
 
 def prefilter(matcher: Matcher, question: "PrefilterQuestion") -> tuple[tuple[str, ...], str]:

@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from evonav.agents.three_d_mem import rules
+from evonav.agents.three_d_mem.candidates import SnapshotCandidate, SnapshotChoice
 from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Part, Prompt, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
-from evonav.decision.questions.three_d_mem_candidates import SnapshotCandidate, SnapshotChoice
 from evonav.decision.questions.wording import goal_parts, merged, titled
-from evonav.decision.rules import three_d_mem as rules
 from evonav.tasks.public import StageInput
 
 _OBJECT = re.compile(r"snapshot\s+(\d+)\s*,\s*object\s+(\d+)\b[.:]?", re.IGNORECASE)

@@ -8,15 +8,15 @@ from typing import Any
 from evonav.agents.agent import AgentAction, Belief, EntryBelief, RoundDiagnostics, Sensing, Stop
 from evonav.agents.explorer import ExplorerConfig
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
+from evonav.agents.three_d_mem.candidates import SnapshotCandidate
+from evonav.agents.three_d_mem.memory import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
+from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
 from evonav.decision.asking import Asker
 from evonav.decision.questions.candidates import ObjectCandidate
 from evonav.decision.questions.question import DecisionModel
-from evonav.decision.questions.three_d_mem import PrefilterQuestion, SnapshotQuestion
-from evonav.decision.questions.three_d_mem_candidates import SnapshotCandidate
 from evonav.decision.text_match import TextMatch
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
-from evonav.memory.snapshots import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
 from evonav.memory.views import crop_of, pixels_of
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo

@@ -1,0 +1,1 @@
+"""3D-Mem: the agent, its memory, its questions and its rules."""
