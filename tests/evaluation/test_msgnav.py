@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 
-from evonav.agents.msgnav import MsgNav, MsgNavConfig
+from evonav.agents.msgnav.agent import MsgNav, MsgNavConfig
+from evonav.agents.msgnav.questions import GraphQuestion
+from evonav.agents.msgnav.scene_graph import SceneGraph
 from evonav.agents.visible_viewpoint import visible_viewpoint
-from evonav.decision.questions.msgnav import GraphQuestion
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
-from evonav.memory.scene_graph import SceneGraph
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import Detections, MapFrame, View, VisibleOccupancy
 from evonav.world.pose import Pose

@@ -34,7 +34,7 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "evonav.agents.three_d_mem.agent:ThreeDMem",
         "3D-Mem: chooses among snapshots and frontiers, forgets nothing",
     ),
-    "msgnav": ("evonav.agents.msgnav:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
+    "msgnav": ("evonav.agents.msgnav.agent:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
     "unigoal": ("evonav.agents.unigoal:UniGoal", "UniGoal as released: single actions, detector, nearest frontiers"),
     "unigoal-paper": ("evonav.agents.unigoal:UniGoalAsPublished", "UniGoal as published: the graphs do match"),
     "stay-still": ("evonav.agents.stay_still:StayStill", "yardstick: stops at once; its successes are free"),

@@ -8,10 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from evonav.agents.msgnav import rules
+from evonav.agents.msgnav.candidates import GraphChoice, GraphImage, GraphObject, PastChoice
 from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
-from evonav.decision.questions.msgnav_candidates import GraphChoice, GraphImage, GraphObject, PastChoice
 from evonav.decision.questions.question import (
     AnswerError,
     ClosedQuestion,
@@ -21,7 +22,6 @@ from evonav.decision.questions.question import (
     lines_of,
 )
 from evonav.decision.questions.wording import goal_parts, merged, titled
-from evonav.decision.rules import msgnav as rules
 from evonav.tasks.public import StageInput
 
 _ID = re.compile(r"(?:object\s+)?(\d+)[.,:;]?", re.IGNORECASE)

@@ -8,15 +8,15 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from evonav.agents.msgnav.candidates import GraphChoice
 from evonav.decision.language import Goal, canonical, similarity
 from evonav.decision.matching import Matcher, gap_m
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.decision.questions.msgnav_candidates import GraphChoice
 from evonav.decision.questions.question import AnswerError
 from evonav.decision.ranking import rank_entries
 
 if TYPE_CHECKING:
-    from evonav.decision.questions.msgnav import (
+    from evonav.agents.msgnav.questions import (
         ArrivalQuestion,
         FrontierImagesQuestion,
         GraphQuestion,

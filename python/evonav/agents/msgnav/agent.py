@@ -23,18 +23,18 @@ from evonav.agents.agent import (
     ViewSchedule,
 )
 from evonav.agents.explorer import ExplorerConfig
-from evonav.agents.msgnav_memory import GraphMemory
+from evonav.agents.msgnav.candidates import GraphObject, PastChoice
+from evonav.agents.msgnav.memory import GraphMemory
+from evonav.agents.msgnav.questions import ArrivalQuestion, FrontierImagesQuestion, GraphQuestion, SubgraphQuestion
+from evonav.agents.msgnav.scene_graph import Subgraph
 from evonav.agents.navigator import Navigator, NavigatorConfig
 from evonav.agents.visible_viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
 from evonav.decision.asking import Asker
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.decision.questions.msgnav import ArrivalQuestion, FrontierImagesQuestion, GraphQuestion, SubgraphQuestion
-from evonav.decision.questions.msgnav_candidates import GraphObject, PastChoice
 from evonav.decision.questions.question import DecisionModel
 from evonav.decision.text_match import TextMatch
 from evonav.memory import Frontier
 from evonav.memory.occupancy import FREE
-from evonav.memory.scene_graph import Subgraph
 from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo

@@ -1,0 +1,1 @@
+"""MSGNav: the agent, its memory, its questions and its rules."""
