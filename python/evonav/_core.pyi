@@ -418,7 +418,7 @@ def update_snapshots(
 
 @final
 class BevMap:
-    """UniGoal's map; `evonav.memory.bev` has shapes and units."""
+    """UniGoal's map; `evonav.agents.unigoal.bev` has shapes and units."""
 
     def __new__(
         cls,

@@ -3,24 +3,24 @@
 import numpy as np
 import pytest
 
-from evonav.decision.questions.question import AnswerError
-from evonav.decision.questions.unigoal import (
+from evonav.agents.unigoal.goal_graph import GoalEdge, GoalGraph
+from evonav.agents.unigoal.object_graph import Group, SceneEdge, SceneNode, Verdict
+from evonav.agents.unigoal.questions import (
     CategoryQuestion,
     DecomposeQuestion,
     DescribeQuestion,
     GoalRelationsQuestion,
     ObjectsQuestion,
 )
-from evonav.decision.questions.unigoal_scene import (
+from evonav.agents.unigoal.scene_questions import (
     CorrectionQuestion,
     GroupScoreQuestion,
     LayoutQuestion,
     RelationLinesQuestion,
     RoomQuestion,
 )
+from evonav.decision.questions.question import AnswerError
 from evonav.decision.text_match import TextMatch
-from evonav.memory.goal_graph import GoalEdge, GoalGraph
-from evonav.memory.object_graph import Group, SceneEdge, SceneNode, Verdict
 from evonav.tasks.public import StageInput
 from evonav.tasks.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES
 

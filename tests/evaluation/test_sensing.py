@@ -8,6 +8,7 @@ from toy_house import ToySimulator, stage_case
 
 from evonav.agents.agent import Sensing
 from evonav.agents.frontier_update.agent import FrontierUpdate
+from evonav.agents.unigoal.bev import BevMap
 from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
@@ -16,7 +17,6 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate, task_files
 from evonav.house import bundled_houses
 from evonav.memory import ObjectMap
-from evonav.memory.bev import BevMap
 from evonav.memory.clouds import clouds_of
 from evonav.perception import StageScene
 from evonav.perception.ground_truth import GroundTruthPerception

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from toy_house import OBJECTS, ToySimulator, stage_case
 
-from evonav.agents.unigoal import UniGoal, UniGoalAsPublished, UniGoalConfig
-from evonav.agents.unigoal_goals import Glimpse, largest_detection
-from evonav.agents.unigoal_graphs import GraphConfig
-from evonav.decision.questions.unigoal import DecomposeQuestion, DescribeQuestion, ObjectsQuestion
-from evonav.decision.questions.unigoal_scene import (
+from evonav.agents.unigoal.agent import UniGoal, UniGoalAsPublished, UniGoalConfig
+from evonav.agents.unigoal.goal_graph import GoalEdge, GoalGraph
+from evonav.agents.unigoal.goals import Glimpse, largest_detection
+from evonav.agents.unigoal.graphs import GraphConfig
+from evonav.agents.unigoal.object_graph import SceneNode
+from evonav.agents.unigoal.questions import DecomposeQuestion, DescribeQuestion, ObjectsQuestion
+from evonav.agents.unigoal.scene_questions import (
     CorrectionQuestion,
     GroupScoreQuestion,
     LayoutQuestion,
@@ -22,8 +24,6 @@ from evonav.decision.text_match import TextMatch
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records.schema import EndState
-from evonav.memory.goal_graph import GoalEdge, GoalGraph
-from evonav.memory.object_graph import SceneNode
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.pose import Pose
 

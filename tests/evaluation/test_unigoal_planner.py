@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from toy_house import ToySimulator, house_json
 
-from evonav.agents.unigoal_planner import UniGoalPlanner
-from evonav.memory.bev import BevConfig, BevMap
+from evonav.agents.unigoal.bev import BevConfig, BevMap
+from evonav.agents.unigoal.planner import UniGoalPlanner
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from evonav.agents.unigoal.bev import BevConfig, BevMap
 from evonav.errors import InvalidArgumentError
-from evonav.memory.bev import BevConfig, BevMap
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.world.camera import unproject

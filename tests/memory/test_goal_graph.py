@@ -6,9 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evonav.agents.unigoal.goal_graph import (
+    GoalEdge,
+    GoalGraph,
+    is_edge_in,
+    match_graphs,
+    relation_kind,
+    similarity_transform,
+)
+from evonav.agents.unigoal.object_graph import ObjectGraph, SceneEdge, SceneNode
 from evonav.decision.language import canonical
-from evonav.memory.goal_graph import GoalEdge, GoalGraph, is_edge_in, match_graphs, relation_kind, similarity_transform
-from evonav.memory.object_graph import ObjectGraph, SceneEdge, SceneNode
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.tasks.language import noun_of
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, WORD_OF_TYPE, category_image, relabelled

@@ -35,8 +35,11 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "3D-Mem: chooses among snapshots and frontiers, forgets nothing",
     ),
     "msgnav": ("evonav.agents.msgnav.agent:MsgNav", "MSGNav: a scene graph with images; stops only where it says yes"),
-    "unigoal": ("evonav.agents.unigoal:UniGoal", "UniGoal as released: single actions, detector, nearest frontiers"),
-    "unigoal-paper": ("evonav.agents.unigoal:UniGoalAsPublished", "UniGoal as published: the graphs do match"),
+    "unigoal": (
+        "evonav.agents.unigoal.agent:UniGoal",
+        "UniGoal as released: single actions, detector, nearest frontiers",
+    ),
+    "unigoal-paper": ("evonav.agents.unigoal.agent:UniGoalAsPublished", "UniGoal as published: the graphs do match"),
     "stay-still": ("evonav.agents.stay_still:StayStill", "yardstick: stops at once; its successes are free"),
     "random-walk": ("evonav.agents.random_walk:RandomWalk", "yardstick: walks in random directions"),
 }

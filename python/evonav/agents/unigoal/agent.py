@@ -23,14 +23,14 @@ from evonav.agents.agent import (
     Stop,
     ViewSchedule,
 )
-from evonav.agents.unigoal_goals import GoalConfig, GoalWatch
-from evonav.agents.unigoal_graphs import Advice, GraphConfig, GraphReasoner
-from evonav.agents.unigoal_planner import PlannedStep, PlannerConfig, UniGoalPlanner
+from evonav.agents.unigoal.bev import BevConfig, BevMap, Cells
+from evonav.agents.unigoal.goals import GoalConfig, GoalWatch
+from evonav.agents.unigoal.graphs import Advice, GraphConfig, GraphReasoner
+from evonav.agents.unigoal.object_graph import SceneNode
+from evonav.agents.unigoal.planner import PlannedStep, PlannerConfig, UniGoalPlanner
 from evonav.decision.asking import Asker
 from evonav.decision.questions.question import DecisionModel
 from evonav.decision.text_match import TextMatch
-from evonav.memory.bev import BevConfig, BevMap, Cells
-from evonav.memory.object_graph import SceneNode
 from evonav.memory.occupancy import BLOCKED, FREE
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import StageInput, TaskInfo

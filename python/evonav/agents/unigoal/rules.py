@@ -7,23 +7,23 @@ what a node is and whether it is there, no box can tell.
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from evonav.agents.unigoal.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph, relation_kind
+from evonav.agents.unigoal.object_graph import SceneNode, Verdict
 from evonav.decision.language import Goal, canonical, parse_goal
 from evonav.decision.matching import ROOM_SIGNS, Matcher, gap_m
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.memory.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph, relation_kind
-from evonav.memory.object_graph import SceneNode, Verdict
 from evonav.tasks.public import StageInput
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 
 if TYPE_CHECKING:
-    from evonav.decision.questions.unigoal import (
+    from evonav.agents.unigoal.questions import (
         CategoryQuestion,
         DecomposeQuestion,
         DescribeQuestion,
         GoalRelationsQuestion,
         ObjectsQuestion,
     )
-    from evonav.decision.questions.unigoal_scene import (
+    from evonav.agents.unigoal.scene_questions import (
         CorrectionQuestion,
         GroupScoreQuestion,
         LayoutQuestion,

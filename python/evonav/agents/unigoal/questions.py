@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from evonav.agents.unigoal import rules
+from evonav.agents.unigoal.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph
 from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Picture, Prompt, Text
 from evonav.decision.questions.candidates import Pixels
 from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
-from evonav.decision.rules import unigoal as rules
-from evonav.memory.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph
 from evonav.tasks.public import StageInput
 from evonav.tasks.vocabulary import NO_CATEGORY
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from evonav.memory.object_graph import SceneEdge, SceneNode
+from evonav.agents.unigoal.object_graph import SceneEdge, SceneNode
 
 Point2 = tuple[float, float]
 MatchMode = Literal["code", "paper"]

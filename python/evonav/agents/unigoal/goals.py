@@ -5,8 +5,8 @@ from typing import Literal
 
 import numpy as np
 
-from evonav.agents.unigoal_planner import UniGoalPlanner
-from evonav.memory.bev import BevMap, Cells
+from evonav.agents.unigoal.bev import BevMap, Cells
+from evonav.agents.unigoal.planner import UniGoalPlanner
 from evonav.sensors.observation import View
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE
 from evonav.world.pose import Pose

@@ -4,26 +4,26 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
-from evonav.decision.asking import Asker
-from evonav.decision.language import ROOMS, canonical
-from evonav.decision.matching import Matcher
-from evonav.decision.questions.candidates import ObjectCandidate
-from evonav.decision.questions.unigoal import (
+from evonav.agents.unigoal.goal_graph import GoalGraph, Match, MatchMode, match_graphs, similarity_transform
+from evonav.agents.unigoal.object_graph import Group, ObjectGraph, ObjectGraphConfig, SceneNode
+from evonav.agents.unigoal.questions import (
     CategoryQuestion,
     DecomposeQuestion,
     DescribeQuestion,
     GoalRelationsQuestion,
     ObjectsQuestion,
 )
-from evonav.decision.questions.unigoal_scene import (
+from evonav.agents.unigoal.scene_questions import (
     CorrectionQuestion,
     GroupScoreQuestion,
     LayoutQuestion,
     RelationLinesQuestion,
     RoomQuestion,
 )
-from evonav.memory.goal_graph import GoalGraph, Match, MatchMode, match_graphs, similarity_transform
-from evonav.memory.object_graph import Group, ObjectGraph, ObjectGraphConfig, SceneNode
+from evonav.decision.asking import Asker
+from evonav.decision.language import ROOMS, canonical
+from evonav.decision.matching import Matcher
+from evonav.decision.questions.candidates import ObjectCandidate
 from evonav.sensors.observation import View
 from evonav.tasks.public import StageInput
 from evonav.tasks.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES, NO_CATEGORY, WORD_OF_TYPE

@@ -1,0 +1,1 @@
+"""UniGoal: the agent, its memory, its questions and its rules."""

@@ -1,1 +1,0 @@
-"""The text matcher's answers, a file an agent family."""
