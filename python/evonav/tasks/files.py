@@ -26,20 +26,13 @@ from evonav.tasks.records import (
 
 
 def encode_png(image: NDArray[np.uint8]) -> bytes:
-    """An RGB image as PNG, without metadata.
+    """Return an RGB image as PNG, without metadata.
 
-    Rows are stored as they are: on these images that is smaller and faster than filtered ones. Level 3 takes half the
-    time of level 6 for 29% more bytes.
+    Level 4 takes half the time of Pillow's level 6 for 17% more bytes.
     """
-    height, width, channels = image.shape
-    rows = np.zeros((height, 1 + width * channels), np.uint8)
-    rows[:, 1:] = image.reshape(height, -1)
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    chunks = [(b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 3)), (b"IEND", b"")]
-    packed = [
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
-    ]
-    return b"\x89PNG\r\n\x1a\n" + b"".join(packed)
+    file = BytesIO()
+    Image.fromarray(image).save(file, "PNG", compress_level=4)
+    return file.getvalue()
 
 
 def decode_png(path: Path, size_px: int) -> NDArray[np.uint8]:
