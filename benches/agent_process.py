@@ -14,12 +14,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from evonav.agents.agent import AgentAction, Sensing, Stop
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, DecisionSpec, RemoteAgent
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.parallel.local import one_thread_each
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics

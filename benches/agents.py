@@ -18,15 +18,15 @@ from evonav.agents.agent import Agent, AgentAction, ExplainingAgent, NavigateTo,
 from evonav.agents.registry import BUILT_IN
 from evonav.decision.questions.question import Question, Reply
 from evonav.decision.text_match import TextMatch
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.run.components import Backend, make_agent
-from evonav.evaluation.run.run import task_file
 from evonav.perception import Perception, StageScene
 from evonav.report.run import PAPER_ORDER
 from evonav.sensors.observation import Observation
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_file
 from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.simulator import Simulator
 

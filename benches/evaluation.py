@@ -10,9 +10,10 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import Progress, RunConfig, TaskFile, evaluate, task_files
+from evonav.evaluation.run.run import Progress, RunConfig, evaluate
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import TaskFile, task_files
 
 NOTES = """`evonav evaluate` as a user runs it: embedded simulator, ground-truth perception, text matcher, an agent in
 a process of its own beside each worker, every stage committed with fsync. Stages a second: by the wall clock, starting

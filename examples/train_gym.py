@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import evonav.gym
-from evonav.evaluation.datasets import make_tasks
+from evonav.generation.engine import generate_dataset
 
 NUM_ENVS, NUM_STEPS, NUM_SECTORS = 32, 32, 5
 STEP_SIZE, DISCOUNT = 0.05, 0.95
@@ -152,7 +152,7 @@ def main(num_updates: int) -> None:
     """Trains, and prints what it was good for."""
     start_s = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder, as_file(files("evonav") / "data" / "houses.jsonl.gz") as houses:
-        make_tasks(houses, Path(folder), limit=32)
+        generate_dataset(houses, Path(folder), limit=32)
         print(f"32 tasks in houses with train assets: {time.perf_counter() - start_s:.0f} s")
         weights, curve = train(Path(folder), num_updates)
     tenth = max(1, len(curve) // 10)

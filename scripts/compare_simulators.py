@@ -14,12 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, TaskFile, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import TaskFile, task_files
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator
 

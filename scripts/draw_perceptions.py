@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.run.components import load_case
 from evonav.perception import StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.noise_config import noise_presets
 from evonav.perception.simulated import noisy_perception
 from evonav.sensors.observation import Detections
+from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.language import noun_of
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import Frame

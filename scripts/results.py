@@ -16,7 +16,7 @@ from pathlib import Path
 
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import Progress, RunConfig, TaskFile, evaluate, task_files
+from evonav.evaluation.run.run import Progress, RunConfig, evaluate
 from evonav.report.line_chart import Line, line_chart
 from evonav.report.mechanisms import STRATA, cause_share_table, counter_table, deeds_of, end_table, success_by_group
 from evonav.report.paper.tables import paper_tables
@@ -24,6 +24,7 @@ from evonav.report.run import PAPER_ORDER, Run, load_run
 from evonav.report.tables.run_tables import effort_table
 from evonav.report.tables.table import NONE, Table, percent
 from evonav.significance import wilson
+from evonav.tasks.listing import TaskFile, task_files
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "results.md"

@@ -6,8 +6,8 @@ import sys
 import pytest
 
 from evonav.cli import main
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.records.store import RunStore
+from evonav.tasks.bundled import bundled_tasks
 
 ONE = "--agents shortest-path --limit 1 --workers 0"
 

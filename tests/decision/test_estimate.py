@@ -8,11 +8,12 @@ from evonav.decision.ledger import Ledger
 from evonav.decision.mock_answers import mock_answer
 from evonav.decision.pacing import Pace
 from evonav.decision.vlm_errors import VlmError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.cost_estimate import estimate_run, ratio_error
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from vlm_stub import serving
 
 

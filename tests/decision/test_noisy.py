@@ -14,12 +14,13 @@ from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.question import AnswerError, Question, Reply
 from evonav.decision.scripted import Scripted
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from evonav.tasks.public import StageInput
 
 GOAL = StageInput(1, "Mug", "Find the mug.", "Find the mug.", "Find the mug.", np.zeros((1, 1, 3), np.uint8))

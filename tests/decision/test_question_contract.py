@@ -14,11 +14,12 @@ from evonav.decision.prompts import Picture, Text
 from evonav.decision.questions.question import AnswerError, Question, Reply
 from evonav.decision.text_match import TextMatch
 from evonav.decision.vlm_decision import read_json, with_schema
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from vlm_stub import check_strict
 
 NUM_OF_A_KIND = 12

@@ -12,10 +12,11 @@ from evonav.decision.questions.candidates import ObjectCandidate
 from evonav.decision.ranking import rank_by_text
 from evonav.decision.text_features import similarity_of_label, text_feature
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 needs_weights = pytest.mark.skipif(not minilm.is_installed(), reason="needs the extra evonav[text]")
 

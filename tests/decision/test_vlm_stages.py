@@ -12,12 +12,13 @@ import pytest
 from evonav.decision.exchanges import ExchangeStore
 from evonav.decision.mock_answers import mock_answer
 from evonav.decision.mock_vlm import FAULTS, MockReply, faulty, without_schemas
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from vlm_stub import KEY, Stub, check_request, images_in, serving
 
 AGENTS = ["fu", "ftu"]

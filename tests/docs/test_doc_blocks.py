@@ -15,10 +15,11 @@ from build_docs import ROOT, links, pages
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.run.components import check_agent_name
-from evonav.evaluation.run.run import evaluate, task_files
+from evonav.evaluation.run.run import evaluate
 from evonav.house import bundled_houses
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PARSED_ONLY = {

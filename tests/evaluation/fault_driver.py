@@ -17,9 +17,10 @@ from test_engine import CONFIG
 from evonav.errors import StoreError
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run import run as engine
-from evonav.evaluation.run.run import evaluate, task_files
+from evonav.evaluation.run.run import evaluate
 from evonav.evaluation.run.worker import EpisodeWork
 from evonav.parallel import folders
+from evonav.tasks.listing import task_files
 
 AGENT = "random-walk"
 KILL, FAIL, FAIL_ALL = 1, 2, 3

@@ -17,7 +17,6 @@ from toy_house import write_tasks
 
 from evonav.agents.registry import BUILT_IN
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.hosting.process import (
     LOG_NAME,
     AgentHosting,
@@ -29,9 +28,11 @@ from evonav.evaluation.hosting.process import (
 from evonav.evaluation.protocol import AgentFailedError, ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.report import write_report
 from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
@@ -211,7 +212,8 @@ def test_a_task_that_breaks_during_a_run_costs_its_stages_alone(tmp_path, num_wo
 ENDED = """
 import sys
 from pathlib import Path
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.tasks.listing import task_files
 from evonav.evaluation.run.components import Backend
 
 if __name__ == "__main__":

@@ -4,11 +4,12 @@ from evonav.agents import wire
 from evonav.decision.account import Account, Price, Usage
 from evonav.decision.metered import Metered
 from evonav.decision.questions.question import Reply
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.metrics.stage_metrics import stage_rows
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import evaluate, task_files
+from evonav.evaluation.run.run import evaluate
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 
 class Client:

@@ -12,15 +12,16 @@ import pytest
 from toy_house import write_tasks
 
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.parallel.folders import writing
 from evonav.report.run import load_run
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 TOY = Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator")
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
@@ -252,7 +253,8 @@ def test_a_run_is_read_as_of_one_moment_while_it_is_written(tasks, tmp_path, mon
 INTERRUPTED = """
 import sys
 from pathlib import Path
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.tasks.listing import task_files
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.protocol import ProtocolConfig

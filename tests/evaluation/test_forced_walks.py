@@ -206,9 +206,10 @@ def test_runs_with_walks_are_handed_in_and_verified(tmp_path):
 
     from evonav.cli import app
     from evonav.controlled.generate import ControlledOptions, generate_arms
-    from evonav.evaluation.run.run import evaluate, task_files
+    from evonav.evaluation.run.run import evaluate
     from evonav.house import bundled_houses
     from evonav.tasks import write_task
+    from evonav.tasks.listing import task_files
     from evonav.tasks.manifest import GenerationParameters
 
     options = ControlledOptions(parameters=GenerationParameters(reference_image_px=64, reference_min_visible_px=10))

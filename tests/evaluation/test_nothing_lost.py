@@ -18,9 +18,10 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.parallel import folders
 from evonav.parallel.folders import write_atomically, writing
+from evonav.tasks.listing import task_files
 
 HERE = Path(__file__).parent
 ONE_THREAD = dict.fromkeys(("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
@@ -134,7 +135,8 @@ DRIVER = """
 import sys
 from pathlib import Path
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
+from evonav.tasks.listing import task_files
 from evonav.evaluation.protocol import ProtocolConfig
 
 config = RunConfig(

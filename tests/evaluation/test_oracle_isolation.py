@@ -16,8 +16,9 @@ from evonav.evaluation.episode.oracle_baselines import PrivilegedAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.perception.ground_truth import GroundTruthPerception
+from evonav.tasks.listing import task_files
 
 CODE = (type, types.ModuleType, types.FunctionType, types.BuiltinFunctionType, types.MethodType, types.FrameType)
 

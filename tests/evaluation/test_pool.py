@@ -16,8 +16,9 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate, evaluate_all, task_files
+from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate, evaluate_all
 from evonav.parallel.pool import Resources
+from evonav.tasks.listing import task_files
 
 HERE = Path(__file__).parent
 AGENT = "nearest-frontier"

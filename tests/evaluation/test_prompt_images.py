@@ -9,11 +9,11 @@ from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailT
 from evonav.agents.frontier_update.questions import ChooseQuestion, VerifyQuestion
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.scripted import Scripted
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import task_file
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_file
 
 TASK = "bundled-0086-0279d6-s0"
 MARGIN_PX = 20

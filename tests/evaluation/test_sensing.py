@@ -9,18 +9,19 @@ from toy_house import ToySimulator, stage_case
 from evonav.agents.agent import Sensing
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.unigoal.bev import BevMap
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.house import bundled_houses
 from evonav.memory import ObjectMap
 from evonav.memory.clouds import clouds_of
 from evonav.perception import StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.sensors.observation import Observation
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig

@@ -9,8 +9,9 @@ from toy_house import write_tasks
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import NUM_RETRIES, RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import NUM_RETRIES, RunConfig, evaluate
 from evonav.report.run import load_run
+from evonav.tasks.listing import task_files
 
 AGENT = "random-walk"  # what it does depends on all that it did before
 

@@ -16,10 +16,11 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, TaskFile, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.submission.pack import MAX_RATIO, About, SubmissionError, SubmissionFile, pack
 from evonav.submission.rescore import reenact
 from evonav.submission.verify import verify
+from evonav.tasks.listing import TaskFile, task_files
 
 SELF_REPORTED = (
     r"agent",
@@ -35,7 +36,7 @@ SELF_REPORTED = (
 
 @pytest.fixture(scope="module")
 def tasks() -> list[TaskFile]:
-    from evonav.evaluation.datasets import bundled_tasks
+    from evonav.tasks.bundled import bundled_tasks
 
     with bundled_tasks() as folder:
         return task_files(folder, 1)
@@ -282,7 +283,7 @@ def test_altered_header_is_found(
 
 
 def test_other_tasks_than_asked_for_are_found(packed: Path, tmp_path: Path) -> None:
-    from evonav.evaluation.datasets import bundled_tasks
+    from evonav.tasks.bundled import bundled_tasks
 
     with bundled_tasks() as folder:
         assert rejected(packed, task_files(folder, 2)) == "tasks"

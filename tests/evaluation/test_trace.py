@@ -15,14 +15,15 @@ from toy_house import CHAIR_AWAY, OBJECTS, make_simulator, write_tasks
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig, as_errored
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import EXPLORED, FREE
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 TOY = Backend(cases="toy_house:load_case", simulator="test_trace:colour_simulator")
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))

@@ -1,7 +1,6 @@
 """Θ from files and options."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
@@ -36,7 +35,6 @@ def test_a_file_gives_some_fields_and_options_win(tmp_path: Path) -> None:
     assert (won.evolve_probability, won.num_stages, won.extensions) == (1.0, (6, 8), read.extensions)
 
 
-@pytest.mark.skipif(sys.version_info < (3, 11), reason="tomllib is new in Python 3.11")
 def test_toml_says_the_same_as_json(tmp_path: Path) -> None:
     path = tmp_path / "theta.toml"
     path.write_text(
@@ -49,15 +47,6 @@ def test_toml_says_the_same_as_json(tmp_path: Path) -> None:
     assert read_parameters(path) == read_parameters(twin)
     path.write_text("evolve_probability = = 1")
     with pytest.raises(TaskError, match=r"theta\.toml: no TOML"):
-        read_parameters(path)
-
-
-def test_toml_without_a_reader_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "theta.toml"
-    path.write_text("evolve_probability = 0.25\n")
-    for name in ("tomllib", "tomli"):
-        monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(InvalidArgumentError, match="as JSON"):
         read_parameters(path)
 
 

@@ -82,7 +82,7 @@ def test_a_sound_task_has_no_problem(root: Path) -> None:
 
 
 def test_bundled_tasks_are_sound() -> None:
-    from evonav.evaluation.datasets import bundled_tasks
+    from evonav.tasks.bundled import bundled_tasks
 
     with bundled_tasks() as folder:
         report = validate_folder(folder)

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 
 from evonav.errors import PerceptionError, StoreError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.perception import StageScene, weights
 from evonav.perception.predicted import predicted_perception
 from evonav.perception.vocabulary import PROCTHOR_TYPES
 from evonav.replay.replay import RunReplay
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from evonav.tasks.public import StageInput
 from evonav.world.embedded import EmbeddedSimulator
 

@@ -11,16 +11,17 @@ import pytest
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.perception import mini
 from evonav.perception.detector import DetectorView
 from evonav.perception.mini import MiniDetector
 from evonav.perception.vocabulary import PROCTHOR_TYPES
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 MIN_AREA_PX = 1000
 MIN_RECALL, MIN_PRECISION = 0.7, 0.7

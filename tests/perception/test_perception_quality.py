@@ -13,9 +13,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import task_files
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
 from evonav.perception_benchmark.estimates import Houses
 from evonav.perception_benchmark.page import write_perception_report
@@ -24,6 +22,8 @@ from evonav.perception_benchmark.scores import differences, scores
 from evonav.perception_benchmark.tables import perception_tables
 from evonav.perception_benchmark.tour import tour
 from evonav.significance import percentile_interval
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 SPECS = [
     PerceptionSpec("gt", "evonav.evaluation.run.components:ground_truth"),

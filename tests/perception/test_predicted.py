@@ -10,11 +10,10 @@ import scripted_models
 from scripted_models import ColourEmbedder, scripted_perception
 
 from evonav.errors import InvalidArgumentError, PerceptionError, StoreError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.house import bundled_houses
 from evonav.perception.detector import Found, nothing_found
@@ -32,6 +31,8 @@ from evonav.perception.vocabulary import (
 )
 from evonav.perception.words import read_word
 from evonav.sensors.observation import Detections
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, WORD_OF_LABEL, category_image, relabelled
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose

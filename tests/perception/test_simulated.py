@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from evonav import _core
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.run.components import load_case
 from evonav.perception import Percept, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
@@ -19,6 +18,7 @@ from evonav.perception.noise_config import NoiseConfig, noise_presets
 from evonav.perception.pose_drift import PoseDrift
 from evonav.perception.simulated import NoisyPerception, noisy_perception
 from evonav.sensors.observation import Detections
+from evonav.tasks.bundled import bundled_tasks
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame

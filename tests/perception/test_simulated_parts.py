@@ -8,12 +8,12 @@ import pytest
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.run.components import load_case
 from evonav.perception.confusion import read_confusion
 from evonav.perception.noise_config import NoiseConfig, noise_presets
 from evonav.perception.simulated import noisy_perception
 from evonav.perception.synthetic_features import DIMENSIONS, image_feature, nouns_of, text_feature
+from evonav.tasks.bundled import bundled_tasks
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.evaluation.run.settings import PerceptionSettings
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 
 def records(out: Path, word: str, num_workers: int) -> list[str]:

@@ -9,11 +9,12 @@ import pytest
 from second_scores import table
 
 from evonav.errors import StoreError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.metrics.stage_metrics import stage_rows
 from evonav.evaluation.records.store import FILE_NAME, RunStore
-from evonav.evaluation.run.run import evaluate, task_files
+from evonav.evaluation.run.run import evaluate
 from evonav.report.run import load_run
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 AGENTS = ("fu", "random-walk", "nearest-frontier", "stay-still")
 

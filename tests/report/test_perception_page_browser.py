@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from browser import Chromium, needs_browser
 
-from evonav.evaluation.datasets import bundled_tasks
-from evonav.evaluation.run.run import task_files
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
 from evonav.perception_benchmark.page import write_perception_report
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 pytestmark = needs_browser
 

@@ -10,10 +10,10 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import load_case
 from evonav.replay.rerun_export import check_recording
+from evonav.tasks.bundled import bundled_tasks
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig

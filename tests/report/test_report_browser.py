@@ -12,7 +12,6 @@ from made_up_run import WriteRun, entry, record_run, stage_record
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.records.schema import EndState, StageError, StageRecord
 from evonav.replay.pages import write_episode
 from evonav.replay.replay import RunReplay
@@ -20,6 +19,7 @@ from evonav.replay.types import TracedStage
 from evonav.report import write_report
 from evonav.report.maps.stage_map import page_name
 from evonav.report.pages import run_page as html
+from evonav.tasks.bundled import bundled_tasks
 
 HERE = Path(__file__).parent
 PROBE = (HERE / "report_probe.js").read_text("utf-8")

@@ -11,17 +11,18 @@ import pytest
 from made_up_run import WriteRun, record_run, stage_record
 
 from evonav.errors import StoreError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageError, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.report import write_report
 from evonav.report.pages import run_page as html
 from evonav.report.run import load_run
 from evonav.report.tables import run_tables as findings
 from evonav.report.tables import table as tables
 from evonav.report.tables.run_metadata import reproduction
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 
 VOID = {"meta", "input", "br", "link", "img"}
 

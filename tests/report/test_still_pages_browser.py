@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.controlled.page import write_controlled_report
-from evonav.evaluation.datasets import bundled_tasks
+from evonav.tasks.bundled import bundled_tasks
 
 pytestmark = needs_browser
 

@@ -10,13 +10,13 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.replay.replay import RunReplay
 from evonav.replay.types import TracedStage
 from evonav.replay.video import write_video
 from evonav.replay.video_frames import LEFTS, MAP_SIZE, SIZE, TOP, episode_frame, stage_frames
 from evonav.report.canvas import MapCanvas, colour, font, plain, wrapped
 from evonav.report.maps.floor_plan import Frame
+from evonav.tasks.bundled import bundled_tasks
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,6 @@ from typer.testing import CliRunner
 from viewer_run import MARKUP
 
 from evonav.cli import app
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.replay.page_data import PageData, cells_text
@@ -29,6 +28,7 @@ from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import page_name
 from evonav.report.maps.svg import cm
 from evonav.report.pages.run_page import write_report
+from evonav.tasks.bundled import bundled_tasks
 
 
 @pytest.fixture(scope="module")

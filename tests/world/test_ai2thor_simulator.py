@@ -19,11 +19,12 @@ import numpy as np
 import pytest
 
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.run import RunConfig, evaluate, task_files
+from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.house import bundled_houses
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import task_files
 from evonav.world import ai2thor
 from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator
 from evonav.world.ai2thor_images import InstanceDecoder, depth_of

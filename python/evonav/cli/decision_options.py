@@ -15,8 +15,9 @@ if TYPE_CHECKING:  # the command must start fast
     from collections.abc import Iterator, Sequence
 
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import RunConfig, TaskFile
+    from evonav.evaluation.run.run import RunConfig
     from evonav.evaluation.run.settings import DecisionSettings
+    from evonav.tasks.listing import TaskFile
 
 MODEL_VARIABLE = "EVONAV_VLM_MODEL"
 _SETTINGS = {"decision": "kind", "vlm_mode": "mode", "request_timeout": "request_timeout_s"}

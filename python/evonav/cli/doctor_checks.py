@@ -120,8 +120,9 @@ def _python() -> Check:
 
 
 def _bundled() -> Check:
-    from evonav.evaluation.datasets import bundled_tasks
-    from evonav.tasks.files import load_task, task_roots
+    from evonav.tasks.bundled import bundled_tasks
+    from evonav.tasks.files import load_task
+    from evonav.tasks.listing import task_roots
 
     with bundled_tasks() as folder:
         roots = task_roots(folder)

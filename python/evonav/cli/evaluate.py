@@ -61,7 +61,8 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from evonav.evaluation.hosting.process import AgentHosting
     from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import RunConfig, TaskFile
+    from evonav.evaluation.run.run import RunConfig
+    from evonav.tasks.listing import TaskFile
 
 NUM_RETRIES = 2
 
@@ -177,23 +178,30 @@ def _tasks(
     num_workers: int,
 ) -> "Iterator[list[TaskFile]]":
     """The tasks of a run: given, generated into the run's folder, or bundled."""
-    from evonav.evaluation.datasets import bundled_tasks, make_tasks
-    from evonav.evaluation.run.run import task_file, task_files
+    from evonav.generation.engine import Workforce, generate_dataset, inherited_names
+    from evonav.generation.worker import GenerationOptions
+    from evonav.house.files import HouseTexts
+    from evonav.tasks.bundled import bundled_tasks
+    from evonav.tasks.listing import task_file, task_files
 
     with ExitStack() as stack:
         if houses is not None:
+            texts = HouseTexts(houses)
+            dataset, split = inherited_names(texts)
+            options = GenerationOptions(
+                seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets
+            )
             with interruptible(out / "tasks"), generation_progress() as show:
-                generated = make_tasks(
-                    houses,
+                generated = generate_dataset(
+                    texts,
                     out / "tasks",
+                    options=options,
                     limit=limit,
                     subset=subset,
-                    seed=seed,
-                    allow_unknown_assets=allow_unknown_assets,
-                    num_workers=num_workers,
+                    workforce=Workforce(num_workers=num_workers),
                     on_progress=show,
                 )
-            yield [task_file(root) for root in generated]
+            yield [task_file(root) for root in generated.roots]
         else:
             directory = tasks if tasks is not None else stack.enter_context(bundled_tasks())
             yield task_files(directory, limit, subset)

@@ -51,13 +51,14 @@ def generate(
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
     """Generates tasks from multi-room houses; run again to resume."""
-    from evonav.evaluation.datasets import inherited_names
     from evonav.generation.config import read_parameters
-    from evonav.generation.engine import Workforce, generate_dataset
+    from evonav.generation.engine import Workforce, generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
+    from evonav.house.files import HouseTexts
 
     check_engine(engine, ray_address)
-    dataset, inherited_split = inherited_names(houses)
+    texts = HouseTexts(houses)
+    dataset, inherited_split = inherited_names(texts)
     options = GenerationOptions(
         seed=seed,
         parameters=read_parameters(config, evolve_probability=evolve_probability, num_stages=num_stages),
@@ -68,7 +69,7 @@ def generate(
     workforce = Workforce(count_of(workers), engine.value, ray_address, house_timeout)
     with interruptible(out), generation_progress() as show:
         made = generate_dataset(
-            houses,
+            texts,
             out,
             options=options,
             limit=limit,

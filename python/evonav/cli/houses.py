@@ -1,5 +1,6 @@
 """House files: `houses list`, `houses fetch`."""
 
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,10 +28,10 @@ def list_houses(
     limit: Limit = None,
 ) -> None:
     """Lists houses with their rooms and objects."""
-    from evonav.evaluation.datasets import house_facts
+    from evonav.house import bundled_houses, load_houses
 
-    for name, num_rooms, num_objects in house_facts(path, limit):
-        typer.echo(f"{name}\t{num_rooms} rooms\t{num_objects} objects")
+    for house in islice(bundled_houses() if path is None else load_houses(path), limit):
+        typer.echo(f"{house.name}\t{len(house.rooms)} rooms\t{len(house.objects)} objects")
 
 
 @houses_app.command(name="fetch")

@@ -59,12 +59,12 @@ def perception(
     from rich import progress as bars
     from rich.console import Console
 
-    from evonav.evaluation.datasets import bundled_tasks
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import task_files
     from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
     from evonav.perception_benchmark.page import write_perception_report
     from evonav.perception_benchmark.tables import perception_tables
+    from evonav.tasks.bundled import bundled_tasks
+    from evonav.tasks.listing import task_files
 
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")

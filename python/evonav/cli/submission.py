@@ -54,9 +54,9 @@ def verify(
     from rich.console import Console
     from rich.progress import Progress
 
-    from evonav.evaluation.datasets import bundled_tasks
-    from evonav.evaluation.run.run import task_files
     from evonav.submission.verify import verdict_json, verify
+    from evonav.tasks.bundled import bundled_tasks
+    from evonav.tasks.listing import task_files
 
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")

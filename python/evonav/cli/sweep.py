@@ -13,10 +13,10 @@ from evonav.cli.options import EXIT_INCOMPLETE, EngineOption, count_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from evonav.evaluation.run.run import TaskFile
     from evonav.sweeps.file import SweepFile
     from evonav.sweeps.row import SweepRow
     from evonav.sweeps.run import Cell, CellRun
+    from evonav.tasks.listing import TaskFile
 
 
 def sweep(

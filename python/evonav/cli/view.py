@@ -114,8 +114,8 @@ def task_path(run: Path, tasks: Path | None) -> "Callable[[str], Path]":
         TaskError: There are none.
     """
     from evonav.errors import TaskError
-    from evonav.evaluation.datasets import bundled_tasks
     from evonav.evaluation.records.store import RunStore
+    from evonav.tasks.bundled import bundled_tasks
 
     with RunStore(run) as store:
         noted = store.meta("tasks_dir")

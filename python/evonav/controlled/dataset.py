@@ -25,7 +25,8 @@ from evonav.tasks.dataset import (
     TaskEntry,
     write_dataset,
 )
-from evonav.tasks.files import read_house, task_roots
+from evonav.tasks.files import read_house
+from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import Task, TaskHeader
 from evonav.tasks.records import parse_record, read_file
 

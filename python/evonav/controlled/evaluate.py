@@ -5,7 +5,8 @@ from pathlib import Path
 
 from evonav.controlled.layout import read_controlled, run_of, tasks_of
 from evonav.evaluation.metrics.navigation import AgentSummary
-from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_all, task_files
+from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_all
+from evonav.tasks.listing import task_files
 
 
 def evaluate_controlled(

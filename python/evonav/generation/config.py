@@ -7,6 +7,7 @@ from typing import Any
 from evonav.errors import InvalidArgumentError, TaskError
 from evonav.tasks.manifest import GenerationParameters
 from evonav.tasks.records import parse_record, read_file
+from evonav.toml import tomllib
 
 
 def read_parameters(
@@ -21,7 +22,7 @@ def read_parameters(
 
     Raises:
         TaskError: The file cannot be read or is no such record; it names the field.
-        InvalidArgumentError: An option is outside its domain, or TOML cannot be read by this Python.
+        InvalidArgumentError: An option is outside its domain.
     """
     parameters = GenerationParameters() if path is None else parse_record(GenerationParameters, _json_of(path), path)
     changes: dict[str, Any] = {}
@@ -44,20 +45,7 @@ def _json_of(path: Path) -> bytes:
     data = read_file(path)
     if path.suffix.lower() != ".toml":
         return data
-    toml = toml_reader()
     try:
-        return json.dumps(toml.loads(data.decode())).encode()
+        return json.dumps(tomllib.loads(data.decode())).encode()
     except ValueError as error:
         raise TaskError(f"{path}: no TOML: {error}") from None
-
-
-def toml_reader() -> Any:  # noqa: ANN401
-    """Python's own `tomllib` from 3.11 on, or the package `tomli`."""
-    import importlib
-
-    for name in ("tomllib", "tomli"):
-        try:
-            return importlib.import_module(name)
-        except ModuleNotFoundError:
-            continue
-    raise InvalidArgumentError("TOML needs Python 3.11 or the package tomli: write the configuration as JSON")

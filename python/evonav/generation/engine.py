@@ -19,7 +19,7 @@ from evonav.errors import HouseError, InvalidArgumentError, TaskError
 from evonav.generation.house_order import house_order, wanted_of
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.worker import PARTIAL_NAME, WORK, GenerationOptions, is_whole, outcome_of
-from evonav.house.files import HouseTexts, named_set
+from evonav.house.files import HouseTexts
 from evonav.parallel.folders import sha256_of_file, writing
 from evonav.parallel.pool import Answer, EngineName, Job, Pool, open_pool
 from evonav.tasks.dataset import (
@@ -83,7 +83,7 @@ class GenerationSummary:
 
 
 def generate_dataset(
-    houses: Path | str,
+    houses: Path | str | HouseTexts,
     out: Path,
     *,
     options: GenerationOptions | None = None,
@@ -96,9 +96,10 @@ def generate_dataset(
     """Makes a task of every house that allows one; called again on the same folder, does what is left.
 
     Args:
-        houses: As for `evonav.house.load_houses`.
+        houses: A path as for `evonav.house.load_houses`, or the opened houses.
         out: Gets a folder a task, `journal.jsonl` and, when all is done, `dataset.json`.
-        options: Must be the folder's own when it already holds tasks.
+        options: Must be the folder's own when it already holds tasks. Default: the paper's parameters, and the dataset
+            and split of the houses.
         limit: The first houses that give so many tasks; must be the folder's own too.
         subset: Only the tasks of a named subset of the split (`evonav.tasks.subsets`); must be the folder's own too.
         workforce: Default: this process.
@@ -112,12 +113,13 @@ def generate_dataset(
         TaskError: No house gives a task, or too few for the subset; it says why.
         EngineError: Workers cannot be had.
     """
-    options, workforce = options or GenerationOptions(), workforce or Workforce()
     if limit is not None and limit < 1:
         raise InvalidArgumentError(f"argument `limit` is {limit}, expected None or at least 1")
+    texts = houses if isinstance(houses, HouseTexts) else HouseTexts(houses)
+    dataset, split = inherited_names(texts)
+    options, workforce = options or GenerationOptions(dataset=dataset, split=split), workforce or Workforce()
     wanted_tasks = None if subset is None else wanted_of(subset, options.split, limit)
-    texts = HouseTexts(houses)
-    sources = _sources(houses, texts)
+    sources = _sources(texts)
     run = {
         "evonav": __version__,
         "houses": {source.name: source.sha256 for source in sources},
@@ -333,17 +335,21 @@ def _write_dataset(
     write_dataset(record, out)
 
 
-def _sources(houses: Path | str, texts: HouseTexts) -> tuple[SourceFile, ...]:
+def inherited_names(houses: HouseTexts) -> tuple[str, str]:
+    """Return the dataset and split that tasks inherit from their houses."""
+    return ("evonav", "none") if houses.published is None else ("procthor-10k", houses.published.split)
+
+
+def _sources(houses: HouseTexts) -> tuple[SourceFile, ...]:
     """Names and checksums of the files of houses.
 
     Raises:
         HouseError: A file cannot be read.
     """
-    published = named_set(houses) is not None
     try:
         return tuple(
-            SourceFile(name=str(houses) if published else file.name, sha256=sha256_of_file(file))
-            for file in texts.files
+            SourceFile(name=houses.name if houses.published else file.name, sha256=sha256_of_file(file))
+            for file in houses.files
         )
     except OSError as error:
-        raise HouseError(f"{houses}: cannot be read: {error}") from error
+        raise HouseError(f"{houses.name}: cannot be read: {error}") from error

@@ -28,7 +28,7 @@ from evonav.significance import (
     wilson,
 )
 from evonav.tasks.dataset import DATASET_NAME, read_dataset
-from evonav.tasks.files import task_roots
+from evonav.tasks.listing import task_roots
 from evonav.tasks.statistics import (
     Distribution,
     Estimate,

@@ -26,7 +26,8 @@ from evonav.errors import TaskError
 from evonav.generation.prompts import appearance_question, cleaned, fault_of, repair_request, unified_question
 from evonav.parallel.folders import put_folder
 from evonav.tasks.dataset import DATASET_NAME, TaskEntry, entry_of, read_dataset, write_dataset
-from evonav.tasks.files import checksums_of, load_task, task_roots, write_task
+from evonav.tasks.files import checksums_of, load_task, write_task
+from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import PublicStage, Task
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from evonav.errors import InvalidArgumentError
 from evonav.gym.spaces import MAX_STAGES
-from evonav.tasks.files import load_task, task_roots
+from evonav.tasks.files import load_task
+from evonav.tasks.listing import task_roots
 from evonav.tasks.public import StageInput
 from evonav.tasks.subsets import subset_roots
 from evonav.world.pose import Pose

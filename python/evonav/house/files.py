@@ -62,8 +62,10 @@ class HouseTexts:
             HouseError: There is no such file.
             InvalidArgumentError: As for `named_set`.
         """
-        self._path = house_file(path)
-        self._name = str(path if named_set(path) else self._path)
+        self.published = named_set(path)
+        """The published split that is read; `None` for a file or a directory."""
+        self._path = _file_of(path, self.published)
+        self.name = str(path if self.published else self._path)
         self.files = files_of(self._path)
         """What is read, in order."""
         self._num_bytes = sum(file.stat().st_size for file in self.files)
@@ -84,7 +86,7 @@ class HouseTexts:
         """
         self._num_bytes_before = 0
         for file in self.files:
-            name = self._name if file == self._path else str(file)
+            name = self.name if file == self._path else str(file)
             try:
                 with file.open("rb") as self._raw, _text_of(file, self._raw) as text:
                     yield from _lines(name, text) if ".jsonl" in file.suffixes else _document(name, text.read())
@@ -136,12 +138,15 @@ def house_file(path: str | Path) -> Path:
         DatasetError: It is a published split that was not fetched, or is not whole.
         InvalidArgumentError: As for `named_set`.
     """
-    named = named_set(path)
-    if named is None:
+    return _file_of(path, named_set(path))
+
+
+def _file_of(path: str | Path, published: "HouseSet | None") -> Path:
+    if published is None:
         return Path(path)
     from evonav.house.procthor10k import split_path
 
-    return split_path(named)
+    return split_path(published)
 
 
 def bundled_houses(limit: int | None = None) -> Iterator[House]:

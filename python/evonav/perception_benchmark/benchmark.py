@@ -13,7 +13,6 @@ from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import EpisodeCase
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.scheduler import TaskFile
 from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.perception import Percept, Perception, StageScene
@@ -34,6 +33,7 @@ from evonav.perception_benchmark.records import (
 from evonav.perception_benchmark.rows import Matched, Rows
 from evonav.perception_benchmark.tour import tour
 from evonav.sensors.observation import Detections
+from evonav.tasks.listing import TaskFile
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Simulator
 
@@ -115,7 +115,7 @@ def measure(
 
     Args:
         specs: Perceptions; those of earlier commands stay in the folder.
-        tasks: Of `engine.task_files`.
+        tasks: From `evonav.tasks.listing.task_files`.
         out: Holds `perception.json` and `records/`.
         config: Must be the folder's own if it holds records.
         simulator: Import path.

@@ -18,9 +18,9 @@ from evonav.evaluation.metrics.navigation import stage_soft_spl, stage_spl
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import TaskFile
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.submission.pack import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
+from evonav.tasks.listing import TaskFile
 
 MAX_WORDS = 5
 """Findings told of one check; the others are counted."""

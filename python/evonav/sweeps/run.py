@@ -20,24 +20,16 @@ from typing import Any
 from evonav._core import __version__
 from evonav.decision.ledger import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import (
-    NUM_RETRIES,
-    Progress,
-    RunConfig,
-    RunRequest,
-    TaskFile,
-    evaluate_all,
-    run_identity,
-    task_files,
-)
+from evonav.evaluation.run.run import NUM_RETRIES, Progress, RunConfig, RunRequest, evaluate_all, run_identity
 from evonav.evaluation.run.settings import Books, SpendingSettings, try_decisions
 from evonav.parallel.folders import write_atomically, writing
 from evonav.parallel.pool import Resources
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
+from evonav.tasks.bundled import bundled_tasks
+from evonav.tasks.listing import TaskFile, task_files
 
 SWEEP_NAME, RUNS_NAME = "sweep.json", "runs"
 SCHEMA_VERSION = 1

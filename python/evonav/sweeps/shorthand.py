@@ -8,6 +8,7 @@ from typing import Any
 
 from evonav.errors import InvalidArgumentError
 from evonav.tasks.subsets import SubsetError, parse_subset
+from evonav.toml import tomllib
 
 MAX_NAME_CHARACTERS = 64
 
@@ -30,9 +31,7 @@ def loaded(path: Path) -> dict[str, Any]:
     kind = path.suffix.lower()
     try:
         if kind == ".toml":
-            from evonav.generation.config import toml_reader
-
-            raw = toml_reader().loads(text)
+            raw = tomllib.loads(text)
         elif kind in (".yaml", ".yml"):
             raw = _yaml(text)
         elif kind == ".json":

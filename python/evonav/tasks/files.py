@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from evonav.errors import TaskError
+from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import PublicStage, Task, TaskHeader
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.records import (
@@ -222,29 +223,3 @@ def load_tasks(directory: Path | str, limit: int | None = None) -> Iterator[Task
     """
     for root in task_roots(Path(directory))[:limit]:
         yield load_task(root)
-
-
-def task_roots(directory: Path) -> list[Path]:
-    """Folders of the tasks in a folder, in order of task id.
-
-    Raises:
-        TaskError: There is none, or it cannot be read.
-    """
-    try:
-        roots = sorted(path.parent for path in directory.glob("*/task.json"))
-    except OSError as error:
-        raise TaskError(f"{directory}: cannot be read: {error.strerror or error}") from error
-    if not roots:
-        raise TaskError(f"{directory}: {_why_no_task(directory)}")
-    return roots
-
-
-def _why_no_task(directory: Path) -> str:
-    """What a folder is in which tasks were looked for, and what was perhaps meant."""
-    if (directory / "task.json").is_file():
-        return f"is a task itself: name the folder that holds it, {directory.parent}"
-    if not directory.exists():
-        return "holds no task, there is no such folder; `evonav generate` makes one, bundled tasks need none"
-    if not directory.is_dir():
-        return "holds no task, it is a file: name a folder of tasks"
-    return "holds no task (expected */task.json); `evonav generate` makes some"

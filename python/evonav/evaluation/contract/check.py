@@ -14,13 +14,13 @@ from evonav.agents import wire
 from evonav.agents.agent import Agent, Sensing
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.evaluation.contract.probe import Probe
-from evonav.evaluation.datasets import bundled_tasks
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
 from evonav.evaluation.run.components import Backend
+from evonav.tasks.bundled import bundled_tasks
 
 PROTOCOL = ProtocolConfig(max_rounds=10, max_actions=40)
 """Shorter than an evaluation's."""

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from evonav.decision.ledger import Ledger
-from evonav.evaluation.run.run import Progress, RunConfig, TaskFile, agent_seed, evaluate
+from evonav.evaluation.run.run import Progress, RunConfig, agent_seed, evaluate
+from evonav.tasks.listing import TaskFile
 
 _T_95 = (math.inf, 12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228)
 """Student's t for 95%, by degrees of freedom; 1.96 beyond."""

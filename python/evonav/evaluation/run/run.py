@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav._core import __version__
-from evonav.errors import InvalidArgumentError, TaskError
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
 from evonav.evaluation.metrics.navigation import AgentSummary, paired_differences, summarise, summary_json
 from evonav.evaluation.protocol import ProtocolConfig
@@ -17,27 +17,23 @@ from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_agent_name
 from evonav.evaluation.run.provenance import note_session
-from evonav.evaluation.run.scheduler import Progress, Run, TaskFile, run_all
+from evonav.evaluation.run.scheduler import Progress, Run, run_all
 from evonav.evaluation.run.worker import WORK, EpisodeJob, Setup
 from evonav.parallel.folders import check_same_run, write_atomically, writing
 from evonav.parallel.pool import EngineName, Resources, open_pool
 from evonav.perception.words import word_of
-from evonav.tasks.files import task_roots
-from evonav.tasks.subsets import subset_roots
+from evonav.tasks.listing import TaskFile
 
 __all__ = [
     "NUM_RETRIES",
     "Progress",
     "RunConfig",
     "RunRequest",
-    "TaskFile",
     "agent_seed",
     "evaluate",
     "evaluate_all",
     "perception_seed",
     "run_identity",
-    "task_file",
-    "task_files",
     "write_summary",
 ]
 
@@ -70,37 +66,6 @@ class RunRequest:
     tasks: tuple[TaskFile, ...]
     run_dir: Path
     config: RunConfig = field(default_factory=RunConfig)
-
-
-def task_files(directory: Path, limit: int | None = None, subset: str | None = None) -> list[TaskFile]:
-    """The tasks of a directory, by task id; contents are checked when they are run.
-
-    Args:
-        directory: Holds tasks.
-        limit: Only the first.
-        subset: Only those of a named subset (`evonav.tasks.subsets`), in its order.
-
-    Raises:
-        TaskError: There is no task, or too few for the subset, or a header is malformed.
-    """
-    roots = task_roots(directory) if subset is None else subset_roots(directory, subset)
-    return [task_file(root) for root in roots[:limit]]
-
-
-def task_file(root: Path) -> TaskFile:
-    """A task by its folder.
-
-    Raises:
-        TaskError: The header is malformed.
-    """
-    path = root / "task.json"
-    try:
-        data = path.read_bytes()
-        header = json.loads(data)
-        num_stages = int(header["num_stages"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise TaskError(f"{path}: no task header ({type(error).__name__}: {error})") from error
-    return TaskFile(root.name, root, num_stages, hashlib.sha256(data).hexdigest())
 
 
 def evaluate(

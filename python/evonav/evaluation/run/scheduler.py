@@ -17,17 +17,7 @@ from evonav.evaluation.records.schema import EndState, ErrorKind, StageFailure, 
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.worker import RETRIED, EpisodeJob, Setup, read_news
 from evonav.parallel.pool import Answer, Job, Pool
-
-
-@dataclass(frozen=True, slots=True)
-class TaskFile:
-    """A task of a run."""
-
-    task_id: str
-    path: Path
-    num_stages: int
-    digest: str
-    """Of `task.json`, which holds the checksums of all other files."""
+from evonav.tasks.listing import TaskFile
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from evonav.generation.validation.problems import Problem, Report
 from evonav.generation.validation.task import validate_files
 from evonav.parallel.pool import Answer, Job, answers, open_pool
 from evonav.tasks.dataset import DATASET_NAME, check_dataset, read_dataset
-from evonav.tasks.files import task_roots
+from evonav.tasks.listing import task_roots
 
 WORK = "evonav.generation.validation.folder:make_worker"
 TASK_TIMEOUT_S = 300.0

@@ -1,0 +1,77 @@
+"""List the tasks of a folder by their headers, without reading the rest of their files."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from evonav.errors import TaskError
+from evonav.tasks.records import sha256_of
+from evonav.tasks.subsets import subset_roots
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFile:
+    """A task on disk."""
+
+    task_id: str
+    path: Path
+    """The task's own folder."""
+    num_stages: int
+    digest: str
+    """The SHA-256 of `task.json`, which holds the checksums of all other files."""
+
+
+def task_files(directory: Path, limit: int | None = None, subset: str | None = None) -> list[TaskFile]:
+    """List the tasks of a folder in order of task id; only their headers are read.
+
+    Args:
+        directory: Folder with one folder a task.
+        limit: Number of tasks to list, from the first; default all.
+        subset: List only the tasks of this named subset (`evonav.tasks.subsets`).
+
+    Raises:
+        TaskError: The folder holds no task or too few for the subset, or a header is malformed.
+    """
+    roots = task_roots(directory) if subset is None else subset_roots(directory, subset)
+    return [task_file(root) for root in roots[:limit]]
+
+
+def task_file(root: Path) -> TaskFile:
+    """Read the header of the task in a folder.
+
+    Raises:
+        TaskError: The header is missing or malformed.
+    """
+    path = root / "task.json"
+    try:
+        data = path.read_bytes()
+        num_stages = int(json.loads(data)["num_stages"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise TaskError(f"{path}: no task header ({type(error).__name__}: {error})") from error
+    return TaskFile(root.name, root, num_stages, sha256_of(data))
+
+
+def task_roots(directory: Path) -> list[Path]:
+    """List the folders of the tasks in a folder, in order of task id.
+
+    Raises:
+        TaskError: The folder holds no task or cannot be read.
+    """
+    try:
+        roots = sorted(path.parent for path in directory.glob("*/task.json"))
+    except OSError as error:
+        raise TaskError(f"{directory}: cannot be read: {error.strerror or error}") from error
+    if not roots:
+        raise TaskError(f"{directory}: {_why_no_task(directory)}")
+    return roots
+
+
+def _why_no_task(directory: Path) -> str:
+    """Say why a folder holds no task, and what to do."""
+    if (directory / "task.json").is_file():
+        return f"is a task itself: name the folder that holds it, {directory.parent}"
+    if not directory.exists():
+        return "holds no task, there is no such folder; `evonav generate` makes one, bundled tasks need none"
+    if not directory.is_dir():
+        return "holds no task, it is a file: name a folder of tasks"
+    return "holds no task (expected */task.json); `evonav generate` makes some"
