@@ -20,7 +20,7 @@ def test_converted_files_are_in_plain_english(found: dict[str, list[str]]) -> No
 
 def test_the_list_of_pending_files_only_has_files_with_findings(found: dict[str, list[str]]) -> None:
     done = [name for name in check_english.pending_files() if name not in found]
-    assert not done, f"remove from {check_english.PENDING.name}: {', '.join(done)}"
+    assert not done, f"run `python scripts/check_english.py --update` to remove: {', '.join(done)}"
 
 
 @pytest.fixture

@@ -83,7 +83,7 @@ class TeleportsAnywhere(EmbeddedSimulator):
         (_frame(lambda f: {"depth_m": f.depth_m[::-1].copy()}), "unproject outside the box"),
         (_frame(_ranges), "unproject outside the box"),
         (_frame(lambda f: {"instances": None if f.instances is None else f.instances + 1}), "instance ids are not all"),
-        (_frame(lambda f: {"rgb": None}), "asked for rgb"),
+        (_frame(lambda f: {"rgb": None}), "requested rgb"),
         (MapsItsSurroundings, "on blocked cells"),
         (TurnsLeft, "TURN_RIGHT turned by"),
         (WalksThroughWalls, "which is not free"),

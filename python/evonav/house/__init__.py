@@ -1,4 +1,4 @@
-"""ProcTHOR houses: read from files, or bundled."""
+"""ProcTHOR houses, read from files or bundled."""
 
 from evonav._core import House, HouseObject, Opening, Room, Wall
 from evonav.house.files import bundled_houses, house_file, load_houses, named_set

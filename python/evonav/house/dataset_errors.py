@@ -1,17 +1,17 @@
-"""What can keep a published dataset of houses away: a type for each cause, all of them `HouseError`s."""
+"""Errors of a published dataset of houses: one type for each cause, all of them `HouseError`s."""
 
 from evonav.errors import HouseError
 
 
 class DatasetError(HouseError):
-    """A dataset cannot be had or used; the message ends with what works without it."""
+    """A dataset cannot be fetched or used; the message ends with an alternative."""
 
     def __init__(self, message: str) -> None:
         super().__init__(message)
 
 
 class DatasetMissingError(DatasetError):
-    """It was never fetched."""
+    """The dataset was never fetched."""
 
 
 class DatasetNetworkError(DatasetError):
@@ -19,12 +19,12 @@ class DatasetNetworkError(DatasetError):
 
 
 class DatasetQuotaError(DatasetError):
-    """The host answers that too much was asked of it: a rate limit, or the bandwidth of git-lfs."""
+    """The host refuses too many requests: a rate limit, or the bandwidth of git-lfs."""
 
 
 class DatasetAccessError(DatasetError):
-    """The host knows no such repository or revision, or keeps it private."""
+    """The host does not have this repository or revision, or it is private."""
 
 
 class DatasetCorruptError(DatasetError):
-    """A file is not what was published: truncated, changed, or only a git-lfs pointer."""
+    """A file differs from the published one: truncated, changed, or only a git-lfs pointer."""

@@ -1,4 +1,4 @@
-"""Houses from files."""
+"""Read houses from files."""
 
 import gzip
 import json
@@ -20,12 +20,12 @@ SUFFIXES = (".json", ".jsonl", ".json.gz", ".jsonl.gz")
 
 
 def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
-    """Houses of a file or a directory, one after the other, in order.
+    """Yield the houses of a file or a directory, in order.
 
     Args:
         path: A `.json` file with a house or a list of houses, a `.jsonl` file with a house a line, either with `.gz`;
             or a directory with such files, taken by name; or a fetched split, `procthor-10k:val`.
-        limit: Stop after so many.
+        limit: Number of houses after which to stop.
 
     Yields:
         Each house, checked; its `name` is `file:line`, for lists `file:line[index]`,
@@ -42,44 +42,44 @@ def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
 
 
 class HouseText(NamedTuple):
-    """A house as it was written, not yet read."""
+    """A house as text, not parsed yet."""
 
     name: str
-    """As `load_houses` gives it."""
+    """The name that `load_houses` gives the house."""
     text: str
 
 
 class HouseTexts:
-    """The houses of a file or a directory as text, one at a time, and how far the reading is."""
+    """The houses of a file or a directory as text, one at a time, with the progress of reading."""
 
     def __init__(self, path: str | Path) -> None:
-        """Looks where the houses are.
+        """Find the files.
 
         Args:
-            path: As for `load_houses`.
+            path: A path, as for `load_houses`.
 
         Raises:
-            HouseError: There is no such file.
-            InvalidArgumentError: As for `named_set`.
+            HouseError: The file does not exist.
+            InvalidArgumentError: The path names no split of a known dataset.
         """
         self.published = named_set(path)
         """The published split that is read; `None` for a file or a directory."""
         self._path = _file_of(path, self.published)
         self.name = str(path if self.published else self._path)
         self.files = files_of(self._path)
-        """What is read, in order."""
+        """The files to read, in order."""
         self._num_bytes = sum(file.stat().st_size for file in self.files)
         self._num_bytes_before = 0
         self._raw: IO[bytes] | None = None
 
     @property
     def share_read(self) -> float:
-        """Of the bytes of all files, 0 to 1."""
+        """Share of the bytes of all files that has been read, 0 to 1."""
         position = 0 if self._raw is None or self._raw.closed else self._raw.tell()
         return min(1.0, (self._num_bytes_before + position) / max(1, self._num_bytes))
 
     def __iter__(self) -> Iterator[HouseText]:
-        """Reads from the first house on.
+        """Yield houses from the first one on.
 
         Raises:
             HouseError: A file cannot be read, or a list of houses is malformed.
@@ -98,10 +98,10 @@ class HouseTexts:
 
 
 def files_of(path: Path) -> list[Path]:
-    """The house files of a directory, by name, or the one that the path is.
+    """Return the house files of a directory, by name, or the one file that the path is.
 
     Raises:
-        HouseError: There is none, or it has another suffix.
+        HouseError: No file exists, or the file has another suffix.
     """
     if path.is_dir():
         files = sorted(file for file in path.iterdir() if file.name.endswith(SUFFIXES) and file.is_file())
@@ -119,10 +119,10 @@ def files_of(path: Path) -> list[Path]:
 
 
 def named_set(path: str | Path) -> "HouseSet | None":
-    """The published split that a `--houses` argument names; None if it is a file or a directory.
+    """Return the published split that a `--houses` argument names; `None` for a file or a directory.
 
     Raises:
-        InvalidArgumentError: It names a dataset that evonav knows, but no split of it.
+        InvalidArgumentError: The argument names a known dataset, but no split of it.
     """
     if not str(path).startswith("procthor-10k") or Path(path).exists():
         return None
@@ -132,11 +132,11 @@ def named_set(path: str | Path) -> "HouseSet | None":
 
 
 def house_file(path: str | Path) -> Path:
-    """The file or directory that a `--houses` argument means.
+    """Return the file or directory that a `--houses` argument means.
 
     Raises:
-        DatasetError: It is a published split that was not fetched, or is not whole.
-        InvalidArgumentError: As for `named_set`.
+        DatasetError: The argument is a published split that was not fetched, or is incomplete.
+        InvalidArgumentError: The argument names a known dataset, but no split of it.
     """
     return _file_of(path, named_set(path))
 
@@ -150,10 +150,10 @@ def _file_of(path: str | Path, published: "HouseSet | None") -> Path:
 
 
 def bundled_houses(limit: int | None = None) -> Iterator[House]:
-    """The multi-room houses that come with evonav (generated with the published `procthor` generator).
+    """Yield the multi-room houses that come with evonav (generated with the published `procthor` generator).
 
     Args:
-        limit: Stop after so many.
+        limit: Number of houses after which to stop.
 
     Yields:
         Each house, in a fixed order; its `name` is `bundled:line`.
@@ -175,7 +175,7 @@ def _lines(name: str, text: IO[str]) -> Iterator[HouseText]:
 
 
 def _document(name: str, text: str) -> Iterator[HouseText]:
-    """One house, or a list of houses."""
+    """Yield the house of a document, or the houses of its list."""
     start = _after_space(text, 0)
     if not text.startswith("[", start):
         yield HouseText(f"{name}:1", text)
@@ -187,7 +187,7 @@ def _document(name: str, text: str) -> Iterator[HouseText]:
 
 
 def _entries(name: str, text: str, start: int) -> Iterator[tuple[int, int]]:
-    """Where the entries of the list at `start` begin and end: cut out, their numbers stay as they were written."""
+    """Yield the begin and end of each entry of the list at `start`; cut out as text, numbers stay as written."""
     decoder = json.JSONDecoder()
     position = _after_space(text, start + 1)
     is_closed = text.startswith("]", position)

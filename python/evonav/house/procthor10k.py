@@ -1,6 +1,6 @@
-"""ProcTHOR-10k (Deitke et al., NeurIPS 2022): 10,000 + 1,000 + 1,000 houses, on this machine once they were fetched.
+"""Find ProcTHOR-10k on this machine (Deitke et al., NeurIPS 2022): 10,000 + 1,000 + 1,000 houses.
 
-`evonav.house.procthor10k_fetch` brings them here; this module knows where they lie and that they are whole.
+`evonav.house.procthor10k_fetch` downloads the houses; this module finds their files and verifies them.
 """
 
 import gzip
@@ -23,8 +23,10 @@ NAME = "procthor-10k"
 SPLITS: tuple[Split, ...] = ("train", "val", "test")
 SOURCE = "https://github.com/allenai/procthor-10k"
 REVISION = "439193522244720b86d8c81cde2e51e3a4d150cf"
-"""The commit for AI2-THOR 5: the head of `main`, which the dataset's own `main.py` and its maintainers (issue 10 of its
-repository) name for AI2-THOR 5.0 and later."""
+"""The commit for AI2-THOR 5.0 and later.
+
+It is the head of `main`. The dataset's `main.py` and its maintainers (issue 10 of its repository) name it.
+"""
 
 MANIFEST_NAME = "manifest.json"
 INSTEAD = (
@@ -33,7 +35,7 @@ INSTEAD = (
 
 
 class SplitFile(BaseModel):
-    """One file of houses, a house a line."""
+    """A file of houses, one house a line."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -43,7 +45,7 @@ class SplitFile(BaseModel):
 
 
 class Manifest(BaseModel):
-    """`manifest.json` beside the files: what they are and where they come from."""
+    """The `manifest.json` beside the files: their contents and origin."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -68,21 +70,21 @@ PUBLISHED: Mapping[str, Mapping[Split, SplitFile]] = MappingProxyType(
         )
     }
 )
-"""Counts that `main.py` and checksums that the git-lfs pointers state, by revision."""
+"""Counts stated by `main.py` and checksums stated by the git-lfs pointers, by revision."""
 
 
 class HouseSet(NamedTuple):
-    """A split of the dataset at a revision, as `procthor-10k:SPLIT[@REVISION]` asks for it."""
+    """A split of the dataset at a revision, as `procthor-10k:SPLIT[@REVISION]` names it."""
 
     split: Split
     revision: str
 
 
 def house_set(text: str | Path) -> HouseSet | None:
-    """The split that a `--houses` argument names; None if it names something else, such as a file.
+    """Return the split that a `--houses` argument names; `None` if it names something else, such as a file.
 
     Raises:
-        InvalidArgumentError: It names the dataset, but no split of it.
+        InvalidArgumentError: The argument names the dataset, but no split of it.
     """
     name, _, rest = str(text).partition(":")
     if name.partition("@")[0] != NAME:
@@ -96,25 +98,25 @@ def house_set(text: str | Path) -> HouseSet | None:
 
 
 def cache_folder() -> Path:
-    """Where fetched datasets lie: `$EVONAV_CACHE`, else `$XDG_CACHE_HOME/evonav`, else `~/.cache/evonav`."""
+    """Return the folder of fetched datasets: `$EVONAV_CACHE`, else `$XDG_CACHE_HOME/evonav`, else `~/.cache/evonav`."""
     if own := os.environ.get("EVONAV_CACHE"):
         return Path(own)
     shared = os.environ.get("XDG_CACHE_HOME", "")
-    # The XDG specification has relative paths ignored.
+    # The XDG specification demands that relative paths are ignored.
     return (Path(shared) if Path(shared).is_absolute() else Path.home() / ".cache") / "evonav"
 
 
 def dataset_folder(revision: str = REVISION, cache: Path | None = None) -> Path:
-    """Where the files of a revision lie, once fetched."""
+    """Return the folder of a revision's files."""
     return (cache_folder() if cache is None else cache) / "houses" / NAME / revision
 
 
 def split_path(houses: HouseSet, cache: Path | None = None) -> Path:
-    """The file of a split, found whole.
+    """Return the file of a split, verified.
 
     Raises:
         DatasetMissingError: The split was not fetched.
-        DatasetCorruptError: The file or its manifest is not as it was fetched.
+        DatasetCorruptError: The file or its manifest has changed.
     """
     folder = dataset_folder(houses.revision, cache)
     manifest = read_manifest(folder)
@@ -128,10 +130,10 @@ def split_path(houses: HouseSet, cache: Path | None = None) -> Path:
 
 
 def read_manifest(folder: Path) -> Manifest | None:
-    """The manifest of a folder; None if there is none.
+    """Return the manifest of a folder; `None` if it has none.
 
     Raises:
-        DatasetCorruptError: It cannot be read, or contradicts the checksums that were published.
+        DatasetCorruptError: The manifest cannot be read, or contradicts the published checksums.
     """
     path = folder / MANIFEST_NAME
     try:
@@ -144,16 +146,18 @@ def read_manifest(folder: Path) -> Manifest | None:
     for split, entry in manifest.splits.items():
         published = PUBLISHED.get(manifest.revision, {}).get(split, entry)
         if entry != published or manifest.revision != folder.name:
-            message = f"{path}: {split}: {entry.sha256} is not what was published. Remove it and fetch again. {INSTEAD}"
+            message = (
+                f"{path}: {split}: {entry.sha256} is not the published sha256. Remove it and fetch again. {INSTEAD}"
+            )
             raise DatasetCorruptError(message)
     return manifest
 
 
 def check_file(path: Path, entry: SplitFile) -> None:
-    """Compares a file with its checksum.
+    """Compare a file with its checksum.
 
     Raises:
-        DatasetCorruptError: It differs, or is not there.
+        DatasetCorruptError: The file differs, or does not exist.
     """
     try:
         digest = sha256_of_file(path)
@@ -169,10 +173,10 @@ def check_file(path: Path, entry: SplitFile) -> None:
 
 
 def count_houses(path: Path) -> int:
-    """Lines of a packed file, all of it unpacked.
+    """Return the number of lines of a packed file, which is unpacked completely.
 
     Raises:
-        DatasetCorruptError: It is not whole.
+        DatasetCorruptError: The file is incomplete.
     """
     try:
         with gzip.open(path, "rb") as lines:

@@ -1,1 +1,1 @@
-"""What an agent senses."""
+"""An agent's input: observations and visible occupancy."""

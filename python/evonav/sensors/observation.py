@@ -1,4 +1,4 @@
-"""What an agent receives each decision round. No simulator id, no oracle field."""
+"""An agent's input in a decision round, without simulator ids and oracle data."""
 
 from dataclasses import dataclass
 
@@ -11,16 +11,16 @@ from evonav.world.simulator import Intrinsics
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """Objects found in one image. Detection `i` is where `masks == i`; numbering means nothing across views."""
+    """Objects found in one image. Detection `i` covers `masks == i`; its number means nothing in other views."""
 
     masks: NDArray[np.int32]
-    """`(H, W)`, -1 where nothing was detected."""
+    """`(H, W)` index of the detection, -1 where nothing was detected."""
     labels: tuple[str, ...]
-    """A word per detection; under ground truth, ProcTHOR's object type."""
+    """The detections' labels; with perfect perception, ProcTHOR's object types."""
     confidences: NDArray[np.float32]
-    """`(N,)` in 0..1."""
+    """`(N,)` confidences, 0 to 1."""
     features: NDArray[np.float32] | None = None
-    """`(N, D)` unit image features (CLIP), when the perception has them."""
+    """`(N, D)` unit image features (CLIP), if the perception computes them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,25 +28,27 @@ class VisibleOccupancy:
     """Cells of the oracle occupancy that rays from a camera pose reach: free ones and each ray's first blocked one."""
 
     free: NDArray[np.int32]
-    """`(F, 2)` `[row, col]`, sorted."""
+    """`(F, 2)` free cells `[row, col]`, sorted."""
     blocked: NDArray[np.int32]
-    """`(B, 2)` `[row, col]`, sorted."""
+    """`(B, 2)` blocked cells `[row, col]`, sorted."""
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One camera pose's worth of sensing."""
+    """The sensor data of one camera pose."""
 
     pose: Pose
-    """The camera's pose, as in `Frame`: `y_m` is the height of its optical centre over the floor, whereas that of
-    `Observation.pose` is the height of the agent's body."""
+    """Pose of the camera itself, as in `Frame`.
+
+    Its `y_m` is the height of the optical centre above the floor; that of `Observation.pose` is the body's.
+    """
     intrinsics: Intrinsics
     depth_m: NDArray[np.float32]
-    """`(H, W)` planar z, `inf` where nothing is."""
+    """`(H, W)` planar depth in metres, `inf` where nothing is."""
     detections: Detections
     occupancy: VisibleOccupancy
     rgb: NDArray[np.uint8] | None = None
-    """`(H, W, 3)`; `None` when the agent declared that it needs none."""
+    """`(H, W, 3)` colours; `None` if the agent declared that it does not need them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,20 +64,24 @@ class MapFrame:
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """One decision round: views around the agent, the heading view last."""
+    """The input of one decision round: views around the agent, the heading view last."""
 
     views: tuple[View, ...]
     pose: Pose
     """The agent's own pose after the last action."""
     is_action_success: bool
-    """Whether the last action was carried out as asked."""
+    """Whether the last action succeeded."""
     num_rounds_left: int
     """Decision rounds left in this stage, this one included."""
     has_arrived: bool = False
     """Whether the last action was a `NavigateTo` that reached its (snapped) point."""
     is_guided: bool = False
-    """The evaluator walks in this stage and carries out no answer: look, remember, and draw no conclusion from where
-    the last action should have led."""
+    """Whether the evaluator moves the agent in this stage and ignores its answers.
+
+    The agent must look and remember, and must not expect the effects of its own actions.
+    """
     goal_feature: NDArray[np.float32] | None = None
-    """`(D,)` unit text feature of the stage's instruction, comparable with `Detections.features`, when the perception
-    has such."""
+    """`(D,)` unit text feature of the stage's instruction, if the perception computes one.
+
+    It is comparable with `Detections.features`.
+    """

@@ -1,4 +1,4 @@
-"""What one camera pose may learn of the oracle occupancy."""
+"""Compute which cells of the oracle occupancy one camera pose reveals."""
 
 import math
 
@@ -11,23 +11,23 @@ from evonav.world.simulator import Intrinsics, OccupancyGrid
 def visible_occupancy(
     grid: OccupancyGrid, pose: Pose, intrinsics: Intrinsics, range_m: float = 3.0
 ) -> VisibleOccupancy:
-    """Casts every ray of the camera's horizontal field of view over the oracle occupancy.
+    """Cast every ray of the camera's horizontal field of view over the oracle occupancy.
 
     The paper gives agents "an occupancy map extracted through ray-casting on the oracle occupancy map" (Sec. C.2).
-    The cells are those of the ground plane, so the camera's pitch does not matter. The cell under the agent is always
-    seen and never hides another.
+    The cells are on the ground plane, so the camera's pitch does not matter. The cell below the agent is always visible
+    and never hides another.
 
     Args:
         grid: The oracle's cells.
-        pose: Of the camera, world frame.
-        intrinsics: Give the horizontal field of view.
-        range_m: Reach of a ray, to where it enters a cell (3D-Mem's depth limit: 3.0 m).
+        pose: Pose of the camera, world frame.
+        intrinsics: Intrinsics, for the horizontal field of view.
+        range_m: Reach of a ray, to the point where it enters a cell (3D-Mem's depth limit: 3.0 m).
 
     Returns:
         Free cells, and the first blocked cell of each ray.
 
     Raises:
-        InvalidArgumentError: The pose is off the grid, or a number is not finite or outside its domain.
+        InvalidArgumentError: The pose is off the grid, or a number is not finite or out of range.
     """
     free, blocked = _core.visible_cells(
         grid.cells,

@@ -1,1 +1,1 @@
-"""The world behind one simulator protocol."""
+"""Simulators of a house, behind one protocol."""

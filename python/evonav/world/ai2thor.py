@@ -1,4 +1,4 @@
-"""AI2-THOR as a simulator: Unity, or our own engine, behind AI2-THOR's Python client."""
+"""Run AI2-THOR as a simulator: Unity, or evonav's own engine, behind AI2-THOR's Python client."""
 
 import json
 import math
@@ -24,76 +24,76 @@ __all__ = ["Ai2ThorOptions", "Ai2ThorSimulator"]
 
 _Position = tuple[float, float, float]
 
-# Unity reports poses in single precision, turned through quaternions. Within this of what was asked, what was asked is
-# the pose.
+# Unity reports poses in single precision, turned through quaternions. A report within this distance of the requested
+# pose counts as the requested pose.
 _SAME_M = 1e-3
 _SAME_DEG = 1e-2
 
 _SNAP_M = 0.5
-"""How far ends of paths, and the seed of the occupancy, may be moved to where the agent fits; as the embedded
-simulator's."""
+"""Largest distance to the free point that a path's end or the occupancy's seed is moved to, as when embedded."""
 _NUM_START_TRIALS = 50
 _AGENT_Y_M = 0.9009992
-"""Where AI2-THOR has the middle of its agent; with force it takes any height, and the camera along."""
+"""Height of the centre of AI2-THOR's agent; by force it takes any height, and the camera follows."""
 
 _BODY = {"camera_height_m": 1.575, "agent_radius_m": 0.2, "agent_height_m": 1.8}
-"""Of AI2-THOR's default agent, which evonav evaluates."""
+"""The dimensions of AI2-THOR's default agent, which evonav evaluates."""
 
 
 class Ai2ThorSimulator:
     """A `Simulator` over `ai2thor.controller.Controller`.
 
-    The process starts with the first `reset`, and again with the first one after it was lost (`SimulatorLostError`).
+    The process starts with the first `reset`, and again with the first one after a `SimulatorLostError`.
 
-    What the house consists of, and in which order, is read from the house file, as the embedded simulator does; boxes
-    of objects, images, collisions and paths are AI2-THOR's.
+    The bodies of the house and their order come from the house file, as in the embedded simulator. Boxes of objects,
+    images, collisions and paths come from AI2-THOR.
     """
 
     def __init__(self, config: SimulatorConfig | None = None, options: Ai2ThorOptions | None = None) -> None:
-        """Starts nothing yet.
+        """Store the configuration; nothing is started yet.
 
         Args:
             config: Camera, body and steps; AI2-THOR's by default.
-            options: Which AI2-THOR, and where it runs.
+            options: Build of AI2-THOR, and the device that it renders on.
 
         Raises:
-            InvalidArgumentError: AI2-THOR cannot do what `config` asks, or the options contradict each other.
+            InvalidArgumentError: AI2-THOR cannot satisfy `config`, or the options contradict each other.
         """
         self.config = config or SimulatorConfig()
         self.options = options or Ai2ThorOptions()
         self.options.check()
         for name, value in _BODY.items():
-            if (asked := getattr(self.config, name)) != value:
-                raise InvalidArgumentError(f"{name} = {asked}: AI2-THOR's default agent has {value}")
+            if (requested := getattr(self.config, name)) != value:
+                raise InvalidArgumentError(f"{name} = {requested}: AI2-THOR's default agent has {value}")
         self.intrinsics = Intrinsics(
             self.config.width_px, self.config.height_px, math.radians(self.config.vertical_fov_deg)
         )
         self._controller: GuardedController | None = None
         self._log: ProcessLog | None = None
-        # Our own reading of the house: its bodies, its start, the place of its map.
+        # The embedded simulator's reading of the house: its bodies, its start, the place of its map.
         self._reading = EmbeddedSimulator(self.config, allow_unknown_assets=True)
         self._is_loaded = False
         self._objects: tuple[SceneObject, ...] = ()
         self._decoder = InstanceDecoder(())
         self._occupancy: OccupancyGrid | None = None
         self._start = self._pose = self._placed = Pose(0.0, self._body_y_m, 0.0, 0.0)
-        # `_pose` is where the agent is for evonav, `_placed` where AI2-THOR has it: renders elsewhere move only that.
+        # `_pose` is the agent's pose for evonav, `_placed` its pose in AI2-THOR: rendering elsewhere changes only the
+        # latter.
 
     def start(self) -> None:
-        """Starts the process, to learn early that it does.
+        """Start the process, so that a failure shows early.
 
         Raises:
-            SimulationError: It does not; the message says why, and what to do.
+            SimulationError: It cannot be started; the message says why, and what to do.
         """
         if self._controller is None:
             self._launch("Procedural")
 
     def reset(self, house_json: str, pose: Pose | None = None) -> Pose:
-        """Loads a house; the agent stands at `pose`, or at the house's own start.
+        """Load a house; the agent stands at `pose`, or at the house's own start.
 
         Args:
             house_json: A ProcTHOR house.
-            pose: Where to stand and look; moved to the nearest reachable grid position if the agent cannot be there.
+            pose: Requested pose; the agent moves to the nearest reachable grid position if it does not fit there.
 
         Returns:
             The effective pose.
@@ -101,7 +101,7 @@ class Ai2ThorSimulator:
         Raises:
             HouseError: The house is malformed.
             SimulationError: AI2-THOR does not start, refuses the house, or the agent fits nowhere.
-            SimulatorLostError: The process ended or hangs.
+            SimulatorLostError: The process ended or does not answer.
         """
         self._is_loaded, self._occupancy = False, None
         own_start = self._reading.reset(house_json)
@@ -118,7 +118,7 @@ class Ai2ThorSimulator:
         self._objects = tuple(_with_boxes(self._reading.objects, event.metadata["objects"]))
         self._decoder = InstanceDecoder(self._objects)
         self._is_loaded = True
-        # Nothing moves from here on but the agent: events need not list every object, most of what they cost.
+        # Only the agent moves from now on: events need not list every object, which is most of their cost.
         self._do("SetObjectFilter", objectIds=[])
         self._enter(own_start)
         self._start = self._pose
@@ -137,31 +137,31 @@ class Ai2ThorSimulator:
         return self._objects
 
     def step(self, action: Action) -> bool:
-        """Does one discrete action; `False`, and the pose unchanged, when it collides. `STOP` does nothing."""
+        """Execute one discrete action; `False`, and the pose unchanged, when it collides. `STOP` does nothing."""
         if action is Action.STOP:
             return True
         self._place(self._pose)
         pose, turn_deg = self._pose, self.config.turn_deg
         if action is Action.MOVE_FORWARD:
             event = self._do("MoveAhead", moveMagnitude=self.config.move_m)
-            asked = replace(
+            requested = replace(
                 pose,
                 x_m=pose.x_m + self.config.move_m * math.sin(pose.yaw_rad),
                 z_m=pose.z_m + self.config.move_m * math.cos(pose.yaw_rad),
             )
         elif action is Action.TURN_RIGHT:
             event = self._do("RotateRight", degrees=turn_deg)
-            asked = replace(pose, yaw_rad=pose.yaw_rad + math.radians(turn_deg)).canonical()
+            requested = replace(pose, yaw_rad=pose.yaw_rad + math.radians(turn_deg)).canonical()
         else:
             event = self._do("RotateLeft", degrees=turn_deg)
-            asked = replace(pose, yaw_rad=pose.yaw_rad - math.radians(turn_deg)).canonical()
+            requested = replace(pose, yaw_rad=pose.yaw_rad - math.radians(turn_deg)).canonical()
         if not event.metadata["lastActionSuccess"]:
             return False
-        self._pose = self._placed = self._adopted(asked, event)
+        self._pose = self._placed = self._adopted(requested, event)
         return True
 
     def teleport(self, pose: Pose) -> bool:
-        """Sets the pose; `False`, and the pose unchanged, when the agent does not fit there."""
+        """Set the pose; `False`, and the pose unchanged, when the agent does not fit there."""
         if not all(map(math.isfinite, (*pose.position_m, pose.yaw_rad, pose.horizon_rad))):
             return False
         if not self._try_place(self._standing(pose)):
@@ -170,10 +170,10 @@ class Ai2ThorSimulator:
         return True
 
     def render(self, pose: Pose | None = None, *, rgb: bool = True, instances: bool = True) -> Frame:
-        """What the camera sees when the agent is at `pose` (default: where it is); collisions are not checked.
+        """Render the camera's view from `pose` (default: the agent's own); collisions are not checked.
 
-        The agent is put there by force, and back before anything that depends on where it stands. (A third-party camera
-        would draw every image twice, and the agent's own body into it.)
+        The agent is put there by force, and back before anything that depends on its pose. (A third-party camera would
+        render every image twice, with the agent's own body in it.)
 
         Raises:
             InvalidArgumentError: The pose is not finite.
@@ -182,7 +182,7 @@ class Ai2ThorSimulator:
         at = self._standing(pose or self._pose)
         if not all(map(math.isfinite, (at.x_m, at.z_m, at.yaw_rad, at.horizon_rad))):
             raise InvalidArgumentError(f"pose = {at}: must be finite")
-        event = self._teleported(at, is_forced=True, is_rendered=True)
+        event = self._teleported(at, by_force=True, is_rendered=True)
         seen = self._placed
         camera = Pose(seen.x_m, self.config.camera_height_m, seen.z_m, seen.yaw_rad, seen.horizon_rad)
         depth_m = depth_of(event, self._far_m)
@@ -190,7 +190,7 @@ class Ai2ThorSimulator:
         return replace(frame, instances=self._decoder.decode(event, frame)) if instances else frame
 
     def reachable_positions(self) -> NDArray[np.float64]:
-        """`(N, 3)` positions of the square grid through the agent that it can reach along that grid, by z, then x."""
+        """Return the `(N, 3)` positions of the square grid through the agent that it can reach there, by z, then x."""
         self._place(self._pose)
         points_m = self._reachable(self._pose, self.config.grid_m)
         raised = np.full((len(points_m), 3), self._body_y_m)
@@ -198,18 +198,18 @@ class Ai2ThorSimulator:
         return raised
 
     def nearest_reachable_position(self, position_m: _Position) -> _Position:
-        """The reachable position nearest on the ground plane."""
+        """Return the reachable position nearest on the ground plane."""
         return nearest_of(self.reachable_positions(), position_m)
 
     def is_free(self, position_m: _Position) -> bool:
-        """Whether the agent's body fits at the position, and it can walk there from the house's start."""
+        """Return whether the agent's body fits at the position and can move there from the house's start."""
         if not all(map(math.isfinite, position_m)):
             return False
         there = replace(self._pose, x_m=position_m[0], z_m=position_m[2])
         return self._try_place(there) and len(self.shortest_path(self._start.position_m, there.position_m)) > 0
 
     def shortest_path(self, start_m: _Position, target_m: _Position) -> NDArray[np.float64]:
-        """`(M, 3)` corners of the geodesic; `(0, 3)` when there is none. Both ends snap to the nearest free point."""
+        """Return the geodesic's `(M, 3)` corners, `(0, 3)` without one; both ends move to the nearest free point."""
         event = self._do(
             "GetShortestPathToPoint",
             position=self._vector(start_m),
@@ -224,16 +224,16 @@ class Ai2ThorSimulator:
         return np.array([[c["x"], self._body_y_m, c["z"]] for c in corners], dtype=np.float64).reshape(-1, 3)
 
     def occupancy(self) -> OccupancyGrid:
-        """The oracle occupancy: a cell is free if the agent reaches its centre along the grid of cell centres.
+        """Return the oracle occupancy: a cell is free if the agent reaches its centre along the grid of cell centres.
 
-        The grid is entered at the centre nearest to the house's start where the agent fits.
+        The flood fill begins at the centre nearest to the house's start where the agent fits.
         """
         if self._occupancy is None:
             self._occupancy = self._mapped()
         return self._occupancy
 
     def close(self) -> None:
-        """Ends the process and releases everything; safe to call twice."""
+        """End the process and release everything; safe to call twice."""
         if self._controller is not None:
             self._controller.stop()
         if self._log is not None:
@@ -249,7 +249,7 @@ class Ai2ThorSimulator:
     @property
     def _far_m(self) -> float:
         server = self._running.server
-        assert server is not None  # of a running controller
+        assert server is not None  # a running controller has one
         return float(server.camera_far_plane)
 
     @property
@@ -276,55 +276,55 @@ class Ai2ThorSimulator:
             raise self._failed(action, error) from error
 
     def _failed(self, action: str, error: Exception) -> SimulationError:
-        """A refusal leaves the process as it is; everything else ends it."""
+        """Return the error for a failed action; anything but a refusal ends the process."""
         if isinstance(error, ValueError):
             return SimulationError(f"AI2-THOR refuses {action}: {error}")
-        failure: SimulatorLostError = lost(f"asked for {action}", error, "" if self._log is None else self._log.tail())
+        failure: SimulatorLostError = lost(f"executing {action}", error, "" if self._log is None else self._log.tail())
         self.close()
         return failure
 
-    def _teleported(self, pose: Pose, *, is_forced: bool, is_rendered: bool = False) -> Any:  # noqa: ANN401
-        """Puts AI2-THOR's agent at a pose by force, or as far as it fits there; returns the event."""
+    def _teleported(self, pose: Pose, *, by_force: bool, is_rendered: bool = False) -> Any:  # noqa: ANN401
+        """Put AI2-THOR's agent at a pose, by force or only if it fits there; return the event."""
         event = self._do(
             "TeleportFull",
             position=self._vector(pose.position_m),
             rotation={"x": 0.0, "y": pose.yaw_deg, "z": 0.0},
             horizon=pose.horizon_deg,
             standing=True,
-            forceAction=is_forced,
+            forceAction=by_force,
             renderImage=is_rendered,
         )
         if event.metadata["lastActionSuccess"]:
             self._placed = self._adopted(pose, event)
-        elif is_forced:
+        elif by_force:
             raise SimulationError(f"AI2-THOR does not put the agent at {pose}: {event.metadata['errorMessage']}")
         return event
 
     def _try_place(self, pose: Pose) -> bool:
-        return bool(self._teleported(pose, is_forced=False).metadata["lastActionSuccess"])
+        return bool(self._teleported(pose, by_force=False).metadata["lastActionSuccess"])
 
     def _place(self, pose: Pose) -> None:
-        """Has AI2-THOR's agent at a pose it was at before."""
+        """Put AI2-THOR's agent at a pose where it was before."""
         if self._placed != pose:
-            self._teleported(pose, is_forced=True)
+            self._teleported(pose, by_force=True)
 
-    def _adopted(self, asked: Pose, event: Any) -> Pose:  # noqa: ANN401 - the client's event
-        """What was asked for where AI2-THOR reports that, else what it reports."""
+    def _adopted(self, requested: Pose, event: Any) -> Pose:  # noqa: ANN401 - the client's event
+        """Return the requested pose if AI2-THOR reports that one, else the reported pose."""
         agent = event.metadata["agent"]
         x_m, z_m = float(agent["position"]["x"]), float(agent["position"]["z"])
         yaw_deg, horizon_deg = float(agent["rotation"]["y"]), float(agent["cameraHorizon"])
         is_same = (
-            math.dist((x_m, z_m), (asked.x_m, asked.z_m)) < _SAME_M
-            and abs(math.remainder(yaw_deg - asked.yaw_deg, 360.0)) < _SAME_DEG
-            and abs(horizon_deg - asked.horizon_deg) < _SAME_DEG
+            math.dist((x_m, z_m), (requested.x_m, requested.z_m)) < _SAME_M
+            and abs(math.remainder(yaw_deg - requested.yaw_deg, 360.0)) < _SAME_DEG
+            and abs(horizon_deg - requested.horizon_deg) < _SAME_DEG
         )
-        return asked if is_same else Pose.of_degrees(x_m, self._body_y_m, z_m, yaw_deg, horizon_deg)
+        return requested if is_same else Pose.of_degrees(x_m, self._body_y_m, z_m, yaw_deg, horizon_deg)
 
     def _enter(self, start: Pose) -> None:
-        """Stands at the house's start, or at the nearest place by it that AI2-THOR takes."""
+        """Put the agent at the house's start, or at the nearest place that AI2-THOR accepts."""
         start = self._standing(start)
         if not self._try_place(start):
-            self._teleported(start, is_forced=True)
+            self._teleported(start, by_force=True)
             points_m = self._reachable(start, self.config.grid_m)
             nearest = np.argsort(np.hypot(*(points_m - (start.x_m, start.z_m)).T), kind="stable")
             trials = points_m[nearest][:_NUM_START_TRIALS].tolist()
@@ -340,14 +340,14 @@ class Ai2ThorSimulator:
             raise SimulationError(f"AI2-THOR does not put the agent at the reachable position ({x_m}, {z_m})")
 
     def _reachable(self, origin: Pose, grid_m: float) -> NDArray[np.float64]:
-        """`(N, 2)` x and z of what AI2-THOR's agent reaches on the grid through `origin`, where it stands."""
+        """Return `(N, 2)` x and z that AI2-THOR's agent reaches on the grid through `origin`, where it stands."""
         event = self._do("GetReachablePositions", gridSize=grid_m)
         if not event.metadata["lastActionSuccess"]:
             raise SimulationError(f"AI2-THOR finds no reachable positions: {event.metadata['errorMessage']}")
         found = event.metadata["actionReturn"]
         points_m = np.array([(p["x"], p["z"]) for p in found], dtype=np.float64).reshape(-1, 2)
         origin_m = np.array([origin.x_m, origin.z_m], dtype=np.float64)
-        # On the grid in double precision, whatever they were reported in.
+        # Reported in single precision; rounded to the grid in double precision.
         cells: NDArray[np.float64] = np.rint((points_m - origin_m) / grid_m)
         cells = cells[np.lexsort((cells[:, 0], cells[:, 1]))]
         on_grid_m: NDArray[np.float64] = origin_m + cells * grid_m
@@ -365,7 +365,7 @@ class Ai2ThorSimulator:
         return grid
 
     def _seeds(self, grid: OccupancyGrid) -> Iterator[Pose]:
-        """Centres of cells by the house's start, the nearest first, of equals by row and column."""
+        """Yield the centres of cells near the house's start, the nearest first, equal ones by row and column."""
         rows, cols = np.indices(grid.cells.shape)
         x_m = grid.corner_m[0] + (cols + 0.5) * grid.cell_m
         z_m = grid.corner_m[1] + (rows + 0.5) * grid.cell_m
@@ -378,15 +378,15 @@ class Ai2ThorSimulator:
         return Pose(pose.x_m, self._body_y_m, pose.z_m, pose.yaw_rad, pose.horizon_rad).canonical()
 
     def _vector(self, position_m: _Position) -> dict[str, float]:
-        """On the wire the agent's height is AI2-THOR's own, whatever ours."""
+        """Return a position for the wire, where the agent's height is always AI2-THOR's own."""
         return {"x": position_m[0], "y": _AGENT_Y_M, "z": position_m[2]}
 
 
 def _with_boxes(bodies: Sequence[SceneObject], records: Sequence[dict[str, Any]]) -> Iterator[SceneObject]:
-    """Bodies of a house, objects with the boxes that AI2-THOR reports.
+    """Yield the bodies of a house, objects with the boxes that AI2-THOR reports.
 
     Raises:
-        SimulationError: AI2-THOR left out an object of the house.
+        SimulationError: AI2-THOR does not list an object of the house.
     """
     boxes = {record["objectId"]: record["axisAlignedBoundingBox"] for record in records}
     missing = [body.id for body in bodies if body.kind == "object" and boxes.get(body.id) is None]

@@ -1,6 +1,6 @@
-"""Starts AI2-THOR's process so that it ends with evonav: `python ai2thor_guard.py PARENT_PID IS_BOUND PROGRAM ...`.
+"""Start AI2-THOR's process so that it ends with evonav: `python ai2thor_guard.py PARENT_PID IS_BOUND PROGRAM ...`.
 
-Run as a script, before the program takes this process's place; imports nothing of evonav, to be quick.
+This is a script. It imports nothing of evonav, to start quickly, and is then replaced by the program.
 """
 
 import os
@@ -11,19 +11,19 @@ _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
 def main(parent_pid: int, is_bound: bool, command: list[str]) -> None:
-    """Binds this process to its parent and becomes `command`.
+    """Bind this process to its parent and become `command`.
 
     Args:
-        parent_pid: Of evonav.
-        is_bound: Have the kernel end this process when the thread that started it ends.
+        parent_pid: Process id of evonav.
+        is_bound: Whether the kernel ends this process when the thread that started it ends.
         command: Program and arguments.
     """
-    os.setsid()  # a group of its own: ended as a whole, and Ctrl-C in the terminal goes to evonav alone
+    os.setsid()  # a group of its own: it is ended as a whole, and Ctrl-C in the terminal goes to evonav alone
     if is_bound and sys.platform == "linux":
         import ctypes
 
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != parent_pid:  # it ended before the kernel was told
+        if os.getppid() != parent_pid:  # the parent ended before the request reached the kernel
             sys.exit(1)
     try:
         os.execvp(command[0], command)  # noqa: S606 - the caller's own command, without a shell

@@ -1,4 +1,4 @@
-"""AI2-THOR's images as evonav's."""
+"""Convert AI2-THOR's images to evonav's."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,14 +11,14 @@ from evonav.world.camera import unproject
 from evonav.world.simulator import Frame, SceneObject
 
 _FAR = 1.0 - 1e-6
-"""Share of the far plane from which on nothing is there: AI2-THOR draws the background on it."""
+"""Share of the far plane from which on a pixel is background: AI2-THOR draws the background there."""
 
 
 def depth_of(event: Any, far_m: float) -> NDArray[np.float32]:  # noqa: ANN401 - the client's event
-    """`(H, W)` planar depth of an event, `inf` where nothing is nearer than the far plane.
+    """Return an event's `(H, W)` planar depth, `inf` where nothing is nearer than the far plane.
 
     Raises:
-        SimulationError: It has no depth image.
+        SimulationError: The event has no depth image.
     """
     if event.depth_frame is None:
         raise SimulationError("AI2-THOR sent no depth image")
@@ -28,10 +28,10 @@ def depth_of(event: Any, far_m: float) -> NDArray[np.float32]:  # noqa: ANN401 -
 
 
 def rgb_of(event: Any) -> NDArray[np.uint8]:  # noqa: ANN401 - the client's event
-    """`(H, W, 3)` colours of an event.
+    """Return an event's `(H, W, 3)` colours.
 
     Raises:
-        SimulationError: It has no image.
+        SimulationError: The event has no colour image.
     """
     if event.frame is None:
         raise SimulationError("AI2-THOR sent no colour image")
@@ -39,17 +39,17 @@ def rgb_of(event: Any) -> NDArray[np.uint8]:  # noqa: ANN401 - the client's even
 
 
 class InstanceDecoder:
-    """From the colours of AI2-THOR's instance images to instance ids.
+    """Converts the colours of AI2-THOR's instance images to instance ids.
 
-    Every event says which colour is which name. Names of bodies of the house are ids; what else is drawn (ceilings,
-    which AI2-THOR does not count as objects, and parts of doors) belongs to the nearest part of the structure.
+    Every event lists the name of each colour. The names of the house's bodies are their ids. Other names (ceilings,
+    which AI2-THOR does not count as objects, and parts of doors) are assigned to the nearest part of the structure.
     """
 
     def __init__(self, objects: Sequence[SceneObject]) -> None:
-        """For the bodies of a house, in instance order."""
+        """Prepare for the bodies of a house, in instance order."""
         self._instance_of: dict[str, int] = {}
         for index, body in enumerate(objects):
-            # A ceiling has the id of its room's floor; our engine names it so, Unity not at all.
+            # A ceiling has the id of its room's floor. Evonav's engine uses this name, Unity has no name for it.
             name = f"Ceiling|{body.id}" if body.kind == "ceiling" else body.id
             self._instance_of[name] = index + 1
         is_fixed = np.array([body.kind != "object" for body in objects], dtype=bool)
@@ -61,14 +61,14 @@ class InstanceDecoder:
         self._instances = np.empty(0, dtype=np.int32)
 
     def decode(self, event: Any, frame: Frame) -> NDArray[np.int32]:  # noqa: ANN401 - the client's event
-        """`(H, W)` instance ids, 0 where nothing is.
+        """Return `(H, W)` instance ids, 0 where nothing is.
 
         Args:
-            event: With an instance image.
-            frame: Of the same view: its depth tells where what has no name of the house lies.
+            event: Event with an instance image.
+            frame: Frame of the same view; its depth locates pixels whose name is not in the house.
 
         Raises:
-            SimulationError: It has no instance image.
+            SimulationError: The event has no instance image.
         """
         image = event.instance_segmentation_frame
         if image is None:
@@ -99,7 +99,7 @@ class InstanceDecoder:
         self._instances = np.array([known[int(key)] for key in self._keys], dtype=np.int32)
 
     def _nearest_fixed(self, points_m: NDArray[np.float64]) -> NDArray[np.int32]:
-        """Instance of the structure's body whose box each point is nearest to."""
+        """Return the instance of the structure's body whose box is nearest to each point."""
         if not len(self._fixed):
             return np.zeros(len(points_m), dtype=np.int32)
         best_m2 = np.full(len(points_m), np.inf)

@@ -1,8 +1,8 @@
-"""AI2-THOR's own client, made to notice at once that its process has ended, and to leave nothing behind.
+"""Change AI2-THOR's client so that it notices the end of its process at once and leaves nothing behind.
 
-As published, the client waits its whole timeout (100 s) at the end of a pipe, blocks for ever on opening a pipe that
-nobody else opens, and leaves its folder of pipes to the interpreter's end. Imports `ai2thor`: import this only where
-that is there.
+The published client waits for its whole timeout (100 s) at the end of a pipe. It blocks for ever on opening a pipe that
+no other process opens. It removes its folder of pipes only when the interpreter ends. This module imports `ai2thor`:
+import it only where that package is installed.
 """
 
 import os
@@ -24,38 +24,38 @@ from evonav.world import ai2thor_guard
 from evonav.world.ai2thor_startup import ProcessEndedError
 
 _POLL_S = 0.1
-"""Between two looks at whether the process lives."""
+"""Time between two checks that the process is alive."""
 _EXIT_S = 5.0
-"""In which a killed process has to be gone."""
+"""Time within which a killed process must have ended."""
 _PIPE_BYTES = 1 << 20
 _F_SETPIPE_SZ = 1031  # linux/fcntl.h
 
 
 class PromptFifoServer(FifoServer):  # type: ignore[misc]
-    """The client's FIFO server; raises `ProcessEndedError` within a tenth of a second after its process has ended."""
+    """The client's FIFO server; raises `ProcessEndedError` within a tenth of a second after its process ended."""
 
     server_pipe: Any = None
     client_pipe: Any = None
 
     def receive(self, timeout: float | None = None) -> Any:  # noqa: ANN401 - the client's event
-        """The next event.
+        """Return the next event.
 
         Raises:
-            ProcessEndedError: There is none to come.
-            TimeoutError: None came in time.
+            ProcessEndedError: The process ended.
+            TimeoutError: No event came in time.
         """
         if self.server_pipe is None:
-            # Opened like this, reading waits for the other side, opening does not.
+            # Opened in this mode, reading waits for the other side, but opening does not.
             descriptor = os.open(self.server_pipe_path, os.O_RDONLY | os.O_NONBLOCK)
             self.server_pipe = os.fdopen(descriptor, "rb", buffering=0)
             _widen(descriptor)
         try:
             return super().receive(timeout)
-        except (ValueError, KeyError, struct.error) as error:  # our engine says goodbye with an empty message
+        except (ValueError, KeyError, struct.error) as error:  # evonav's engine ends with an empty message
             self._raise_ended(f"broke the protocol: {error}")
 
     def stop(self) -> None:
-        """Ends the process and removes the pipes; safe to call twice."""
+        """End the process and remove the pipes; safe to call twice."""
         if self.unity_proc is not None and self.unity_proc.poll() is None:
             with suppress(OSError):
                 os.killpg(self.unity_proc.pid, signal.SIGKILL)
@@ -71,7 +71,7 @@ class PromptFifoServer(FifoServer):  # type: ignore[misc]
         poll = select.poll()
         poll.register(descriptor, select.POLLIN)
         while len(message) < message_size:
-            has_ended = self.unity_proc.poll() is not None  # before looking for what it wrote last
+            has_ended = self.unity_proc.poll() is not None  # checked before reading what it wrote last
             if poll.poll(0 if has_ended else _POLL_S * 1e3):
                 part = os.read(descriptor, message_size - len(message))
                 if not part:
@@ -100,11 +100,11 @@ class PromptFifoServer(FifoServer):  # type: ignore[misc]
             self._check(deadline_s)
 
     def _opened_by_both(self, deadline_s: float) -> int:
-        """Descriptor of the pipe to the process, once that reads from it."""
+        """Open the pipe to the process once the process reads from it; return its descriptor."""
         while True:
             try:
                 descriptor = os.open(self.client_pipe_path, os.O_WRONLY | os.O_NONBLOCK)
-            except OSError:  # ENXIO: nobody reads yet
+            except OSError:  # ENXIO: no process reads yet
                 self._check(deadline_s)
                 time.sleep(0.005)
             else:
@@ -119,7 +119,7 @@ class PromptFifoServer(FifoServer):  # type: ignore[misc]
 
     def _raise_ended(self, otherwise: str | None = None) -> NoReturn:
         with suppress(subprocess.TimeoutExpired):
-            self.unity_proc.wait(timeout=1.0)  # the pipe closes a moment before the process is gone
+            self.unity_proc.wait(timeout=1.0)  # the pipe closes a moment before the process ends
         if self.unity_proc.returncode is None and otherwise is not None:
             raise ProcessEndedError(otherwise)
         raise ProcessEndedError.of(self.unity_proc.returncode)
@@ -128,16 +128,16 @@ class PromptFifoServer(FifoServer):  # type: ignore[misc]
 class GuardedController(Controller):  # type: ignore[misc]
     """The client's controller over `PromptFifoServer`; its process ends with this one.
 
-    Whatever is raised while it starts, the process has ended by then.
+    If starting raises anything, the process has ended by then.
     """
 
     def __init__(self, *, log_dir: Path, uses_gpu: bool, **settings: Any) -> None:  # noqa: ANN401
-        """Starts the process and loads the scene.
+        """Start the process and load the scene.
 
         Args:
-            log_dir: Where the process's output goes, as `unity.log`.
-            uses_gpu: Whether the process draws on a GPU; if not, CUDA_VISIBLE_DEVICES is nothing to it.
-            settings: The client's own.
+            log_dir: Folder of the process's output, `unity.log`.
+            uses_gpu: Whether the process renders on a GPU; otherwise CUDA_VISIBLE_DEVICES is ignored.
+            settings: Settings of the client's own.
         """
         self._own_log_dir = str(log_dir)
         self._uses_gpu = uses_gpu
@@ -151,12 +151,12 @@ class GuardedController(Controller):  # type: ignore[misc]
 
     @property
     def log_dir(self) -> str:
-        """Where the process's output goes."""
+        """Folder of the process's output."""
         return self._own_log_dir
 
     def start(self, *args: Any, **settings: Any) -> Any:  # noqa: ANN401
-        """Starts the process; waits for its first event."""
-        if self.server is None:  # the client makes only servers of its own classes itself
+        """Start the process and wait for its first event."""
+        if self.server is None:  # the client only makes servers of its own classes
             self.server = PromptFifoServer(
                 width=self.width,
                 height=self.height,
@@ -167,21 +167,21 @@ class GuardedController(Controller):  # type: ignore[misc]
         return super().start(*args, **settings)
 
     def unity_command(self, width: int, height: int, headless: bool) -> list[str]:
-        """The command line, behind `ai2thor_guard`."""
+        """Return the command line, which starts `ai2thor_guard`."""
         if not self._uses_gpu:
             self.gpu_device = None
-        is_bound = threading.current_thread() is threading.main_thread()  # other threads may end before evonav does
+        is_bound = threading.current_thread() is threading.main_thread()  # other threads may end before evonav
         guard = [sys.executable, "-S", "-E", ai2thor_guard.__file__, str(os.getpid()), "1" if is_bound else "0"]
         return [*guard, *super().unity_command(width, height, headless)]
 
     def stop(self) -> None:
-        """Ends the process and removes its pipes; safe to call twice."""
+        """End the process and remove its pipes; safe to call twice."""
         if self.server is not None:
             self.server.stop()
             self.server.last_event = None
-        with suppress(AttributeError):  # what has not got as far as having a build has nothing to unlock
+        with suppress(AttributeError):  # a controller that failed before it had a build has nothing to unlock
             super().stop()
-        self.last_event = None  # the client's exit hook keeps this object for as long as Python runs
+        self.last_event = None  # the client's exit hook refers to this object as long as Python runs
 
 
 def _deadline_s(timeout_s: float | None) -> float:
@@ -189,7 +189,7 @@ def _deadline_s(timeout_s: float | None) -> float:
 
 
 def _widen(descriptor: int) -> None:
-    """A pipe that holds a whole answer costs fewer turns between the processes."""
+    """Enlarge a pipe to hold a whole answer, which saves turns between the processes."""
     with suppress(OSError, ImportError):
         import fcntl
 

@@ -1,4 +1,4 @@
-"""Starts AI2-THOR, and says what to do where that fails."""
+"""Start AI2-THOR, and explain what to do where that fails."""
 
 import os
 import re
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from evonav.world.ai2thor_process import GuardedController
 
 OWN_ENGINE = "evonav"
-"""As an executable: our own engine, installed with evonav as `evonav-thor`."""
+"""Name of evonav's own engine as an executable; it is installed with evonav as `evonav-thor`."""
 
 START_TIMEOUTS = 3.0
-"""How many timeouts of an answer a start may take."""
+"""Time limit of a start, in timeouts of one answer."""
 
 _PLAYER_LOG = Path(".config/unity3d/Allen Institute for Artificial Intelligence/AI2-THOR/Player.log")
 _LOG_LINES = 12
@@ -31,31 +31,31 @@ _LOG_LINES = 12
 
 @dataclass(frozen=True, slots=True)
 class Ai2ThorOptions:
-    """Which AI2-THOR, and where it draws. By default the client's own build, downloaded on first use."""
+    """Build of AI2-THOR and its rendering device; by default the client's own build, downloaded on first use."""
 
     executable: str | None = None
-    """Path of a build's executable, or `evonav` for our engine."""
+    """Path of a build's executable, or `evonav` for evonav's engine."""
     commit_id: str | None = None
-    """Of the build to download; default: the client's."""
+    """Commit of the build to download; `None` for the client's default."""
     platform: Literal["cloud", "x11"] | None = None
-    """`cloud`: on a GPU through Vulkan, without a display. `x11`: on an X display. Default: what the client takes."""
+    """`cloud` renders on a GPU through Vulkan, `x11` on an X display; `None` for the client's choice."""
     gpu_device: int | None = None
-    """As CUDA counts them."""
+    """Index of the GPU, as CUDA counts."""
     x_display: str | None = None
-    """Such as `:0`; default: DISPLAY."""
+    """X display such as `:0`; `None` for the variable DISPLAY."""
     timeout_s: float = 100.0
-    """For one answer, three times that to come up; a process that takes longer counts as hanging."""
+    """Time limit of one answer; a start may take three times as long. A slower process counts as hanging."""
 
     @property
     def is_own_engine(self) -> bool:
-        """Whether it is our engine, which needs neither GPU nor display."""
+        """Whether it is evonav's engine, which needs neither GPU nor display."""
         return self.executable == OWN_ENGINE
 
     def check(self) -> None:
-        """Refuses options that contradict each other.
+        """Reject options that contradict each other.
 
         Raises:
-            InvalidArgumentError: They do.
+            InvalidArgumentError: The options contradict each other.
         """
         if not self.timeout_s > 0.0:
             raise InvalidArgumentError(f"timeout_s = {self.timeout_s}: must be > 0")
@@ -71,11 +71,11 @@ class Ai2ThorOptions:
 
 
 class ProcessEndedError(Exception):
-    """The process has ended, or speaks nonsense; the message continues `AI2-THOR's process`."""
+    """The process ended, or broke the protocol; the message continues `AI2-THOR's process`."""
 
     @staticmethod
     def of(returncode: int | None) -> "ProcessEndedError":
-        """For an exit status; `None` if the process lives on without its pipe."""
+        """Return the error for an exit status; `None` if the process still runs without its pipe."""
         if returncode is None:
             return ProcessEndedError("hung up")
         if returncode < 0:
@@ -85,7 +85,7 @@ class ProcessEndedError(Exception):
 
 
 class ProcessLog:
-    """What the simulator's process prints, in a temporary folder of its own."""
+    """The output of the simulator's process, in a temporary folder of its own."""
 
     def __init__(self) -> None:
         self._temporary = TemporaryDirectory(prefix="evonav.ai2thor-")
@@ -93,7 +93,7 @@ class ProcessLog:
         self.folder = Path(self._temporary.name)
 
     def tail(self) -> str:
-        """Last lines, and those of Unity's own log if they are of this process's time; empty if there are none."""
+        """Return the last lines, with those of Unity's own log if this process wrote them; empty without any."""
         lines: list[str] = []
         for path in (self.folder / "unity.log", Path.home() / _PLAYER_LOG):
             with suppress(OSError):
@@ -102,7 +102,7 @@ class ProcessLog:
         return "\n".join(line for line in lines if line.strip())
 
     def close(self) -> None:
-        """Removes it; safe to call twice."""
+        """Remove the log; safe to call twice."""
         self._temporary.cleanup()
 
 
@@ -112,18 +112,18 @@ def start_controller(
     scene: str | dict[str, Any],
     log: ProcessLog,
 ) -> "GuardedController":
-    """Starts AI2-THOR.
+    """Start AI2-THOR.
 
     Args:
         config: Camera and steps.
-        options: Which, and where.
+        options: Build and rendering device.
         scene: A house, or the name of a scene.
-        log: Takes the process's output.
+        log: Log that receives the process's output.
 
     Raises:
         InvalidArgumentError: The options contradict each other.
-        SimulationError: It cannot be started as things are; the message says what to do.
-        SimulatorLostError: The process ended or hung while starting.
+        SimulationError: It cannot be started here; the message says what to do.
+        SimulatorLostError: The process ended or did not answer while starting.
     """
     options.check()
     try:
@@ -138,7 +138,7 @@ def start_controller(
         "height": config.height_px,
         "fieldOfView": config.vertical_fov_deg,
         "gridSize": config.grid_m,
-        "snapToGrid": False,  # on, AI2-THOR refuses to turn by less than 90 degrees
+        "snapToGrid": False,  # if true, AI2-THOR refuses turns of less than 90 degrees
         "rotateStepDegrees": config.turn_deg,
         "renderDepthImage": True,
         "renderInstanceSegmentation": True,
@@ -148,7 +148,7 @@ def start_controller(
         "x_display": _x_display(options),
     }
     if options.executable is not None:
-        # The client takes it apart as a shell would.
+        # The client splits it like a shell.
         settings["local_executable_path"] = shlex.quote(str(_executable(options.executable)))
     else:
         if options.platform is not None:
@@ -159,16 +159,16 @@ def start_controller(
     try:
         return GuardedController(log_dir=log.folder, uses_gpu=not options.is_own_engine, **settings)
     except Exception as error:
-        raise _explained(error, options, log.tail()) from error
+        raise _helpful_error(error, options, log.tail()) from error
 
 
 def lost(doing: str, error: BaseException, log_tail: str) -> SimulatorLostError:
-    """What to raise when the process ended or hung.
+    """Return the error to raise when the process ended or hung.
 
     Args:
-        doing: What it was asked for.
-        error: What the client raised; the cause may be hidden in what that was raised from.
-        log_tail: Of the process.
+        doing: Present participle of the work that failed.
+        error: Error that the client raised; its cause may be among those it was raised from.
+        log_tail: End of the process's log.
     """
     cause = _cause(error)
     how = f"hangs ({cause})" if isinstance(cause, TimeoutError) else str(cause)
@@ -176,11 +176,11 @@ def lost(doing: str, error: BaseException, log_tail: str) -> SimulatorLostError:
 
 
 def _cause(error: BaseException) -> BaseException:
-    """What happened: the client wraps it into errors that no longer say it."""
+    """Return the original error: the client wraps it into errors that do not contain its message."""
     chain: list[BaseException] = [error]
     while (inner := chain[-1].__cause__ or chain[-1].__context__) is not None:
         chain.append(inner)
-    # Of what the client wrapped, the reason is innermost; of our own, what was caught on the way to it is.
+    # The reason is the innermost of the errors that the client wrapped, and the outermost of our own.
     ours = (ProcessEndedError, TimeoutError)
     return next((found for found in reversed(chain) if isinstance(found, ours)), chain[-1])
 
@@ -189,14 +189,14 @@ def _logged(tail: str) -> str:
     return f". The end of its log:\n{tail}" if tail else "; it logged nothing"
 
 
-def _executable(asked: str) -> Path:
-    if asked == OWN_ENGINE:
+def _executable(named: str) -> Path:
+    if named == OWN_ENGINE:
         beside = Path(sys.executable).with_name("evonav-thor")
         found = str(beside) if beside.is_file() else shutil.which("evonav-thor")
         if found is None:
             raise SimulationError("evonav's engine `evonav-thor` is not on PATH: reinstall evonav")
         return Path(found)
-    path = Path(asked).expanduser().resolve()
+    path = Path(named).expanduser().resolve()
     if not path.exists():
         raise SimulationError(f"{path}: no such executable of AI2-THOR; `{OWN_ENGINE}` names evonav's own engine")
     if not path.is_file():
@@ -207,7 +207,7 @@ def _executable(asked: str) -> Path:
 
 
 def _x_display(options: Ai2ThorOptions) -> str | None:
-    """The display for the client, which insists on one for every executable that it is given."""
+    """Return the display for the client, which demands one for every executable that it is given."""
     display = options.x_display or os.environ.get("DISPLAY")
     if display is None and options.platform == "x11":
         raise SimulationError(
@@ -215,17 +215,17 @@ def _x_display(options: Ai2ThorOptions) -> str | None:
             "or take --thor-platform cloud, which needs none"
         )
     if display is None and options.executable is not None:
-        return "0"  # of no meaning to our engine and to builds for CloudRendering
+        return "0"  # without meaning for evonav's engine and for builds of CloudRendering
     return display
 
 
-def _explained(error: Exception, options: Ai2ThorOptions, log_tail: str) -> SimulationError:
-    """An error of the client's start, in words that help."""
+def _helpful_error(error: Exception, options: Ai2ThorOptions, log_tail: str) -> SimulationError:
+    """Turn an error of the client's start into one that says what to do."""
     if isinstance(error, SimulationError):
         return error
     cause, text = _cause(error), f"{error}"
-    if (told := re.search(r"Unity process has exited.*returncode=(-?\d+)", text, re.DOTALL)) is not None:
-        cause = ProcessEndedError.of(int(told[1]))  # of CloudRendering, the client looks itself
+    if (exited := re.search(r"Unity process has exited.*returncode=(-?\d+)", text, re.DOTALL)) is not None:
+        cause = ProcessEndedError.of(int(exited[1]))  # for CloudRendering, the client itself checks the process
     if isinstance(cause, ProcessEndedError):
         advice = _advice(log_tail) if not options.is_own_engine else ""
         return SimulatorLostError(f"AI2-THOR's process {cause} while starting{_logged(log_tail)}{advice}")
@@ -269,7 +269,7 @@ _WITHOUT_NETWORK = (
 
 
 def _no_build(options: Ai2ThorOptions) -> str:
-    """The client says the same of a build that is not there and of a network that is not: ask again."""
+    """Find out whether the build or the network is missing: the client reports both alike."""
     import ai2thor.build
     import ai2thor.platform
     import requests

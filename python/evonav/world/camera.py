@@ -1,4 +1,4 @@
-"""The pinhole camera of frames and views: AI2-THOR's, pixel centres at half-integers, planar depth."""
+"""Project with AI2-THOR's pinhole camera: pixel centres at half-integers, planar depth."""
 
 import math
 from dataclasses import dataclass
@@ -14,41 +14,41 @@ from evonav.world.simulator import Intrinsics
 
 @dataclass(frozen=True, slots=True)
 class CameraView:
-    """What a camera of one's own draws, wherever it hangs: AI2-THOR's third-party cameras."""
+    """A camera anywhere in the scene, as AI2-THOR's third-party cameras."""
 
     pose: Pose
-    """Of the optical centre; any horizon, also straight down (`pi / 2`)."""
+    """Pose of the optical centre; any horizon, also straight down (`pi / 2`)."""
     width_px: int = 300
     height_px: int = 300
     vertical_fov_rad: float = math.pi / 2
-    """From the upper to the lower border; not used by an orthographic view."""
+    """Field of view between the upper and the lower border; an orthographic view does not use it."""
     near_m: float = 0.1
     far_m: float = 20.0
-    """Planar depths between which surfaces are drawn."""
+    """Planar depths between which surfaces are drawn, `near_m` to `far_m`."""
     roll_rad: float = 0.0
     """Turn about the optical axis before all others, as Unity's z rotation: the image's right side goes up."""
     orthographic_half_height_m: float | None = None
-    """Half of the image's height in the world (Unity's `orthographicSize`) for an orthographic view."""
+    """Half of the image's height in metres (Unity's `orthographicSize`); `None` for a perspective view."""
 
 
 class Images(NamedTuple):
-    """What a camera sees."""
+    """The images of one camera."""
 
     depth_m: NDArray[np.float32]
-    """`(H, W)` planar z in metres, `inf` where nothing is."""
+    """`(H, W)` planar depth in metres, `inf` where nothing is."""
     rgb: NDArray[np.uint8] | None
-    """`(H, W, 3)`, when asked for."""
+    """`(H, W, 3)` colours; `None` if not requested."""
     instances: NDArray[np.int32] | None
-    """`(H, W)`, 0 where nothing is, else 1 + index of the body, when asked for."""
+    """`(H, W)` instance ids: 0 where nothing is, else 1 + index of the body; `None` if not requested."""
 
 
 def unproject(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intrinsics) -> NDArray[np.float64]:
-    """World points behind a depth image.
+    """Return the world points behind a depth image.
 
     Args:
-        depth_m: `(H, W)` planar z.
-        pose: The camera's own, as `Frame.pose` is.
-        intrinsics: Of the image.
+        depth_m: `(H, W)` planar depth.
+        pose: Pose of the camera itself, as `Frame.pose`.
+        intrinsics: Intrinsics of the image.
 
     Returns:
         `(H, W, 3)` metres, not finite where the depth is not.
@@ -66,12 +66,12 @@ def unproject(depth_m: NDArray[np.float32], pose: Pose, intrinsics: Intrinsics) 
 
 
 def project(points_m: NDArray[np.float64], pose: Pose, intrinsics: Intrinsics) -> NDArray[np.float64]:
-    """Where a camera sees points.
+    """Return the image positions of world points.
 
     Args:
         points_m: `(N, 3)`, world frame.
-        pose: The camera's own, as `Frame.pose` is.
-        intrinsics: Of the image.
+        pose: Pose of the camera itself, as `Frame.pose`.
+        intrinsics: Intrinsics of the image.
 
     Returns:
         `(N, 3)` image column and row in pixels (a pixel's centre is at half-integers; the borders are not checked) and

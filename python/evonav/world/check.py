@@ -1,4 +1,4 @@
-"""Tests any implementation of `Simulator` against its contract, as Gymnasium's environment checker does."""
+"""Test an implementation of `Simulator` against its contract, as Gymnasium's environment checker does."""
 
 import math
 
@@ -12,26 +12,26 @@ from evonav.world.simulator import Action, Frame, Simulator
 KINDS = frozenset({"object", "wall", "floor", "ceiling", "door", "window"})
 _TOLERANCE_M = 1e-3
 _TOLERANCE_RAD = 2e-6
-"""Simulators may round angles to 1e-4 degrees (`Pose.canonical`)."""
+"""Tolerance for angles; simulators may round them to 1e-4 degrees (`Pose.canonical`)."""
 _MAX_LOST_SHARE = 0.02
-"""How many reachable positions and free cells may disagree: their grids differ, and squeeze through different gaps."""
+"""Share of reachable positions and free cells that may disagree: two grids pass through different narrow gaps."""
 _BOX_SLACK_M = 0.05
-"""How far a seen point may lie outside the box of the object it is said to belong to."""
+"""Distance that a visible point may lie outside the box of the object that it is assigned to."""
 
 
 def check_simulator(simulator: Simulator, house_json: str) -> None:
-    """Runs a simulator through its contract in one house; the house is loaded several times.
+    """Test a simulator's contract in one house, which is loaded several times.
 
-    Tested are shapes, types and value ranges; that what fails leaves no trace; conventions (yaw clockwise, horizon
-    down, planar depth, instance ids) by unprojecting images into the objects' boxes; that the navigation queries agree
-    with each other; and that the same calls give the same answers.
+    Tests cover shapes, types and value ranges; that a failed action changes nothing; the conventions (yaw clockwise,
+    horizon down, planar depth, instance ids), by unprojecting images into the objects' boxes; that the navigation
+    queries agree with each other; and that the same calls give the same answers.
 
     Args:
-        simulator: With or without a house.
+        simulator: Simulator with or without a house.
         house_json: A ProcTHOR house in which the agent can move.
 
     Raises:
-        SimulationError: Something is not as promised; the message says what, with the values found.
+        SimulationError: The contract is broken; the message says where, with the values found.
     """
     start = simulator.reset(house_json)
     _check(simulator.pose == start, f"reset returned {start}, but pose is {simulator.pose}")
@@ -71,9 +71,10 @@ def _check_turns(simulator: Simulator) -> None:
         pose = simulator.pose
         _check(simulator.step(action), f"{action.value} failed; turning cannot collide")
         turned_rad = _angle(simulator.pose.yaw_rad - pose.yaw_rad)
-        asked_rad = sign * math.radians(simulator.config.turn_deg)
+        requested_rad = sign * math.radians(simulator.config.turn_deg)
         _check(
-            abs(turned_rad - asked_rad) < _TOLERANCE_RAD, f"{action.value} turned by {turned_rad} rad, not {asked_rad}"
+            abs(turned_rad - requested_rad) < _TOLERANCE_RAD,
+            f"{action.value} turned by {turned_rad} rad, not {requested_rad}",
         )
         _check(simulator.pose.position_m == pose.position_m, f"{action.value} moved the agent")
     _check(abs(_angle(simulator.pose.yaw_rad - before.yaw_rad)) < _TOLERANCE_RAD, "TURN_LEFT does not undo TURN_RIGHT")
@@ -118,7 +119,7 @@ def _check_teleport(simulator: Simulator, reachable_m: NDArray[np.float64]) -> N
 
 
 def _check_moves(simulator: Simulator, reachable_m: NDArray[np.float64]) -> None:
-    """Walks straight into something from several places and in several directions."""
+    """Move forward until something blocks, from several places in several directions."""
     num_moved = num_blocked = 0
     for index, position in enumerate(reachable_m[:: max(1, len(reachable_m) // 8)]):
         simulator.teleport(Pose(*_triple(position), yaw_rad=index * math.pi / 4))
@@ -130,9 +131,11 @@ def _check_moves(simulator: Simulator, reachable_m: NDArray[np.float64]) -> None
                 break
             num_moved += 1
             step_m = simulator.config.move_m
-            asked = (before.x_m + step_m * math.sin(before.yaw_rad), before.z_m + step_m * math.cos(before.yaw_rad))
+            requested = (before.x_m + step_m * math.sin(before.yaw_rad), before.z_m + step_m * math.cos(before.yaw_rad))
             got = (simulator.pose.x_m, simulator.pose.z_m)
-            _check(math.dist(asked, got) < _TOLERANCE_M, f"MOVE_FORWARD from {before} ended at {got}, not {asked}")
+            _check(
+                math.dist(requested, got) < _TOLERANCE_M, f"MOVE_FORWARD from {before} ended at {got}, not {requested}"
+            )
             _check(simulator.pose.yaw_rad == before.yaw_rad, "MOVE_FORWARD turned the agent")
             _check(simulator.is_free(simulator.pose.position_m), f"MOVE_FORWARD ended at {got}, which is not free")
     _check(num_moved > 0, "no MOVE_FORWARD succeeded")
@@ -150,8 +153,8 @@ def _check_images(simulator: Simulator, reachable_m: NDArray[np.float64]) -> Non
         again = simulator.render(pose)
         _check(np.array_equal(frame.depth_m, again.depth_m), "render twice from one pose gave two depth images")
         bare = simulator.render(pose, rgb=False, instances=False)
-        _check(bare.rgb is None and bare.instances is None, "render made images that were not asked for")
-        _check(np.array_equal(frame.depth_m, bare.depth_m), "depth depends on which other images are asked for")
+        _check(bare.rgb is None and bare.instances is None, "render made images that were not requested")
+        _check(np.array_equal(frame.depth_m, bare.depth_m), "depth depends on which other images are requested")
         outside, seen = _count_outside_boxes(simulator, frame)
         num_outside, num_points = num_outside + outside, num_points + seen
     _check(num_points > 0, "no image showed anything")
@@ -165,14 +168,14 @@ def _check_images(simulator: Simulator, reachable_m: NDArray[np.float64]) -> Non
 def _check_frame(simulator: Simulator, frame: Frame, pose: Pose) -> None:
     config = simulator.config
     shape = (config.height_px, config.width_px)
-    for name, image, asked in (
+    for name, image, requested in (
         ("depth_m", frame.depth_m, (np.float32, shape)),
         ("rgb", frame.rgb, (np.uint8, (*shape, 3))),
         ("instances", frame.instances, (np.int32, shape)),
     ):
-        _check(image is not None, f"render was asked for {name} and left it out")
+        _check(image is not None, f"render did not return the requested {name}")
         if image is not None:
-            got, promised = f"{image.dtype} {image.shape}", f"{np.dtype(asked[0])} {asked[1]}"
+            got, promised = f"{image.dtype} {image.shape}", f"{np.dtype(requested[0])} {requested[1]}"
             _check(got == promised, f"{name} is {got}, not {promised}")
     depth_m, instances = frame.depth_m, frame.instances
     _check(bool((depth_m > 0).all()), "depth holds values that are not positive (nothing there is inf)")
@@ -182,14 +185,16 @@ def _check_frame(simulator: Simulator, frame: Frame, pose: Pose) -> None:
         _check(bool(((instances == 0) == np.isinf(depth_m)).all()), "depth must be inf exactly where the instance is 0")
     intrinsics = frame.intrinsics
     _check((intrinsics.height_px, intrinsics.width_px) == shape, f"intrinsics are of another image: {intrinsics}")
-    asked_rad = math.radians(config.vertical_fov_deg)
-    _check(abs(intrinsics.vertical_fov_rad - asked_rad) < 1e-6, f"field of view is {intrinsics.vertical_fov_rad} rad")
+    requested_rad = math.radians(config.vertical_fov_deg)
+    _check(
+        abs(intrinsics.vertical_fov_rad - requested_rad) < 1e-6, f"field of view is {intrinsics.vertical_fov_rad} rad"
+    )
     camera = Pose(pose.x_m, config.camera_height_m, pose.z_m, pose.yaw_rad, pose.horizon_rad)
     _check(_is_close(frame.pose, camera, y=True), f"frame.pose is {frame.pose}, expected the camera's: {camera}")
 
 
 def _count_outside_boxes(simulator: Simulator, frame: Frame) -> tuple[int, int]:
-    """How many pixels unproject outside their instance's box, and how many there are."""
+    """Count the pixels that unproject outside their instance's box, and all pixels."""
     if frame.instances is None:
         return 0, 0
     rows, cols = np.nonzero(frame.instances)
@@ -224,8 +229,8 @@ def _check_paths(simulator: Simulator, reachable_m: NDArray[np.float64]) -> None
         place = f"shortest_path from {start} to {target}"
         _check(path_m.ndim == 2 and path_m.shape[1] == 3, f"{place} has shape {path_m.shape}, not (M, 3)")
         _check(len(path_m) > 0, f"{place} is empty, but both ends are reachable from each other")
-        for end_m, asked in ((path_m[0], start), (path_m[-1], target)):
-            off_m = math.dist(end_m[[0, 2]], (asked[0], asked[2]))
+        for end_m, requested in ((path_m[0], start), (path_m[-1], target)):
+            off_m = math.dist(end_m[[0, 2]], (requested[0], requested[2]))
             _check(off_m < 0.1, f"{place} ends {off_m:.3f} m off")
         length_m = float(np.linalg.norm(np.diff(path_m[:, [0, 2]], axis=0), axis=1).sum())
         straight_m = math.dist((start[0], start[2]), (target[0], target[2]))
@@ -244,7 +249,7 @@ def _check_occupancy(simulator: Simulator, reachable_m: NDArray[np.float64]) -> 
     rows = np.floor((reachable_m[:, 2] - grid.corner_m[1]) / grid.cell_m).astype(int)
     is_on_grid = (rows >= 0) & (cols >= 0) & (rows < grid.cells.shape[0]) & (cols < grid.cells.shape[1])
     _check(bool(is_on_grid.all()), "reachable positions are off the occupancy grid")
-    # A position and its cell's centre are up to 0.7 cells apart, and the centre may be blocked: look one cell around.
+    # A position is up to 0.7 cells from its cell's centre, and the centre may be blocked: accept a free neighbour.
     padded = np.pad(grid.cells, 1, constant_values=1)
     around = [padded[rows + row, cols + col] for row in range(3) for col in range(3)]
     num_blocked = int(np.min(around, axis=0).sum())
@@ -269,9 +274,9 @@ def _check_reset(simulator: Simulator, house_json: str, start: Pose) -> None:
     _check(tuple(simulator.objects) == objects, "reset with the same house gave other objects")
     second = simulator.render(rgb=False)
     _check(np.array_equal(first.depth_m, second.depth_m), "the same house and pose gave another depth image")
-    asked = Pose(start.x_m, start.y_m, start.z_m, start.yaw_rad + 0.5, 0.0)
-    effective = simulator.reset(house_json, asked)
-    _check(_is_close(effective, asked), f"reset at the free pose {asked} ended at {effective}")
+    requested = Pose(start.x_m, start.y_m, start.z_m, start.yaw_rad + 0.5, 0.0)
+    effective = simulator.reset(house_json, requested)
+    _check(_is_close(effective, requested), f"reset at the free pose {requested} ended at {effective}")
 
 
 def _triple(position_m: NDArray[np.float64]) -> tuple[float, float, float]:
@@ -284,7 +289,7 @@ def _angle(angle_rad: float) -> float:
 
 
 def _is_close(a: Pose, b: Pose, *, y: bool = False) -> bool:
-    """Whether two poses agree; heights only count when asked."""
+    """Return whether two poses agree; heights are compared only with `y`."""
     return (
         math.dist((a.x_m, a.z_m), (b.x_m, b.z_m)) < _TOLERANCE_M
         and (not y or abs(a.y_m - b.y_m) < _TOLERANCE_M)

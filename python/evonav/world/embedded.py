@@ -1,4 +1,4 @@
-"""The embedded simulator: AI2-THOR's agent in a ProcTHOR house, in Rust, without Unity."""
+"""Simulate AI2-THOR's agent in a ProcTHOR house with the Rust core, without Unity."""
 
 import json
 import math
@@ -18,11 +18,10 @@ _Position = tuple[float, float, float]
 
 
 class EmbeddedSimulator:
-    """A `Simulator` over the Rust core: one house at a time, deterministic, about 1,000 images a second a core.
+    """A `Simulator` over the Rust core: one house at a time, deterministic, about 1,000 images a second per CPU core.
 
-    Angles of poses are canonical (`Pose.canonical`), so that this and a simulator that talks in degrees give the same
-    bits. Calls release the GIL. Pickling carries the house and the pose, not what is derived from them, which loading
-    makes again in a few milliseconds.
+    Angles of poses are canonical (`Pose.canonical`), so a simulator that uses degrees gives the same bits. Calls
+    release the GIL. A pickle contains the house and the pose; the rest is computed again in a few milliseconds.
 
     Example:
         >>> simulator = EmbeddedSimulator()  # doctest: +SKIP
@@ -32,12 +31,12 @@ class EmbeddedSimulator:
     """
 
     def __init__(self, config: SimulatorConfig | None = None, *, allow_unknown_assets: bool = False) -> None:
-        """Makes a simulator without a house; call `reset` next.
+        """Make a simulator without a house; call `reset` next.
 
         Args:
             config: Camera, body and steps; AI2-THOR's by default.
-            allow_unknown_assets: Draw assets that the catalogue does not hold (Objaverse ones) in the usual size of
-                their category, instead of refusing the house.
+            allow_unknown_assets: Whether to draw assets that the catalogue lacks (Objaverse's) in the usual size of
+                their category; otherwise such a house is refused.
         """
         self.config = config or SimulatorConfig()
         self.allow_unknown_assets = allow_unknown_assets
@@ -50,21 +49,21 @@ class EmbeddedSimulator:
         self._objects: tuple[SceneObject, ...] | None = None
 
     def reset(self, house_json: str, pose: Pose | None = None, *, name: str = "house") -> Pose:
-        """Loads a house; the agent stands at `pose`, or at the house's own start.
+        """Load a house; the agent stands at `pose`, or at the house's own start.
 
-        A `pose` that the agent does not fit at, or cannot be reached from the house's start, is moved to the nearest
+        If the agent does not fit at `pose`, or cannot reach it from the house's start, it moves to the nearest
         reachable grid position.
 
         Args:
             house_json: A ProcTHOR house.
-            pose: Where to stand and look.
-            name: Of the house, for errors.
+            pose: Requested pose of the agent.
+            name: Name of the house in errors.
 
         Returns:
             The effective pose.
 
         Raises:
-            HouseError: The house is malformed or holds an unknown asset.
+            HouseError: The house is malformed or contains an unknown asset.
             SimulationError: The agent fits nowhere.
         """
         core = _core.EmbeddedSimulator(
@@ -82,52 +81,52 @@ class EmbeddedSimulator:
         return self._enter(core, pose)
 
     def apply(self, delta: str | Mapping[str, Any], pose: Pose | None = None) -> Pose:
-        """Changes the house at hand; only what moved is built again.
+        """Change the current house; only what moved is built again.
 
         Args:
             delta: A `HouseDelta`, as JSON or as its dictionary.
-            pose: Where to stand then; by default where the agent is.
+            pose: The agent's pose after the change; by default its present one.
 
         Returns:
-            The effective pose, as `reset`.
+            The effective pose, as from `reset`.
 
         Raises:
-            HouseError: The delta names an object that the house does not hold.
-            InvalidArgumentError: It is no `HouseDelta`.
+            HouseError: The delta names an object that the house does not contain.
+            InvalidArgumentError: The argument is not a `HouseDelta`.
         """
         delta_json = delta if isinstance(delta, str) else json.dumps(delta)
         return self._enter(self._world.apply(delta_json), pose or self._pose)
 
     def random_spawn(self, request_json: str) -> tuple[str, list[str]]:
-        """Draws random places for objects, AI2-THOR's `InitialRandomSpawn`; changes nothing.
+        """Draw random places for objects by AI2-THOR's `InitialRandomSpawn`, without a change of the house.
 
         Args:
             request_json: A `SpawnRequest` of the core.
 
         Returns:
-            The `HouseDelta` to `apply`, as JSON, and ids of the objects that found no place.
+            The `HouseDelta` to `apply`, as JSON, and the ids of the objects that found no place.
 
         Raises:
-            InvalidArgumentError: It is no such request, or names what the house does not hold.
+            InvalidArgumentError: The request is malformed, or names objects that the house does not contain.
         """
         return self._world.random_spawn(request_json)
 
     def settled(self) -> str:
-        """The `HouseDelta` (JSON) that brings down what hangs in the air; empty moves where nothing does."""
+        """Return the `HouseDelta` (JSON) that lets unsupported objects fall; it is empty if there are none."""
         return self._world.settled()
 
     def enter(self, pose: Pose | None = None) -> Pose:
-        """Stands at `pose` as after `reset`, in the house at hand."""
+        """Put the agent at `pose`, as `reset` does, in the current house."""
         return self._enter(self._world, pose)
 
     @property
     def core(self) -> _core.EmbeddedSimulator:
-        """The house at hand, as the core has it; it never changes, so many may share it."""
+        """The core's simulator of the current house; it never changes, so many may share it."""
         return self._world
 
     @property
     def house_json(self) -> str:
-        """The house at hand."""
+        """The current house as JSON."""
         return self._world.house_json()
 
     @property
@@ -146,7 +145,7 @@ class EmbeddedSimulator:
         return self._objects
 
     def step(self, action: Action) -> bool:
-        """Does one discrete action; `False`, and the pose unchanged, when it collides. `STOP` does nothing."""
+        """Execute one discrete action; `False`, and the pose unchanged, when it collides. `STOP` does nothing."""
         pose, turn_rad = self._pose, math.radians(self.config.turn_deg)
         if action is Action.TURN_LEFT:
             self._pose = _turned(pose, -turn_rad)
@@ -161,14 +160,14 @@ class EmbeddedSimulator:
         return True
 
     def teleport(self, pose: Pose) -> bool:
-        """Sets the pose; `False`, and the pose unchanged, when the agent does not fit there."""
+        """Set the pose; `False`, and the pose unchanged, when the agent does not fit there."""
         if not _is_finite(pose) or not self._world.is_free((pose.x_m, pose.z_m)):
             return False
         self._pose = self._standing(pose, pose.x_m, pose.z_m)
         return True
 
     def render(self, pose: Pose | None = None, *, rgb: bool = True, instances: bool = True) -> Frame:
-        """What the camera sees when the agent is at `pose` (default: where it is); collisions are not checked.
+        """Render the camera's view from `pose` (default: the agent's own); collisions are not checked.
 
         Raises:
             InvalidArgumentError: The pose is not finite.
@@ -181,9 +180,9 @@ class EmbeddedSimulator:
         return Frame(camera, self.intrinsics, depth_m, colours, ids)
 
     def render_camera(self, view: CameraView, *, rgb: bool = True, instances: bool = True) -> Images:
-        """What a camera of one's own sees; ceilings are seen from below only, so views from above look into the house.
+        """Render any camera; ceilings are seen from below only, so views from above show the rooms.
 
-        Angles are taken as they are.
+        Angles are not rounded.
 
         Raises:
             InvalidArgumentError: A number of the view is not finite or out of range.
@@ -205,18 +204,18 @@ class EmbeddedSimulator:
     def visible_objects(
         self, view: CameraView, *, max_distance_m: float = 1.5, agent_m: tuple[float, float] | None = None
     ) -> list[int]:
-        """What AI2-THOR calls visible (`visibilityScheme` "Collider", its default).
+        """Return the bodies that AI2-THOR calls visible (`visibilityScheme` "Collider", its default).
 
-        Something of the body is near the agent on the ground plane, and one of its visibility points, a grid over its
-        surfaces, is inside the picture with nothing else before it. Clip planes do not count.
+        A body is visible if some part of it is near the agent on the ground plane, and one of its visibility points, a
+        grid over its surfaces, is inside the image and not occluded. Clip planes do not count.
 
         Args:
-            view: Of the agent's camera, or of another.
+            view: View of the agent's camera, or of another.
             max_distance_m: AI2-THOR's `visibilityDistance`.
-            agent_m: `(x, z)` of the agent; by default below the camera.
+            agent_m: The agent's `(x, z)`; by default below the camera.
 
         Returns:
-            Indices into `objects` (instance id - 1), rising; never ceilings.
+            Indices into `objects` (instance id - 1), ascending; never ceilings.
 
         Raises:
             InvalidArgumentError: A number is not finite or out of range.
@@ -234,60 +233,60 @@ class EmbeddedSimulator:
         )
 
     def reachable_positions(self) -> NDArray[np.float64]:
-        """`(N, 3)` positions of the square grid through the agent that it can reach along that grid."""
+        """Return the `(N, 3)` positions of the square grid through the agent that it can reach there."""
         points_m = self._world.reachable_positions((self._pose.x_m, self._pose.z_m), self.config.grid_m)
         return self._raised(points_m)
 
     def nearest_reachable_position(self, position_m: _Position) -> _Position:
-        """The reachable position nearest on the ground plane."""
+        """Return the reachable position nearest on the ground plane."""
         reachable_m = self.reachable_positions()
         return nearest_of(reachable_m, position_m)
 
     def is_free(self, position_m: _Position) -> bool:
-        """Whether the agent's body fits at the position, and it can walk there from the house's start."""
+        """Return whether the agent's body fits at the position and can move there from the house's start."""
         return self._world.is_reachable((position_m[0], position_m[2]))
 
     def can_move(self, from_m: tuple[float, float], to_m: tuple[float, float]) -> bool:
-        """Whether the agent's body can move straight between two points `(x, z)`; to the same point: fits there."""
+        """Return whether the agent can move straight between `(x, z)` points; for equal points, whether it fits."""
         return self._world.can_move(from_m, to_m)
 
     def blocker(self, from_m: tuple[float, float], to_m: tuple[float, float]) -> SceneObject | None:
-        """What a straight move between two points `(x, z)` touches; `None` for what lacks only a floor."""
+        """Return the body that blocks a straight move between points `(x, z)`; `None` if only the floor is missing."""
         index = self._world.blocker(from_m, to_m)
         return None if index is None else self.objects[index]
 
     def is_visible(self, from_m: _Position, to_m: _Position, ignored_instances: Sequence[int] = ()) -> bool:
-        """Whether nothing stands between two points but bodies with the given instance ids."""
+        """Return whether nothing stands between two points, except bodies with the given instance ids."""
         return self._world.is_visible(from_m, to_m, [instance - 1 for instance in ignored_instances if instance > 0])
 
     def shortest_path(self, start_m: _Position, target_m: _Position) -> NDArray[np.float64]:
-        """`(M, 3)` corners of the geodesic; `(0, 3)` when there is none. Both ends snap to the nearest free point."""
+        """Return the geodesic's `(M, 3)` corners, `(0, 3)` without one; both ends move to the nearest free point."""
         return self._raised(self._world.shortest_path((start_m[0], start_m[2]), (target_m[0], target_m[2])))
 
     def path_lengths_m(self, start_m: _Position, targets_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Geodesic distances from one position to many.
+        """Return the geodesic distances from one position to many.
 
         Args:
-            start_m: `(x, y, z)`.
-            targets_m: `(N, 3)`.
+            start_m: Start, `(x, y, z)`.
+            targets_m: Targets, `(N, 3)`.
 
         Returns:
-            `(N,)` metres, `inf` where there is no way.
+            `(N,)` metres, `inf` where no path exists.
         """
         targets = np.ascontiguousarray(np.asarray(targets_m, dtype=np.float64).reshape(-1, 3)[:, [0, 2]])
         return self._world.distances_m((start_m[0], start_m[2]), targets)
 
     def occupancy(self) -> OccupancyGrid:
-        """Cells whose centres the agent's body reaches from the house's start, by straight moves along the grid.
+        """Return the oracle occupancy: cells whose centres the agent's body reaches from the house's start are free.
 
-        The same grid for all arrangements of a house. The grid's moves begin at the centre nearest to the start where
-        the body fits.
+        The body moves straight along the grid, beginning at the centre nearest to the start where it fits. The grid has
+        the same shape for all arrangements of a house.
         """
         cells, corner_m = self._world.occupancy(self.config.occupancy_cell_m)
         return OccupancyGrid(cells, self.config.occupancy_cell_m, corner_m)
 
     def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
-        """All surfaces, for other renderers and for export.
+        """Return all surfaces, for other renderers and for export.
 
         Returns:
             `(N, 3, 3)` corners in metres, clockwise seen from outside; `(N,)` body indices (instance id - 1); and
@@ -296,23 +295,23 @@ class EmbeddedSimulator:
         return self._world.triangles()
 
     def close(self) -> None:
-        """Releases the house; safe to call twice."""
+        """Release the house; safe to call twice."""
         self._loaded = None
         self._objects = None
 
     def __copy__(self) -> "EmbeddedSimulator":
-        """Another simulator of the same house, which `apply` replaces and never changes: both share it."""
+        """Return another simulator of the same house; both share it, since `apply` replaces the house."""
         twin = type(self).__new__(type(self))
         twin.__dict__.update(self.__dict__)
         return twin
 
     def __getstate__(self) -> dict[str, Any]:
-        """House and pose; see the class."""
+        """Return house and pose; see the class."""
         house_json = self._loaded and self._loaded.house_json()
         return self.__dict__ | {"_loaded": house_json, "_objects": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Loads the house again."""
+        """Load the house again."""
         house_json = state["_loaded"]
         self.__dict__.update(state | {"_loaded": None})
         if house_json:
@@ -355,9 +354,9 @@ def _turned(pose: Pose, angle_rad: float) -> Pose:
 
 
 def nearest_of(reachable_m: NDArray[np.float64], position_m: _Position) -> _Position:
-    """The position nearest to another on the ground plane, the first of equals."""
+    """Return the position nearest to another on the ground plane, the first of equal ones."""
     if not len(reachable_m):
-        raise SimulationError("no position is reachable from where the agent stands")
+        raise SimulationError("no position is reachable from the agent's place")
     squared_m2 = (reachable_m[:, 0] - position_m[0]) ** 2 + (reachable_m[:, 2] - position_m[2]) ** 2
     x_m, y_m, z_m = reachable_m[int(np.argmin(squared_m2))].tolist()
     return (x_m, y_m, z_m)

@@ -1,50 +1,50 @@
-"""Poses, in AI2-THOR's frame."""
+"""Poses in AI2-THOR's frame."""
 
 import math
 from dataclasses import dataclass
 
 _DECIMALS_DEG = 4
-"""Angles are whole multiples of 1e-4 degrees, see `Pose.canonical`."""
+"""Decimals of an angle in degrees: angles are whole multiples of 1e-4 degrees, see `Pose.canonical`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """Where an agent stands and looks: left-handed frame, y up, metres and radians."""
+    """An agent's position and view: left-handed frame, y up, metres and radians."""
 
     x_m: float
     y_m: float
     z_m: float
     yaw_rad: float
-    """0 along +z, growing towards +x (clockwise seen from above)."""
+    """Yaw, 0 along +z, growing towards +x (clockwise seen from above)."""
     horizon_rad: float = math.radians(30.0)
     """Camera pitch, positive looking down (30 degrees is ProcTHOR's default)."""
 
     @staticmethod
     def of_degrees(x_m: float, y_m: float, z_m: float, yaw_deg: float, horizon_deg: float) -> "Pose":
-        """The canonical pose of AI2-THOR's angles."""
+        """Return the canonical pose of AI2-THOR's angles."""
         yaw_rad, horizon_rad = math.radians(yaw_deg), math.radians(horizon_deg)
         return Pose(x_m, y_m, z_m, canonical_yaw_rad(yaw_rad), canonical_horizon_rad(horizon_rad))
 
     @property
     def position_m(self) -> tuple[float, float, float]:
-        """`(x, y, z)`."""
+        """Position `(x, y, z)` in metres."""
         return (self.x_m, self.y_m, self.z_m)
 
     @property
     def yaw_deg(self) -> float:
-        """In `[0, 360)`, rounded to 1e-4 degrees: what goes to AI2-THOR."""
+        """Yaw in `[0, 360)`, rounded to 1e-4 degrees: the value for AI2-THOR."""
         return _round_deg(math.degrees(self.yaw_rad) % 360.0) % 360.0
 
     @property
     def horizon_deg(self) -> float:
-        """Rounded to 1e-4 degrees: what goes to AI2-THOR."""
+        """Horizon rounded to 1e-4 degrees: the value for AI2-THOR."""
         return _round_deg(math.degrees(self.horizon_rad))
 
     def canonical(self) -> "Pose":
-        """This pose with its angles rounded to 1e-4 degrees and its yaw in `[0, 2 pi)`.
+        """Return this pose with angles rounded to 1e-4 degrees and its yaw in `[0, 2 pi)`.
 
-        AI2-THOR talks in degrees and evonav in radians. Angles that are whole multiples of 1e-4 degrees survive the
-        way there and back to the bit, so that images and steps are the same whichever side computes them.
+        AI2-THOR uses degrees and evonav radians. Whole multiples of 1e-4 degrees survive the conversion there and back
+        bit by bit, so images and steps are the same whichever side computes them.
         """
         return Pose(
             self.x_m, self.y_m, self.z_m, canonical_yaw_rad(self.yaw_rad), canonical_horizon_rad(self.horizon_rad)
@@ -52,12 +52,12 @@ class Pose:
 
 
 def canonical_yaw_rad(yaw_rad: float) -> float:
-    """A yaw in `[0, 2 pi)`, rounded to 1e-4 degrees; see `Pose.canonical`."""
+    """Return a yaw in `[0, 2 pi)`, rounded to 1e-4 degrees; see `Pose.canonical`."""
     return math.radians(_round_deg(math.degrees(yaw_rad) % 360.0) % 360.0)
 
 
 def canonical_horizon_rad(horizon_rad: float) -> float:
-    """A horizon rounded to 1e-4 degrees; see `Pose.canonical`."""
+    """Round a horizon to 1e-4 degrees; see `Pose.canonical`."""
     return math.radians(_round_deg(math.degrees(horizon_rad)))
 
 

@@ -1,4 +1,4 @@
-"""The simulator protocol: what AI2-THOR and the embedded simulator both are."""
+"""The simulator protocol, which AI2-THOR and the embedded simulator implement."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,38 +36,38 @@ class Intrinsics:
 
 @dataclass(frozen=True, slots=True)
 class SimulatorConfig:
-    """AI2-THOR's defaults, with the paper's 15 degree turns (Sec. C.3)."""
+    """Camera, body and steps: AI2-THOR's defaults, with the paper's 15 degree turns (Sec. C.3)."""
 
     width_px: int = 300
     height_px: int = 300
     vertical_fov_deg: float = 90.0
     near_m: float = 0.1
     far_m: float = 20.0
-    """Planar depths between which surfaces are seen: beyond, depth is `inf`, the instance 0, the colour the sky's."""
+    """Planar depths between which surfaces are visible; elsewhere depth is `inf` and the instance 0."""
     camera_height_m: float = 1.575
     move_m: float = 0.25
     turn_deg: float = 15.0
     agent_radius_m: float = 0.2
     agent_height_m: float = 1.8
     grid_m: float = 0.25
-    """Spacing of `reachable_positions`."""
+    """Spacing of `reachable_positions`, in metres."""
     occupancy_cell_m: float = 0.1
-    """Cell of the oracle occupancy."""
+    """Edge of a cell of the oracle occupancy, in metres."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What the simulator renders at one camera pose. For evaluators: holds instance ids."""
+    """A simulator's images at one camera pose. It contains instance ids, so it is for evaluators only."""
 
     pose: Pose
-    """The camera's own: `y_m` is the height of its optical centre (`config.camera_height_m`), not the agent's."""
+    """Pose of the camera itself: `y_m` is its optical centre's height (`config.camera_height_m`), not the agent's."""
     intrinsics: Intrinsics
     depth_m: NDArray[np.float32]
-    """`(H, W)`, planar z in metres, `inf` where nothing is between `config.near_m` and `config.far_m`."""
+    """`(H, W)` planar depth in metres, `inf` where nothing is between `config.near_m` and `config.far_m`."""
     rgb: NDArray[np.uint8] | None = None
-    """`(H, W, 3)`, when asked for."""
+    """`(H, W, 3)` colours; `None` if not requested."""
     instances: NDArray[np.int32] | None = None
-    """`(H, W)`, 0 where nothing is, else 1 + index in `SceneObject` table order, when asked for."""
+    """`(H, W)` instance ids: 0 where nothing is, else 1 + index of the `SceneObject`; `None` if not requested."""
     is_action_success: bool = True
 
 
@@ -76,7 +76,7 @@ class OccupancyGrid:
     """Cells on the ground plane, `[row = z, col = x]`."""
 
     cells: NDArray[np.uint8]
-    """`(R, C)`: 0 where the agent's body reaches the cell's centre from the house's start, 1 everywhere else."""
+    """`(R, C)`: 0 where the agent's body reaches the cell's centre from the house's start, 1 elsewhere."""
     cell_m: float
     corner_m: tuple[float, float]
     """`(x, z)` of the smallest corner of cell (0, 0)."""
@@ -84,27 +84,27 @@ class OccupancyGrid:
 
 @dataclass(frozen=True, slots=True)
 class SceneObject:
-    """A body of the world, by instance id (its index + 1). Oracle data."""
+    """A body of the world; its instance id is its index + 1. Oracle data."""
 
     id: str
     category: str
     kind: str
-    """`object`, `wall`, `floor`, `ceiling`, `door` or `window`."""
+    """Kind: `object`, `wall`, `floor`, `ceiling`, `door` or `window`."""
     centre_m: tuple[float, float, float]
     size_m: tuple[float, float, float]
 
 
 class Simulator(Protocol):
-    """One house at a time; `evonav.world.check.check_simulator` tests an implementation.
+    """A simulator of one house at a time; `evonav.world.check.check_simulator` tests an implementation.
 
-    Agent poses and positions that it returns have AI2-THOR's height, the middle of the body
-    (`config.agent_height_m / 2`); heights that it is given do not matter.
+    Agent poses and positions that it returns have AI2-THOR's height, the middle of the body (`config.agent_height_m /
+    2`). It ignores the heights of those that it is given.
     """
 
     config: SimulatorConfig
 
     def reset(self, house_json: str, pose: Pose | None = None) -> Pose:
-        """Loads a house; the agent stands at `pose`, or at the house's own start. Returns the effective pose."""
+        """Load a house; the agent stands at `pose`, or at the house's own start. Return the effective pose."""
         ...
 
     @property
@@ -118,43 +118,43 @@ class Simulator(Protocol):
         ...
 
     def step(self, action: Action) -> bool:
-        """Does one discrete action; `False`, and the pose unchanged, when it collides."""
+        """Execute one discrete action; `False`, and the pose unchanged, when it collides."""
         ...
 
     def teleport(self, pose: Pose) -> bool:
-        """Sets the pose; `False`, and the pose unchanged, when it is not free."""
+        """Set the pose; `False`, and the pose unchanged, when it is not free."""
         ...
 
     def render(self, pose: Pose | None = None, *, rgb: bool = True, instances: bool = True) -> Frame:
-        """What the camera sees when the agent is at `pose` (default: where it is).
+        """Render the camera's view from `pose` (default: the agent's own).
 
-        The camera is `config.camera_height_m` over the floor, whatever `pose.y_m`. Colours cost more than the rest
-        together: pass `rgb=False` unless they are looked at.
+        The camera is `config.camera_height_m` above the floor, whatever `pose.y_m`. Colours cost more than the rest
+        together: pass `rgb=False` unless they are needed.
         """
         ...
 
     def reachable_positions(self) -> NDArray[np.float64]:
-        """`(N, 3)` positions of the grid that the agent can reach from where it stands."""
+        """Return the `(N, 3)` positions of the grid that the agent can reach from its place."""
         ...
 
     def nearest_reachable_position(self, position_m: tuple[float, float, float]) -> tuple[float, float, float]:
-        """The reachable position nearest on the ground plane."""
+        """Return the reachable position nearest on the ground plane."""
         ...
 
     def is_free(self, position_m: tuple[float, float, float]) -> bool:
-        """Whether the agent's body fits at the position and it is connected to the reachable floor."""
+        """Return whether the agent's body fits at the position and it is connected to the reachable floor."""
         ...
 
     def shortest_path(
         self, start_m: tuple[float, float, float], target_m: tuple[float, float, float]
     ) -> NDArray[np.float64]:
-        """`(M, 3)` corners of the geodesic; `(0, 3)` when there is none. Both ends snap to the nearest free point."""
+        """Return the geodesic's `(M, 3)` corners, `(0, 3)` without one; both ends move to the nearest free point."""
         ...
 
     def occupancy(self) -> OccupancyGrid:
-        """The oracle occupancy at `config.occupancy_cell_m`."""
+        """Return the oracle occupancy at `config.occupancy_cell_m`."""
         ...
 
     def close(self) -> None:
-        """Releases everything; safe to call twice."""
+        """Release everything; safe to call twice."""
         ...
