@@ -9,9 +9,9 @@ from typing import Any
 import jsonschema
 from PIL import Image
 
-from evonav.decision import mock_vlm
-from evonav.decision.mock_vlm import MockReply
-from evonav.decision.mock_vlm import MockServer as Stub
+from evonav.decision.vlm import mock_server as mock_vlm
+from evonav.decision.vlm.mock_server import MockReply
+from evonav.decision.vlm.mock_server import MockServer as Stub
 
 KEY = "sk-test-0123456789abcdefghijklmnop"
 

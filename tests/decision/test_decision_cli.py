@@ -10,10 +10,10 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.decision.mock_answers import mock_answer
 from evonav.decision.prompts import Prompt, Text, Turn
-from evonav.decision.vlm import VlmClient, VlmConfig
-from evonav.decision.vlm_errors import VlmError
+from evonav.decision.vlm.client import VlmClient, VlmConfig
+from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.evaluation.records.store import RunStore
 from vlm_stub import KEY, check_request, serving
 

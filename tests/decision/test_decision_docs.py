@@ -10,8 +10,8 @@ from evonav.cli.decision_options import DecisionOptions
 from evonav.decision import questions
 from evonav.decision.noisy import NoiseRates
 from evonav.decision.questions.question import Question
-from evonav.decision.vlm_decision import FAULTS
-from evonav.decision.vlm_errors import LASTING
+from evonav.decision.vlm.decision import FAULTS
+from evonav.decision.vlm.errors import LASTING
 
 TEXT = (Path(__file__).parents[2] / "docs" / "decision.md").read_text(encoding="utf-8")
 
@@ -45,7 +45,7 @@ def test_options_and_noise_are_told_of() -> None:
 def test_every_failure_of_a_model_has_a_consequence() -> None:
     from typing import get_args
 
-    from evonav.decision.vlm_errors import VlmFailure
+    from evonav.decision.vlm.errors import VlmFailure
 
     assert set(FAULTS) | LASTING == set(get_args(VlmFailure))
     assert not set(FAULTS) & LASTING

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from evonav.decision.ledger import Ledger
-from evonav.decision.mock_answers import mock_answer
-from evonav.decision.pacing import Pace
-from evonav.decision.vlm_errors import VlmError
+from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.ledger import Ledger
+from evonav.decision.vlm.mock_answers import mock_answer
+from evonav.decision.vlm.pacing import Pace
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.cost_estimate import estimate_run, ratio_error

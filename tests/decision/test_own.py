@@ -8,12 +8,12 @@ import pytest
 from test_noisy import Letter
 
 from evonav.decision.backends import own
-from evonav.decision.exchanges import ExchangeStore
 from evonav.decision.own import OwnClient
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.question import AnswerError, Question, Reply
-from evonav.decision.vlm_decision import VlmDecision
-from evonav.decision.vlm_errors import VlmError
+from evonav.decision.vlm.decision import VlmDecision
+from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.response_cache import ExchangeStore
 from evonav.errors import DecisionError, InvalidArgumentError
 from evonav.evaluation.records.store import RunStore
 

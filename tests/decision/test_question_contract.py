@@ -13,7 +13,7 @@ from evonav.decision.noisy import GARBAGE
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.questions.question import AnswerError, Question, Reply
 from evonav.decision.text_match import TextMatch
-from evonav.decision.vlm_decision import read_json, with_schema
+from evonav.decision.vlm.decision import read_json, with_schema
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend

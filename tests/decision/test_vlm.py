@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evonav.decision.account import Account, Price, Usage, image_tokens, read_prices
-from evonav.decision.exchanges import ExchangeStore, Failure, key_of
 from evonav.decision.prompts import Picture, Prompt, Text, Turn
-from evonav.decision.vlm import Answer, VlmClient, VlmConfig
-from evonav.decision.vlm_errors import VlmError
+from evonav.decision.vlm.account import Account, Price, Usage, image_tokens, read_prices
+from evonav.decision.vlm.client import Answer, VlmClient, VlmConfig
+from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.response_cache import ExchangeStore, Failure, key_of
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError
 from vlm_stub import KEY, Stub, images_in, serving
 
@@ -111,9 +111,9 @@ def test_replay_imports_no_client(config: VlmConfig, path: Path) -> None:
     VlmClient(config, store=ExchangeStore(path), mode="record").ask(Prompt.of(Text("Hello?")))
     script = f"""
 import sys
-from evonav.decision.exchanges import ExchangeStore
+from evonav.decision.vlm.response_cache import ExchangeStore
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.vlm import VlmClient, VlmConfig
+from evonav.decision.vlm.client import VlmClient, VlmConfig
 client = VlmClient(VlmConfig("gpt-4o"), store=ExchangeStore({str(path)!r}), mode="replay")
 print(client.ask(Prompt.of(Text("Hello?"))).text)
 assert not {{"openai", "httpx", "httpx2"}} & sys.modules.keys()

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evonav.decision.exchanges import ExchangeStore
-from evonav.decision.mock_answers import mock_answer
-from evonav.decision.mock_vlm import FAULTS, MockReply, faulty, without_schemas
+from evonav.decision.vlm.mock_answers import mock_answer
+from evonav.decision.vlm.mock_server import FAULTS, MockReply, faulty, without_schemas
+from evonav.decision.vlm.response_cache import ExchangeStore
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore

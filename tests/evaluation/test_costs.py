@@ -1,9 +1,9 @@
 import pytest
 
 from evonav.agents import wire
-from evonav.decision.account import Account, Price, Usage
 from evonav.decision.metered import Metered
 from evonav.decision.questions.question import Reply
+from evonav.decision.vlm.account import Account, Price, Usage
 from evonav.evaluation.metrics.stage_metrics import stage_rows
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.store import RunStore

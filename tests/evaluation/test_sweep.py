@@ -15,8 +15,8 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.decision.ledger import Ledger
-from evonav.decision.mock_answers import mock_answer
+from evonav.decision.vlm.ledger import Ledger
+from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.errors import EvonavError, StoreError
 from evonav.evaluation.metrics.navigation import rates
 from evonav.evaluation.records.store import RunStore

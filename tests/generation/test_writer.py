@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evonav.decision.account import Account, Price
-from evonav.decision.exchanges import ExchangeStore
-from evonav.decision.vlm import VlmClient, VlmConfig
+from evonav.decision.vlm.account import Account, Price
+from evonav.decision.vlm.client import VlmClient, VlmConfig
+from evonav.decision.vlm.response_cache import ExchangeStore
 from evonav.errors import TaskError
 from evonav.generation import prompts
 from evonav.generation.writer import estimate_texts, write_texts

@@ -207,8 +207,8 @@ def print_estimate(
     from rich.table import Table
 
     from evonav.cli.display import progress
-    from evonav.decision.account import Usage
-    from evonav.decision.counting import OUTPUT_TOKENS
+    from evonav.decision.vlm.account import Usage
+    from evonav.decision.vlm.counting import OUTPUT_TOKENS
     from evonav.evaluation.run.cost_estimate import estimate_run
     from evonav.evaluation.run.settings import SpendingSettings
 
@@ -237,7 +237,7 @@ def print_estimate(
 
 def print_spending(out: Path) -> None:
     """What the models of a run were asked and paid, over all its calls."""
-    from evonav.decision.ledger import LEDGER_NAME, Ledger
+    from evonav.decision.vlm.ledger import LEDGER_NAME, Ledger
 
     path = out / LEDGER_NAME
     if not path.is_file():

@@ -280,7 +280,7 @@ def _procthor() -> Check:
 
 def _endpoint(where: Where) -> Check:
     """Lists the models of an endpoint, only where one is configured."""
-    from evonav.decision.vlm import KEY_VARIABLE, URL_VARIABLE
+    from evonav.decision.vlm.client import KEY_VARIABLE, URL_VARIABLE
 
     key, url = os.environ.get(KEY_VARIABLE), where.base_url or os.environ.get(URL_VARIABLE)
     if not key and not url:

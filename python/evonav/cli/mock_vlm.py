@@ -21,9 +21,9 @@ def mock_vlm(
     """
     import time
 
-    from evonav.decision.mock_answers import mock_answer
-    from evonav.decision.mock_vlm import FAULTS, MockServer, faulty, serving, without_schemas
     from evonav.decision.rates import read_rates
+    from evonav.decision.vlm.mock_answers import mock_answer
+    from evonav.decision.vlm.mock_server import FAULTS, MockServer, faulty, serving, without_schemas
 
     def answer(request: dict[str, object]) -> str:
         time.sleep(latency)

@@ -100,7 +100,7 @@ class SweepProgress:
 
     def costs(self) -> "Mapping[str, float]":
         """Dollars by cell; read now and then."""
-        from evonav.decision.ledger import LEDGER_NAME, Ledger
+        from evonav.decision.vlm.ledger import LEDGER_NAME, Ledger
 
         now_s = time.monotonic()
         path = self.out / LEDGER_NAME

@@ -50,9 +50,9 @@ def write(
 
     The key is read from OPENAI_API_KEY. An interrupted pass goes on where it was when it is started again.
     """
-    from evonav.decision.account import Account, read_prices
-    from evonav.decision.exchanges import ExchangeStore
-    from evonav.decision.vlm import VlmClient, VlmConfig
+    from evonav.decision.vlm.account import Account, read_prices
+    from evonav.decision.vlm.client import VlmClient, VlmConfig
+    from evonav.decision.vlm.response_cache import ExchangeStore
     from evonav.errors import InvalidArgumentError
     from evonav.generation.writer import estimate_texts, write_texts
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 from evonav.decision.questions.question import DecisionModel
 
 if TYPE_CHECKING:  # the text matcher loads none of this
-    from evonav.decision.vlm import VlmConfig
+    from evonav.decision.vlm.client import VlmConfig
 
 SAMPLING: Mapping[str, Any] = {
     "temperature": 0.7,
@@ -74,11 +74,11 @@ def vlm(
         InvalidArgumentError: An option makes no sense.
         StoreError: The file of exchanges cannot be opened.
     """
-    from evonav.decision.account import Account, Price
-    from evonav.decision.exchanges import ExchangeStore
-    from evonav.decision.ledger import Ledger
-    from evonav.decision.vlm import VlmClient
-    from evonav.decision.vlm_decision import VlmDecision
+    from evonav.decision.vlm.account import Account, Price
+    from evonav.decision.vlm.client import VlmClient
+    from evonav.decision.vlm.decision import VlmDecision
+    from evonav.decision.vlm.ledger import Ledger
+    from evonav.decision.vlm.response_cache import ExchangeStore
 
     store = None if exchanges is None else ExchangeStore(Path(exchanges))
     config = vlm_config(model, request, server)
@@ -119,11 +119,11 @@ def own(
         InvalidArgumentError: It cannot be imported or made, or is none such.
         StoreError: The file of exchanges cannot be opened.
     """
-    from evonav.decision.account import Account
-    from evonav.decision.exchanges import ExchangeStore
-    from evonav.decision.ledger import Ledger
     from evonav.decision.own import OwnClient, own_model
-    from evonav.decision.vlm_decision import VlmDecision
+    from evonav.decision.vlm.account import Account
+    from evonav.decision.vlm.decision import VlmDecision
+    from evonav.decision.vlm.ledger import Ledger
+    from evonav.decision.vlm.response_cache import ExchangeStore
 
     model = own_model(path, seed)
     if hasattr(model, "answer"):
@@ -146,10 +146,10 @@ def counting(
     noise: Mapping[str, float] | None = None,
 ) -> DecisionModel:
     """The text matcher, booking in `ledger` what `vlm` with the same options would be asked; see `vlm`."""
-    from evonav.decision.counting import Counting
-    from evonav.decision.ledger import Ledger
     from evonav.decision.text_match import TextMatch
-    from evonav.decision.vlm import VlmClient
+    from evonav.decision.vlm.client import VlmClient
+    from evonav.decision.vlm.counting import Counting
+    from evonav.decision.vlm.ledger import Ledger
 
     client = VlmClient(vlm_config(model, request))
     is_json = structured != "off"
@@ -173,7 +173,7 @@ def vlm_config(
     Raises:
         InvalidArgumentError: A name is unknown, or a value makes no sense.
     """
-    from evonav.decision.vlm import VlmConfig
+    from evonav.decision.vlm.client import VlmConfig
     from evonav.errors import InvalidArgumentError
 
     try:

@@ -3,8 +3,8 @@
 import time
 from typing import Any, TypeVar
 
-from evonav.decision.account import Account
 from evonav.decision.questions.question import DecisionModel, Question, Reply
+from evonav.decision.vlm.account import Account
 
 A = TypeVar("A")
 

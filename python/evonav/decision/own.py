@@ -5,13 +5,13 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, Protocol, cast
 
-from evonav.decision.account import Account, Usage
-from evonav.decision.exchanges import ExchangeStore, Failure, JsonObject, image_name, key_of
-from evonav.decision.images import png_of
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.question import DecisionModel
-from evonav.decision.vlm_answer import Answer
-from evonav.decision.vlm_errors import LASTING, VlmError, VlmFailure
+from evonav.decision.vlm.account import Account, Usage
+from evonav.decision.vlm.answer import Answer
+from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure
+from evonav.decision.vlm.images import png_of
+from evonav.decision.vlm.response_cache import ExchangeStore, Failure, JsonObject, image_name, key_of
 from evonav.errors import DecisionError, InvalidArgumentError
 
 

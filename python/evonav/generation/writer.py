@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.account import Usage
 from evonav.decision.prompts import Prompt
-from evonav.decision.vlm import VlmClient
-from evonav.decision.vlm_errors import LASTING, VlmError
+from evonav.decision.vlm.account import Usage
+from evonav.decision.vlm.client import VlmClient
+from evonav.decision.vlm.errors import LASTING, VlmError
 from evonav.errors import TaskError
 from evonav.generation.prompts import appearance_question, cleaned, fault_of, repair_request, unified_question
 from evonav.parallel.folders import put_folder

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from evonav.decision.account import Usage
+from evonav.decision.vlm.account import Usage
 from evonav.evaluation.run.cost_estimate import estimate_run
 from evonav.evaluation.run.settings import SpendingSettings
 from evonav.sweeps.file import SweepFile

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from evonav.decision.ledger import Ledger
+from evonav.decision.vlm.ledger import Ledger
 from evonav.evaluation.run.run import Progress, RunConfig, agent_seed, evaluate
 from evonav.tasks.listing import TaskFile
 

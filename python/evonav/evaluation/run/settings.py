@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ConfigDict, Field
 
-from evonav.decision.ledger import LEDGER_NAME
-from evonav.decision.vlm import Mode
+from evonav.decision.vlm.client import Mode
+from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.run.components import Backend
 from evonav.perception.words import PREDICTED, read_word
 from evonav.tasks.records import Record
 
 if TYPE_CHECKING:
-    from evonav.decision.account import Price
+    from evonav.decision.vlm.account import Price
 
 EXCHANGES_NAME = "exchanges.sqlite"
 """In the folder of a run."""
@@ -255,7 +255,7 @@ class DecisionSettings(Settings):
 
     def _keeping(self, run_dir: Path) -> dict[str, Any]:
         """Where exchanges are kept, and what is had from there."""
-        from evonav.decision.exchanges import ExchangeStore
+        from evonav.decision.vlm.response_cache import ExchangeStore
         from evonav.evaluation.records.store import FILE_NAME
 
         mode = self.mode or "auto"
@@ -288,7 +288,7 @@ class SpendingSettings:
         Raises:
             InvalidArgumentError: The table cannot be read, or lacks the model.
         """
-        from evonav.decision.account import read_prices
+        from evonav.decision.vlm.account import read_prices
 
         if self.prices is None:
             return None

@@ -2,11 +2,11 @@
 
 from typing import TypeVar
 
-from evonav.decision.account import Usage
-from evonav.decision.ledger import Ledger
 from evonav.decision.questions.question import DecisionModel, Question, Reply
-from evonav.decision.vlm import VlmClient
-from evonav.decision.vlm_decision import with_schema
+from evonav.decision.vlm.account import Usage
+from evonav.decision.vlm.client import VlmClient
+from evonav.decision.vlm.decision import with_schema
+from evonav.decision.vlm.ledger import Ledger
 
 A = TypeVar("A")
 

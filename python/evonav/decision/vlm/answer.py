@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from evonav.decision.account import Usage
-from evonav.decision.exchanges import Failure, JsonObject
-from evonav.decision.vlm_errors import VlmError
+from evonav.decision.vlm.account import Usage
+from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.response_cache import Failure, JsonObject
 
 
 @dataclass(frozen=True, slots=True)

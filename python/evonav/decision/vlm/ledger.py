@@ -7,8 +7,8 @@ with a question under way leaves what it had set aside: the server may have coun
 from dataclasses import dataclass
 from pathlib import Path
 
-from evonav.decision.shared_file import SharedFile
-from evonav.decision.vlm_errors import VlmError
+from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.shared_file import SharedFile
 
 LEDGER_NAME = "spending.sqlite"
 """In the folder of a run."""

@@ -6,8 +6,8 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
-from evonav.decision.ledger import Ledger
-from evonav.decision.vlm_errors import VlmError
+from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.ledger import Ledger
 from evonav.errors import InvalidArgumentError
 
 CHARACTERS_PER_TOKEN = 3.0

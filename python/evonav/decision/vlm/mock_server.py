@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from evonav.decision.mock_answers import mock_answer
+from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.errors import InvalidArgumentError
 
 JsonObject = dict[str, Any]

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.shared_file import SharedFile
+from evonav.decision.vlm.shared_file import SharedFile
 from evonav.errors import StoreError
 
 JsonObject = dict[str, Any]

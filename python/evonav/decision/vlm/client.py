@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.account import CHARACTERS_PER_TOKEN, Account, Usage, image_tokens
-from evonav.decision.exchanges import ExchangeStore, Failure, JsonObject, image_name, key_of
-from evonav.decision.images import png_of
-from evonav.decision.pacing import Pace
 from evonav.decision.prompts import Prompt, Text, Turn
-from evonav.decision.vlm_answer import Answer, is_malformed, read_answer, usage_of
-from evonav.decision.vlm_errors import LASTING, VlmError, VlmFailure
+from evonav.decision.vlm.account import CHARACTERS_PER_TOKEN, Account, Usage, image_tokens
+from evonav.decision.vlm.answer import Answer, is_malformed, read_answer, usage_of
+from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure
+from evonav.decision.vlm.images import png_of
+from evonav.decision.vlm.pacing import Pace
+from evonav.decision.vlm.response_cache import ExchangeStore, Failure, JsonObject, image_name, key_of
 from evonav.errors import DecisionError, InvalidArgumentError
 
 if TYPE_CHECKING:
