@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from evonav.decision.language import parse_goal
-from evonav.decision.matching import Matcher
-from evonav.decision.text_features import similarity_of_label
+from evonav.decision.text.features import similarity_of_label
+from evonav.decision.text.language import parse_goal
+from evonav.decision.text.matcher import Matcher
 from evonav.evaluation.run.components import load_case
 from evonav.tasks.language import noun_of
 from evonav.world.embedded import EmbeddedSimulator

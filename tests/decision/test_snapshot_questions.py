@@ -11,7 +11,7 @@ from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuest
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.questions.question import AnswerError
-from evonav.decision.text_match import TextMatch
+from evonav.decision.text.decision import TextMatch
 from evonav.tasks.public import StageInput
 
 CLASSES = tuple(sorted(("Apple", "Bed", "Chair", "CounterTop", "DiningTable", "Fridge", "Mug", "Sink")))

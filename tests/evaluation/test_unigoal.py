@@ -20,7 +20,7 @@ from evonav.agents.unigoal.scene_questions import (
     RelationLinesQuestion,
 )
 from evonav.decision.scripted import Scripted
-from evonav.decision.text_match import TextMatch
+from evonav.decision.text.decision import TextMatch
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records.schema import EndState

@@ -15,7 +15,7 @@ from evonav.agents.unigoal.goal_graph import (
     similarity_transform,
 )
 from evonav.agents.unigoal.object_graph import ObjectGraph, SceneEdge, SceneNode
-from evonav.decision.language import canonical
+from evonav.decision.text.language import canonical
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.tasks.language import noun_of
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, WORD_OF_TYPE, category_image, relabelled
@@ -195,7 +195,7 @@ def test_unmapped_types_are_invisible():
 
 
 def test_tables_name_types_that_there_are():
-    from evonav.decision.language import _NOUNS
+    from evonav.decision.text.language import _NOUNS
 
     for kind in {*CATEGORY_OF_TYPE, *WORD_OF_TYPE} - {"SinkBasin", "Cabinet", "Mirror", "Curtains", "Cup"}:
         assert canonical(noun_of(kind)) in _NOUNS, kind

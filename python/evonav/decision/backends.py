@@ -24,13 +24,13 @@ SAMPLING: Mapping[str, Any] = {
 
 
 def text_match(seed: int, *, noise: Mapping[str, float] | None = None) -> DecisionModel:
-    """The rules of `evonav.decision.text_match`, which draw nothing.
+    """The rules of `evonav.decision.text.decision`, which draw nothing.
 
     Args:
         seed: Of the agent.
         noise: Rates of mistakes, by the names of `NoiseRates`; so for all of these.
     """
-    from evonav.decision.text_match import TextMatch
+    from evonav.decision.text.decision import TextMatch
 
     return _with_noise(TextMatch(), noise, seed)
 
@@ -146,7 +146,7 @@ def counting(
     noise: Mapping[str, float] | None = None,
 ) -> DecisionModel:
     """The text matcher, booking in `ledger` what `vlm` with the same options would be asked; see `vlm`."""
-    from evonav.decision.text_match import TextMatch
+    from evonav.decision.text.decision import TextMatch
     from evonav.decision.vlm.client import VlmClient
     from evonav.decision.vlm.counting import Counting
     from evonav.decision.vlm.ledger import Ledger

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Literal
 
-from evonav.decision.language import canonical
+from evonav.decision.text.language import canonical
 from evonav.tasks.language import noun_of
 from evonav.tasks.vocabulary import MAP_CATEGORIES
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
 from evonav.decision.asking import Asker
-from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.question import AnswerError, DecisionModel, Question, first_line
+from evonav.decision.text.matcher import Matcher
 from evonav.memory import ObjectMap, OccupancyMap
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo

@@ -10,12 +10,12 @@ from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.asking import Asker
-from evonav.decision.matching import Matcher
-from evonav.decision.minilm import encoder
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
 from evonav.decision.questions.question import DecisionModel
-from evonav.decision.ranking import rank_by_feature, rank_by_text, rank_entries
-from evonav.decision.text_match import TextMatch
+from evonav.decision.text.decision import TextMatch
+from evonav.decision.text.matcher import Matcher
+from evonav.decision.text.minilm import encoder
+from evonav.decision.text.ranking import rank_by_feature, rank_by_text, rank_entries
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
 from evonav.sensors.observation import Observation

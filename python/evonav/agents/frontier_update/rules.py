@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-from evonav.decision.choosing import choose_candidate
-from evonav.decision.language import canonical
-from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import Choice
+from evonav.decision.text.choosing import choose_candidate
+from evonav.decision.text.language import canonical
+from evonav.decision.text.matcher import Matcher
 
 if TYPE_CHECKING:
     from evonav.agents.frontier_update.questions import ChooseQuestion, VerifyQuestion

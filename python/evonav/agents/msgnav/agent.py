@@ -32,7 +32,7 @@ from evonav.agents.visible_viewpoint import Viewpoint, ViewpointConfig, visible_
 from evonav.decision.asking import Asker
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
 from evonav.decision.questions.question import DecisionModel
-from evonav.decision.text_match import TextMatch
+from evonav.decision.text.decision import TextMatch
 from evonav.memory import Frontier
 from evonav.memory.occupancy import FREE
 from evonav.memory.views import pixels_of

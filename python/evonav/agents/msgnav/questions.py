@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 from evonav.agents.msgnav import rules
 from evonav.agents.msgnav.candidates import GraphChoice, GraphImage, GraphObject, PastChoice
-from evonav.decision.matching import Matcher
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.decision.questions.question import (
@@ -22,6 +21,7 @@ from evonav.decision.questions.question import (
     lines_of,
 )
 from evonav.decision.questions.wording import goal_parts, merged, titled
+from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput
 
 _ID = re.compile(r"(?:object\s+)?(\d+)[.,:;]?", re.IGNORECASE)

@@ -14,7 +14,7 @@ from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuest
 from evonav.decision.asking import Asker
 from evonav.decision.questions.candidates import ObjectCandidate
 from evonav.decision.questions.question import DecisionModel
-from evonav.decision.text_match import TextMatch
+from evonav.decision.text.decision import TextMatch
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.views import crop_of, pixels_of

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING
 
 from evonav.agents.three_d_mem.candidates import SnapshotChoice
-from evonav.decision.choosing import choose_candidate
-from evonav.decision.matching import Matcher
-from evonav.decision.ranking import rank_entries
+from evonav.decision.text.choosing import choose_candidate
+from evonav.decision.text.matcher import Matcher
+from evonav.decision.text.ranking import rank_entries
 
 if TYPE_CHECKING:
     from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion

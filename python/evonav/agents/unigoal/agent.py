@@ -30,7 +30,7 @@ from evonav.agents.unigoal.object_graph import SceneNode
 from evonav.agents.unigoal.planner import PlannedStep, PlannerConfig, UniGoalPlanner
 from evonav.decision.asking import Asker
 from evonav.decision.questions.question import DecisionModel
-from evonav.decision.text_match import TextMatch
+from evonav.decision.text.decision import TextMatch
 from evonav.memory.occupancy import BLOCKED, FREE
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import StageInput, TaskInfo

@@ -21,9 +21,9 @@ from evonav.agents.unigoal.scene_questions import (
     RoomQuestion,
 )
 from evonav.decision.asking import Asker
-from evonav.decision.language import ROOMS, canonical
-from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import ObjectCandidate
+from evonav.decision.text.language import ROOMS, canonical
+from evonav.decision.text.matcher import Matcher
 from evonav.sensors.observation import View
 from evonav.tasks.public import StageInput
 from evonav.tasks.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES, NO_CATEGORY, WORD_OF_TYPE

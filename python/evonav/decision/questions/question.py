@@ -15,7 +15,7 @@ from evonav.errors import DecisionError
 from evonav.tasks.public import StageInput
 
 if TYPE_CHECKING:
-    from evonav.decision.matching import Matcher
+    from evonav.decision.text.matcher import Matcher
 
 A = TypeVar("A")
 """What an answer means."""

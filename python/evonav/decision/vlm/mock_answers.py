@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from evonav.decision.language import Goal, parse_goal, similarity
+from evonav.decision.text.language import Goal, parse_goal, similarity
 
 _TOLD = re.compile(r"^(?:Goal of the robot|A robot is told|A robot looks for)(?: for)?:? (.*)$", re.MULTILINE)
 _TITLE = re.compile(r"^((?:Snapshot \d+, )?Object \d+|Frontier \d+):? ?(.*)$", re.MULTILINE)

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.decision.text_features import similarity_of_label
+from evonav.decision.text.features import similarity_of_label
+from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput
 
 

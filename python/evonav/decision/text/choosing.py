@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from evonav.decision.matching import Matcher
 from evonav.decision.questions.candidates import Choice, FrontierCandidate, ObjectCandidate
 from evonav.decision.questions.question import AnswerError
+from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput
 
 

