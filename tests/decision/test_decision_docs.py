@@ -9,7 +9,7 @@ from pkgutil import iter_modules
 from evonav.cli.decision_options import DecisionOptions
 from evonav.decision import questions
 from evonav.decision.noisy import NoiseRates
-from evonav.decision.questions.question import Question
+from evonav.decision.question import Question
 from evonav.decision.vlm.decision import FAULTS
 from evonav.decision.vlm.errors import LASTING
 

@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from evonav.decision.asking import Asker
 from evonav.decision.noisy import GARBAGE, NoiseRates, Noisy
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.questions.question import AnswerError, Question, Reply
+from evonav.decision.query import Asker
+from evonav.decision.question import AnswerError, Question, Reply
 from evonav.decision.scripted import Scripted
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig

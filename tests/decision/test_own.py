@@ -8,9 +8,9 @@ import pytest
 from test_noisy import Letter
 
 from evonav.decision.backends import own
-from evonav.decision.own import OwnClient
+from evonav.decision.custom_model import OwnClient
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.questions.question import AnswerError, Question, Reply
+from evonav.decision.question import AnswerError, Question, Reply
 from evonav.decision.vlm.decision import VlmDecision
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.response_cache import ExchangeStore

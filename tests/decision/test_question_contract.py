@@ -11,7 +11,7 @@ import pytest
 
 from evonav.decision.noisy import GARBAGE
 from evonav.decision.prompts import Picture, Text
-from evonav.decision.questions.question import AnswerError, Question, Reply
+from evonav.decision.question import AnswerError, Question, Reply
 from evonav.decision.text.decision import TextMatch
 from evonav.decision.vlm.decision import read_json, with_schema
 from evonav.evaluation.protocol import ProtocolConfig

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.three_d_mem.candidates import SnapshotCandidate, SnapshotChoice
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.prompts import Picture, Text
-from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
-from evonav.decision.questions.question import AnswerError
+from evonav.decision.question import AnswerError
 from evonav.decision.text.decision import TextMatch
 from evonav.tasks.public import StageInput
 

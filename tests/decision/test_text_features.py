@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
-from evonav.decision.questions.candidates import ObjectCandidate
+from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.text import minilm
 from evonav.decision.text.features import similarity_of_label, text_feature
 from evonav.decision.text.ranking import rank_by_text

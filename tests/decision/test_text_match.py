@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evonav.agents.frontier_update.questions import ChooseQuestion, Sighting, VerifyQuestion
-from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
-from evonav.decision.questions.question import AnswerError, Question
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
+from evonav.decision.question import AnswerError, Question
 from evonav.decision.text.decision import TextMatch
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.ranking import rank_by_feature, rank_entries

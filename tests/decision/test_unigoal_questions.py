@@ -19,7 +19,7 @@ from evonav.agents.unigoal.scene_questions import (
     RelationLinesQuestion,
     RoomQuestion,
 )
-from evonav.decision.questions.question import AnswerError
+from evonav.decision.question import AnswerError
 from evonav.decision.text.decision import TextMatch
 from evonav.tasks.public import StageInput
 from evonav.tasks.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES

@@ -2,7 +2,7 @@ import pytest
 
 from evonav.agents import wire
 from evonav.decision.metered import Metered
-from evonav.decision.questions.question import Reply
+from evonav.decision.question import Reply
 from evonav.decision.vlm.account import Account, Price, Usage
 from evonav.evaluation.metrics.stage_metrics import stage_rows
 from evonav.evaluation.records.costs import Stopwatch

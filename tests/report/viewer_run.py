@@ -2,7 +2,7 @@
 
 import re
 
-from evonav.decision.questions.question import AnswerError
+from evonav.decision.question import AnswerError
 from evonav.decision.scripted import Scripted
 
 MARKUP = "<b>bold</b> & </script> reasons"

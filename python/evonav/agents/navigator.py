@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from evonav.agents.agent import Belief, EntryBelief, FrontierBelief, NavigateTo, RoundDiagnostics
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
-from evonav.decision.asking import Asked
-from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels
+from evonav.decision.query import Asked
 from evonav.memory import Frontier, ObjectMap, ObjectMapConfig
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE

@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import Any, cast
 
 from evonav.agents.agent import Agent
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 
 ENTRY_POINT_GROUP = "evonav.agents"

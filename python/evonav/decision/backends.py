@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.question import DecisionModel
 
 if TYPE_CHECKING:  # the text matcher loads none of this
     from evonav.decision.vlm.client import VlmConfig
@@ -119,7 +119,7 @@ def own(
         InvalidArgumentError: It cannot be imported or made, or is none such.
         StoreError: The file of exchanges cannot be opened.
     """
-    from evonav.decision.own import OwnClient, own_model
+    from evonav.decision.custom_model import OwnClient, own_model
     from evonav.decision.vlm.account import Account
     from evonav.decision.vlm.decision import VlmDecision
     from evonav.decision.vlm.ledger import Ledger

@@ -3,7 +3,7 @@
 import time
 from typing import Any, TypeVar
 
-from evonav.decision.questions.question import DecisionModel, Question, Reply
+from evonav.decision.question import DecisionModel, Question, Reply
 from evonav.decision.vlm.account import Account
 
 A = TypeVar("A")

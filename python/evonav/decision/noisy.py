@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
-from evonav.decision.questions.question import AnswerError, DecisionModel, Question, Reply
+from evonav.decision.question import AnswerError, DecisionModel, Question, Reply
 from evonav.errors import InvalidArgumentError
 
 A = TypeVar("A")

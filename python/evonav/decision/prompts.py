@@ -1,11 +1,13 @@
 """What a model is given to read and to look at: words and images in turns."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from evonav.tasks.public import StageInput
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,3 +68,25 @@ class Prompt:
         """The prompt that follows an answer."""
         turns = (*self.turns, Turn("assistant", (Text(answer),)), Turn("user", (Text(reply),)))
         return Prompt(turns, self.schema)
+
+
+def goal_parts(goal: StageInput) -> tuple[Part, ...]:
+    """Return the goal as the reported experiments give it: the unified instruction alone (paper, Sec. C.1)."""
+    return (Text(f"Goal of the robot: {goal.unified_instruction}"),)
+
+
+def titled(title: str, image: NDArray[np.uint8] | None) -> tuple[Part, ...]:
+    """Return a line, and the image that it describes if there is one."""
+    return (Text(title),) if image is None else (Text(title), Picture(image))
+
+
+def merged(parts: Iterable[Part]) -> tuple[Part, ...]:
+    """Join neighbouring texts by line breaks."""
+    joined: list[Part] = []
+    for part in parts:
+        last = joined[-1] if joined else None
+        if isinstance(part, Text) and isinstance(last, Text):
+            joined[-1] = Text(f"{last.text}\n{part.text}")
+        else:
+            joined.append(part)
+    return tuple(joined)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from evonav.decision.questions.question import Question, Reply
+from evonav.decision.question import Question, Reply
 
 A = TypeVar("A")
 

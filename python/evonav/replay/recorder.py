@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from evonav.agents.agent import Agent, Belief, InspectableAgent
-from evonav.decision.asking import Asked
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.prompts import Picture
-from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate
-from evonav.decision.questions.question import Question
+from evonav.decision.query import Asked
+from evonav.decision.question import Question
 from evonav.evaluation.protocol import AgentFailedError, StageOutcome
 from evonav.evaluation.records.convert import STALE_MARGIN_M, distance_to_box_m, entry_record, pose_record
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord

@@ -15,7 +15,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from evonav.agents.registry import imported
-from evonav.decision.own import own_model
+from evonav.decision.custom_model import own_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES

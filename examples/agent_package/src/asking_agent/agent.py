@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass
 
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
-from evonav.decision.asking import Asker
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.questions.question import AnswerError, DecisionModel, Question, first_line
+from evonav.decision.query import Asker
+from evonav.decision.question import AnswerError, DecisionModel, Question, first_line
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import ObjectMap, OccupancyMap
 from evonav.sensors.observation import Observation

@@ -9,9 +9,9 @@ from evonav.agents.agent import AgentAction, Belief, EntryBelief, RoundDiagnosti
 from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
-from evonav.decision.asking import Asker
-from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.query import Asker
+from evonav.decision.question import DecisionModel
 from evonav.decision.text.decision import TextMatch
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.minilm import encoder

@@ -6,8 +6,8 @@ from typing import Literal
 
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
 from evonav.agents.frontier_update.questions import Sighting, VerifyQuestion
-from evonav.decision.questions.candidates import Point3
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.candidates import Point3
+from evonav.decision.question import DecisionModel
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.views import pixels_of
 from evonav.sensors.observation import Observation, View

@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from evonav.agents.frontier_update import rules
-from evonav.decision.prompts import Prompt, Text
-from evonav.decision.questions.candidates import Choice, FrontierCandidate, ObjectCandidate, Pixels, Point2
-from evonav.decision.questions.question import AnswerError, ClosedQuestion, YesNoQuestion, first_line
-from evonav.decision.questions.wording import goal_parts, merged, titled
+from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.prompts import Prompt, Text, goal_parts, merged, titled
+from evonav.decision.question import AnswerError, ClosedQuestion, YesNoQuestion, first_line
 from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput
 

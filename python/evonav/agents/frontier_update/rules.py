@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from evonav.decision.questions.candidates import Choice
+from evonav.decision.candidates import Choice
 from evonav.decision.text.choosing import choose_candidate
 from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher

@@ -8,7 +8,7 @@ from evonav.agents.agent import AgentAction, NavigateTo
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
 from evonav.agents.navigator import Navigator
 from evonav.agents.viewpoint import widest_direction_rad
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.question import DecisionModel
 from evonav.memory.occupancy import FREE
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput

@@ -29,9 +29,9 @@ from evonav.agents.msgnav.questions import ArrivalQuestion, FrontierImagesQuesti
 from evonav.agents.msgnav.scene_graph import Subgraph
 from evonav.agents.navigator import Navigator, NavigatorConfig
 from evonav.agents.visible_viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
-from evonav.decision.asking import Asker
-from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.query import Asker
+from evonav.decision.question import DecisionModel
 from evonav.decision.text.decision import TextMatch
 from evonav.memory import Frontier
 from evonav.memory.occupancy import FREE

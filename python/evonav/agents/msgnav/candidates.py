@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from evonav.decision.questions.candidates import ObjectCandidate, Pixels, Point2
+from evonav.decision.candidates import ObjectCandidate, Pixels, Point2
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from evonav.agents.msgnav.candidates import GraphImage, GraphObject, SeenObject
 from evonav.agents.msgnav.scene_graph import SceneGraph
 from evonav.agents.navigator import Navigator
-from evonav.decision.questions.candidates import ObjectCandidate
+from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.text.language import canonical, similarity
 from evonav.decision.text.matcher import Matcher
 from evonav.memory.clouds import ViewClouds, clouds_of

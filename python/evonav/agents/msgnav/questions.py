@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 
 from evonav.agents.msgnav import rules
 from evonav.agents.msgnav.candidates import GraphChoice, GraphImage, GraphObject, PastChoice
-from evonav.decision.prompts import Prompt, Text
-from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
-from evonav.decision.questions.question import (
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.prompts import Prompt, Text, goal_parts, merged, titled
+from evonav.decision.question import (
     AnswerError,
     ClosedQuestion,
     Question,
@@ -20,7 +20,6 @@ from evonav.decision.questions.question import (
     first_line,
     lines_of,
 )
-from evonav.decision.questions.wording import goal_parts, merged, titled
 from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput
 

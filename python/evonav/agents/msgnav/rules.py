@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from evonav.agents.msgnav.candidates import GraphChoice
-from evonav.decision.questions.candidates import ObjectCandidate, Point2
-from evonav.decision.questions.question import AnswerError
+from evonav.decision.candidates import ObjectCandidate, Point2
+from evonav.decision.question import AnswerError
 from evonav.decision.text.language import Goal, canonical, similarity
 from evonav.decision.text.matcher import Matcher, gap_m
 from evonav.decision.text.ranking import rank_entries

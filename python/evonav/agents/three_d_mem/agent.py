@@ -11,9 +11,9 @@ from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.agents.three_d_mem.candidates import SnapshotCandidate
 from evonav.agents.three_d_mem.memory import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
-from evonav.decision.asking import Asker
-from evonav.decision.questions.candidates import ObjectCandidate
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.query import Asker
+from evonav.decision.question import DecisionModel
 from evonav.decision.text.decision import TextMatch
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from evonav.decision.questions.candidates import ObjectCandidate, Pixels
+from evonav.decision.candidates import ObjectCandidate, Pixels
 
 
 @dataclass(frozen=True, slots=True)

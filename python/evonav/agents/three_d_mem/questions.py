@@ -7,10 +7,9 @@ from typing import Any, ClassVar
 
 from evonav.agents.three_d_mem import rules
 from evonav.agents.three_d_mem.candidates import SnapshotCandidate, SnapshotChoice
-from evonav.decision.prompts import Part, Prompt, Text
-from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
-from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
-from evonav.decision.questions.wording import goal_parts, merged, titled
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
+from evonav.decision.prompts import Part, Prompt, Text, goal_parts, merged, titled
+from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput
 

@@ -28,8 +28,8 @@ from evonav.agents.unigoal.goals import GoalConfig, GoalWatch
 from evonav.agents.unigoal.graphs import Advice, GraphConfig, GraphReasoner
 from evonav.agents.unigoal.object_graph import SceneNode
 from evonav.agents.unigoal.planner import PlannedStep, PlannerConfig, UniGoalPlanner
-from evonav.decision.asking import Asker
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.query import Asker
+from evonav.decision.question import DecisionModel
 from evonav.decision.text.decision import TextMatch
 from evonav.memory.occupancy import BLOCKED, FREE
 from evonav.sensors.observation import MapFrame, Observation

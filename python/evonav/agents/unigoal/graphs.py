@@ -20,8 +20,8 @@ from evonav.agents.unigoal.scene_questions import (
     RelationLinesQuestion,
     RoomQuestion,
 )
-from evonav.decision.asking import Asker
-from evonav.decision.questions.candidates import ObjectCandidate
+from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.query import Asker
 from evonav.decision.text.language import ROOMS, canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.sensors.observation import View

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 
 from evonav.agents.unigoal import rules
 from evonav.agents.unigoal.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph
+from evonav.decision.candidates import Pixels
 from evonav.decision.prompts import Picture, Prompt, Text
-from evonav.decision.questions.candidates import Pixels
-from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
+from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput
 from evonav.tasks.vocabulary import NO_CATEGORY

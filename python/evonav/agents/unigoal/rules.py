@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from evonav.agents.unigoal.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph, relation_kind
 from evonav.agents.unigoal.object_graph import SceneNode, Verdict
-from evonav.decision.questions.candidates import ObjectCandidate, Point2
+from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.text.language import Goal, canonical, parse_goal
 from evonav.decision.text.matcher import ROOM_SIGNS, Matcher, gap_m
 from evonav.tasks.public import StageInput

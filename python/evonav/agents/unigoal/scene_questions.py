@@ -10,9 +10,9 @@ from evonav.agents.unigoal import rules
 from evonav.agents.unigoal.goal_graph import GoalGraph
 from evonav.agents.unigoal.object_graph import Group, SceneEdge, SceneNode, Verdict
 from evonav.agents.unigoal.questions import parse_relation, relation_line
+from evonav.decision.candidates import Point2
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.questions.candidates import Point2
-from evonav.decision.questions.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
+from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from evonav.decision.questions.candidates import Choice, FrontierCandidate, ObjectCandidate
-from evonav.decision.questions.question import AnswerError
+from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate
+from evonav.decision.question import AnswerError
 from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput
 

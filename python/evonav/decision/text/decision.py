@@ -7,7 +7,7 @@ the method `by_rule(matcher)`, which returns an answer and the reason for it.
 
 from typing import TypeVar
 
-from evonav.decision.questions.question import Question, Reply
+from evonav.decision.question import Question, Reply
 from evonav.decision.text.matcher import Matcher, TextMatchConfig
 
 A = TypeVar("A")

@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from evonav.decision.questions.candidates import FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Point2
 from evonav.decision.text.language import Goal, Relation, canonical, parse_goal, similarity
 from evonav.tasks.language import STRUCTURES
 from evonav.tasks.public import StageInput

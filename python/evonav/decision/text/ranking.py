@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.questions.candidates import ObjectCandidate, Point2
+from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.text.features import similarity_of_label
 from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput

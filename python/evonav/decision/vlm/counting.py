@@ -2,7 +2,7 @@
 
 from typing import TypeVar
 
-from evonav.decision.questions.question import DecisionModel, Question, Reply
+from evonav.decision.question import DecisionModel, Question, Reply
 from evonav.decision.vlm.account import Usage
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.decision import with_schema

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any, Literal, Protocol, TypeVar
 
 from evonav.decision.prompts import Prompt, Text, Turn
-from evonav.decision.questions.question import AnswerError, Fault, Question, Reply
+from evonav.decision.question import AnswerError, Fault, Question, Reply
 from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.errors import VlmError, VlmFailure
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError

@@ -12,7 +12,7 @@ from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagn
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.agents.registry import new_agent
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import Point3
 from evonav.sensors.observation import Observation

@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from evonav.agents.agent import Agent
 from evonav.agents.registry import BUILT_IN, agent_descriptions, agent_factory, new_agent
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS, yardstick
 from evonav.evaluation.hosting.process import DecisionSpec, check_importable

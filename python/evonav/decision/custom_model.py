@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import Any, Protocol, cast
 
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.questions.question import DecisionModel
+from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.account import Account, Usage
 from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure

@@ -4,7 +4,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Any, Literal, TypeVar
 
-from evonav.decision.questions.question import AnswerError, DecisionModel, Fault, Question
+from evonav.decision.question import AnswerError, DecisionModel, Fault, Question
 
 A = TypeVar("A")
 
