@@ -4,10 +4,10 @@ import inspect
 from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
-from pkgutil import iter_modules
+from pkgutil import walk_packages
 
+from evonav import agents
 from evonav.cli.decision_options import DecisionOptions
-from evonav.decision import questions
 from evonav.decision.noisy import NoiseRates
 from evonav.decision.question import Question
 from evonav.decision.vlm.decision import FAULTS
@@ -19,7 +19,7 @@ TEXT = (Path(__file__).parents[2] / "docs" / "decision.md").read_text(encoding="
 def kinds() -> dict[str, str]:
     """Kinds of all questions, by class."""
     found = {}
-    for module in iter_modules(questions.__path__, f"{questions.__name__}."):
+    for module in walk_packages(agents.__path__, f"{agents.__name__}."):
         for name, kind in inspect.getmembers(import_module(module.name), inspect.isclass):
             if issubclass(kind, Question) and not inspect.isabstract(kind):
                 found[name] = kind.kind
