@@ -2,6 +2,7 @@
 
 import gzip
 import json
+import math
 import re
 import shlex
 import shutil
@@ -9,17 +10,23 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import typer
 from build_docs import ROOT, links, pages
 from typer.testing import CliRunner
 
+from evonav.agents.agent import NavigateTo
 from evonav.cli import app
 from evonav.evaluation.run.components import check_agent_name
 from evonav.evaluation.run.run import evaluate
 from evonav.house import bundled_houses
+from evonav.sensors.observation import Detections, MapFrame, Observation, View, VisibleOccupancy
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
+from evonav.tasks.public import StageInput, TaskInfo
+from evonav.world.pose import Pose
+from evonav.world.simulator import Intrinsics
 
 BLOCK = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```", re.DOTALL | re.MULTILINE)
 PARSED_ONLY = {
@@ -206,6 +213,38 @@ def test_python_of_a_page_runs(page: Path, place: Path, monkeypatch: pytest.Monk
         for value in namespace.values():
             if type(value).__name__ == "Controller":
                 value.stop()
+
+
+def test_the_doubting_agent_of_the_tutorial_forgets_an_object_that_is_gone() -> None:
+    namespace: dict[str, Any] = {}
+    for text in python_texts(Path("docs/tutorial-agent.md")):
+        exec(compile(text, "tutorial-agent.md", "exec", dont_inherit=True), namespace)
+    agent = namespace["Doubter"]()
+    agent.begin_task(TaskInfo("a-task", 1, 50, MapFrame(40, 60, 0.1, (-3.0, -1.0)), 0))
+    goal = "Please find the mug."
+    agent.begin_stage(StageInput(1, "Mug", goal, goal, goal, np.zeros((8, 8, 3), np.uint8)))
+
+    target = agent.act(observation_of("Mug"))
+    assert len(agent.objects.entries) == 1
+    assert isinstance(target, NavigateTo)
+    assert math.dist(target.position_m, (0.0, 2.0)) < 0.2
+    assert agent.act(observation_of()) == target, "still on its way"
+    agent.act(observation_of(has_arrived=True))
+    assert agent.objects.entries == []
+    assert agent.target is None
+
+
+def observation_of(*labels: str, has_arrived: bool = False) -> Observation:
+    """One view of a plate 2 m ahead, which is detected once for each label."""
+    depth_m = np.full((60, 60), np.inf, np.float32)
+    masks = np.full((60, 60), -1, np.int32)
+    for index, _ in enumerate(labels):
+        depth_m[20:40, 20:40], masks[20:40, 20:40] = 2.0, index
+    detections = Detections(masks, labels, np.ones(len(labels), np.float32))
+    cells = VisibleOccupancy(np.array([[10, 30]], np.int32), np.zeros((0, 2), np.int32))
+    view = View(Pose(0.0, 1.575, 0.0, 0.0, 0.0), Intrinsics(60, 60, math.pi / 2), depth_m, detections, cells)
+    pose = Pose(0.0, 0.9, 0.0, 0.0)
+    return Observation((view,), pose, is_action_success=True, num_rounds_left=9, has_arrived=has_arrived)
 
 
 @pytest.mark.parametrize("page", pages(), ids=str)
