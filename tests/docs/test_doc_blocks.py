@@ -6,6 +6,7 @@ import math
 import re
 import shlex
 import shutil
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -253,11 +254,11 @@ def test_links_of_a_page_lead_somewhere(page: Path) -> None:
         assert (ROOT / target).exists(), f"{page}: {words}"
 
 
-def test_every_page_is_in_the_site() -> None:
-    navigation = (ROOT / "mkdocs.yml").read_text()
-    for page in pages():
-        if page.name not in ("README.md",) or page.parent != Path():
-            assert f": {page}\n" in navigation, f"{page} is not in mkdocs.yml"
+def test_every_page_is_in_the_navigation_once() -> None:
+    _, _, navigation = (ROOT / "mkdocs.yml").read_text().partition("\nnav:\n")
+    found = Counter(re.findall(r": (\S+[.]md)$", navigation, re.MULTILINE))
+    assert found.pop("index.md") == 1, "the home page, made of README.md"
+    assert found == {str(page): 1 for page in pages() if page != Path("README.md")}
 
 
 def test_api_pages_name_modules_that_exist() -> None:
