@@ -3,24 +3,21 @@
 import dataclasses
 import json
 import math
-import os
 from collections import Counter
 from importlib.resources import as_file, files
 from itertools import islice
-from pathlib import Path
 
 import pytest
+from recorded_data import data_path, needs_data
 from second_opinion import Plan, problems_of
 
 from evonav.generation import GenerationParameters, TaskRejectedError, generate_task
 from evonav.house import bundled_houses, load_houses
 from evonav.tasks import Task, load_tasks
 
-SHARED = Path(os.environ.get("EVONAV_SHARED", Path(__file__).parents[3] / "shared")) / "data"
 REAL_SETS = {
     "ram81-procthor-100k-history/uniform-hard-val-75.jsonl.gz": 16,
     "ram81-procthor-100k-history/attr-onav-1k-val-100.jsonl.gz": 32,
-    "procthor-generated/houses-test.jsonl.gz": 16,
 }
 """Houses taken of each file."""
 MODES = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
@@ -61,12 +58,11 @@ def test_bundled_houses_stay_possible(mode: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", REAL_SETS)
-@pytest.mark.skipif(not SHARED.is_dir(), reason="real houses are not in ../shared (or $EVONAV_SHARED)")
+@pytest.mark.parametrize("name", [pytest.param(name, marks=needs_data(name)) for name in REAL_SETS])
 def test_real_houses_stay_possible(name: str) -> None:
     found = []
     num_tasks = 0
-    houses = load_houses(SHARED / name)
+    houses = load_houses(data_path(name))
     for i, house in enumerate(houses):
         if num_tasks == REAL_SETS[name]:
             break

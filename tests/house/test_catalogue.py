@@ -3,36 +3,43 @@
 import filecmp
 import gzip
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
-import pytest
+from recorded_data import data_folder, data_path, needs_data
 
 ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("EVONAV_SHARED", ROOT.parent / "shared")) / "data"
 DATA = ROOT / "rust" / "evonav-core" / "data"
-
-pytestmark = pytest.mark.skipif(not SHARED.exists(), reason=f"{SHARED} is not there")
+HOUSE_SETS = (
+    "michael-quinlan-hallway-houses",
+    "ram81-procthor-100k-history",
+    "ram81-procthor-1k",
+    "ram81-procthor-one-room",
+    "roseh-procthor-100k-history",
+    "zhiyuan-gao-procthor-houses",
+)
+"""Houses that AI2-THOR furnished: surfaces are learnt from them."""
 
 
 def rows(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in gzip.decompress(path.read_bytes()).splitlines()]
 
 
+@needs_data("procthor-databases", "molmospaces-resources", *HOUSE_SETS)
 def test_the_script_reproduces_the_bundled_data(tmp_path: Path) -> None:
     script = ROOT / "scripts" / "build_asset_catalogue.py"
-    subprocess.run([sys.executable, script, SHARED, "--out", tmp_path], check=True)
+    subprocess.run([sys.executable, script, data_folder(), "--out", tmp_path], check=True)
     names = sorted(path.name for path in DATA.glob("*.json") if path.name != "activities.json")  # made by hand
     assert names == ["assets.json", "categories.json", "groups.json", "materials.json"]
     assert filecmp.cmpfiles(DATA, tmp_path, names, shallow=False) == (names, [], [])
 
 
+@needs_data("ram81-procthor-1k")
 def test_recorded_cubes_rest_on_catalogue_surfaces() -> None:
     """Cubes that AI2-THOR put on receptacles; the catalogue was not derived from them."""
-    folder = SHARED / "ram81-procthor-1k"
+    folder = data_path("ram81-procthor-1k")
     houses = rows(folder / "val.jsonl.gz")
     assets = {asset["id"]: asset for asset in json.loads((DATA / "assets.json").read_text())["assets"]}
     offsets_m = []

@@ -3,18 +3,17 @@
 import functools
 import gzip
 import json
-import os
 import pickle
+from importlib.resources import as_file, files
 from pathlib import Path
 
 import pytest
+from recorded_data import data_path, needs_data
 
 from evonav import HouseError, InvalidArgumentError
 from evonav.house import House, bundled_houses, load_houses
 
-SHARED = Path(os.environ.get("EVONAV_SHARED", Path(__file__).parents[3] / "shared")) / "data"
 RECORDED = [
-    "procthor-generated",
     "ram81-procthor-100k-history",
     "ram81-procthor-1k/train.jsonl.gz",
     "ram81-procthor-1k/val.jsonl.gz",
@@ -135,11 +134,18 @@ def text_of(path: Path) -> str:
     return (gzip.decompress(content) if path.suffix == ".gz" else content).decode()
 
 
-@pytest.mark.parametrize("source", RECORDED)
+def test_bundled_houses_survive_reading_and_writing() -> None:
+    with as_file(files("evonav") / "data" / "houses.jsonl.gz") as path:
+        check_reading_and_writing(path)
+
+
+@pytest.mark.parametrize("source", [pytest.param(source, marks=needs_data(source)) for source in RECORDED])
 def test_recorded_houses_survive_reading_and_writing(source: str) -> None:
-    if not (SHARED / source).exists():
-        pytest.skip(f"{SHARED / source} is not there")
-    houses = list(load_houses(SHARED / source))
+    check_reading_and_writing(data_path(source))
+
+
+def check_reading_and_writing(source: Path) -> None:
+    houses = list(load_houses(source))
     assert houses
     for house in houses[:: max(1, len(houses) // 50)]:
         path, _, place = house.name.rpartition(":")
@@ -151,13 +157,21 @@ def test_recorded_houses_survive_reading_and_writing(source: str) -> None:
         assert json.dumps(json.loads(house.to_json())) == json.dumps(source_document)
 
 
+def test_a_house_without_the_wall_of_a_door_is_refused(tmp_path: Path, houses: list[House]) -> None:
+    document = json.loads(houses[0].to_json())
+    wall_id = document["doors"][0]["wall1"]
+    document["walls"] = [wall for wall in document["walls"] if wall["id"] != wall_id]
+    path = tmp_path / "house.json"
+    path.write_text(json.dumps(document))
+    with pytest.raises(HouseError, match="wall1"):
+        list(load_houses(path))
+
+
+@needs_data("zhiyuan-gao-procthor-houses/partial_houses")
 def test_partial_houses_are_read_or_refused() -> None:
     """One house saved after each generator step: before its outer walls exist, its outer door has no wall."""
-    folder = SHARED / "zhiyuan-gao-procthor-houses" / "partial_houses"
-    if not folder.exists():
-        pytest.skip(f"{folder} is not there")
     without_outer_walls = {"1_DOORS.json", "2_LIGHTS.json", "3_SKYBOX.json"}
-    for path in sorted(folder.iterdir()):
+    for path in sorted(data_path("zhiyuan-gao-procthor-houses/partial_houses").iterdir()):
         if path.name in without_outer_walls:
             with pytest.raises(HouseError, match="wall1"):
                 list(load_houses(path))

@@ -3,13 +3,13 @@
 import gzip
 import json
 import math
-import os
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from recorded_data import data_path, needs_data
 
 from evonav.house import bundled_houses
 
@@ -17,8 +17,7 @@ metrics = pytest.importorskip("ai2thor.util.metrics", reason="the thor dependenc
 
 Json = dict[str, Any]
 StartController = Callable[..., Any]
-SHARED = Path(os.environ.get("EVONAV_SHARED", Path(__file__).parents[3] / "shared")) / "data"
-RECORDED = SHARED / "ram81-procthor-1k"
+RECORDED = data_path("ram81-procthor-1k")
 
 
 def rows(path: Path) -> list[Json]:
@@ -101,7 +100,7 @@ def test_house_starts_as_they_are(start_controller: StartController) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not RECORDED.is_dir(), reason="recorded data is not in ../shared ($EVONAV_SHARED)")
+@needs_data("ram81-procthor-1k")
 def test_recorded_locobot_starts(start_controller: StartController) -> None:
     """AI2-THOR drew them from its own GetReachablePositions, so all of a house hang together."""
     houses = rows(RECORDED / "val.jsonl.gz")

@@ -2,7 +2,6 @@
 
 import gzip
 import json
-import os
 import subprocess
 import sys
 from functools import cache
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from recorded_data import data_folder, data_path, needs_data
 
 from evonav.house import bundled_houses
 from evonav.thor import edits, objects
@@ -20,9 +20,8 @@ from evonav.thor.engine import Engine
 Json = dict[str, Any]
 
 ROOT = Path(__file__).parents[2]
-SHARED = Path(os.environ.get("EVONAV_SHARED", ROOT.parent / "shared")) / "data"
-RECORDED = SHARED / "ram81-procthor-1k"
-needs_recorded = pytest.mark.skipif(not RECORDED.is_dir(), reason="recorded data is not in ../shared ($EVONAV_SHARED)")
+RECORDED = data_path("ram81-procthor-1k")
+needs_recorded = needs_data("ram81-procthor-1k", "ram81-procthor-100k-history", "procthor-databases")
 
 
 def engine_of(house: Json) -> Engine:
@@ -55,14 +54,14 @@ def test_records_have_the_fields_of_recorded_ones() -> None:
 @needs_recorded
 def test_the_script_reproduces_the_bundled_asset_metadata(tmp_path: Path) -> None:
     out = tmp_path / "assets.json"
-    subprocess.run([sys.executable, ROOT / "scripts" / "build_thor_assets.py", SHARED, "--out", out], check=True)
+    subprocess.run([sys.executable, ROOT / "scripts" / "build_thor_assets.py", data_folder(), "--out", out], check=True)
     assert out.read_bytes() == (ROOT / "python" / "evonav" / "thor" / "data" / "assets.json").read_bytes()
 
 
 @needs_recorded
 def test_assets_agree_with_what_ai2thor_recorded_of_all_its_rooms() -> None:
     """8,715 records of iTHOR and RoboTHOR; positions follow from the boxes' middles, by the pivots, at any yaw."""
-    packed = (SHARED / "procthor-databases" / "ai2thor-object-metadata.json.gz").read_bytes()
+    packed = data_path("procthor-databases/ai2thor-object-metadata.json.gz").read_bytes()
     flags = agreed = pivots = 0
     off_m = []
     for record in records_in(json.loads(gzip.decompress(packed))):
@@ -92,7 +91,7 @@ def test_assets_agree_with_what_ai2thor_recorded_of_all_its_rooms() -> None:
 @needs_recorded
 def test_oriented_boxes_are_those_that_ai2thor_recorded() -> None:
     """Of all that can be moved in iTHOR and RoboTHOR, from pivot, turn and asset alone; corner by corner."""
-    packed = (SHARED / "procthor-databases" / "ai2thor-object-metadata.json.gz").read_bytes()
+    packed = data_path("procthor-databases/ai2thor-object-metadata.json.gz").read_bytes()
     off_m = []
     for record in records_in(json.loads(gzip.decompress(packed))):
         asset, box = metadata_of_asset(record["assetId"], record["objectType"]), record["objectOrientedBoundingBox"]
@@ -180,7 +179,7 @@ def cubes_of(index: int) -> list[Json]:
 def test_doors_and_windows_are_in_their_walls() -> None:
     """Position and turn follow from the wall; our body of a window, which has no leaf, has its middle there too."""
     num_windows = 0
-    for house in rows(SHARED / "ram81-procthor-100k-history" / "uniform-hard-val-75.jsonl.gz")[:3]:
+    for house in rows(data_path("ram81-procthor-100k-history/uniform-hard-val-75.jsonl.gz"))[:3]:
         records = {record["objectId"]: record for record in objects.static_records(engine_of(house).scene)}
         for entry in house["windows"]:
             record, wall = records[entry["id"]], records[entry["wall0"]]

@@ -3,7 +3,6 @@
 import itertools
 import json
 import math
-import os
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +10,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
+from recorded_data import data_path, needs_data
 
 from evonav.errors import InvalidArgumentError
 from evonav.world.camera import project, unproject
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics, SimulatorConfig
 
-SHARED = Path(os.environ.get("EVONAV_SHARED", Path(__file__).parents[3] / "shared")) / "data"
-RECORDED = SHARED / "cs-gavin-procthor10k-train10-frames"
+FRAMES = "cs-gavin-procthor10k-train10-frames"
+RECORDED = data_path(FRAMES)
 LEVELS_PER_M = 51.0
 """The recorded depth is `floor(51 * metres)` in 8 bits, clipped at 5 m: a level is 19.6 mm."""
 
@@ -37,7 +37,7 @@ def _pose(frame: dict[str, Any]) -> Pose:
     return Pose(frame["agent_x"], height_m, frame["agent_z"], math.radians(frame["yaw_deg"]), math.radians(30.0))
 
 
-@pytest.mark.skipif(not RECORDED.is_dir(), reason="recorded frames are not in ../shared (or $EVONAV_SHARED)")
+@needs_data(FRAMES)
 def test_recorded_frames_reproject_onto_each_other() -> None:
     """Median 0.8 mm over 72 pairs of consecutive frames, a quarter of them with a turn in between."""
     frames = json.loads((RECORDED / "poses.json").read_text(encoding="utf-8"))["frames"]
@@ -61,7 +61,7 @@ def test_recorded_frames_reproject_onto_each_other() -> None:
 
 
 @pytest.mark.parametrize(("vertical_fov_deg", "height_m", "horizon_deg"), [(60.0, 1.575, 30.0), (90.0, 1.4, 30.0)])
-@pytest.mark.skipif(not RECORDED.is_dir(), reason="recorded frames are not in ../shared (or $EVONAV_SHARED)")
+@needs_data(FRAMES)
 def test_recorded_floors_are_level_with_our_camera_only(
     vertical_fov_deg: float, height_m: float, horizon_deg: float
 ) -> None:

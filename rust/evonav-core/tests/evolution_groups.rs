@@ -12,7 +12,7 @@ use evonav_core::{
     evolution::asset_groups,
     house::House,
 };
-use recorded::{house_of, lines, recordings};
+use recorded::{house_lines, house_of};
 use serde_json::Value;
 
 const UNKNOWN: UnknownAssets = UnknownAssets::CategoryDefault;
@@ -71,17 +71,16 @@ const FILES: [&str; 4] = [
 
 #[test]
 fn ids_of_recorded_houses_name_procthors_groups() {
-    let Some(data) = recordings() else { return };
     let (mut num_groups, mut num_named) = (0, 0);
-    for (file, (i, line)) in
-        FILES.iter().flat_map(|f| lines(&data.join(f)).into_iter().enumerate().map(move |l| (f, l)))
-    {
-        let house = house_of(file, &line);
-        let found = groups_found(&house);
-        let expected: BTreeSet<BTreeSet<String>> = groups_by_id(&house).into_values().collect();
-        assert_eq!(found.keys().cloned().collect::<BTreeSet<_>>(), expected, "{file} {i}");
-        num_groups += found.len();
-        num_named += found.values().filter(|name| name.is_some()).count();
+    for (file, lines) in house_lines(&FILES) {
+        for (i, line) in lines.iter().enumerate() {
+            let house = house_of(&file, line);
+            let found = groups_found(&house);
+            let expected: BTreeSet<BTreeSet<String>> = groups_by_id(&house).into_values().collect();
+            assert_eq!(found.keys().cloned().collect::<BTreeSet<_>>(), expected, "{file} {i}");
+            num_groups += found.len();
+            num_named += found.values().filter(|name| name.is_some()).count();
+        }
     }
     eprintln!("{num_groups} groups, {num_named} named");
     assert!(num_groups > 300, "{num_groups}");
@@ -90,15 +89,13 @@ fn ids_of_recorded_houses_name_procthors_groups() {
 
 #[test]
 fn furniture_without_ids_is_grouped_as_the_generator_grouped_it() {
-    let Some(data) = recordings() else { return };
     let [mut num_ids, mut num_found, mut num_right] = [0, 0, 0];
     let mut missed: BTreeMap<String, usize> = BTreeMap::new();
-    for (file, line) in
-        FILES[..3].iter().flat_map(|f| lines(&data.join(f)).into_iter().map(move |l| (f, l)))
-    {
+    let files = house_lines(&FILES[..3]);
+    for (file, line) in files.iter().flat_map(|(f, lines)| lines.iter().map(move |l| (f, l))) {
         let expected: BTreeMap<BTreeSet<String>, Option<String>> =
-            groups_found(&house_of(file, &line));
-        let found: BTreeSet<BTreeSet<String>> = groups_found(&anonymous(&line))
+            groups_found(&house_of(file, line));
+        let found: BTreeSet<BTreeSet<String>> = groups_found(&anonymous(line))
             .into_keys()
             .map(|ids| {
                 ids.iter().map(|id| id.split(" was ").nth(1).unwrap().replace("-", "|")).collect()

@@ -1,5 +1,8 @@
 //! The asset catalogue: what it holds, against the published database and recorded boxes.
 
+#[allow(dead_code, reason = "other tests use the rest")]
+mod recorded;
+
 use std::path::PathBuf;
 
 use evonav_core::{
@@ -7,21 +10,10 @@ use evonav_core::{
     assets::{Catalogue, UnknownAssets, placement::Place},
     house::House,
 };
+use recorded::data_set;
 use serde_json::Value;
 
 const HOUSE: &str = include_str!("data/house_100_objects.json");
-
-/// `../shared/data`, or under `EVONAV_SHARED`; `None`, saying so, where it is not.
-fn shared_data(path: &str) -> Option<PathBuf> {
-    let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared");
-    let root = std::env::var_os("EVONAV_SHARED").map_or(beside, PathBuf::from);
-    let full = root.join("data").join(path);
-    if full.exists() {
-        return Some(full);
-    }
-    eprintln!("skipped: {} is not there", full.display());
-    None
-}
 
 fn read(path: PathBuf) -> Value {
     let text = std::fs::read_to_string(path).expect("readable");
@@ -99,7 +91,7 @@ fn facts_are_procthors() {
 
 #[test]
 fn sizes_equal_the_published_database() {
-    let Some(path) = shared_data("procthor-databases/asset-database.json") else { return };
+    let Some(path) = data_set("procthor-databases/asset-database.json") else { return };
     let catalogue = Catalogue::bundled();
     for published in read(path)
         .as_object()
@@ -120,7 +112,7 @@ fn sizes_equal_the_published_database() {
 #[test]
 fn boxes_match_a_recorded_scene() {
     let file = "piqiuni-molmospaces-procthor10k/procthor-10k_train_1_base_scene_full.json";
-    let Some(path) = shared_data(file) else { return };
+    let Some(path) = data_set(file) else { return };
     let catalogue = Catalogue::bundled();
     let mut errors_m = Vec::new();
     for record in read(path)["records"].as_array().expect("records") {

@@ -1,11 +1,12 @@
 //! Navigation in real ProcTHOR houses, against positions recorded from AI2-THOR itself.
 
+#[allow(dead_code, reason = "other tests use the rest")]
 mod recorded;
 
-use std::{collections::BTreeMap, path::Path};
+use std::collections::BTreeMap;
 
 use evonav_core::{geometry::Vec2, world::collision::AgentBody};
-use recorded::{house_of, lines, navigation_of, recordings, scene_of};
+use recorded::{bundled_lines, data_set, house_of, lines, navigation_of, scene_of};
 use serde_json::Value;
 
 /// `[x, z]` of a JSON position, an object or an array.
@@ -67,8 +68,7 @@ fn total(counts: impl Iterator<Item = [usize; 2]>) -> [usize; 2] {
 
 #[test]
 fn locobot_start_positions_are_free() {
-    let Some(data) = recordings() else { return };
-    let folder = data.join("ram81-procthor-1k");
+    let Some(folder) = data_set("ram81-procthor-1k") else { return };
     let houses = lines(&folder.join("val.jsonl.gz"));
     let episodes = lines(&folder.join("procthor-attr-onav-locobot-val.jsonl.gz"));
     let positions = by_house(episodes.iter().map(|line| {
@@ -84,9 +84,10 @@ fn locobot_start_positions_are_free() {
 
 #[test]
 fn stretch_start_positions_are_free() {
-    let Some(data) = recordings() else { return };
-    let houses = lines(&data.join("roseh-procthor-100k-history/tiny-val.jsonl.gz"));
-    let folder = data.join("kunalmessi10-procthor-100k-eval");
+    let file = data_set("roseh-procthor-100k-history/tiny-val.jsonl.gz");
+    let folder = data_set("kunalmessi10-procthor-100k-eval");
+    let (Some(file), Some(folder)) = (file, folder) else { return };
+    let houses = lines(&file);
     let files = ["explorehouse", "fetch2roomtype", "objectnavtype"];
     let episodes = files.iter().flat_map(|kind| {
         lines(&folder.join(format!("tinyval_June8_procthor_100k_{kind}_val.jsonl.gz")))
@@ -112,15 +113,12 @@ const RECORDED_HOUSES: [&str; 7] = [
     "roseh-procthor-100k-history/tiny-train.jsonl.gz",
     "roseh-procthor-100k-history/tiny-val.jsonl.gz",
 ];
-/// Houses made on a stand-in for the simulator, which cannot tell as well what is navigable.
-const GENERATED_HOUSES: [&str; 2] =
-    ["procthor-generated/houses-test.jsonl.gz", "procthor-generated/houses-train.jsonl.gz"];
 
 /// Starts that are free, and houses all of whose rooms are reached from there.
-fn starts_and_connected(data: &Path, files: &[&str]) -> [[usize; 2]; 2] {
+fn starts_and_connected(files: &[(String, Vec<String>)]) -> [[usize; 2]; 2] {
     let (mut starts, mut connected) = ([0, 0], [0, 0]);
-    for file in files {
-        for (i, line) in lines(&data.join(file)).iter().enumerate() {
+    for (file, lines) in files {
+        for (i, line) in lines.iter().enumerate() {
             let name = format!("{file}:{i}");
             let house = house_of(&name, line);
             let Some(start) = house.start else { continue };
@@ -143,16 +141,19 @@ fn starts_and_connected(data: &Path, files: &[&str]) -> [[usize; 2]; 2] {
 
 #[test]
 fn recorded_houses_start_free_and_reach_every_room() {
-    let Some(data) = recordings() else { return };
-    let [starts, connected] = starts_and_connected(&data, &RECORDED_HOUSES);
+    let found = |name: &&str| data_set(name).map(|path| ((*name).to_owned(), lines(&path)));
+    let files: Vec<_> = RECORDED_HOUSES.iter().filter_map(found).collect();
+    if files.is_empty() {
+        return;
+    }
+    let [starts, connected] = starts_and_connected(&files);
     assert_share("starts of recorded houses", starts, 0.995);
     assert_share("connected recorded houses", connected, 0.995);
 }
 
 #[test]
-fn generated_houses_start_free() {
-    let Some(data) = recordings() else { return };
-    let [starts, connected] = starts_and_connected(&data, &GENERATED_HOUSES);
-    assert_share("starts of generated houses", starts, 0.995);
-    assert_share("connected generated houses", connected, 0.9);
+fn bundled_houses_start_free_and_reach_every_room() {
+    let [starts, connected] = starts_and_connected(&[bundled_lines()]);
+    assert_share("starts of bundled houses", starts, 1.0);
+    assert_share("connected bundled houses", connected, 1.0);
 }

@@ -1,5 +1,5 @@
-//! Houses and recordings that are not in the repository: read from `$EVONAV_SHARED/data`, or from
-//! `../shared/data` beside the checkout. Tests that miss them say so and pass.
+//! Houses and recordings that are not in the repository: in the folder that `EVONAV_DATA` names,
+//! see CONTRIBUTING.md. Tests that miss them say so, and use the bundled houses or pass.
 
 use std::{
     path::{Path, PathBuf},
@@ -16,18 +16,39 @@ use evonav_core::{
     },
 };
 
-/// The folder of the recordings, or a line on why nothing is tested.
-pub fn recordings() -> Option<PathBuf> {
-    let root = std::env::var_os("EVONAV_SHARED").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
-        PathBuf::from,
-    );
-    let data = root.join("data");
-    if data.is_dir() {
-        return Some(data);
+const BUNDLED: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../python/evonav/data/houses.jsonl.gz");
+
+/// A file or folder of the data sets; `None`, and a line on what is missing, where it is not.
+pub fn data_set(name: &str) -> Option<PathBuf> {
+    let path = data_folder().join(name);
+    if path.exists() {
+        return Some(path);
     }
-    eprintln!("skipped: no recordings in {}", data.display());
+    eprintln!("skipped: {name} not found: set EVONAV_DATA to a folder that has it");
     None
+}
+
+/// Names and lines of those files of houses that are there, or of the bundled houses if none is.
+pub fn house_lines(names: &[&str]) -> Vec<(String, Vec<String>)> {
+    let found: Vec<_> = names
+        .iter()
+        .filter_map(|&name| data_set(name).map(|path| (name.to_owned(), lines(&path))))
+        .collect();
+    if found.is_empty() { vec![bundled_lines()] } else { found }
+}
+
+/// The houses that ship with evonav.
+pub fn bundled_lines() -> (String, Vec<String>) {
+    ("bundled".to_owned(), lines(Path::new(BUNDLED)))
+}
+
+/// `EVONAV_DATA`, or the folder beside the checkout.
+pub fn data_folder() -> PathBuf {
+    std::env::var_os("EVONAV_DATA").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join("shared/data"),
+        PathBuf::from,
+    )
 }
 
 /// Lines of a gzipped JSONL file.
