@@ -1,5 +1,6 @@
-"""What MSGNav asks (agents.md 2.3-2.6): which part of the graph matters, where to go, which frontier, whether it is it.
+"""Questions of MSGNav (arXiv 2511.10376): a subgraph, the next place, a frontier, and whether the target is reached.
 
+docs/parity.md lists where these questions differ from the original's.
 Images are at most 512 px (`MsgNavConfig`); evonav's views have 300 px, so that they are shown as they were seen.
 """
 
