@@ -20,8 +20,9 @@ from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.paired import PairedEffect, paired_effect
 from evonav.perception.words import read_word
-from evonav.report.line_chart import Line, line_chart
 from evonav.report.paper.tables import PAPER, PaperResult
+from evonav.report.plots.render import write_plots
+from evonav.report.plots.specs import CurvePlot, Line
 from evonav.report.run import PAPER_ORDER, Run, load_run
 from evonav.report.tables.table import NONE, Table, percent
 from evonav.significance import Interval
@@ -35,7 +36,7 @@ PERCEPTIONS = (
     "predicted:mini",
 )
 """The curves are of the first ones; what a learned detector gives stands beside them in the tables."""
-FIGURES = PAGE.parent / "images"
+IMAGES = PAGE.parent / "images"
 
 Keep = Callable[[StageRecord], bool]
 CLAIMS: tuple[tuple[str, str, str, Keep], ...] = (
@@ -76,15 +77,14 @@ def name_of(word: str) -> str:
 
 
 def parts(runs: Mapping[str, Run]) -> dict[str, str]:
-    """The marked parts of the page, by name; draws the figures."""
-    charts = []
+    """The marked parts of the page, by name; draws the plots."""
+    pictures = []
     for measure in ("sr", "spl"):
-        path = FIGURES / f"perception-{measure}.svg"
-        path.write_text(_figure(runs, measure), encoding="utf-8")
-        charts.append(f"![{measure.upper()} by perception](images/{path.name})")
+        path = write_plots([_plot(runs, measure)], IMAGES / f"perception-{measure}.svg")
+        pictures.append(f"![{measure.upper()} by perception](images/{path.name})")
     tables = [rate_table(runs, "sr"), rate_table(runs, "spl")]
     return {
-        "perception-rates": "\n\n".join((*charts, *(table.markdown() for table in tables))),
+        "perception-rates": "\n\n".join((*pictures, *(table.markdown() for table in tables))),
         "perception-claims": claim_table(runs).markdown(),
         "perception-costs": cost_table(runs).markdown(),
     }
@@ -187,17 +187,15 @@ def _words(runs: Mapping[str, Run], measure: str) -> str:
     return f"{measure.upper()} %, {len(run.num_stages)} houses, {num_stages} stages; bootstrap over houses."
 
 
-def _figure(runs: Mapping[str, Run], measure: str) -> str:
+def _plot(runs: Mapping[str, Run], measure: str) -> CurvePlot:
     lines = []
     runs = {word: run for word, run in runs.items() if word.startswith("noisy:")}
     for agent in _agents(runs):
         found = [(x, rate) for x, run in enumerate(runs.values()) if (rate := _rate(_summary(run, agent), measure))]
-        ends = [None if ci is None else (100 * ci[0], 100 * ci[1]) for _, (_, ci) in found]
-        lines.append(Line(agent, [(x, 100 * value) for x, (value, _) in found], ends))
-    words = measure.upper()
-    return line_chart(
-        lines, f"{words} by perception", "perception", f"{words}, %", x_names=[name_of(word) for word in runs]
-    )
+        ends = tuple(None if ci is None else (100 * ci[0], 100 * ci[1]) for _, (_, ci) in found)
+        lines.append(Line(agent, tuple((x, 100 * value) for x, (value, _) in found), ends))
+    name, x_names = measure.upper(), tuple(name_of(word) for word in runs)
+    return CurvePlot(f"{name} by perception", tuple(lines), "perception", f"{name}, %", x_names)
 
 
 def _backend(word: str) -> Backend:

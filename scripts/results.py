@@ -3,7 +3,7 @@
     python scripts/results.py --out out/results --tasks TASKS/uniform-hard-val-75 TASKS/tiny-val TASKS/attr:40
 
 evaluates all six agents on all tasks of the folders (the first 40 of the last), then those of a subset with decisions
-that go wrong at stated rates, and writes tables and figure. Run again, it goes on where it ended; `--write-only` runs
+that go wrong at stated rates, and writes tables and a plot. Run again, it goes on where it ended; `--write-only` runs
 nothing. A folder of results holds one version of the code: give another version another folder.
 """
 
@@ -17,9 +17,10 @@ from pathlib import Path
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import Progress, RunConfig, evaluate
-from evonav.report.line_chart import Line, line_chart
 from evonav.report.mechanisms import STRATA, cause_share_table, counter_table, deeds_of, end_table, success_by_group
 from evonav.report.paper.tables import paper_tables
+from evonav.report.plots.render import write_plots
+from evonav.report.plots.specs import CurvePlot, Line
 from evonav.report.run import PAPER_ORDER, Run, load_run
 from evonav.report.tables.run_tables import effort_table
 from evonav.report.tables.table import NONE, Table, percent
@@ -28,7 +29,7 @@ from evonav.tasks.listing import TaskFile, task_files
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "results.md"
-FIGURE = ROOT / "docs" / "images" / "decision-errors.svg"
+PLOT = ROOT / "docs" / "images" / "decision-errors.svg"
 RATES = (0.0, 0.05, 0.1, 0.2, 0.4)
 """Shares of decisions that are another valid answer than the model's own."""
 ROOM_GROUPS = ((2, 3), (4, 5), (6, 10))
@@ -51,7 +52,7 @@ def main() -> None:
     for name, text in found.items():
         page = with_part(page, name, text)
     PAGE.write_text(page, encoding="utf-8")
-    sys.stdout.write(f"{PAGE}\n{FIGURE}\n")
+    sys.stdout.write(f"{PAGE}\n{PLOT}\n")
 
 
 def pooled_tasks(folders: Sequence[str]) -> list[TaskFile]:
@@ -75,16 +76,15 @@ def noisy_backend(rate: float) -> Backend:
 
 
 def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
-    """The marked parts of the page, by name; draws the figure."""
+    """The marked parts of the page, by name; draws the plot."""
     run = load_run(out / "main")
     deeds = deeds_of(run)
     main_table, relocation, first, order, differences = paper_tables(run)
     sweep = {rate: load_run(folder) for rate in RATES if (folder := out / f"wrong-{rate:g}").exists()}
-    FIGURE.parent.mkdir(exist_ok=True)
     errors = ""
     if sweep:
-        FIGURE.write_text(_figure(sweep, agents), encoding="utf-8")
-        picture = f"![SR by share of wrong decisions](images/{FIGURE.name})"
+        write_plots([_plot(sweep, agents)], PLOT)
+        picture = f"![SR by share of wrong decisions](images/{PLOT.name})"
         errors = f"{picture}\n\n{sensitivity_table(sweep, agents).markdown()}"
     return {
         "setting": setting_table(run).markdown(),
@@ -196,7 +196,7 @@ def sensitivity_table(sweep: dict[float, Run], agents: Sequence[str]) -> Table:
     return Table("Decisions that go wrong", columns, tuple(rows), (note,))
 
 
-def _figure(sweep: dict[float, Run], agents: Sequence[str]) -> str:
+def _plot(sweep: dict[float, Run], agents: Sequence[str]) -> CurvePlot:
     lines = []
     for agent in agents:
         points = []
@@ -205,9 +205,9 @@ def _figure(sweep: dict[float, Run], agents: Sequence[str]) -> str:
             if summary is not None and summary.sr is not None:
                 points.append((100 * rate, 100 * summary.sr, summary.sr_ci95))
         if points:
-            ends = [None if ci is None else (100 * ci[0], 100 * ci[1]) for _, _, ci in points]
-            lines.append(Line(agent, [(x, y) for x, y, _ in points], ends))
-    return line_chart(lines, "SR by share of wrong decisions", "wrong decisions, %", "SR, %")
+            ends = tuple(None if ci is None else (100 * ci[0], 100 * ci[1]) for _, _, ci in points)
+            lines.append(Line(agent, tuple((x, y) for x, y, _ in points), ends))
+    return CurvePlot("SR by share of wrong decisions", tuple(lines), "wrong decisions, %", "SR, %")
 
 
 def _rate(counts: tuple[int, int]) -> str:

@@ -16,8 +16,8 @@ from evonav.generation.measures import MEASURES, PAPER_EVOLUTIONS
 from evonav.generation.statistics import statistics_of, statistics_of_folders
 from evonav.generation.task_facts import expected_evolutions, facts_of_task, read_all_facts
 from evonav.house import bundled_houses
-from evonav.report import figures
-from evonav.report.tasks.dataset_page import write_dataset_report
+from evonav.report.plots.render import check_plot
+from evonav.report.tasks.dataset_page import write_dataset_report, write_statistics_plot
 from evonav.tasks import Task, load_tasks
 from evonav.tasks.records import parse_record
 from evonav.tasks.statistics import TaskStatistics
@@ -211,10 +211,11 @@ def test_what_is_wrong_is_named(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(TaskError, match=r"bad/task\.json: field"):
         list(read_all_facts([*good, tmp_path / "bad"], num_workers=2))
     with pytest.raises(InvalidArgumentError, match=r"\.png"):
-        figures.check_figure(Path("figure.bmp"))
+        check_plot(Path("plot.bmp"))
 
 
-def test_the_page_nests_and_the_figures_are_xml(found: TaskStatistics, tmp_path: Path) -> None:
+def test_the_page_nests_and_the_plots_are_xml(found: TaskStatistics, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="evonav[viz] is not installed")
     page = write_dataset_report(found, tmp_path)
     text = page.read_text(encoding="utf-8")
     check_html(text)
@@ -222,8 +223,8 @@ def test_the_page_nests_and_the_figures_are_xml(found: TaskStatistics, tmp_path:
         if measure.raw is not None:
             assert f"<td>{measure.label.strip().replace(chr(39), '&#39;')}</td>" in text
     svg = ET.fromstring((tmp_path / "statistics.svg").read_text(encoding="utf-8"))
-    marks = [node for node in svg.iter() if node.get("class") == "paper"]
-    assert len(marks) == 5 + 2 + 1
+    marks = [node for node in svg.iter("{http://www.w3.org/2000/svg}title") if ", the paper: " in (node.text or "")]
+    assert len(marks) == 5 + 2
     assert "http" not in text.replace("http://www.w3.org/2000/svg", "").replace("http-equiv", "")
     data = tmp_path / "statistics.json"
     assert parse_record(TaskStatistics, data.read_bytes(), data) == found
@@ -234,17 +235,21 @@ def test_the_page_nests_and_the_figures_are_xml(found: TaskStatistics, tmp_path:
 def test_matplotlib_draws_the_papers_figure(found: TaskStatistics, tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="evonav[viz] is not installed")
     for suffix, start in ((".png", b"\x89PNG"), (".pdf", b"%PDF")):
-        path = figures.write_figure(found, tmp_path / f"deep/figure{suffix}")
+        path = write_statistics_plot(found, tmp_path / f"deep/plot{suffix}")
         data = path.read_bytes()
         assert data.startswith(start)
-        assert figures.write_figure(found, path).read_bytes() == data
+        assert write_statistics_plot(found, path).read_bytes() == data
 
 
-def test_without_matplotlib_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_matplotlib_the_extra_is_named(
+    found: TaskStatistics, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
-    monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
     with pytest.raises(StoreError, match=r"pip install 'evonav\[viz\]'"):
-        figures.check_figure(Path("figure.png"))
+        check_plot(Path("plot.png"))
+    page = write_dataset_report(found, tmp_path)
+    assert page.read_text("utf-8").count("Plots need: pip install &#39;evonav[viz]&#39;") == 2
+    assert not (tmp_path / "statistics.svg").exists()
 
 
 def test_the_command_prints_eighty_columns_and_writes_the_page(folder: Path, tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 import csv
 import io
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 from made_up_run import lettered_run, record_run, stage_record
@@ -13,13 +12,10 @@ from evonav.evaluation.metrics.navigation import rates
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
 from evonav.report.compare.selection import read_sides
-from evonav.report.figures import write_plots
-from evonav.report.plots import CurvePlot, Gap, GapPlot, gap_range, plot_svg, ticks
+from evonav.report.plots.run_plots import run_plots
+from evonav.report.plots.specs import CurvePlot
 from evonav.report.run import load_run
-from evonav.report.run_figures import run_figures
 from evonav.report.tables.run_tables import run_tables
-
-SVG = "{http://www.w3.org/2000/svg}"
 
 
 @pytest.fixture
@@ -99,46 +95,6 @@ def test_tables_and_csv_hold_n_and_interval(run: Path) -> None:
     ]
 
 
-def test_a_plot_has_a_mark_for_every_value_where_it_belongs(run: Path) -> None:
-    found = breakdown(read_sides([str(run)]), "stratum")
-    root = ElementTree.fromstring(plot_svg(breakdown_plot(found)))
-    marks = [node for node in root.iter(f"{SVG}g") if node.find(f"{SVG}title") is not None]
-    told = {node.findtext(f"{SVG}title"): float(node.find(f"{SVG}circle").get("cy")) for node in marks}
-    assert len(told) == 4
-    high = next(y for words, y in told.items() if words.startswith("fu, first, n = 8-9: 100.0"))
-    low = next(y for words, y in told.items() if words.startswith("fu, relocated"))
-    assert high < low
-    assert "fu" in [node.text for node in root.iter(f"{SVG}text")]
-
-
-def test_differences_are_drawn_around_zero() -> None:
-    plot = GapPlot("a<b", (Gap("x", "n = 3", 12.0, (-3.0, 27.0)), Gap("y", "", -1.0, None, True)), "left", "right")
-    marks = gap_range(plot)
-    assert 0.0 in marks
-    assert marks[0] <= -3
-    assert marks[-1] >= 27
-    root = ElementTree.fromstring(plot_svg(plot))
-    x, y = (float(node.get("cx")) for node in root.iter(f"{SVG}circle"))
-    assert y < x
-    assert ticks(0.0, 100.0, 7) == [0.0, 20.0, 40.0, 60.0, 80.0, 100.0]
-    assert ticks(-0.5, 0.2)[0] <= -0.5
-    assert ticks(0.0, 0.0)[-1] > 0.0
-    assert "<circle" in plot_svg(GapPlot("", (Gap("equal", "", 0.0, None),), "", ""))
-
-
-def test_figures_are_written_in_every_format(run: Path, tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
-    sides = read_sides([str(run)])
-    plots = [breakdown_plot(breakdown(sides, by)) for by in ("stratum", "radius")]
-    plots.append(GapPlot("gaps", (Gap("x", "n = 3", 12.0, (-3.0, 27.0)),), "left", "right"))
-    assert write_plots(plots, tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
-    assert write_plots(plots[-1:], tmp_path / "f.pdf").read_bytes().startswith(b"%PDF")
-    write_plots(plots, tmp_path / "f.svg")
-    assert sorted(path.name for path in tmp_path.glob("*.svg")) == ["f-2.svg", "f-3.svg", "f.svg"]
-    with pytest.raises(InvalidArgumentError, match=r"expected a file \.pdf"):
-        write_plots(plots, tmp_path / "f.gif")
-
-
 def test_the_command_prints_all_and_writes_what_is_asked(run: Path, tmp_path: Path) -> None:
     md, tex, table = tmp_path / "b.md", tmp_path / "b.tex", tmp_path / "b.csv"
     asked = ["breakdown", str(run), "--md", str(md), "--latex", str(tex), "--csv", str(table)]
@@ -149,10 +105,10 @@ def test_the_command_prints_all_and_writes_what_is_asked(run: Path, tmp_path: Pa
     assert len({row["by"] for row in csv.DictReader(table.read_text().splitlines())}) == 7
 
 
-def test_a_page_gets_the_figures_and_tables_of_its_run(run: Path) -> None:
+def test_a_page_gets_the_plots_and_tables_of_its_run(run: Path) -> None:
     loaded = load_run(run)
-    figures = run_figures(loaded)
-    assert [figure.title for figure in figures] == [
+    plots = run_plots(loaded)
+    assert [one.plot.title for one in plots] == [
         "SR differences, points",
         "SR by stratum",
         "SR by evolution",
@@ -160,14 +116,12 @@ def test_a_page_gets_the_figures_and_tables_of_its_run(run: Path) -> None:
         "SR by earlier stages",
         "SR by success radius",
     ]
-    for figure in figures:
-        assert ElementTree.fromstring(figure.svg).tag == f"{SVG}svg"
-        assert figure.words.endswith(("house.", "interval."))
+    assert all(one.caption.endswith(("house.", "interval.")) for one in plots)
     titles = [table.title for table in run_tables(loaded)]
     assert [
         title for title in ("SR by path length", "SR by rooms", "SR by success radius") if title not in titles
     ] == []
 
 
-def test_a_run_without_a_stage_has_no_figure(tmp_path: Path) -> None:
-    assert run_figures(load_run(record_run(tmp_path / "empty", [], {"task": 2}, ["fu"]))) == []
+def test_a_run_without_a_stage_has_no_plot(tmp_path: Path) -> None:
+    assert run_plots(load_run(record_run(tmp_path / "empty", [], {"task": 2}, ["fu"]))) == []

@@ -126,7 +126,7 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     (run / VIEW_DIR).mkdir()
     (run / VIEW_DIR / page_name("task-00", "fu")).write_text("page")
     files = {name: tmp_path / "out" / f"c.{name}" for name in ("md", "tex", "csv", "json", "html", "svg")}
-    options = [f"--{ {'tex': 'latex', 'svg': 'figure'}.get(name, name) }={path}" for name, path in files.items()]
+    options = [f"--{ {'tex': 'latex', 'svg': 'plot'}.get(name, name) }={path}" for name, path in files.items()]
     result = CliRunner().invoke(app, ["compare", str(run), "fu", "ftu", *options])
     assert result.exit_code == 0, result.output
     assert "ftu is ahead" in result.output
@@ -148,7 +148,7 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
     assert f'href="../run/view/{page_name("task-00", "fu")}#stage=2&amp;round=1"' in page
     assert "http" not in page.replace("http://www.w3.org/2000/svg", "").replace("http-equiv", "")
     assert files["tex"].read_text().count(r"\toprule") == 2
-    assert files["svg"].read_text().count("<circle") == len(found.parts)
+    assert files["svg"].read_text().count("<use ") == len(found.parts)
 
 
 def test_text_of_a_run_is_only_text_in_every_file(tmp_path: Path) -> None:

@@ -253,5 +253,5 @@ def test_a_sweep_tells_rates_leads_and_crossover(tmp_path):
     assert found.ci95[0] <= 0.5 <= found.ci95[1]
     assert crossover(analysis, "stage-reset", MEASURES["SR"]) is None
     path = write_controlled_report(tmp_path / "rates")
-    assert (path.parent / "rates-sr.svg").is_file()
+    assert (path.parent / "rates.svg").is_file()
     assert "overtaken by stage-reset at p" in path.read_text(encoding="utf-8")

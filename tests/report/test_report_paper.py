@@ -4,7 +4,6 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
-from xml.etree import ElementTree
 
 import perception_results
 import pytest
@@ -15,7 +14,6 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.evaluation.metrics.navigation import PairedDifference
 from evonav.evaluation.records.schema import EndState
-from evonav.report.line_chart import Line, line_chart
 from evonav.report.mechanisms import cause_share_table, counter_table, deeds_of, end_table, success_by_group
 from evonav.report.paper import tables as paper
 from evonav.report.run import load_run
@@ -202,36 +200,6 @@ def test_counters_are_summed_over_tasks_and_over_what_a_lost_agent_began_anew(tm
     assert success_by_group(run, {"a": "x", "b": "x"}) == {"x": {"fu": (2, 4)}}
 
 
-def test_a_line_chart_draws_every_point_and_name_where_it_belongs() -> None:
-    lines = [
-        Line("fu", [(0.0, 60.0), (20.0, 30.0)], [(50.0, 70.0), None]),
-        Line("a<b", [(0.0, 60.0), (20.0, 31.0)], [None, None]),
-    ]
-    root = ElementTree.fromstring(line_chart(lines, "SR", "wrong, %", "SR, %"))
-    svg = "{http://www.w3.org/2000/svg}"
-    circles = root.findall(f"{svg}circle")
-    assert [circle.findtext(f"{svg}title") for circle in circles] == [
-        "fu: 60.0 at 0",
-        "fu: 30.0 at 20",
-        "a<b: 60.0 at 0",
-        "a<b: 31.0 at 20",
-    ]
-    x, y = ([float(circle.get(axis, "")) for circle in circles] for axis in ("cx", "cy"))
-    assert x[0] < x[1]
-    assert y[0] == y[2] < y[3] < y[1]  # up is more
-    names = {node.text: float(node.get("y", "")) for node in root.findall(f"{svg}text") if node.get("fill")}
-    assert set(names) == {"fu", "a<b"}
-    assert abs(names["fu"] - names["a<b"]) >= 14.0
-
-
-def test_a_line_chart_names_its_places_where_they_are_no_numbers() -> None:
-    points = [(0.0, 60.0), (1.0, 40.0), (2.0, 20.0)]
-    drawn = line_chart([Line("fu", points, [None] * 3)], "SR", "perception", "SR, %", x_names=["gt", "<b>", "poor"])
-    texts = [element.text for element in ElementTree.fromstring(drawn).iter() if element.tag.endswith("text")]
-    assert [text for text in texts if text in {"gt", "<b>", "poor"}] == ["gt", "<b>", "poor"]
-    assert "1" not in texts
-
-
 @pytest.fixture(scope="module")
 def script():
     path = Path(__file__).parents[2] / "scripts" / "results.py"
@@ -254,11 +222,11 @@ def test_the_script_replaces_marked_parts_alone(script) -> None:
 
 def test_the_page_has_every_part_that_the_script_writes(script, write_run: WriteRun, monkeypatch) -> None:
     run_dir = write_run("main")
-    monkeypatch.setattr(script, "FIGURE", run_dir.parent / "figure.svg")
+    monkeypatch.setattr(script, "PLOT", run_dir.parent / "plot.svg")
     page = script.PAGE.read_text(encoding="utf-8")
     parts = script.parts(run_dir.parent, ["fu", "ftu"])
     marked = re.findall(r"<!-- results: (\S+) -->", page)
-    monkeypatch.setattr(perception_results, "FIGURES", run_dir.parent)
+    monkeypatch.setattr(perception_results, "IMAGES", run_dir.parent)
     of_perception = perception_results.parts({"noisy:perfect": load_run(run_dir), "noisy:poor": load_run(run_dir)})
     assert sorted(marked) == sorted(parts | script.large_parts(run_dir) | of_perception)
     assert "| ftu" in parts["table-1"]

@@ -21,7 +21,7 @@ def breakdown(
     md: Annotated[Path | None, typer.Option(help="Markdown file to write.")] = None,
     latex: Annotated[Path | None, typer.Option(help="LaTeX file to write (booktabs, graphicx).")] = None,
     csv: Annotated[Path | None, typer.Option(help="CSV file to write, unrounded.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Figure to write: .svg, or .png or .pdf (extra `viz`).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Plots to write: .svg, .png or .pdf file (extra `viz`).")] = None,
 ) -> None:
     """Shows rates by kind of stage, each with n and a 95% interval by house."""
     from rich.console import Console
@@ -29,10 +29,10 @@ def breakdown(
     from evonav.parallel.folders import write_atomically
     from evonav.report.compare import breakdown as made
     from evonav.report.compare.selection import read_sides
-    from evonav.report.figures import check_figure, write_plots
+    from evonav.report.plots.render import check_plot, write_plots
 
-    if figure is not None and figure.suffix.lower() != ".svg":
-        check_figure(figure)
+    if plot is not None:
+        check_plot(plot)
     sides = read_sides(runs)
     found = [made.breakdown(sides, name, measure) for name in by or made.STANDARD]
     found = [one for one in found if one.groups]
@@ -50,5 +50,5 @@ def breakdown(
             path.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(path, text)
             typer.echo(f"written: {path}")
-    if figure is not None:
-        typer.echo(f"written: {write_plots([made.breakdown_plot(one) for one in found], figure)}")
+    if plot is not None:
+        typer.echo(f"written: {write_plots([made.breakdown_plot(one) for one in found], plot)}")

@@ -27,7 +27,7 @@ def compare(
     csv: Annotated[Path | None, typer.Option(help="CSV file to write, unrounded.")] = None,
     json: Annotated[Path | None, typer.Option(help="JSON file to write, with the stages that flipped.")] = None,
     html: Annotated[Path | None, typer.Option(help="HTML page to write, with links to replays.")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Figure to write: .svg, or .png or .pdf (extra `viz`).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Plot to write: .svg, .png or .pdf file (extra `viz`).")] = None,
 ) -> None:
     """Compares agents stage by stage: differences with 95% interval and p, by stratum and mode, and what flipped."""
     from rich.console import Console
@@ -45,7 +45,7 @@ def compare(
     for line in words.statements(found) if len(found) == 1 else words.warnings(found):
         console.print(line, markup=False, highlight=False)
     console.print(words.METHOD, style="dim", highlight=False)
-    for path in _write(found, md=md, latex=latex, csv=csv, json=json, html=html, figure=figure):
+    for path in _write(found, md=md, latex=latex, csv=csv, json=json, html=html, plot=plot):
         typer.echo(f"written: {path}")
 
 
@@ -57,7 +57,7 @@ def _write(
     csv: Path | None,
     json: Path | None,
     html: Path | None,
-    figure: Path | None,
+    plot: Path | None,
 ) -> list[Path]:
     import json as json_text
     from collections.abc import Callable
@@ -66,7 +66,7 @@ def _write(
     from evonav.report.compare import wording as words
     from evonav.report.compare.compare import comparison_json
     from evonav.report.compare.page import comparison_page, comparison_plot
-    from evonav.report.figures import write_plots
+    from evonav.report.plots.render import write_plots
 
     written = []
     texts: list[tuple[Path | None, Callable[[], str]]] = [
@@ -81,6 +81,6 @@ def _write(
             path.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(path, text())
             written.append(path)
-    if figure is not None:
-        written.append(write_plots([comparison_plot(found)], figure))
+    if plot is not None:
+        written.append(write_plots([comparison_plot(found)], plot))
     return written

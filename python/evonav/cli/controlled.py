@@ -146,7 +146,7 @@ def report(
     directory: Directory,
     out: Annotated[Path | None, typer.Option(help="Where to write; default: DIRECTORY/report.")] = None,
 ) -> None:
-    """Prints the tables, and writes them, the figures and a page of all pairs."""
+    """Prints the tables, and writes them, the plots and a page of all pairs."""
     from rich.console import Console
 
     from evonav.controlled.analysis import load_analysis

@@ -29,7 +29,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "measures": ("evonav measures out/run", "evonav measures out/run --agents fu,ftu --out out/measures.md"),
     "breakdown": (
         "evonav breakdown out/run",
-        "evonav breakdown out/run fu ftu --by path-length --measure spl --figure out/length.pdf",
+        "evonav breakdown out/run fu ftu --by path-length --measure spl --plot out/length.pdf",
         "evonav breakdown out/gpt-4o out/rules --by num_stale_at_start --csv out/stale.csv",
     ),
     "export": (

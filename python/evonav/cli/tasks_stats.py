@@ -1,4 +1,4 @@
-"""`evonav tasks stats`: what a set of tasks is like, beside the paper's figures."""
+"""`evonav tasks stats`: what a set of tasks is like, beside the paper's."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,24 +19,24 @@ NUM_NAMES = 6
 def stats(
     folders: Annotated[list[Path], typer.Argument(help="Folders of tasks: in each, one folder a task.")],
     out: Annotated[
-        Path | None, typer.Option(help="Folder for statistics.json, statistics.html and figures as SVG.")
+        Path | None, typer.Option(help="Folder for statistics.json, statistics.html and statistics.svg.")
     ] = None,
     reweight: Annotated[
         str | None, typer.Option(help="Also weigh tasks so that houses have the rooms of a set: procthor-10k.")
     ] = None,
-    figure: Annotated[
-        Path | None, typer.Option(help="File for the paper's three figures, .png or .pdf (needs evonav[viz]).")
+    plot: Annotated[
+        Path | None, typer.Option(help="File for the paper's figure: .svg, .png or .pdf (extra `viz`).")
     ] = None,
     workers: Workers = None,
 ) -> None:
-    """Prints and plots statistics of tasks beside the paper's figures."""
+    """Prints and plots statistics of tasks beside the paper's."""
     from evonav.cli.display import status
     from evonav.generation.statistics import statistics_of_folders
-    from evonav.report.figures import check_figure, write_figure
-    from evonav.report.tasks.dataset_page import write_dataset_report
+    from evonav.report.plots.render import check_plot
+    from evonav.report.tasks.dataset_page import write_dataset_report, write_statistics_plot
 
-    if figure is not None:
-        check_figure(figure)
+    if plot is not None:
+        check_plot(plot)
     with status("Reading tasks") as tell:
         found = statistics_of_folders(
             folders,
@@ -47,8 +47,8 @@ def stats(
     print_statistics(found)
     if out is not None:
         typer.echo(f"report: {write_dataset_report(found, out)}")
-    if figure is not None:
-        typer.echo(f"figure: {write_figure(found, figure)}")
+    if plot is not None:
+        typer.echo(f"plot: {write_statistics_plot(found, plot)}")
 
 
 def print_statistics(found: "TaskStatistics") -> None:
@@ -88,7 +88,7 @@ def print_statistics(found: "TaskStatistics") -> None:
 def _measures(found: "TaskStatistics") -> "Table":
     from rich.table import Table
 
-    table = Table(box=None, padding=(0, 1, 0, 0), title="Figures in %, unless they say otherwise", title_justify="left")
+    table = Table(box=None, padding=(0, 1, 0, 0), title="Metrics in %, unless they say otherwise", title_justify="left")
     table.add_column("", no_wrap=True)
     headings = ["paper", "here", "95%", "n"]
     if found.weighting is not None:

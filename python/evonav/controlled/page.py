@@ -1,4 +1,4 @@
-"""Writes what came of a controlled analysis: tables, figures, pictures of telling pairs, and a page of all pairs."""
+"""Write the report of a controlled analysis: tables, plots, pictures of telling pairs, and a page of all pairs."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, Key, load_analysis, pair_tables
+from evonav.controlled.analysis import BASELINE, Analysis, Key, load_analysis, pair_tables
 from evonav.controlled.claims import claim_table
 from evonav.controlled.paired_maps import (
     REASONS,
@@ -20,7 +20,7 @@ from evonav.controlled.paired_maps import (
     telling_pairs,
     walk_and_course,
 )
-from evonav.controlled.plots import bars_svg, lines_svg, write_figures
+from evonav.controlled.plots import controlled_plots
 from evonav.controlled.rates import rate_tables
 from evonav.errors import StoreError
 from evonav.report.maps.floor_plan import furniture, ground, labels, moving_ids
@@ -29,10 +29,14 @@ from evonav.report.maps.stage_map import map_css, outcome_words
 from evonav.report.maps.svg import join, slug
 from evonav.report.maps.trajectory import change, rounds
 from evonav.report.pages.template import page_environment, picture_uri, policy, text_of
+from evonav.report.plots.render import SUFFIXES, has_renderer, plot_elements, write_plots
+from evonav.report.plots.style import plot_css
 from evonav.report.tables.causes import sentence
 from evonav.report.tables.table import Table
 
 PAGE_NAME = "index.html"
+PLOT_NAMES = {"pairs": "fixed-not-fixed", "rates": "rates"}
+"""Stems of the plots' files, by kind of analysis."""
 PAIRS_DIR, PICTURES_DIR = "pairs", "rollouts"
 TELLING_AGENT = "fu"
 """Of the paper's pictures; where it was not run, the first agent that is not the baseline."""
@@ -46,7 +50,7 @@ def tables_of(analysis: Analysis) -> list[Table]:
 
 
 def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
-    """Writes `tables.md`, figures as SVG (and PNG and PDF where matplotlib is), and `index.html`.
+    """Write `tables.md`, `tables.tex` and `index.html`, and with the extra `viz` the plots as SVG, PNG and PDF.
 
     Args:
         directory: Of the analysis; its runs may be unfinished.
@@ -62,15 +66,15 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
     out = out or directory / "report"
     analysis = load_analysis(directory)
     tables = tables_of(analysis)
-    figures = _figures(analysis)
+    plots = controlled_plots(analysis)
     is_pairs = analysis.record.kind == "pairs"
     try:
         out.mkdir(parents=True, exist_ok=True)
         (out / "tables.md").write_text("\n".join(f"## {t.title}\n\n{t.markdown()}" for t in tables), encoding="utf-8")
         (out / "tables.tex").write_text("\n".join(table.latex() for table in tables), encoding="utf-8")
-        for name, drawn in figures.items():
-            (out / f"{name}.svg").write_text(drawn, encoding="utf-8")
-        write_figures(analysis, out)
+        if has_renderer():
+            for suffix in SUFFIXES:
+                write_plots(plots, out / f"{PLOT_NAMES[analysis.record.kind]}{suffix}", columns=len(plots))
         page = page_environment().get_template("controlled.html.j2")
         path = out / PAGE_NAME
         path.write_text(
@@ -79,8 +83,8 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
                 kind=analysis.record.kind,
                 record=analysis.record,
                 policy=policy(None),
-                css=text_of("report.css") + map_css(),
-                figures=[Markup(drawn) for drawn in figures.values()],  # noqa: S704 - our own SVG
+                css=text_of("report.css") + map_css() + plot_css(),
+                plots=plot_elements(plots),
                 tables=tables,
                 telling=_write_telling(analysis, out) if is_pairs else [],
                 pairs=_write_pairs(analysis, out) if is_pairs else [],
@@ -92,12 +96,6 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
     except OSError as error:
         raise StoreError(f"{out}: {error}") from error
     return path
-
-
-def _figures(analysis: Analysis) -> dict[str, str]:
-    if analysis.record.kind == "pairs":
-        return {"fixed-not-fixed": bars_svg(analysis)}
-    return {f"rates-{name.lower()}": lines_svg(analysis, name, measure) for name, measure in MEASURES.items()}
 
 
 def _write_telling(analysis: Analysis, out: Path) -> list[dict[str, str]]:

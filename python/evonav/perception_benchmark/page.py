@@ -5,16 +5,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
-
 from evonav.parallel.folders import write_atomically
 from evonav.perception_benchmark.other_scores import measure_values
-from evonav.perception_benchmark.plots import confusion_figures, feature_figures, perception_figures
+from evonav.perception_benchmark.plots import confusion_plots, feature_plots, perception_plots
 from evonav.perception_benchmark.records import read_header, read_records
 from evonav.perception_benchmark.scores import Scores, differences, scores
 from evonav.perception_benchmark.tables import perception_csv, perception_tables
-from evonav.report.line_chart import PLOT_CSS
 from evonav.report.pages.template import page_environment, policy, text_of
+from evonav.report.plots.render import plot_elements
+from evonav.report.plots.style import plot_css
 
 REPORT_NAME = "report.html"
 
@@ -35,7 +34,7 @@ def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
     write_atomically(folder / "summary.csv", perception_csv(found))
     markdown = "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables)
     write_atomically(folder / "summary.md", markdown)
-    css = text_of("report.css") + PLOT_CSS + text_of("perception.css")
+    css = text_of("report.css") + plot_css() + text_of("perception.css")
     page = page_environment().get_template("perception.html.j2")
     tasks = [task for task, _ in found[0].pictures]
     text = page.render(
@@ -45,9 +44,9 @@ def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
         found=found,
         missing=0 if header is None else len(header.tasks) - found[0].num_tasks,
         tables=tables,
-        figures=_trusted(perception_figures(found)),
-        confusions=_trusted(confusion_figures(found)),
-        features=_trusted(feature_figures(found)),
+        plots=plot_elements(perception_plots(found)),
+        confusions=plot_elements(confusion_plots(found)),
+        features=plot_elements(feature_plots(found)),
         tasks=tasks,
         pictures={(one.word, task): picture for one in found for task, picture in one.pictures},
     )
@@ -92,7 +91,3 @@ def _values(one: Scores) -> dict[str, Any]:
         "memory": measure_values(one.memory),
         "memory_by_share": [{"share": share, **measure_values(measures)} for share, measures in one.memory_curve],
     }
-
-
-def _trusted(drawn: Sequence[str]) -> list[Markup]:
-    return [Markup(svg) for svg in drawn]  # noqa: S704 - our own SVG

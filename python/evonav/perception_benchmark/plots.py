@@ -2,15 +2,15 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from evonav.perception_benchmark.average_precision import RECALLS
-from evonav.perception_benchmark.charts import Axes, ConfusionRow, Curve, confusion_chart, square_chart
 from evonav.perception_benchmark.estimates import Estimate
 from evonav.perception_benchmark.records import NUM_COSINE_BINS
 from evonav.perception_benchmark.scores import Scores
-from evonav.report.plots import Dots, GroupPlot, plot_svg
+from evonav.report.plots.specs import ConfusionPlot, ConfusionRow, CurvePlot, GroupPlot, Line, Plot, Series
 from evonav.significance import Interval
 
 MAX_CONFUSED = 12
@@ -25,42 +25,39 @@ COSINE_NAMES = {
 }
 
 
-def perception_figures(found: Sequence[Scores]) -> list[str]:
-    """SVG elements for a page that has `PLOT_CSS`, in reading order."""
+def perception_plots(found: Sequence[Scores]) -> list[Plot]:
+    """Return the plots of all perceptions, in reading order."""
     curves = [
-        Curve(one.word, list(zip(RECALLS.tolist(), one.precision_curve, strict=True)))
+        Line(one.word, tuple(zip(RECALLS.tolist(), one.precision_curve, strict=True)), has_dots=False)
         for one in found
         if one.precision_curve
     ]
-    heading = "Precision and recall at IoU 0.5"
-    drawn = [square_chart(Axes(heading, "recall", "precision, mean over categories"), curves)]
-    reliable = [
-        Curve(
+    title = "Precision and recall at IoU 0.5"
+    plots: list[Plot] = [_square_plot(title, curves, "recall", "precision, mean over categories")]
+    calibrations = [
+        Line(
             one.word,
-            [(confidence, each.value or 0.0) for confidence, each in one.calibration],
-            [each.interval for _, each in one.calibration],
-            has_dots=True,
+            tuple((confidence, each.value or 0.0) for confidence, each in one.calibration),
+            tuple(each.interval for _, each in one.calibration),
         )
         for one in found
         if one.calibration
     ]
-    axes = Axes("Is confidence what it says?", "confidence", "precision", has_diagonal=True)
-    drawn.append(square_chart(axes, reliable))
-    for by, words in _GROUPS:
-        drawn += [
-            plot_svg(_group_plot(found, by, words, measure), is_inline=True) for measure in ("recall", "precision")
-        ]
-    return drawn + _memory_figures(found)
+    calibration = _square_plot("Precision by confidence", calibrations, "confidence", "precision")
+    plots.append(replace(calibration, has_diagonal=True))
+    for by, name in _GROUPS:
+        plots += [_group_plot(found, by, name, measure) for measure in ("recall", "precision")]
+    return plots + _memory_plots(found)
 
 
-def confusion_figures(found: Sequence[Scores]) -> list[str]:
-    """A table in shades of each perception that takes things for others."""
-    return [_confusion_figure(one) for one in found if one.confusions]
+def confusion_plots(found: Sequence[Scores]) -> list[ConfusionPlot]:
+    """Return a table in shades of each perception that takes objects for others."""
+    return [_confusion_plot(one) for one in found if one.confusions]
 
 
-def feature_figures(found: Sequence[Scores]) -> list[str]:
-    """Histograms of cosines of each perception that has features."""
-    drawn = []
+def feature_plots(found: Sequence[Scores]) -> list[CurvePlot]:
+    """Return histograms of cosines of each perception that has features."""
+    plots = []
     for one in found:
         tables = {name: np.array(counts, np.float64) for name, counts in one.cosines.items()}
         if not tables:
@@ -70,54 +67,58 @@ def feature_figures(found: Sequence[Scores]) -> list[str]:
         used = [x for name in shares for x, share in zip(middles, shares[name].tolist(), strict=True) if share > 0]
         low = max(-1.0, np.floor(10 * min(used)) / 10)
         top = max(float(share.max()) for share in shares.values())
-        curves = [
-            Curve(
+        lines = [
+            Line(
                 COSINE_NAMES[name],
-                [(x, y) for x, y in zip(middles, share.tolist(), strict=True) if x >= low],
+                tuple((x, y) for x, y in zip(middles, share.tolist(), strict=True) if x >= low),
+                has_dots=False,
             )
             for name, share in shares.items()
         ]
-        axes = Axes(one.word, "cosine of features", "share of pairs", (float(low), 1.0), top)
-        drawn.append(square_chart(axes, curves))
-    return drawn
+        plot = _square_plot(one.word, lines, "cosine of features", "share of pairs")
+        plots.append(replace(plot, x_range=(float(low), 1.0), y_top=top))
+    return plots
 
 
-def _group_plot(found: Sequence[Scores], by: str, words: str, measure: str) -> GroupPlot:
+def _square_plot(title: str, lines: Sequence[Line], x_label: str, y_label: str) -> CurvePlot:
+    return CurvePlot(title, tuple(lines), x_label, y_label, x_range=(0.0, 1.0), y_top=1.0, is_square=True)
+
+
+def _group_plot(found: Sequence[Scores], by: str, name: str, measure: str) -> GroupPlot:
     first = found[0].groups[by]
     # Objects are the same for all, detections are not: then no n could stand below.
     groups = tuple(
         f"{group.name}\nn = {group.measures[measure].n}" if measure == "recall" else group.name for group in first
     )
     series = tuple(
-        Dots(
+        Series(
             one.word,
             tuple(_percent(group.measures[measure]) for group in one.groups[by]),
             tuple(_interval(group.measures[measure]) for group in one.groups[by]),
         )
         for one in found
     )
-    return GroupPlot(f"{measure.capitalize()} by {words}", groups, series, "% with 95% intervals by house")
+    return GroupPlot(f"{measure.capitalize()} by {name}", groups, series, "% with 95% intervals by house")
 
 
-def _memory_figures(found: Sequence[Scores]) -> list[str]:
-    drawn = []
-    for name, heading in _MEMORY:
-        curves = [
-            Curve(
+def _memory_plots(found: Sequence[Scores]) -> list[CurvePlot]:
+    plots = []
+    for name, title in _MEMORY:
+        lines = [
+            Line(
                 one.word,
-                [(share, measures[name].value or 0.0) for share, measures in one.memory_curve],
-                [measures[name].interval for _, measures in one.memory_curve],
-                has_dots=True,
+                tuple((share, measures[name].value or 0.0) for share, measures in one.memory_curve),
+                tuple(measures[name].interval for _, measures in one.memory_curve),
             )
             for one in found
             if one.memory_curve
         ]
-        if curves:
-            drawn.append(square_chart(Axes(heading, "share of the first house's tour", ""), curves))
-    return drawn
+        if lines:
+            plots.append(_square_plot(title, lines, "share of the first house's tour", "share"))
+    return plots
 
 
-def _confusion_figure(one: Scores) -> str:
+def _confusion_plot(one: Scores) -> ConfusionPlot:
     by_category: Counter[str] = Counter()
     by_label: Counter[str] = Counter()
     for each in one.confusions:
@@ -133,11 +134,10 @@ def _confusion_figure(one: Scores) -> str:
     for name in names:
         mine = measures[name]
         right, missed = mine["recall"].value or 0.0, 1.0 - (mine["located"].value or 0.0)
-        rows.append(
-            ConfusionRow(name, mine["recall"].n, [right, missed, *(shares.get((name, label), 0.0) for label in labels)])
-        )
-    heading = f"{one.word}: what objects are told as, % of each category (n)"
-    return confusion_chart(heading, ["right", "nothing", *labels], rows)
+        others = (shares.get((name, label), 0.0) for label in labels)
+        rows.append(ConfusionRow(name, mine["recall"].n, (right, missed, *others)))
+    title = f"{one.word}: labels of objects, % of each category (n)"
+    return ConfusionPlot(title, ("right", "nothing", *labels), tuple(rows))
 
 
 def _percent(estimate: Estimate) -> float | None:

@@ -14,8 +14,7 @@ from evonav.report.compare.compare import MODES, STRATA, check_measure
 from evonav.report.compare.selection import Side
 from evonav.report.compare.wording import RATES, measure_name
 from evonav.report.export import csv_text
-from evonav.report.line_chart import Line
-from evonav.report.plots import CurvePlot, Dots, GroupPlot, Plot
+from evonav.report.plots.specs import CurvePlot, GroupPlot, Line, Plot, Series
 from evonav.report.tables.table import NONE, Table
 from evonav.significance import Interval
 
@@ -285,16 +284,17 @@ def breakdown_plot(found: Breakdown) -> Plot:
         lines = []
         for agent in found.agents:
             there = [(group, found.cells[group, agent]) for group in radii if (group, agent) in found.cells]
-            points = [(float(group[:-2]), 100 * cell.value) for group, cell in there if cell.value is not None]
+            points = tuple((float(group[:-2]), 100 * cell.value) for group, cell in there if cell.value is not None)
             if points:
-                lines.append(Line(agent, points, [_scaled(cell.ci95, 100) for _, cell in there]))
+                lines.append(Line(agent, points, tuple(_scaled(cell.ci95, 100) for _, cell in there)))
         return CurvePlot("SR by success radius", tuple(lines), "success radius, m", "SR, %")
     groups = found.groups[:MAX_PLOTTED]
     series = []
     for agent in found.agents:
         cells = [found.cells.get((group, agent)) for group in groups]
         values = tuple(None if cell is None or cell.value is None else scale * cell.value for cell in cells)
-        series.append(Dots(agent, values, tuple(None if cell is None else _scaled(cell.ci95, scale) for cell in cells)))
+        ends = tuple(None if cell is None else _scaled(cell.ci95, scale) for cell in cells)
+        series.append(Series(agent, values, ends))
     sizes = [
         {found.cells[group, agent].n for agent in found.agents if (group, agent) in found.cells} for group in groups
     ]

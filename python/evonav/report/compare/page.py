@@ -4,13 +4,12 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from markupsafe import Markup
-
 from evonav.report.compare import wording as words
 from evonav.report.compare.compare import Comparison, Flip
-from evonav.report.line_chart import PLOT_CSS
 from evonav.report.pages.template import page_environment, policy, text_of
-from evonav.report.plots import Gap, GapPlot, plot_svg
+from evonav.report.plots.render import plot_elements
+from evonav.report.plots.specs import Gap, GapPlot
+from evonav.report.plots.style import plot_css
 
 
 def comparison_plot(comparisons: Sequence[Comparison]) -> GapPlot:
@@ -39,7 +38,7 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
     sections = [
         {
             "title": f"{one.b} less {one.a}",
-            "plot": Markup(plot_svg(comparison_plot([one]), is_inline=True)),  # noqa: S704 - our own SVG
+            "plot": plot_elements([comparison_plot([one])])[0],
             "table": words.part_table(one),
             "winners": [
                 (winner, [_shown(flip, out_dir) for flip in one.flips if flip.winner == winner])
@@ -53,12 +52,12 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
         .get_template("compare.html.j2")
         .render(
             title=f"{comparisons[0].b} and {comparisons[0].a}" if len(comparisons) == 1 else "agents",
-            css=text_of("report.css") + PLOT_CSS,
+            css=text_of("report.css") + plot_css(),
             policy=policy(None),
             statements=words.findings(comparisons),
             warnings=words.warnings(comparisons),
             pairs=words.pair_table(comparisons),
-            overview=Markup(plot_svg(comparison_plot(comparisons), is_inline=True)) if len(comparisons) > 1 else "",  # noqa: S704
+            overview=plot_elements([comparison_plot(comparisons)])[0] if len(comparisons) > 1 else "",
             sections=sections,
         )
     )

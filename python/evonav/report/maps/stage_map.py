@@ -4,6 +4,8 @@ import re
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
 
+from markupsafe import Markup
+
 from evonav.evaluation.metrics.navigation import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
 from evonav.report.maps.floor_plan import Frame, frame_of, ground, item_labels, labels
@@ -17,14 +19,14 @@ VIEW_DIR = "view"
 """Of a run, with the pages of `evonav view`."""
 
 
-def map_css() -> str:
-    """Colours and fonts of maps on a page: custom properties, light and dark."""
-    return str((files("evonav.report") / "templates" / "map.css").read_text(encoding="utf-8"))
+def map_css() -> Markup:
+    """Return colours and fonts of maps on a page: custom properties, light and dark."""
+    return Markup((files("evonav.report") / "templates" / "map.css").read_text(encoding="utf-8"))  # noqa: S704 - ours
 
 
 def file_css() -> str:
     """The same for a file of its own: colours written out, since few programs but browsers know custom properties."""
-    light, dark, rules = map_css().split("/* --- */")
+    light, dark, rules = str(map_css()).split("/* --- */")
     return f"{_inlined(rules, light)}@media (prefers-color-scheme:dark){{{_inlined(rules, dark)}}}"
 
 

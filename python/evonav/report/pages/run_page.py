@@ -10,7 +10,6 @@ from markupsafe import Markup
 
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import AgentSummary
-from evonav.report.line_chart import PLOT_CSS
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import VIEW_DIR, map_css, map_name, outcome_words, stage_svg
 from evonav.report.maps.svg import slug
@@ -18,8 +17,10 @@ from evonav.report.pages.highlights import telling_episodes
 from evonav.report.pages.replays import ListedPage, listed_pages, viewer_css, viewer_js
 from evonav.report.pages.task_cards import TaskView, filter_data, task_view
 from evonav.report.pages.template import packed, page_environment, policy, text_of
+from evonav.report.plots.render import plot_elements
+from evonav.report.plots.run_plots import run_plots
+from evonav.report.plots.style import plot_css
 from evonav.report.run import Run, StageOutcome, Task, load_run
-from evonav.report.run_figures import run_figures
 from evonav.report.tables import table as tables
 from evonav.report.tables.causes import WORDS, Cause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
@@ -148,9 +149,10 @@ def _page_context(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
         for task_id, num_stages in run.num_stages.items()
     ]
     headline, *others = found
+    plots = run_plots(run)
     used = {outcome.cause for outcome in run.outcomes.values()}
     columns = "".join(f".k{k}{{--k:{k}}}" for k in sorted(set(run.num_stages.values())))
-    css = text_of("report.css") + map_css() + PLOT_CSS + columns
+    css = text_of("report.css") + map_css() + plot_css() + columns
     js = text_of("report.js")
     return {
         "run": run,
@@ -158,7 +160,7 @@ def _page_context(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
         "headline": headline,
         "bars": [_bars(summary) for summary in run.summaries],
         "others": [table for table in others if table.rows],
-        "figures": [(figure, Markup(figure.svg)) for figure in run_figures(run)],  # noqa: S704 - our own SVG
+        "plots": list(zip(plot_elements([one.plot for one in plots]), [one.caption for one in plots], strict=False)),
         "statements": statements(run),
         "overview": overview,
         "causes": [(cause.name, WORDS[cause]) for cause in Cause if cause in used],

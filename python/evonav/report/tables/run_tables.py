@@ -5,8 +5,8 @@ from collections.abc import Iterable
 
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import breakdown_table
+from evonav.report.plots.run_plots import run_breakdowns
 from evonav.report.run import Run
-from evonav.report.run_figures import run_breakdowns
 from evonav.report.tables import table as tables
 
 

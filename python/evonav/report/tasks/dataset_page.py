@@ -3,22 +3,23 @@
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
-
 from evonav.errors import StoreError
-from evonav.report.charts import chart_css, figure_svg, legend_svg, panel_svg
 from evonav.report.pages.template import page_environment, policy, text_of
-from evonav.report.panels import other_panels, paper_panels
+from evonav.report.plots.render import has_renderer, plot_elements, write_plots
+from evonav.report.plots.statistics_plots import other_plots, paper_plots
+from evonav.report.plots.style import plot_css
 from evonav.tasks.records import record_bytes
 from evonav.tasks.statistics import Estimate, Measure, TaskStatistics
 
 PAGE_NAME = "statistics.html"
 DATA_NAME = "statistics.json"
-FIGURE_NAME = "statistics.svg"
+PLOT_NAME = "statistics.svg"
 
 
 def write_dataset_report(found: TaskStatistics, out_dir: Path) -> Path:
-    """Writes `statistics.html`, `statistics.json` and `statistics.svg`; the same statistics give the same bytes.
+    """Write `statistics.html`, `statistics.json` and, with the extra `viz`, `statistics.svg`.
+
+    The same statistics give the same bytes.
 
     Returns:
         Path of the page.
@@ -30,12 +31,30 @@ def write_dataset_report(found: TaskStatistics, out_dir: Path) -> Path:
     try:
         out_dir.mkdir(parents=True, exist_ok=True)
         (out_dir / DATA_NAME).write_bytes(record_bytes(found))
-        (out_dir / FIGURE_NAME).write_text(figure_svg(paper_panels(found)), encoding="utf-8")
+        if has_renderer():
+            write_statistics_plot(found, out_dir / PLOT_NAME)
         path = out_dir / PAGE_NAME
         path.write_text(page.render(**_context(found)), encoding="utf-8")
     except OSError as error:
         raise StoreError(f"{out_dir}: {error}") from error
     return path
+
+
+def write_statistics_plot(found: TaskStatistics, path: Path) -> Path:
+    """Write the paper's figure of statistics: three plots side by side.
+
+    Args:
+        found: Statistics of tasks.
+        path: `.svg`, `.png` or `.pdf` file.
+
+    Returns:
+        `path`.
+
+    Raises:
+        InvalidArgumentError: The file's suffix is of no format.
+        StoreError: matplotlib is not installed, or the file cannot be written.
+    """
+    return write_plots(paper_plots(found), path, columns=3)
 
 
 def _context(found: TaskStatistics) -> dict[str, Any]:
@@ -46,10 +65,9 @@ def _context(found: TaskStatistics) -> dict[str, Any]:
     return {
         "found": found,
         "policy": policy(None),
-        "css": text_of("report.css") + Markup(chart_css()),  # noqa: S704 - our own
-        "legend": Markup(legend_svg(found.weighting is not None)),  # noqa: S704
-        "figures": [Markup(panel_svg(panel)) for panel in paper_panels(found)],  # noqa: S704
-        "others": [Markup(panel_svg(panel)) for panel in other_panels(found)],  # noqa: S704
+        "css": text_of("report.css") + plot_css(),
+        "plots": plot_elements(paper_plots(found)),
+        "others": plot_elements(other_plots(found)),
         "groups": groups,
     }
 

@@ -1,0 +1,173 @@
+"""Render plots: as elements of pages, and as SVG, PNG and PDF files (extra `viz`)."""
+
+import hashlib
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+from markupsafe import Markup
+
+from evonav.errors import InvalidArgumentError, StoreError
+from evonav.parallel.folders import write_atomically
+from evonav.report.maps.svg import escape, title
+from evonav.report.plots.draw import TOOLTIP, draw, size_in
+from evonav.report.plots.specs import Plot
+from evonav.report.plots.style import RC, plot_css
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SUFFIXES = (".svg", ".png", ".pdf")
+HINT = "Plots need: pip install 'evonav[viz]'"
+_PX_PER_POINT = 96 / 72
+_SKIPPED = frozenset(("metadata", "style", "clipPath"))
+_DROPPED = frozenset(("font-family", "clip-path"))
+_DECIMALS = re.compile(r"-?\d+\.\d{3,}")
+
+
+def has_renderer() -> bool:
+    """Return whether matplotlib is installed."""
+    return find_spec("matplotlib") is not None
+
+
+def plot_elements(plots: Sequence[Plot]) -> list[Markup]:
+    """Return plots as `svg` elements for a page that has `plot_css()`.
+
+    Returns:
+        One element a plot, without styles of its own; where matplotlib is missing, a single line that says so.
+    """
+    if plots and not has_renderer():
+        return [Markup('<p class="note">{}</p>').format(HINT)]
+    return [Markup(_svg([plot], columns=1, style="")) for plot in plots]  # noqa: S704 - our own SVG
+
+
+def check_plot(path: Path) -> None:
+    """Check that a plot could be written there, before the work is done.
+
+    Raises:
+        InvalidArgumentError: The file's suffix is of no format.
+        StoreError: matplotlib is not installed.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise InvalidArgumentError(f"argument `path` is {str(path)!r}, expected a file {', '.join(SUFFIXES)}")
+    if not has_renderer():
+        raise StoreError(f"{path}: matplotlib is not installed. {HINT}")
+
+
+def write_plots(plots: Sequence[Plot], path: Path, *, columns: int = 1) -> Path:
+    """Write plots as one file; the same plots give the same bytes.
+
+    Args:
+        plots: The plots, one or more.
+        path: `.svg`, `.png` or `.pdf` file; folders are made.
+        columns: Number of plots side by side.
+
+    Returns:
+        `path`.
+
+    Raises:
+        InvalidArgumentError: The file's suffix is of no format.
+        StoreError: matplotlib is not installed, or the file cannot be written.
+    """
+    check_plot(path)
+    suffix = path.suffix.lower()
+    if suffix == ".svg":
+        data = (_svg(plots, columns, f"<style>{plot_css()}</style>") + "\n").encode()
+    else:
+        # Without dates, the same plots are the same file.
+        metadata = {"CreationDate": None} if suffix == ".pdf" else {}
+        with _figure(plots, columns) as figure:
+            data = _saved(figure, format=suffix[1:], dpi=200, metadata=metadata)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"{path}: {error}") from error
+    write_atomically(path, data)
+    return path
+
+
+@contextmanager
+def _figure(plots: Sequence[Plot], columns: int) -> "Iterator[Figure]":
+    """Draw plots row by row, in the style of the pages."""
+    from matplotlib import style
+    from matplotlib.figure import Figure
+
+    sizes = [size_in(plot) for plot in plots]
+    rows = [sizes[i : i + columns] for i in range(0, len(sizes), columns)]
+    widths = [max(row[j][0] for row in rows if j < len(row)) for j in range(min(columns, len(plots)))]
+    heights = [max(height for _, height in row) for row in rows]
+    # Names hold the ids of their marks apart: no two plots of a page have an id in common.
+    salt = hashlib.sha256(repr(plots).encode("utf-8", "replace")).hexdigest()
+    with style.context([RC, {"svg.hashsalt": salt}], after_reset=True), warnings.catch_warnings():
+        # A page's own fonts have the letters that matplotlib's lacks.
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
+        figure = Figure(figsize=(sum(widths), sum(heights)), layout="constrained")
+        panels = figure.subfigures(len(rows), len(widths), False, width_ratios=widths, height_ratios=heights).flat
+        for panel, plot in zip(panels, plots, strict=False):
+            draw(panel, plot)
+        yield figure
+
+
+def _saved(figure: "Figure", **options: Any) -> bytes:  # noqa: ANN401 - options of matplotlib
+    buffer = BytesIO()
+    figure.savefig(buffer, **options)
+    return buffer.getvalue()
+
+
+def _svg(plots: Sequence[Plot], columns: int, style: str) -> str:
+    with _figure(plots, columns) as figure:
+        root = ElementTree.fromstring(_saved(figure, format="svg", metadata={"Date": None}))  # noqa: S314 - our own
+    tooltips: list[str] = []
+    content = "".join(_element(child, tooltips) for child in root)
+    width = _PX_PER_POINT * float(root.attrib["viewBox"].split()[2])
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox="{root.attrib["viewBox"]}" width="{width:.0f}" '
+        f'role="img" stroke-linejoin="round">{title("; ".join(plot.title for plot in plots))}'
+        f"<desc>{escape('; '.join(tooltips))}</desc>{style}{content}</svg>"
+    )
+
+
+def _element(node: ElementTree.Element, tooltips: list[str]) -> str:
+    """Return an element of matplotlib's SVG without styles, unused ids and surplus digits; ids become tooltips."""
+    tag = node.tag.rpartition("}")[2]
+    if tag in _SKIPPED:
+        return ""
+    mark = node.get("id", "")
+    tooltip = ""
+    if mark.startswith(TOOLTIP):
+        tooltips.append(mark.removeprefix(TOOLTIP))
+        tooltip = title(tooltips[-1])
+    content = tooltip + "".join(_element(child, tooltips) for child in node)
+    attributes = _attributes(node, keeps_id=tag == "path")
+    if tag == "g" and not attributes and not tooltip:
+        return content
+    if tag == "defs" and not content:
+        return ""
+    if tag == "text":
+        content = escape(node.text or "")
+    return f"<{tag}{attributes}>{content}</{tag}>" if content else f"<{tag}{attributes}/>"
+
+
+def _attributes(node: ElementTree.Element, *, keeps_id: bool) -> str:
+    """Return attributes as text, with those of `style` among them: a page's policy forbids styles."""
+    found: dict[str, str] = {}
+    for name, value in node.attrib.items():
+        key = name.rpartition("}")[2]
+        if key == "style":
+            parts = (part.partition(":") for part in value.split(";"))
+            found |= {part.strip(): setting.strip() for part, _, setting in parts if part.strip()}
+        elif key != "id" or keeps_id:
+            found[key] = value
+    shown = {name: value for name, value in found.items() if name not in _DROPPED and not value.startswith("rotate(-0")}
+    numbers = {name: _DECIMALS.sub(_rounded, " ".join(value.split())) for name, value in shown.items()}
+    return "".join(f' {name}="{escape(value)}"' for name, value in numbers.items())
+
+
+def _rounded(number: re.Match[str]) -> str:
+    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")

@@ -1,0 +1,124 @@
+"""Describe plots as data: what to draw, not how."""
+
+from dataclasses import dataclass
+
+from evonav.significance import Interval
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """The values of one agent, or of one kind of tasks, in every group."""
+
+    name: str
+    values: tuple[float | None, ...]
+    """One value a group; `None` where there is none."""
+    intervals: tuple[Interval | None, ...]
+    """The interval of each value."""
+
+
+@dataclass(frozen=True, slots=True)
+class GroupPlot:
+    """Dots with whiskers, side by side in groups."""
+
+    title: str
+    groups: tuple[str, ...]
+    """Names below the axis; a second line holds the group's n."""
+    series: tuple[Series, ...]
+    y_label: str
+
+
+@dataclass(frozen=True, slots=True)
+class BarPlot:
+    """Bars with whiskers, side by side in groups; in percent."""
+
+    title: str
+    groups: tuple[str, ...]
+    series: tuple[Series, ...]
+    x_label: str = ""
+    references: tuple[float | None, ...] = ()
+    """Published values, one a group; empty or `None` where there is none."""
+    band: tuple[int, int] | None = None
+    """First and last group of a range that is shaded."""
+    band_label: str = ""
+    notes: tuple[str, ...] = ()
+    """Lines below the plot."""
+    y_top: float | None = None
+    """Upper end of the axis; `None` to fit the values."""
+    has_values: bool = False
+    """Whether the number stands above each bar."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """Points in order of x."""
+
+    name: str
+    points: tuple[tuple[float, float], ...]
+    intervals: tuple[Interval | None, ...] = ()
+    """The interval of each y; empty: no whiskers."""
+    has_dots: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class CurvePlot:
+    """Lines along a number."""
+
+    title: str
+    lines: tuple[Line, ...]
+    x_label: str
+    y_label: str
+    x_names: tuple[str, ...] = ()
+    """Names to write below x = 0, 1, ... in place of the numbers."""
+    x_range: tuple[float, float] | None = None
+    y_top: float | None = None
+    """Upper end of the axis, which begins at 0; `None` to fit the values."""
+    is_square: bool = False
+    has_diagonal: bool = False
+    """Whether to mark where x and y are equal."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A difference with its interval."""
+
+    name: str
+    detail: str
+    """A few words at the end of the row."""
+    value: float
+    interval: Interval | None
+    is_emphasised: bool = False
+    """Whether it is more than a tie."""
+
+
+@dataclass(frozen=True, slots=True)
+class GapPlot:
+    """Differences around zero, one a row."""
+
+    title: str
+    gaps: tuple[Gap, ...]
+    left_label: str
+    """Meaning of a difference below zero."""
+    right_label: str
+    """Meaning of a difference above zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConfusionRow:
+    """The labels that the objects of one category were given."""
+
+    category: str
+    num: int
+    shares: tuple[float, ...]
+    """Shares of the category's objects, one a column."""
+
+
+@dataclass(frozen=True, slots=True)
+class ConfusionPlot:
+    """A table of shares in shades; the first column is right, the second is nothing."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[ConfusionRow, ...]
+
+
+Plot = GroupPlot | BarPlot | CurvePlot | GapPlot | ConfusionPlot
