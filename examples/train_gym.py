@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import evonav.gym
-from evonav.generation.engine import generate_dataset
+from evonav.generation.dataset import generate_dataset
 
 NUM_ENVS, NUM_STEPS, NUM_SECTORS = 32, 32, 5
 STEP_SIZE, DISCOUNT = 0.05, 0.95

@@ -16,7 +16,7 @@ import numpy as np
 
 from evonav._core import assets
 from evonav.errors import HouseError
-from evonav.generation.room_mix import reweight
+from evonav.generation.statistics.room_mix import reweight
 from evonav.house import House, load_houses
 from evonav.significance import weighted_quantiles
 

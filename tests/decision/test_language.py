@@ -5,8 +5,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from evonav.decision.text.language import Goal, Relation, canonical, parse_goal, similarity
-from evonav.generation.describe import Anchor, Relations, unified_instruction
-from evonav.generation.looks import Appearance, Detail, Tint, looks_of
+from evonav.generation.instructions.appearance import Appearance, Detail, Tint, looks_of
+from evonav.generation.instructions.describe import Anchor, Relations, unified_instruction
 from evonav.tasks.language import MATERIALS, STRUCTURES
 
 TYPES = [

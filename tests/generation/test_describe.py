@@ -3,14 +3,14 @@
 import pytest
 
 from evonav._core import assets
-from evonav.generation.describe import (
+from evonav.generation.instructions.appearance import Appearance, Detail, Tint, colour_word, size_word
+from evonav.generation.instructions.describe import (
     Anchor,
     Relations,
     appearance_instruction,
     basic_instruction,
     unified_instruction,
 )
-from evonav.generation.looks import Appearance, Detail, Tint, colour_word, size_word
 
 SIZES_M = {category: tuple(size_m) for _, category, size_m in assets()}
 

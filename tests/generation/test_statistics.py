@@ -5,16 +5,16 @@ from pathlib import Path
 from statistics import fmean, median
 
 import pytest
-from html5 import check_html
+from html_nesting import check_html
 from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.generation import generate_tasks
-from evonav.generation.engine import generate_dataset
-from evonav.generation.measures import MEASURES, PAPER_EVOLUTIONS
-from evonav.generation.statistics import statistics_of, statistics_of_folders
-from evonav.generation.task_facts import expected_evolutions, facts_of_task, read_all_facts
+from evonav.generation.dataset import generate_dataset
+from evonav.generation.statistics.compute import statistics_of, statistics_of_folders
+from evonav.generation.statistics.metrics import MEASURES, PAPER_EVOLUTIONS
+from evonav.generation.statistics.task_summary import expected_evolutions, facts_of_task, read_all_facts
 from evonav.house import bundled_houses
 from evonav.report.plots.render import check_plot
 from evonav.report.tasks.dataset_page import write_dataset_report, write_statistics_plot

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
-from evonav.generation.engine import Workforce, generate_dataset
+from evonav.generation.dataset import Workforce, generate_dataset
 from evonav.generation.worker import GenerationOptions
 from evonav.house import bundled_houses
 from evonav.tasks.dataset import read_dataset

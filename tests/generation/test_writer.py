@@ -16,8 +16,8 @@ from evonav.decision.vlm.account import Account, Price
 from evonav.decision.vlm.client import VlmClient, VlmConfig
 from evonav.decision.vlm.response_cache import ExchangeStore
 from evonav.errors import TaskError
-from evonav.generation import prompts
-from evonav.generation.writer import estimate_texts, write_texts
+from evonav.generation.instructions import prompts
+from evonav.generation.instructions.writer import estimate_texts, write_texts
 from evonav.tasks import Task, load_tasks, write_task
 from evonav.tasks.dataset import DatasetRecord, check_dataset, entry_of, read_dataset, write_dataset
 from vlm_stub import KEY, Stub, images_in, serving

@@ -59,7 +59,7 @@ def generate(
     from evonav.controlled.dataset import generate_controlled
     from evonav.controlled.generate import ControlledOptions
     from evonav.generation.config import read_parameters
-    from evonav.generation.engine import Workforce
+    from evonav.generation.dataset import Workforce
 
     options = ControlledOptions(
         seed=seed,

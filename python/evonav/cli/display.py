@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.evaluation.run.run import Progress
-    from evonav.generation.engine import GenerationProgress
+    from evonav.generation.dataset import GenerationProgress
 
 
 MAX_WIDTH = 200

@@ -178,7 +178,7 @@ def _tasks(
     num_workers: int,
 ) -> "Iterator[list[TaskFile]]":
     """The tasks of a run: given, generated into the run's folder, or bundled."""
-    from evonav.generation.engine import Workforce, generate_dataset, inherited_names
+    from evonav.generation.dataset import Workforce, generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
     from evonav.house.files import HouseTexts
     from evonav.tasks.bundled import bundled_tasks

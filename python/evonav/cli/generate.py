@@ -21,7 +21,7 @@ from evonav.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from evonav.generation.engine import GenerationSummary
+    from evonav.generation.dataset import GenerationSummary
 
 
 def generate(
@@ -52,7 +52,7 @@ def generate(
 ) -> None:
     """Generates tasks from multi-room houses; run again to resume."""
     from evonav.generation.config import read_parameters
-    from evonav.generation.engine import Workforce, generate_dataset, inherited_names
+    from evonav.generation.dataset import Workforce, generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
     from evonav.house.files import HouseTexts
 

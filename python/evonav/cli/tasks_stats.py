@@ -31,7 +31,7 @@ def stats(
 ) -> None:
     """Prints and plots statistics of tasks beside the paper's."""
     from evonav.cli.display import status
-    from evonav.generation.statistics import statistics_of_folders
+    from evonav.generation.statistics.compute import statistics_of_folders
     from evonav.report.plots.render import check_plot
     from evonav.report.tasks.dataset_page import write_dataset_report, write_statistics_plot
 

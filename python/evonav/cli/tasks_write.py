@@ -12,7 +12,7 @@ from evonav.cli.options import Limit
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from evonav.generation.writer import Writing
+    from evonav.generation.instructions.writer import Writing
 
 EXIT_INCOMPLETE = 3
 
@@ -54,7 +54,7 @@ def write(
     from evonav.decision.vlm.client import VlmClient, VlmConfig
     from evonav.decision.vlm.response_cache import ExchangeStore
     from evonav.errors import InvalidArgumentError
-    from evonav.generation.writer import estimate_texts, write_texts
+    from evonav.generation.instructions.writer import estimate_texts, write_texts
 
     table = {} if prices is None else read_prices(prices)
     if prices is not None and vlm_model not in table:

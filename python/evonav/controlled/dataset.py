@@ -11,7 +11,7 @@ from evonav._core import __version__
 from evonav.controlled.generate import ControlledOptions, generate_arms
 from evonav.controlled.layout import ControlledRecord, tasks_of, write_controlled
 from evonav.errors import InvalidArgumentError, TaskError
-from evonav.generation.engine import Workforce
+from evonav.generation.dataset import Workforce
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.worker import PARTIAL_NAME, is_whole, outcome_of, worker_of
 from evonav.house import House

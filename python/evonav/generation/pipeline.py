@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.errors import TaskError
-from evonav.generation.describe import (
+from evonav.generation.instructions.appearance import parse_appearance
+from evonav.generation.instructions.describe import (
     WRITER,
     appearance_instruction,
     basic_instruction,
     parse_relations,
     unified_instruction,
 )
-from evonav.generation.looks import parse_appearance
 from evonav.house import House
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.files import checksums_of

@@ -1,7 +1,7 @@
 """The words of instructions, and their grammar.
 
-All three instructions of `evonav.generation.describe` are one sentence each and readable by rule; those that a language
-model writes (`PublicStage.writer` says so) are free English.
+All three instructions of `evonav.generation.instructions.describe` are one sentence each and readable by rule; those
+that a language model writes (`PublicStage.writer` says so) are free English.
 
     basic_instruction      := "Please navigate to the " NOUN {" " RELATION} "."
     appearance_instruction := "Please navigate to the " LOOKS "."

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from evonav.generation.looks import Appearance, details_of, looks_of
+from evonav.generation.instructions.appearance import Appearance, details_of, looks_of
 from evonav.tasks.language import listed, noun_of, plural_of, with_article
 from evonav.tasks.records import Id, Record
 

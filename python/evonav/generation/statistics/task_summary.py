@@ -24,7 +24,7 @@ CHUNK = 16
 """Tasks a worker process reads at a time."""
 CHUNK_TIMEOUT_S = 300.0
 """For one task of them."""
-WORK = "evonav.generation.task_facts:make_reader"
+WORK = "evonav.generation.statistics.task_summary:make_reader"
 
 _PLAN = re.compile(r'"roomSpecId"\s*:\s*"([^"\\]{1,80})"')
 

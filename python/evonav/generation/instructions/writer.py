@@ -23,7 +23,13 @@ from evonav.decision.vlm.account import Usage
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.errors import LASTING, VlmError
 from evonav.errors import TaskError
-from evonav.generation.prompts import appearance_question, cleaned, fault_of, repair_request, unified_question
+from evonav.generation.instructions.prompts import (
+    appearance_question,
+    cleaned,
+    fault_of,
+    repair_request,
+    unified_question,
+)
 from evonav.parallel.folders import put_folder
 from evonav.tasks.dataset import DATASET_NAME, TaskEntry, entry_of, read_dataset, write_dataset
 from evonav.tasks.files import checksums_of, load_task, write_task

@@ -1,4 +1,4 @@
-"""A second opinion on the physics of stage houses (`second_opinion.py`): of bundled tasks, and of real houses."""
+"""A second opinion on the physics of stage houses (`shapely_physics.py`): of bundled tasks, and of real houses."""
 
 import dataclasses
 import json
@@ -9,7 +9,7 @@ from itertools import islice
 
 import pytest
 from recorded_data import data_path, needs_data
-from second_opinion import Plan, problems_of
+from shapely_physics import Plan, problems_of
 
 from evonav.generation import GenerationParameters, TaskRejectedError, generate_task
 from evonav.house import bundled_houses, load_houses

@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
-from evonav.generation import engine
-from evonav.generation.engine import Workforce, generate_dataset
+from evonav.generation import dataset
+from evonav.generation.dataset import Workforce, generate_dataset
 from evonav.generation.worker import GenerationOptions
 from evonav.house import House
 from evonav.tasks import load_task
@@ -26,7 +26,7 @@ from evonav.tasks.dataset import check_dataset, read_dataset
 from evonav.tasks.manifest import GenerationParameters
 
 OPTIONS = GenerationOptions(parameters=GenerationParameters(reference_image_px=64, reference_min_visible_px=4))
-FAULTY = "faulty_worker:make_worker"
+FAULTY = "faulty_generation_worker:make_worker"
 MALFORMED, SINGLE = 2, 5
 """Indices of the houses without a task."""
 
@@ -81,7 +81,7 @@ def local(num_workers, **values):
 @pytest.fixture
 def faults(monkeypatch):
     def set_faults(**by_index):
-        monkeypatch.setattr(engine, "WORK", FAULTY)
+        monkeypatch.setattr(dataset, "WORK", FAULTY)
         monkeypatch.setenv("EVONAV_TEST_FAULTS", json.dumps({key.strip("_"): what for key, what in by_index.items()}))
 
     return set_faults

@@ -3,8 +3,8 @@
 Nothing of the generator's placement, collision or navigation is used; only the asset catalogue's sizes and shapes
 (`House.footprints`) and the task's files. By hand, over many houses:
 
-    python tests/generation/second_opinion.py HOUSES.jsonl.gz [--limit N] [--seed S] [--evolve P]
-    python tests/generation/second_opinion.py FOLDER_OF_TASKS
+    python tests/generation/shapely_physics.py HOUSES.jsonl.gz [--limit N] [--seed S] [--evolve P]
+    python tests/generation/shapely_physics.py FOLDER_OF_TASKS
 """
 
 import argparse

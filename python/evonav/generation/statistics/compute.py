@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import TaskError
-from evonav.generation.measures import (
+from evonav.generation.statistics.metrics import (
     DISTRIBUTIONS,
     MEASURES,
     PAPER_EVOLUTIONS,
     PAPER_MODES,
     QUANTITIES,
 )
-from evonav.generation.room_mix import Reweighting, check_mix, reweight
-from evonav.generation.task_facts import MODES, RATIO_CLASSES, TaskFacts, read_all_facts
+from evonav.generation.statistics.room_mix import Reweighting, check_mix, reweight
+from evonav.generation.statistics.task_summary import MODES, RATIO_CLASSES, TaskFacts, read_all_facts
 from evonav.significance import (
     bootstrap_medians,
     bootstrap_ratios,
@@ -104,7 +104,7 @@ def statistics_of(
     Args:
         facts: Of each task.
         sources: Recorded.
-        mix: Also reweight to this data set's rooms (`evonav.generation.room_mix`).
+        mix: Also reweight to this data set's rooms (`evonav.generation.statistics.room_mix`).
         house_rejections: Houses without a task, by reason.
 
     Raises:

@@ -1,0 +1,1 @@
+"""Write the instructions of tasks: by rule (`describe`, `appearance`) or with a model (`writer`, `prompts`)."""
