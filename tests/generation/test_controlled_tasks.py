@@ -101,7 +101,7 @@ def test_a_sweep_has_the_same_goals_and_nested_changes():
         assert not any(evolved[0])
         assert all(a <= b for few, many in pairwise(evolved) for a, b in zip(few, many, strict=True))
         assert evolved[2] == [False] + [True] * (len(evolved[2]) - 1)
-        assert [task.forced_stages for task in tasks] == [()] * 3
+        assert [task.guided_stages for task in tasks] == [()] * 3
         num_changed += sum(evolved[1])
     assert num_changed
 
@@ -111,7 +111,7 @@ def test_tasks_of_other_kinds_are_written_as_before(tmp_path):
     task = generate_task(house, seed=0, config=SMALL)
     header = json.loads((write_task(task, tmp_path) / "task.json").read_bytes())
     assert "control" not in header
-    assert task.forced_stages == ()
+    assert task.guided_stages == ()
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_tasks_of_other_kinds_are_written_as_before(tmp_path):
         ({"forced_stages": (1, 9)}, "expected forced_stages of 1 to 3"),
         ({"shown_goals": (1, 2)}, "expected shown_goals of 3 stages"),
         ({"shown_goals": (1, 2, 4)}, "expected shown_goals of 3 stages"),
-        ({"shown_goals": (1, 1, 1)}, "expected stage 2 to have the words and image of stage 1"),
+        ({"shown_goals": (1, 1, 1)}, "expected stage 2 to have the instructions and image of stage 1"),
     ],
 )
 def test_a_header_that_the_stages_contradict_is_refused(pairs, tmp_path, change, message):

@@ -18,7 +18,7 @@ from evonav.agents.unigoal.object_graph import ObjectGraph, SceneEdge, SceneNode
 from evonav.decision.text.language import canonical
 from evonav.sensors.observation import Detections, View, VisibleOccupancy
 from evonav.tasks.language import noun_of
-from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, WORD_OF_TYPE, category_image, relabelled
+from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, LABEL_OF_TYPE, MAP_CATEGORIES, category_image, relabelled
 from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
@@ -184,20 +184,20 @@ def test_neighbourhood_is_two_hops_along_short_edges():
 
 def test_unmapped_types_are_invisible():
     found = wall_of(["Chair", "Mug", "Desk"]).detections
-    seen = relabelled(found, WORD_OF_TYPE)
+    seen = relabelled(found, LABEL_OF_TYPE)
     assert seen.labels == ("chair", "table")
     assert np.array_equal(seen.masks == 0, found.masks == 0)
     assert np.array_equal(seen.masks == 1, found.masks == 2)
     assert not (seen.masks[found.masks == 1] >= 0).any()
     image = category_image(found)
     assert set(np.unique(image)) == {-1, MAP_CATEGORIES.index("chair"), MAP_CATEGORIES.index("cup")}
-    assert relabelled(replace(found, labels=("Mug",) * 3), WORD_OF_TYPE).labels == ()
+    assert relabelled(replace(found, labels=("Mug",) * 3), LABEL_OF_TYPE).labels == ()
 
 
 def test_tables_name_types_that_there_are():
     from evonav.decision.text.language import _NOUNS
 
-    for kind in {*CATEGORY_OF_TYPE, *WORD_OF_TYPE} - {"SinkBasin", "Cabinet", "Mirror", "Curtains", "Cup"}:
+    for kind in {*CATEGORY_OF_TYPE, *LABEL_OF_TYPE} - {"SinkBasin", "Cabinet", "Mirror", "Curtains", "Cup"}:
         assert canonical(noun_of(kind)) in _NOUNS, kind
     assert set(CATEGORY_OF_TYPE.values()) <= set(MAP_CATEGORIES)
     assert len(MAP_CATEGORIES) == 15

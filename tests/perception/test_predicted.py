@@ -33,7 +33,7 @@ from evonav.perception.words import read_word
 from evonav.sensors.observation import Detections
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
-from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, WORD_OF_LABEL, category_image, relabelled
+from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, LABEL_TRANSLATION, category_image, relabelled
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics
@@ -190,7 +190,7 @@ def test_unigoal_reads_its_own_words_again() -> None:
     told = Detections(
         np.arange(len(label), dtype=np.int32)[None], tuple(label.values()), np.ones(len(label), np.float32)
     )
-    kept = relabelled(told, WORD_OF_LABEL).labels
+    kept = relabelled(told, LABEL_TRANSLATION).labels
     assert {"table", "tv", "chair", "sofa", "bed", "plant", "painting", "cabinet", "mirror", "curtain"} <= set(kept)
     assert category_image(told).shape == (1, len(label))
 

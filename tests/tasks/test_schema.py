@@ -87,7 +87,7 @@ def test_strangers_are_refused_at_every_depth(task: Task) -> None:
 def test_fields_are_described() -> None:
     schema = schema_of("oracle_stage")
     assert "shortest path" in schema["properties"]["reference_path_m"]["description"].lower()
-    assert "2 unique" in schema["$defs"]["Target"]["properties"]["score"]["description"]
+    assert "2 in the house" in schema["$defs"]["Target"]["properties"]["score"]["description"]
 
 
 def test_the_command_prints_and_writes(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
-"""Tasks on disk: public and oracle parts, apart.
+"""Tasks on disk, with public and oracle parts in separate files.
 
-Names are imported when they are first used, so that who needs the public part alone, such as an agent in a process of
-its own, loads nothing of the oracle.
+Names are imported on first use. A program that needs the public part alone, such as an agent in a process of its own,
+loads nothing of the oracle.
 """
 
 import lazy_loader

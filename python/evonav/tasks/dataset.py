@@ -1,4 +1,4 @@
-"""`dataset.json`: what a folder of tasks is, what it was made of, and which houses gave none."""
+"""Read and write `dataset.json`: a folder's tasks, their source files, and the houses without a task."""
 
 from collections import Counter
 from itertools import pairwise
@@ -28,64 +28,66 @@ RejectReason = Literal[
     "timeout",
     "error",
 ]
-"""Why a house gives no task; `not_evolved` when a controlled analysis needs a change and none could be made,
-`unusable_house` when the world cannot be built, such as for an unknown asset. At a `crash`, `timeout` or `error` it is
-the generator that failed."""
+"""Reason that a house gives no task.
+
+`not_evolved`: a controlled analysis needs a change, and none could be made. `unusable_house`: the world cannot be
+built, for example because of an unknown asset. `crash`, `timeout`, `error`: the generator failed.
+"""
 
 
 class SourceFile(Record):
     """A file of houses."""
 
     name: Annotated[str, Field(min_length=1, max_length=512)]
-    """Without folders, or `procthor-10k:val`."""
+    """File name without folders, or `procthor-10k:val`."""
     sha256: Sha256
-    """Of its bytes."""
+    """SHA-256 of the file's bytes."""
 
 
 class TaskEntry(Record):
-    """A task of the set."""
+    """A task of the data set."""
 
     task_id: TaskId
     sha256: Sha256
-    """Of the bytes of `task.json`, which holds the checksums of all else."""
+    """SHA-256 of `task.json`, which contains the checksums of all other files."""
     house_sha256: Sha256
-    """Of the first house, `task.json`'s `house.sha256`: what subsets are chosen by."""
+    """SHA-256 of the first house, `house.sha256` in `task.json`; subsets are chosen by it."""
 
 
 class HouseRejection(Record):
     """A house that gave no task."""
 
     house: Annotated[str, Field(max_length=512)]
-    """As `HouseSource.name`."""
+    """The house's name, as `HouseSource.name`."""
     reason: RejectReason
     stage: NonNegativeInt
-    """At which it was found, 0 before the first."""
+    """The stage at which the problem was found, 0 before the first."""
     detail: Annotated[str, Field(max_length=2000)]
 
 
 class DatasetRecord(Record):
-    """All of `dataset.json`. It depends on what was asked for, not on how many processes did it."""
+    """The content of `dataset.json`. It depends on the request, not on the number of processes."""
 
     schema_version: Literal[2] = 2
     name: Id
     split: Id
     generator: Id
-    """Program and version."""
+    """Program and version that made the tasks."""
     sources: tuple[SourceFile, ...]
     seed: Annotated[int, Field(ge=0, lt=2**64)]
     limit: PositiveInt | None
-    """Most tasks that were asked for."""
+    """Largest number of tasks requested."""
     subset: Id | None
-    """Named subset that alone was made (`evonav.tasks.subsets`)."""
+    """Named subset that the tasks are limited to (`evonav.tasks.subsets`)."""
     allow_unknown_assets: bool
     parameters: GenerationParameters
     num_houses: NonNegativeInt
-    """Houses looked at: `num_tasks` and the rejections."""
+    """Number of houses read: `num_tasks` and the rejections."""
     num_tasks: NonNegativeInt
     tasks: tuple[TaskEntry, ...]
-    """In order of task id."""
+    """The tasks, in order of task id."""
     rejections: tuple[HouseRejection, ...]
-    """In order of the houses."""
+    """The rejected houses, in their order in the source."""
 
     @property
     def num_rejected(self) -> Counter[str]:
@@ -94,16 +96,16 @@ class DatasetRecord(Record):
 
 
 def entry_of(task: Task) -> TaskEntry:
-    """The entry of a task as `write_task` writes it."""
+    """Return the entry of a task as `write_task` writes it."""
     digest = sha256_of(record_bytes(task.header))
     return TaskEntry(task_id=task.task_id, sha256=digest, house_sha256=task.header.house.sha256)
 
 
 def write_dataset(record: DatasetRecord, directory: Path | str) -> Path:
-    """Writes `dataset.json`, all of it or nothing.
+    """Write `dataset.json` atomically.
 
     Raises:
-        TaskError: It cannot be written.
+        TaskError: The file cannot be written.
     """
     path = Path(directory) / DATASET_NAME
     try:
@@ -115,10 +117,10 @@ def write_dataset(record: DatasetRecord, directory: Path | str) -> Path:
 
 
 def read_dataset(directory: Path | str) -> DatasetRecord:
-    """Reads `dataset.json` and checks that it does not contradict itself.
+    """Read `dataset.json` and check that it is consistent.
 
     Raises:
-        TaskError: With file, field and value.
+        TaskError: The file is missing or malformed; the message names file, field and value.
     """
     path = Path(directory) / DATASET_NAME
     record = parse_record(DatasetRecord, read_file(path), path)
@@ -135,10 +137,10 @@ def read_dataset(directory: Path | str) -> DatasetRecord:
 
 
 def check_dataset(record: DatasetRecord, directory: Path | str) -> list[tuple[str, str]]:
-    """What of a folder's tasks is not as its `dataset.json` says.
+    """Compare a folder's tasks with its `dataset.json`.
 
     Returns:
-        Task id, and what is wrong, in order of task id.
+        Task id and problem, in order of task id.
     """
     directory = Path(directory)
     entries = {entry.task_id: entry for entry in record.tasks}

@@ -1,4 +1,4 @@
-"""Files of a task, and how they are read, checked and written."""
+"""Read, check and write the files of a task."""
 
 import struct
 import zlib
@@ -37,26 +37,26 @@ def encode_png(image: NDArray[np.uint8]) -> bytes:
 
 
 def decode_png(path: Path, size_px: int) -> NDArray[np.uint8]:
-    """A square RGB image, `(S, S, 3)`, read-only.
+    """Read a square RGB image, `(S, S, 3)`, read-only.
 
     Raises:
-        TaskError: The file is no PNG, not RGB, or of another size.
+        TaskError: The file is not a PNG, not RGB, or of another size.
     """
     data = read_file(path)
-    # Size, depth and colour type stand in the first chunk; checking them first keeps huge images unread.
+    # Size, depth and colour type stand in the first chunk. They are checked first, so that huge images are not decoded.
     if data[:16] != b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" or data[16:26] != struct.pack(">IIBB", size_px, size_px, 8, 2):
         raise field_error(path, "IHDR", data[:26], f"expected an 8-bit RGB PNG image of {size_px}x{size_px} px")
     try:
         with Image.open(BytesIO(data), formats=["PNG"]) as image:
             pixels = np.array(image.convert("RGB"))
     except (OSError, EOFError, ValueError, SyntaxError, struct.error, zlib.error) as error:
-        raise TaskError(f"{path}: not a whole PNG image: {error}") from error
+        raise TaskError(f"{path}: not a complete PNG image: {error}") from error
     pixels.flags.writeable = False
     return pixels
 
 
 def contents_of(task: Task) -> dict[str, bytes]:
-    """Uncompressed contents of a task's files but `task.json`, by relative path: what checksums are taken of."""
+    """Return the uncompressed contents of a task's files except `task.json`, by relative path, for checksums."""
     contents: dict[str, bytes] = {}
     for number in range(1, task.num_stages + 1):
         contents[f"houses/stage_{number}.json.gz"] = task.houses_json[number - 1].encode()
@@ -67,17 +67,17 @@ def contents_of(task: Task) -> dict[str, bytes]:
 
 
 def checksums_of(task: Task) -> dict[str, str]:
-    """The checksums that the header holds."""
+    """Return the checksums for the header."""
     return {name: sha256_of(data) for name, data in contents_of(task).items()}
 
 
 def packed_of(task: Task) -> dict[str, bytes]:
-    """The bytes of a task's files, by relative path."""
+    """Return the bytes of a task's files, by relative path."""
     files = {"task.json": record_bytes(task.header)}
     packed: dict[str, bytes] = {}
     for number in range(1, task.num_stages + 1):
         house = task.houses_json[number - 1]
-        if house not in packed:  # half of the stages have the house of the stage before
+        if house not in packed:  # half of the stages have the house of the previous stage
             packed = {house: write_gzip(house.encode())}
         files[f"houses/stage_{number}.json.gz"] = packed[house]
         files[f"oracle/stage_{number}.json"] = record_bytes(task.oracle_stages[number - 1])
@@ -87,7 +87,7 @@ def packed_of(task: Task) -> dict[str, bytes]:
 
 
 def write_task(task: Task, directory: Path | str) -> Path:
-    """Writes a task's files under `directory`/`task_id`.
+    """Write a task's files to `directory`/`task_id`.
 
     Returns:
         The task's own directory.
@@ -107,10 +107,10 @@ def write_task(task: Task, directory: Path | str) -> Path:
 
 
 def load_task(root: Path | str) -> Task:
-    """Reads one task's directory and checks it.
+    """Read one task's directory and check it.
 
     Raises:
-        TaskError: With file, field and value.
+        TaskError: A file is missing or malformed; the message names file, field and value.
     """
     root = Path(root)
     header_path = root / "task.json"
@@ -135,7 +135,7 @@ def load_task(root: Path | str) -> Task:
 
 
 def read_house(path: Path) -> str:
-    """A stage's house, ProcTHOR JSON.
+    """Return a stage's house as ProcTHOR JSON.
 
     Raises:
         TaskError: The file is missing, damaged or not text.
@@ -147,16 +147,16 @@ def read_house(path: Path) -> str:
 
 
 class Inconsistency(NamedTuple):
-    """Two files that do not go together."""
+    """Two files that contradict each other."""
 
     kind: Literal["checksum", "contradiction"]
     stage: int
-    """0: the header."""
+    """Number of the stage, 0 for the header."""
     error: TaskError
 
 
 def inconsistencies(task: Task, root: Path) -> Iterator[Inconsistency]:
-    """What no single file of a task can tell."""
+    """Yield the problems that no single file of a task shows."""
     header_path = root / "task.json"
     for number, (public, oracle) in enumerate(zip(task.public_stages, task.oracle_stages, strict=True), start=1):
         public_path, oracle_path = root / f"public/stage_{number}.json", root / f"oracle/stage_{number}.json"
@@ -191,7 +191,7 @@ def inconsistencies(task: Task, root: Path) -> Iterator[Inconsistency]:
 
 
 def _control_problems(task: Task) -> Iterator[str]:
-    """What a header's `control` says that the stages do not."""
+    """Yield the contradictions between a header's `control` and the stages."""
     control = task.header.control
     if control is None:
         return
@@ -206,20 +206,20 @@ def _control_problems(task: Task) -> Iterator[str]:
         same = task.public_stages[shown - 1].model_copy(update={"stage": stage})
         is_same_image = np.array_equal(task.reference_images[stage - 1], task.reference_images[shown - 1])
         if task.public_stages[stage - 1] != same or not is_same_image:
-            yield f"expected stage {stage} to have the words and image of stage {shown}"
+            yield f"expected stage {stage} to have the instructions and image of stage {shown}"
         if task.oracle_stages[stage - 1].target.id != task.oracle_stages[shown - 1].target.id:
             yield f"expected stage {stage} to have the target of stage {shown}"
 
 
 def load_tasks(directory: Path | str, limit: int | None = None) -> Iterator[Task]:
-    """Reads a data set, a task at a time, in order of task id.
+    """Read a data set, one task at a time, in order of task id.
 
     Args:
-        directory: Holds one directory a task.
-        limit: Most tasks to read; default all.
+        directory: Folder with one folder a task.
+        limit: Largest number of tasks to read; default all.
 
     Raises:
-        TaskError: There is no task in it, or one is malformed.
+        TaskError: The folder has no task, or a task is malformed.
     """
     for root in task_roots(Path(directory))[:limit]:
         yield load_task(root)

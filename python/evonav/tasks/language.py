@@ -1,7 +1,7 @@
-"""The words of instructions, and their grammar.
+"""Define the vocabulary and grammar of instructions.
 
-All three instructions of `evonav.generation.instructions.describe` are one sentence each and readable by rule; those
-that a language model writes (`PublicStage.writer` says so) are free English.
+All three instructions of `evonav.generation.instructions.describe` are one sentence each and can be parsed by rule.
+Instructions written by a language model (`PublicStage.writer` names it) are free English.
 
     basic_instruction      := "Please navigate to the " NOUN {" " RELATION} "."
     appearance_instruction := "Please navigate to the " LOOKS "."
@@ -12,26 +12,26 @@ that a language model writes (`PublicStage.writer` says so) are free English.
     DETAIL   := "a " PART | NUMBER " " PARTS | PARTS
     RELATION := ROOM | SUPPORT | NEAR | [","] EXTRA [" and " EXTRA]
     ROOM     := "in the " NOUN | "in one of the " NOUNS         when the category is not unique in the house
-    SUPPORT  := "on " THING | "in " THING                       what it stands on, or the basin or cupboard it is in
+    SUPPORT  := "on " THING | "in " THING                       its receptacle: furniture, a basin or a cupboard
     NEAR     := "next to " THING [" and " THING]                at most two nearby objects
     EXTRA    := "near " PLACE [" and " THING] | "in a corner"   a door, a window, or a corner of the room
               | "below " THING | "near " THING                  something on a wall
     THING    := "the " NOUN | "a " NOUN | "some " NOUNS
     PLACE    := "the " STRUCTURE | "a " STRUCTURE
 
-Relations come in this order, each at most once; "the" is said of what the room has one of, "some" of several that are
-all near. `NOUN` is `noun_of` a ProcTHOR object or room type, `NOUNS` its plural, `SIZE` says how large a thing is for
-its kind, and the other words are those of `SHAPES`, `COLOURS` (two if the second colour covers much of it) and
-`MATERIALS`. A comma stands before the extras if a support or a neighbour comes before them.
+Relations come in this order, each at most once. "the" marks the only one of its kind in the room, "some" several that
+are all near. `NOUN` is `noun_of` a ProcTHOR object or room type, `NOUNS` its plural. `SIZE` is the size relative to
+other assets of the category. The other adjectives are those of `SHAPES`, `COLOURS` (two if the second colour covers
+much of the object) and `MATERIALS`. A comma comes before the extras if a support or a neighbour precedes them.
 """
 
 import re
 
 SIZES = ("small", "large")
-"""Words for the size of a target among the catalogue's assets of its category; none for the middle."""
+"""Adjectives for the size of a target among the catalogue's assets of its category; the middle has none."""
 
 SHAPES = ("round", "square", "rectangular", "L-shaped", "U-shaped", "long", "tall", "slim", "wide", "low")
-"""Words for a target's form and proportions."""
+"""Adjectives for a target's form and proportions."""
 
 COLOURS = (
     "black",
@@ -47,7 +47,7 @@ COLOURS = (
     "brown",
     "beige",
 )
-"""Words for the colours that a target shows in its reference image."""
+"""Adjectives for the colours that a target shows in its reference image."""
 
 MATERIALS = {
     "cardboard": "cardboard",
@@ -63,13 +63,13 @@ MATERIALS = {
     "wax": "wax",
     "wood": "wooden",
 }
-"""Adjectives for what a target is made of."""
+"""Adjectives for the materials of a target."""
 
 STRUCTURES = ("doorway", "window", "corner")
 """Parts of the house that instructions refer to."""
 
 NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
-"""Words for counts of parts."""
+"""Numerals for counts of parts."""
 
 _IRREGULAR = {"ArmChair": "armchair", "CD": "CD", "CounterTop": "countertop", "TVStand": "TV stand"}
 _PLURALS = {"decor": "decor", "foil": "foil", "knife": "knives", "paper": "paper", "shelf": "shelves"}
@@ -77,7 +77,7 @@ _UNCOUNTED = {"aluminum foil", "blinds", "boots", "bread", "lettuce", "room deco
 
 
 def noun_of(category: str) -> str:
-    """Words for a ProcTHOR object or room type: `noun_of("DiningTable")` is `dining table`.
+    """Return the noun of a ProcTHOR object or room type: `noun_of("DiningTable")` is `dining table`.
 
     No two ProcTHOR types share a noun.
     """
@@ -87,7 +87,7 @@ def noun_of(category: str) -> str:
 
 
 def plural_of(noun: str) -> str:
-    """Several of a noun: `plural_of("wine bottle")` is `wine bottles`."""
+    """Return the plural of a noun: `plural_of("wine bottle")` is `wine bottles`."""
     head, _, last = noun.rpartition(" ")
     if noun in _UNCOUNTED:
         return noun
@@ -103,12 +103,12 @@ def plural_of(noun: str) -> str:
 
 
 def with_article(noun: str) -> str:
-    """One of several: `an armchair`, `a mug`, `some bread`."""
+    """Return a noun with its indefinite article: `an armchair`, `a mug`, `some bread`."""
     if noun in _UNCOUNTED:
         return f"some {noun}"
     return f"an {noun}" if noun[0] in "aeiou" else f"a {noun}"
 
 
-def listed(words: list[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    return " and ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else "".join(words)
+def listed(nouns: list[str]) -> str:
+    """Join nouns: `a`, `a and b`, `a, b and c`."""
+    return " and ".join([", ".join(nouns[:-1]), nouns[-1]]) if len(nouns) > 1 else "".join(nouns)

@@ -1,4 +1,4 @@
-"""The evaluator's part of a task: where the target is, and what was changed. No agent may import this."""
+"""The evaluator's part of a task: targets and changes. Agents must not import this module."""
 
 from typing import Annotated, Literal
 
@@ -7,17 +7,20 @@ from pydantic import Field, NonNegativeFloat, NonNegativeInt
 from evonav.tasks.records import Id, Point2, Point3, PoseRecord, Probability, Record, Sha256
 
 Mode = Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"]
-"""Room modification (paper, Sec. 3.2)."""
+"""Modification of a room (paper, Sec. 3.2)."""
 
 Outcome = Literal["first_stage", "not_triggered", "no_room", "no_placement", "evolved"]
-"""How a transition went: `no_room` when every room's weight is 0, `no_placement` when nothing drawn could be moved."""
+"""Outcome of a transition.
+
+`no_room`: every room's weight is 0. `no_placement`: none of the drawn objects could be moved.
+"""
 
 Failure = Literal["nothing_movable", "no_free_place", "cuts_off"]
-"""Why nothing could be moved: nothing there to move, no free place drawn, or only places that cut something off."""
+"""Reason that nothing was moved: no movable object, no free place drawn, or only places that cut off other places."""
 
 
 class Change(Record):
-    """One object that was moved, children of a moved support included."""
+    """One moved object; children of a moved support have entries of their own."""
 
     id: Id
     category: Id
@@ -28,15 +31,15 @@ class Change(Record):
     to_rotation_deg: Point3
     to_support_id: Id | None
     displacement_m: NonNegativeFloat
-    """Distance between the box centres, 3-D."""
+    """Distance between the box centres in three dimensions."""
     is_relocated: bool
-    """Moved more than 0.1 m, or stands on another support."""
+    """Whether it moved more than 0.1 m or stands on another support."""
     cause: Id
     """The process that moved it: the mode, or an extension such as `ACTIVITY:cook`."""
 
 
 class ObjectRecord(Record):
-    """An object that came (where it is) or went (where it was); by an extension."""
+    """An object that an extension added (at its new place) or removed (at its old place)."""
 
     id: Id
     category: Id
@@ -48,26 +51,26 @@ class ObjectRecord(Record):
 
 
 class StateChange(Record):
-    """A door or object that opened, closed, or went on or off; by an extension."""
+    """A door or object that an extension opened, closed, or switched on or off."""
 
     id: Id
     category: Id
     field: Literal["openness", "isOn"]
     before: Probability
-    """Openness, or 1 for on."""
+    """Openness before the change, or 1 for switched on."""
     after: Probability
     cause: Id
 
 
 class Activity(Record):
-    """What one person did between two stages."""
+    """One activity of a person between two stages."""
 
     person: NonNegativeInt
     name: Id
     room_id: Id | None
-    """`None` away from home."""
+    """Room of the activity; `None` away from home."""
     start_min: NonNegativeInt
-    """After midnight of the first stage's day."""
+    """Minutes after midnight of the first stage's day."""
     end_min: NonNegativeInt
 
 
@@ -89,80 +92,80 @@ class Evolution(Record):
     mode: Mode | None
     room_id: Id | None
     salient_id: Id | None
-    """The salient object that was moved, under `SALIENT_OBJECT`."""
+    """The salient object that was moved, for `SALIENT_OBJECT`."""
     room_weights: tuple[RoomWeight, ...]
-    """Empty when evolution was not triggered."""
+    """Weights of the rooms; empty when evolution was not triggered."""
     failure: Failure | None = None
-    """Why nothing could be moved, under `no_placement`."""
+    """Reason that nothing was moved, for `no_placement`."""
     changes: tuple[Change, ...]
     unmoved_ids: tuple[Id, ...]
-    """Objects that were to move, but for which no valid place was found."""
+    """Objects selected to move for which no valid place was found."""
     blocking_ids: tuple[Id, ...] = ()
-    """Those of them that had free places, each of which would have cut something off."""
+    """Those of them with free places that would all have cut off other places."""
     crowded_ids: tuple[Id, ...] = ()
-    """Furniture that had to do without the free floor that ProcTHOR leaves around it."""
+    """Furniture placed without the free floor that ProcTHOR leaves around it."""
     rearranged_ids: tuple[Id, ...] = ()
-    """Furniture of groups that fitted nowhere as they stood: arranged anew by ProcTHOR's definition of the group."""
+    """Furniture of groups that fitted nowhere unchanged, arranged anew by ProcTHOR's definition of the group."""
     additions: tuple[ObjectRecord, ...] = ()
-    """Empty unless an extension is on, as all below."""
+    """Added objects; like all fields below, empty unless an extension is on."""
     removals: tuple[ObjectRecord, ...] = ()
     states: tuple[StateChange, ...] = ()
     clock_min: NonNegativeInt | None = None
-    """Time of day of the stage, minutes after midnight."""
+    """Time of day of the stage, in minutes after midnight."""
     activities: tuple[Activity, ...] = ()
-    """What people did since the stage before."""
+    """Activities since the previous stage."""
 
     @property
     def relocated_ids(self) -> tuple[str, ...]:
-        """Objects relocated by this change."""
+        """Ids of the objects relocated by this change."""
         return tuple(change.id for change in self.changes if change.is_relocated)
 
 
 class GenerationState(Record):
-    """The generator's state S as it was when the stage was made; oldest first."""
+    """The generator's state S when the stage was made, oldest entries first."""
 
     visited_room_ids: tuple[Id, ...]
     changed_room_ids: tuple[Id | None, ...]
-    """Per transition so far, the last two; `None` where nothing changed."""
+    """Changed room of each of the last two transitions; `None` where nothing changed."""
     goal_room_ids: tuple[Id, ...]
-    """The last two."""
+    """Rooms of the last two goals."""
     transition_room_id: Id | None
 
 
 class Rejection(Record):
-    """A goal that was drawn and refused."""
+    """A goal that was drawn and rejected."""
 
     id: Id
     reason: Literal["no_reference_pose", "not_visible", "unreachable"]
 
 
 class Target(Record):
-    """The object to be found, x_k."""
+    """The target object x_k."""
 
     id: Id
     category: Id
     room_id: Id
     position_m: Point3
-    """Centre of its box in the stage's house; success is measured from its x and z."""
+    """Centre of its box in the stage's house; success is measured from x and z."""
     size_m: Point3
     support_id: Id | None
     score: Annotated[float, Field(ge=1.0, le=2.0)]
-    """2 unique in the house, 1.5 unique in its room, 1 otherwise."""
+    """Uniqueness: 2 in the house, 1.5 in its room, 1 otherwise."""
     same_category_ids: tuple[Id, ...]
-    """Other objects of its category in the house."""
+    """Ids of other objects of its category in the house."""
     is_relocated_now: bool
-    """By this stage's change."""
+    """Whether this stage's change relocated it."""
     is_relocated_ever: bool
-    """By any change since stage 1."""
+    """Whether any change since stage 1 relocated it."""
 
 
 class OracleStage(Record):
-    """Everything about a stage that the agent must not know."""
+    """The part of a stage that the agent must not know."""
 
     schema_version: Literal[2] = 2
     stage: Annotated[int, Field(ge=1)]
     house_sha256: Sha256
-    """Of `Task.house_json(stage)`, UTF-8."""
+    """SHA-256 of `Task.house_json(stage)` in UTF-8."""
     evolution: Evolution
     state: GenerationState
     start_pose: PoseRecord
@@ -170,11 +173,11 @@ class OracleStage(Record):
     target: Target
     rejections: tuple[Rejection, ...]
     reference_pose: PoseRecord
-    """1.0-1.5 m from the target, which is visible from it."""
+    """Pose 1.0-1.5 m from the target, from which the target is visible."""
     reference_visible_px: Annotated[int, Field(ge=1)]
-    """Pixels of the target in the reference image."""
+    """Number of the target's pixels in the reference image."""
     reference_path_m: Annotated[tuple[Point2, ...], Field(min_length=1)]
-    """Shortest path from `start_pose` to `reference_pose`, corners."""
+    """Corners of the shortest path from `start_pose` to `reference_pose`."""
     reference_path_length_m: NonNegativeFloat
     ever_relocated_ids: tuple[Id, ...]
-    """Objects relocated by any change up to this stage, sorted."""
+    """Ids of the objects relocated by any change up to this stage, sorted."""

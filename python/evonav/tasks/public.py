@@ -1,4 +1,4 @@
-"""The public part of a task: all that an agent is given."""
+"""The public part of a task: all that an agent receives."""
 
 from dataclasses import dataclass
 
@@ -10,29 +10,29 @@ from evonav.sensors.observation import MapFrame
 
 @dataclass(frozen=True, slots=True)
 class TaskInfo:
-    """What an agent knows before the first stage."""
+    """An agent's information before the first stage."""
 
     task_id: str
     num_stages: int
     max_rounds: int
-    """Decision rounds a stage (paper: 50)."""
+    """Decision rounds per stage (paper: 50)."""
     map_frame: MapFrame
     seed: int
-    """For the agent's own random choices."""
+    """Seed for the agent's own random choices."""
 
 
 @dataclass(frozen=True, slots=True)
 class StageInput:
-    """The goal input `g_k` (paper, Sec. A.3) less its start pose, which would tell where the last target was.
+    """The goal input `g_k` (paper, Sec. A.3) without its start pose, which would reveal the previous target.
 
     Instructions follow the grammar of `evonav.tasks.language`.
     """
 
     stage: int
-    """1-based."""
+    """Number of the stage, from 1."""
     category: str
     basic_instruction: str
     appearance_instruction: str
     unified_instruction: str
     reference_image: NDArray[np.uint8]
-    """`(300, 300, 3)` RGB."""
+    """`(300, 300, 3)` RGB image."""

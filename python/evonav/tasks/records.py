@@ -1,4 +1,4 @@
-"""What all task files share: strict records, poses, and errors that name file, field and value."""
+"""Parse and write task files as strict records, with errors that name file, field and value."""
 
 import gzip
 import hashlib
@@ -14,7 +14,7 @@ from evonav.errors import TaskError
 from evonav.world.pose import Pose
 
 MAX_FILE_BYTES = 64 * 2**20
-"""Uncompressed size beyond which a task file is refused: a 10-room house takes 0.3 MB."""
+"""Uncompressed size beyond which a task file is refused; a 10-room house takes 0.3 MB."""
 
 Point2 = tuple[float, float]
 """`(x, z)` in metres."""
@@ -26,20 +26,20 @@ Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
 
 
 class Record(BaseModel):
-    """A part of a task file: frozen, no coercion, no unknown key, no infinity or NaN."""
+    """A part of a task file: frozen, without coercion, unknown keys, infinity or NaN."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
 
 class PoseRecord(Record):
-    """A pose as AI2-THOR writes it, angles in degrees."""
+    """A pose as AI2-THOR writes it, with angles in degrees."""
 
     position_m: Point3
     yaw_deg: float
     horizon_deg: float
 
     def pose(self) -> Pose:
-        """The pose, in radians."""
+        """Return the pose, in radians."""
         x_m, y_m, z_m = self.position_m
         return Pose(x_m, y_m, z_m, math.radians(self.yaw_deg), math.radians(self.horizon_deg))
 
@@ -48,15 +48,15 @@ RecordT = TypeVar("RecordT", bound=Record)
 
 
 def parse_record(model: type[RecordT], data: bytes, path: Path) -> RecordT:
-    """Reads a record from JSON.
+    """Parse a record from JSON.
 
     Args:
-        model: Its type.
+        model: Type of the record.
         data: UTF-8 JSON.
-        path: Named in errors.
+        path: Path of the file, for errors.
 
     Raises:
-        TaskError: The first thing wrong, with file, field and value.
+        TaskError: The first problem, with file, field and value.
     """
     record, errors = record_errors(model, data, path)
     if record is None:
@@ -65,7 +65,7 @@ def parse_record(model: type[RecordT], data: bytes, path: Path) -> RecordT:
 
 
 def record_errors(model: type[RecordT], data: bytes, path: Path) -> tuple[RecordT | None, list[TaskError]]:
-    """Reads a record from JSON; where that fails, all that is wrong with it, each with file, field and value."""
+    """Parse a record from JSON; if that fails, return all problems, each with file, field and value."""
     try:
         return model.model_validate_json(data), []
     except ValidationError as error:
@@ -77,17 +77,17 @@ def record_errors(model: type[RecordT], data: bytes, path: Path) -> tuple[Record
 
 
 def field_error(path: Path, place: str, value: Any, message: str) -> TaskError:  # noqa: ANN401
-    """A `TaskError` in the words of all task files."""
+    """Return a `TaskError` in the form of all task files."""
     shown = repr(value)
     shown = shown if len(shown) <= 80 else shown[:77] + "..."
     return TaskError(f"{path}: field `{place}`: {message} (found {shown})")
 
 
 def read_file(path: Path, max_bytes: int = MAX_FILE_BYTES) -> bytes:
-    """Contents of a task's file.
+    """Return the contents of a task's file.
 
     Raises:
-        TaskError: It cannot be read, or is larger than `max_bytes`.
+        TaskError: The file cannot be read, or is larger than `max_bytes`.
     """
     try:
         with path.open("rb") as file:
@@ -100,10 +100,10 @@ def read_file(path: Path, max_bytes: int = MAX_FILE_BYTES) -> bytes:
 
 
 def read_gzip(path: Path) -> bytes:
-    """Contents of a gzipped task file, uncompressed.
+    """Return the uncompressed contents of a gzipped task file.
 
     Raises:
-        TaskError: It cannot be read, is no gzip file, is cut short, or is too large.
+        TaskError: The file cannot be read, is not a complete gzip file, or is too large.
     """
     packed = read_file(path)
     if not packed:
@@ -112,22 +112,22 @@ def read_gzip(path: Path) -> bytes:
         with gzip.open(BytesIO(packed)) as file:
             data = file.read(MAX_FILE_BYTES + 1)
     except (OSError, EOFError, zlib.error) as error:
-        raise TaskError(f"{path}: not a whole gzip file: {error}") from error
+        raise TaskError(f"{path}: not a complete gzip file: {error}") from error
     if len(data) > MAX_FILE_BYTES:
         raise TaskError(f"{path}: uncompressed, larger than {MAX_FILE_BYTES} bytes")
     return data
 
 
 def write_gzip(data: bytes) -> bytes:
-    """Gzips without time stamp or name, so that the same contents give the same bytes (for one zlib build)."""
+    """Compress without time stamp or name, so that the same contents give the same bytes (for one zlib build)."""
     return gzip.compress(data, compresslevel=6, mtime=0)
 
 
 def record_bytes(record: Record) -> bytes:
-    """A record as UTF-8 JSON, two spaces deep, newline at the end."""
+    """Return a record as UTF-8 JSON, indented by two spaces, with a final newline."""
     return (record.model_dump_json(indent=2) + "\n").encode()
 
 
 def sha256_of(data: bytes) -> str:
-    """SHA-256, hexadecimal."""
+    """Return the SHA-256 in hexadecimal."""
     return hashlib.sha256(data).hexdigest()

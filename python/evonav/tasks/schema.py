@@ -1,8 +1,8 @@
-"""JSON Schema (draft 2020-12) of task files, made from the records that read them.
+"""Make the JSON Schema (draft 2020-12) of task files from the records that parse them.
 
-The same documents lie in the package's folder `schema/`, so that no program needs Python to check a file. JSON itself
-has no NaN and no infinity; no key but those listed is allowed. What no schema can say (files that contradict each
-other, checksums, physics) `evonav tasks validate` finds.
+The same documents lie in the package's folder `schema/`, so that programs in other languages can check files. JSON has
+no NaN and no infinity, and keys that are not listed are forbidden. Problems that a schema cannot express (files that
+contradict each other, checksums, physics) are found by `evonav tasks validate`.
 """
 
 import ast
@@ -30,13 +30,13 @@ MODELS: Mapping[str, type[Record]] = MappingProxyType(
 
 
 def schema_of(name: str) -> dict[str, Any]:
-    """The schema of a kind of file.
+    """Return the schema of a kind of file.
 
     Args:
         name: A key of `MODELS`.
 
     Raises:
-        TaskError: There is no such kind.
+        TaskError: The kind does not exist.
     """
     if name not in MODELS:
         raise TaskError(f"schema {name!r}: expected one of {', '.join(MODELS)}")
@@ -51,12 +51,12 @@ def schema_of(name: str) -> dict[str, Any]:
 
 
 def schema_text(name: str) -> str:
-    """The file of a schema."""
+    """Return the text of a schema's file."""
     return json.dumps(schema_of(name), indent=2) + "\n"
 
 
 def write_schemas(directory: Path | str) -> list[Path]:
-    """Writes all schemas, `NAME.schema.json`.
+    """Write all schemas, `NAME.schema.json`.
 
     Raises:
         TaskError: A file cannot be written.
@@ -79,7 +79,7 @@ def _all_records(record: type[Record]) -> Iterator[type[Record]]:
 
 
 def _described(record: type[Record]) -> Iterator[tuple[str, str]]:
-    """Fields with the sentences below them in the source."""
+    """Yield fields with the documentation below them in the source."""
     (definition,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
     for field, below in pairwise(definition.body if isinstance(definition, ast.ClassDef) else []):
         if not isinstance(field, ast.AnnAssign) or not isinstance(field.target, ast.Name):

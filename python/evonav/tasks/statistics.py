@@ -1,4 +1,4 @@
-"""`statistics.json`: what a set of tasks is like, as `evonav tasks stats` leaves it and its figures read it."""
+"""Define `statistics.json`: the statistics of a set of tasks, written by `evonav tasks stats`."""
 
 from typing import Annotated, Literal
 
@@ -10,38 +10,43 @@ Range = tuple[float, float]
 
 
 class Estimate(Record):
-    """A figure over tasks."""
+    """An estimate over tasks."""
 
     value: float
     ci95: Range | None
-    """`None` where nothing varies."""
+    """The 95% confidence interval; `None` where all values are equal."""
 
 
 class Measure(Record):
-    """A share, mean or median."""
+    """A share, a mean or a median."""
 
     key: str
     label: str
     group: str
     unit: Literal["share", "m", "stages", "median share", "goals"]
     n: NonNegativeInt
-    """What the figure is of: tasks, transitions, goals."""
+    """Number of tasks, transitions or goals in the estimate."""
     raw: Estimate | None
-    """`None` where there is nothing to count."""
+    """The estimate without weights; `None` without any values."""
     interval: Literal["wilson", "bootstrap"]
-    """Of `raw`: Wilson's for shares of tasks, else a percentile bootstrap over houses. Reweighted: always bootstrap."""
+    """Method for `raw`: Wilson's for shares of tasks, else a percentile bootstrap over houses.
+
+    Reweighted estimates always use the bootstrap.
+    """
     reweighted: Estimate | None = None
     paper: float | None = None
-    """Published."""
+    """The published value."""
     expected: float | None = None
-    """What the published process gives, worked out; for the rest, what our reading of it gave in a trial without
-    pictures and refusals."""
+    """The value that the published process gives, if it can be computed.
+
+    For other measures, the value of our reading in a trial without images and rejections.
+    """
     accepted: Range | None = None
-    """Where it is to lie."""
+    """The accepted range."""
 
 
 class Test(Record):
-    """A chi-square test of counts against shares."""
+    """A chi-square test of counts against expected shares."""
 
     key: str
     label: str
@@ -53,11 +58,11 @@ class Test(Record):
     num_degrees: int
     p: Annotated[float, Field(ge=0.0, le=1.0)]
     reweighted_p: float | None = None
-    """Of the reweighted shares, counted as often as the effective number of tasks allows."""
+    """P-value of the reweighted shares, counted with the effective number of tasks."""
 
 
 class Distribution(Record):
-    """How often each of some things is; shares are of their sum."""
+    """Frequencies of categories; shares refer to their sum."""
 
     key: str
     label: str
@@ -67,7 +72,7 @@ class Distribution(Record):
 
 
 class Quantity(Record):
-    """A quantity's spread."""
+    """The distribution of a quantity."""
 
     key: str
     label: str
@@ -75,13 +80,13 @@ class Quantity(Record):
     n: NonNegativeInt
     mean: float
     quantiles: tuple[float, float, float, float, float, float, float]
-    """At 0, 5, 25, 50, 75, 95 and 100%."""
+    """Quantiles at 0, 5, 25, 50, 75, 95 and 100%."""
     reweighted_mean: float | None = None
     reweighted_median: float | None = None
 
 
 class Stratum(Record):
-    """Houses of a kind, and how many there are to be."""
+    """Houses of one kind, with their target share."""
 
     name: str
     target_share: float
@@ -89,31 +94,31 @@ class Stratum(Record):
 
 
 class Weighting(Record):
-    """How tasks were reweighted."""
+    """The weights of the reweighted estimates."""
 
     mix: str
     by: str
     covered_share: float
-    """Part of the mix that the tasks have at all."""
+    """Share of the target mix for which tasks exist."""
     num_left_out: NonNegativeInt
-    """Tasks in houses that the mix has none of."""
+    """Number of tasks in houses of a kind that the mix does not have."""
     effective_num_tasks: float
     strata: tuple[Stratum, ...]
 
 
 class TaskStatistics(Record):
-    """The whole."""
+    """The content of `statistics.json`."""
 
     schema_version: Literal[1] = 1
     sources: tuple[str, ...]
-    """Folders, as given."""
+    """Folders of the tasks, as given on the command line."""
     generators: tuple[str, ...]
     seeds: tuple[int, ...]
     num_tasks: NonNegativeInt
     num_houses: NonNegativeInt
     num_stages: NonNegativeInt
     parameters: tuple[str, ...]
-    """Θ as JSON, each once."""
+    """Generation parameters as JSON, each distinct set once."""
     weighting: Weighting | None
     measures: tuple[Measure, ...]
     tests: tuple[Test, ...]
@@ -121,17 +126,17 @@ class TaskStatistics(Record):
     quantities: tuple[Quantity, ...]
 
     def measure(self, key: str) -> Measure:
-        """A measure by its key."""
+        """Return a measure by its key."""
         return next(one for one in self.measures if one.key == key)
 
     def test(self, key: str) -> Test | None:
-        """A test by its key; `None` where there was too little to test."""
+        """Return a test by its key; `None` if there was too little to test."""
         return next((one for one in self.tests if one.key == key), None)
 
     def distribution(self, key: str) -> Distribution | None:
-        """A distribution by its key; `None` where nothing was counted."""
+        """Return a distribution by its key; `None` if nothing was counted."""
         return next((one for one in self.distributions if one.key == key), None)
 
     def quantity(self, key: str) -> Quantity | None:
-        """A quantity by its key; `None` where none was noted."""
+        """Return a quantity by its key; `None` if it was not measured."""
         return next((one for one in self.quantities if one.key == key), None)

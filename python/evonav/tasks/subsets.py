@@ -1,10 +1,9 @@
-"""Named subsets, the same for everyone: `test-90` is ninety tasks of the test split.
+"""Choose named subsets that are the same for everyone: `test-90` is ninety tasks of the test split.
 
-A subset `SPLIT-N` takes the houses of a split that give a task in the order of
-`sha256("evonav-subset-1:" + sha256 of the house)`, each once, and of these the first N. So it depends on what is in the
-houses, and on nothing else: not on file names, on the order of houses or on how many processes made the tasks; and
-`test-90` begins as `test-10` does. The paper's "10% subset" of its test split is 90 of 776 tasks, 11.6%
-(docs/parity.md).
+A subset `SPLIT-N` orders the houses of a split that give a task by `sha256("evonav-subset-1:" + sha256 of the house)`,
+each house once, and takes the first N. So it depends on the content of the houses alone, not on file names, the order
+of houses or the number of processes; and `test-90` begins with `test-10`. The paper's "10% subset" of its test split is
+90 of 776 tasks, 11.6% (docs/parity.md).
 """
 
 import re
@@ -20,11 +19,11 @@ _SALT = "evonav-subset-1:"
 
 
 class SubsetError(TaskError):
-    """A subset that is not one, or that a set of tasks does not hold."""
+    """A subset's name is malformed, or a set of tasks does not contain the subset."""
 
 
 class Subset(NamedTuple):
-    """What a subset's name says."""
+    """The parts of a subset's name."""
 
     split: str
     num_tasks: int
@@ -34,10 +33,10 @@ class Subset(NamedTuple):
 
 
 def parse_subset(name: str) -> Subset:
-    """Takes a name such as `test-90` apart.
+    """Parse a subset's name such as `test-90`.
 
     Raises:
-        SubsetError: It is no such name.
+        SubsetError: The name is malformed.
     """
     match = re.fullmatch(r"(.+)-([1-9][0-9]{0,8})", name)
     if match is None:
@@ -46,15 +45,15 @@ def parse_subset(name: str) -> Subset:
 
 
 def subset_key(house_sha256: str) -> str:
-    """What houses are ordered by: of a house's `sha256` as task headers hold it."""
+    """Return the key that orders houses, made of a house's `sha256` in task headers."""
     return sha256_of((_SALT + house_sha256).encode())
 
 
 def subset_of(dataset: DatasetRecord, name: str) -> tuple[TaskEntry, ...]:
-    """The tasks of a named subset, in order of task id.
+    """Return the tasks of a named subset, in order of task id.
 
     Raises:
-        SubsetError: The name is none, the set is of another split, or it holds too few tasks.
+        SubsetError: The name is malformed, the data set is of another split, or it has too few tasks.
     """
     subset = parse_subset(name)
     if subset.split != dataset.split:
@@ -65,15 +64,15 @@ def subset_of(dataset: DatasetRecord, name: str) -> tuple[TaskEntry, ...]:
 
 
 def subset_roots(folder: Path | str, name: str) -> list[Path]:
-    """Folders of a named subset's tasks, in order of task id.
+    """Return the folders of a named subset's tasks, in order of task id.
 
     Args:
-        folder: Holds the tasks and their `dataset.json`.
-        name: Such as `test-90`.
+        folder: Folder of the tasks and their `dataset.json`.
+        name: Name of the subset, such as `test-90`.
 
     Raises:
-        SubsetError: As for `subset_of`, or a task of the subset is not there.
-        TaskError: There is no `dataset.json`, or it is malformed.
+        SubsetError: The name is malformed, the data set has too few tasks, or a task of the subset does not exist.
+        TaskError: `dataset.json` is missing or malformed.
     """
     parse_subset(name)
     if not (Path(folder) / DATASET_NAME).is_file():
@@ -89,7 +88,7 @@ def subset_roots(folder: Path | str, name: str) -> list[Path]:
 
 
 def choose(entries: Iterable[TaskEntry], subset: Subset) -> list[TaskEntry]:
-    """The first tasks in the order of subsets.
+    """Return the first tasks in the order of subsets.
 
     Raises:
         SubsetError: There are too few houses.

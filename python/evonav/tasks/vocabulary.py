@@ -1,8 +1,8 @@
-"""The words that UniGoal's detectors know, as fixed tables from ProcTHOR's object types.
+"""Translate ProcTHOR's object types to the vocabularies of UniGoal's detectors, by fixed tables.
 
-With ground-truth perception the tables stand for its detectors' vocabularies. A type goes under a word if the word,
-in plain English, names it: an armchair is a chair, a stool and a dog bed are not what `chair` and `bed` mean. Types
-without a word are invisible to the agent; docs/agents.md says how many goals that leaves out.
+With perfect perception the tables replace the detectors. A type gets a label if the label names it in plain English:
+an armchair is a `chair`, but a stool is not, and a dog bed is not a `bed`. Types without a label are invisible to the
+agent; docs/agents.md gives the number of goals that this excludes.
 """
 
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from evonav.sensors.observation import Detections
 
 CODE_CATEGORIES = ("chair", "couch", "plant", "bed", "toilet", "tv")
-"""What the released code lets a text goal be."""
+"""Categories that the released code accepts as a text goal."""
 
 CATEGORY_OF_TYPE: dict[str, str] = {
     "Chair": "chair",
@@ -43,12 +43,12 @@ MAP_CATEGORIES = (
     *CODE_CATEGORIES,
     *("dining table", "oven", "sink", "refrigerator", "book", "clock", "vase", "cup", "bottle"),
 )
-"""All that the map's detector knows."""
+"""All categories of the map's detector."""
 
 NO_CATEGORY = "none"
-"""What a goal's category is called that the detector does not know."""
+"""Category of a goal that the detector does not know."""
 
-WORD_OF_TYPE: dict[str, str] = {
+LABEL_OF_TYPE: dict[str, str] = {
     "DiningTable": "table",
     "CoffeeTable": "table",
     "SideTable": "table",
@@ -67,40 +67,40 @@ WORD_OF_TYPE: dict[str, str] = {
     "ShowerCurtain": "curtain",
     "Painting": "painting",
 }
-"""The scene graph's words (Grounding-DINO with a fixed list).
+"""The scene graph's labels (Grounding-DINO with a fixed list of 15).
 
-Of the 15, `windows` are background to our perception, `kitchen`, `bedroom` and `living room` are no objects, and
-`picture` is what `painting` already names.
+Five of them are not used: `windows` are background in our perception, `kitchen`, `bedroom` and `living room` are not
+objects, and `picture` means the same as `painting`.
 """
 
-WORD_OF_LABEL: dict[str, str] = {**{word: word for word in WORD_OF_TYPE.values()}, **WORD_OF_TYPE}
-"""The same, and the words themselves: a detector that says `table` cannot tell which of ProcTHOR's tables it is."""
+LABEL_TRANSLATION: dict[str, str] = {**{label: label for label in LABEL_OF_TYPE.values()}, **LABEL_OF_TYPE}
+"""The same, with the labels themselves: a detection labelled `table` may be any of ProcTHOR's tables."""
 
 
-def relabelled(detections: Detections, words: Mapping[str, str]) -> Detections:
-    """What a detector that knows only certain words finds.
+def relabelled(detections: Detections, translation: Mapping[str, str]) -> Detections:
+    """Return what a detector with a limited vocabulary finds.
 
     Args:
-        detections: Labelled with types, or in the detector's own words.
-        words: Word by label; a label without one is not detected.
+        detections: Detections labelled with types, or with the detector's own labels.
+        translation: The detector's label by label; a label without one is not detected.
     """
-    kept = [index for index, label in enumerate(detections.labels) if label in words]
-    if len(kept) == len(detections.labels):
+    detected = [index for index, label in enumerate(detections.labels) if label in translation]
+    if len(detected) == len(detections.labels):
         masks = detections.masks
     else:
-        renumbered = np.full(len(detections.labels) + 1, -1, np.int32)  # the last is what -1 finds
-        renumbered[kept] = np.arange(len(kept), dtype=np.int32)
+        renumbered = np.full(len(detections.labels) + 1, -1, np.int32)  # index -1 finds the last
+        renumbered[detected] = np.arange(len(detected), dtype=np.int32)
         masks = renumbered[detections.masks]
     return Detections(
         masks=masks,
-        labels=tuple(words[detections.labels[index]] for index in kept),
-        confidences=detections.confidences[kept],
-        features=None if detections.features is None else detections.features[kept],
+        labels=tuple(translation[detections.labels[index]] for index in detected),
+        confidences=detections.confidences[detected],
+        features=None if detections.features is None else detections.features[detected],
     )
 
 
 def category_image(detections: Detections) -> NDArray[np.int32]:
-    """`(H, W)` index into `MAP_CATEGORIES` of each pixel, -1 where nothing that the map's detector knows is."""
+    """Return each pixel's `(H, W)` index into `MAP_CATEGORIES`, -1 where the map's detector finds nothing."""
     index = [
         MAP_CATEGORIES.index(CATEGORY_OF_TYPE[label]) if label in CATEGORY_OF_TYPE else -1
         for label in detections.labels

@@ -26,7 +26,7 @@ from evonav.decision.text.language import ROOMS, canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.sensors.observation import View
 from evonav.tasks.public import StageInput
-from evonav.tasks.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES, NO_CATEGORY, WORD_OF_TYPE
+from evonav.tasks.vocabulary import CODE_CATEGORIES, LABEL_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 
 Point2 = tuple[float, float]
 MatchStage = Literal["zero", "partial", "perfect"]
@@ -36,7 +36,7 @@ ROOM_ZERO = "bedroom"
 ELSEWHERE = "other room"
 
 
-_WORD_OF_NOUN = {canonical(kind): canonical(word) for kind, word in WORD_OF_TYPE.items()}
+_WORD_OF_NOUN = {canonical(kind): canonical(word) for kind, word in LABEL_OF_TYPE.items()}
 
 
 def scene_word(word: str) -> str:

@@ -12,7 +12,7 @@ from typing import Literal
 
 from evonav.memory.objects import ObjectMap, ObjectMapConfig
 from evonav.sensors.observation import View
-from evonav.tasks.vocabulary import WORD_OF_LABEL, relabelled
+from evonav.tasks.vocabulary import LABEL_TRANSLATION, relabelled
 
 Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]
@@ -144,8 +144,8 @@ class ObjectGraph:
             Pairs that need a relation: every new node with each old one and each other new one. A node whose caption
             has changed is new, and its edges are gone.
         """
-        update = self.objects.update(replace(view, detections=relabelled(view.detections, WORD_OF_LABEL)))
-        types = [label for label in view.detections.labels if label in WORD_OF_LABEL]
+        update = self.objects.update(replace(view, detections=relabelled(view.detections, LABEL_TRANSLATION)))
+        types = [label for label in view.detections.labels if label in LABEL_TRANSLATION]
         for entry_id, kind in zip(update.entry_ids, types, strict=True):
             if entry_id is not None:
                 self._types.setdefault(entry_id, Counter())[kind] += 1

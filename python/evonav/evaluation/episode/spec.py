@@ -31,7 +31,7 @@ def episode_case(task: Task) -> EpisodeCase:
                 house_json=task.house_json(k),
                 target=target_record(task, k),
                 transition=transition_record(task.oracle(k)),
-                forced=_forced_walk(task.oracle(k)) if k in task.forced_stages else None,
+                forced=_forced_walk(task.oracle(k)) if k in task.guided_stages else None,
             )
             for k in numbers
         ),
