@@ -4,9 +4,9 @@ use std::{f64::consts::FRAC_PI_2, hint::black_box};
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use evonav_core::{
+    grid::dilate::dilate_disk,
     planning::{
         bev::{BevConfig, BevMap, DepthView},
-        dilate::dilate_disk,
         explore::{ExploreConfig, choose_frontier},
         short_term::{PlanConfig, plan},
     },

@@ -2,9 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use evonav_core::{
-    evolution::plan::{gap_m, is_within, overlap_m},
-    geometry::{Vec2, polygon_contains},
+use evonav_core::geometry::{
+    Vec2,
+    outline::{gap_m, is_within, overlap_m},
+    polygon_contains,
 };
 use proptest::{collection::vec, prelude::*};
 

@@ -1,10 +1,12 @@
 //! The generator's draws against the probabilities that the paper states.
 
-use evonav_core::evolution::{
-    Candidate, GoalBias, Mode, Parameters, RoomHistory, evolved_room_weight, goal_room_weights,
-    sample_evolved_room, sample_goal, target_scores,
+use evonav_core::{
+    evolution::{
+        Candidate, GoalBias, Mode, Parameters, RoomHistory, evolved_room_weight, goal_room_weights,
+        sample_evolved_room, sample_goal, target_scores,
+    },
+    rng::Stream,
 };
-use evonav_core::rng::Stream;
 use proptest::{collection::vec, prelude::*};
 
 /// Pearson's statistic of `observed` counts against `expected` probabilities.

@@ -3,10 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use evonav_core::{
-    grid::GridSpec,
+    grid::{GridSpec, bits::BitGrid, components::Components},
     memory::{
-        bits::BitGrid,
-        components::Components,
         frontiers::{FrontierConfig, Frontiers, extract},
         occupancy::{BLOCKED, FREE, OccupancyMap, UNKNOWN},
     },

@@ -4,11 +4,9 @@ use std::collections::{BTreeSet, VecDeque};
 
 use evonav_core::{
     geometry::Pose,
-    grid::GridSpec,
-    memory::bits::BitGrid,
+    grid::{GridSpec, bits::BitGrid, dilate::dilate_disk},
     planning::{
         collision::{Strip, strip_cells},
-        dilate::dilate_disk,
         explore::keep_large,
         fmm::{Field, Until, Window, flood, march},
         short_term::short_term_goal,

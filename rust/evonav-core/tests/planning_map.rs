@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use evonav_core::{
-    memory::bits::BitGrid,
+    grid::bits::BitGrid,
     planning::{
         bev::{BevConfig, BevMap, DepthView},
         explore::{ExploreConfig, choose_frontier, frontier_cells},

@@ -2,7 +2,11 @@
 
 use evonav_core::{
     Error,
-    nn::{detector, network, network::Network, segments::Resemblance},
+    nn::{
+        detector,
+        network::{self, Network},
+        segments::Resemblance,
+    },
 };
 use numpy::{
     PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,

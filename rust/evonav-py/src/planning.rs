@@ -3,11 +3,10 @@
 use evonav_core::{
     Error,
     geometry::{Pose, Vec3},
-    memory::bits::BitGrid,
+    grid::{bits::BitGrid, dilate::dilate_disk},
     planning::{
         bev::{self, BevConfig, DepthView},
         collision::{Strip, strip_cells},
-        dilate::dilate_disk,
         explore::{ExploreConfig, choose_frontier, frontier_cells},
         short_term::{PlanConfig, plan},
     },

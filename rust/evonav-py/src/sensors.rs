@@ -1,6 +1,9 @@
 //! `evonav_core::sensors`. Shapes, units and errors: `_core.pyi`.
 
-use evonav_core::{grid::GridSpec, sensors::ground_truth, sensors::raycast};
+use evonav_core::{
+    grid::GridSpec,
+    sensors::{ground_truth, raycast},
+};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 

@@ -4,9 +4,9 @@ use std::{collections::HashMap, sync::OnceLock};
 
 use serde::Deserialize;
 
-use super::{Asset, Split, groups::GroupDefinition, placement::PlacementRule, unknown};
 use crate::{
     Error,
+    assets::{Asset, Split, groups::GroupDefinition, placement::PlacementRule, unknown},
     geometry::Vec3,
     house::{House, Object},
 };

@@ -2,8 +2,10 @@
 
 use serde::Deserialize;
 
-use super::placement::Place;
-use crate::geometry::{Vec2, Vec3};
+use crate::{
+    assets::placement::Place,
+    geometry::{Vec2, Vec3},
+};
 
 /// One of ProcTHOR's 18 asset groups, in the frame of its first member, which looks along +z.
 #[derive(Debug, Clone, PartialEq, Deserialize)]

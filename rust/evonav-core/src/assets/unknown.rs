@@ -1,7 +1,7 @@
 //! Sizes for assets that the catalogue does not hold, from where the house puts them.
 
-use super::{Asset, catalogue::Catalogue};
 use crate::{
+    assets::{Asset, catalogue::Catalogue},
     geometry::{Vec2, Vec3, distance_2d_m},
     house::{House, Object},
 };

@@ -1,11 +1,11 @@
 //! What a target looks like in its reference image, as far as the shape and the catalogue know.
 
-use super::record::{Appearance, Tint};
 use crate::{
     assets::{
         Asset,
         shapes::{Condition, lit, looks_in, shape_in},
     },
+    evolution::record::{Appearance, Tint},
     sensors::raster::FrameBuffer,
 };
 

@@ -2,21 +2,21 @@
 //! vanish and appear. Every process draws from a stream of its own, so that it changes nothing of
 //! the others, and leaves the room alone in which the reference trajectory stands.
 
-use super::{
-    Occurrence,
-    generate::Generator,
-    layout::Layout,
-    record::{EvolutionRecord, ObjectRecord},
-    stage::StageWorld,
-    state::State,
-    states::has_room,
-    surfaces::sample_surface_place,
-};
 use crate::{
     Error,
     assets::{
         Asset, Split,
         catalogue::{Catalogue, UnknownAssets},
+    },
+    evolution::{
+        Occurrence,
+        generate::Generator,
+        layout::Layout,
+        record::{EvolutionRecord, ObjectRecord},
+        stage::StageWorld,
+        state::State,
+        states::has_room,
+        surfaces::sample_surface_place,
     },
     house::{AddedObject, House, HouseDelta},
     rng::Stream,

@@ -1,20 +1,20 @@
 //! The hidden change between two stages: whether, where, how (paper, Sec. 3.2).
 
-use super::{
-    Mode, RoomHistory,
-    generate::Generator,
-    layout::Layout,
-    modify::{Blocked, Modification, Modifier},
-    reach::Reach,
-    record::{
-        ChangeRecord, EvolutionOutcome, EvolutionRecord, ModificationFailure, RoomWeightRecord,
-    },
-    sample_evolved_room,
-    stage::StageWorld,
-    state::State,
-};
 use crate::{
     Error,
+    evolution::{
+        Mode, RoomHistory,
+        generate::Generator,
+        layout::Layout,
+        modify::{Blocked, Modification, Modifier},
+        reach::Reach,
+        record::{
+            ChangeRecord, EvolutionOutcome, EvolutionRecord, ModificationFailure, RoomWeightRecord,
+        },
+        sample_evolved_room,
+        stage::StageWorld,
+        state::State,
+    },
     house::{House, HouseDelta},
 };
 

@@ -4,19 +4,19 @@ use std::cell::RefCell;
 
 use serde::Serialize;
 
-use super::{
-    Extensions, Given, Parameters,
-    beyond::Transition,
-    evolve::no_evolution,
-    record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason, Rejected},
-    relations::relations_of,
-    schedule::Household,
-    stage::StageWorld,
-    state::State,
-};
 use crate::{
     Error,
     assets::catalogue::{Catalogue, UnknownAssets},
+    evolution::{
+        Extensions, Given, Parameters,
+        beyond::Transition,
+        evolve::no_evolution,
+        record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason, Rejected},
+        relations::relations_of,
+        schedule::Household,
+        stage::StageWorld,
+        state::State,
+    },
     geometry::{Vec2, distance_2d_m},
     house::{House, HouseDelta},
     rng::Stream,

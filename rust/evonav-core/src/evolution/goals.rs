@@ -1,7 +1,6 @@
 //! Which object is the next target (paper, Sec. 3.2).
 
-use super::Parameters;
-use crate::rng::Stream;
+use crate::{evolution::Parameters, rng::Stream};
 
 /// An object that may become a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

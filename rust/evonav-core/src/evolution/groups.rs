@@ -5,13 +5,13 @@
 //! stands to each other as one of ProcTHOR's definitions puts it is a group; in recorded houses both
 //! ways find the same. What an earlier change took away from its group is on its own.
 
-use super::{layout::Layout, unit::Unit};
 use crate::{
     Error,
     assets::{
         catalogue::{Catalogue, UnknownAssets},
         groups::GroupDefinition,
     },
+    evolution::{layout::Layout, unit::Unit},
     geometry::{Vec2, Vec3, distance_2d_m, rotate, yaw_rotation},
     house::House,
     rng::Stream,

@@ -1,11 +1,5 @@
 //! Objects of a house as they are moved about: poses, plan outlines, collision.
 
-use super::{
-    placement::{round_to, turned_deg},
-    plan::overlap_m,
-    reserve::{self, Floor},
-    unit::{Placed, ROUND_M},
-};
 use crate::{
     Error,
     assets::{
@@ -15,7 +9,14 @@ use crate::{
         placement::Place,
         shapes::shape_in,
     },
-    geometry::{Aabb, Vec3, add, euler_rotation_deg, rotate, sub, yaw_rotation},
+    evolution::{
+        placement::{round_to, turned_deg},
+        reserve::{self, Floor},
+        unit::{Placed, ROUND_M},
+    },
+    geometry::{
+        Aabb, Vec3, add, euler_rotation_deg, outline::overlap_m, rotate, sub, yaw_rotation,
+    },
     house::{House, HouseDelta, ObjectMove},
     world::{
         footprint::{Footprint, footprint},

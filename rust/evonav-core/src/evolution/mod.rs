@@ -14,7 +14,6 @@ mod layout;
 mod modify;
 mod parameters;
 mod placement;
-pub mod plan;
 mod reach;
 pub mod record;
 mod relations;

@@ -1,18 +1,18 @@
 //! The three room modifications (paper, Sec. 3.2).
 
-use super::{
-    Mode, Parameters,
-    groups::{Group, groups_of, rearranged},
-    layout::{Layout, Placement},
-    placement::{RoomPlan, Rules, Search, placements},
-    reach::Reach,
-    record::ModificationFailure,
-    reserve::Floor,
-    surfaces::{is_fitting, receptacles_for, sample_surface_place},
-    unit::Unit,
-};
 use crate::{
     assets::{catalogue::Catalogue, placement::Place},
+    evolution::{
+        Mode, Parameters,
+        groups::{Group, groups_of, rearranged},
+        layout::{Layout, Placement},
+        placement::{RoomPlan, Rules, Search, placements},
+        reach::Reach,
+        record::ModificationFailure,
+        reserve::Floor,
+        surfaces::{is_fitting, receptacles_for, sample_surface_place},
+        unit::Unit,
+    },
     house::House,
     rng::Stream,
 };

@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Extensions;
-use crate::Error;
+use crate::{Error, evolution::Extensions};
 
 /// Θ (paper, Sec. A.2), and the numbers that the paper leaves open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,14 +1,17 @@
 //! Where furniture can go: ProcTHOR's corner, edge and middle places on a room's floor.
 
-use super::{
-    layout::{Layout, Placement},
-    plan::{edges, is_within, point_segment_m},
-    reserve::{self, Floor},
-    unit::{Placed, ROUND_M, Unit},
-};
 use crate::{
     assets::placement::Place,
-    geometry::{Vec2, distance_2d_m, polygon_area_m2, polygon_contains},
+    evolution::{
+        layout::{Layout, Placement},
+        reserve::{self, Floor},
+        unit::{Placed, ROUND_M, Unit},
+    },
+    geometry::{
+        Vec2, distance_2d_m,
+        outline::{edges, is_within, point_segment_m},
+        polygon_area_m2, polygon_contains,
+    },
     house::{House, Room},
     rng::Stream,
     world::footprint::convex_hull,

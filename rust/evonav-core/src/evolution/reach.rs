@@ -4,8 +4,8 @@
 //! kept as counts per grid point and per step, so that a moved object costs the points around it
 //! and not the house.
 
-use super::{Parameters, layout::Layout};
 use crate::{
+    evolution::{Parameters, layout::Layout},
     geometry::{Vec2, distance_2d_m},
     house::House,
     world::{

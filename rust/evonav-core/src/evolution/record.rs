@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::Mode;
 use crate::{
     assets::shapes::Detail,
+    evolution::Mode,
     geometry::{Vec2, Vec3},
     house::{AddedObject, HouseDelta, ObjectMove, StateChange},
 };

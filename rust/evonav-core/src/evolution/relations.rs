@@ -1,12 +1,11 @@
 //! What an instruction may say of a target's surroundings (paper, Sec. A.4).
 
-use super::{
-    layout::{Item, Layout, bottom_m},
-    plan::gap_m,
-    record::{Anchor, Determiner, Relations},
-};
 use crate::{
-    geometry::{Vec2, distance_2d_m},
+    evolution::{
+        layout::{Item, Layout, bottom_m},
+        record::{Anchor, Determiner, Relations},
+    },
+    geometry::{Vec2, distance_2d_m, outline::gap_m},
     house::{House, Opening},
     world::{footprint::convex_hull, scene::BodyKind},
 };

@@ -3,10 +3,10 @@
 //! The lengths are those of the package `procthor` (`constants.MARGIN`, `doors.py`); 1,115 recorded
 //! houses hold to them.
 
-use super::{layout::TOUCH_M, plan::overlap_m};
 use crate::{
     assets::placement::Place,
-    geometry::{Vec2, distance_2d_m},
+    evolution::layout::TOUCH_M,
+    geometry::{Vec2, distance_2d_m, outline::overlap_m},
     house::{House, Opening},
 };
 

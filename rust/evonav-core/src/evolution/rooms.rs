@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Parameters;
-use crate::rng::Stream;
+use crate::{evolution::Parameters, rng::Stream};
 
 /// How a room is modified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

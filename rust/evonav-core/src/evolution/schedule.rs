@@ -3,19 +3,19 @@
 
 use std::collections::BTreeMap;
 
-use super::{
-    Schedule,
-    activities::{Activity, DAY_MIN, Doing, Habit, activities, day, habits},
-    beyond::Transition,
-    evolve::{changes_of, no_evolution},
-    layout::{Layout, Placement},
-    record::{ActivityRecord, ChangeRecord, EvolutionOutcome, EvolutionRecord},
-    stage::{Access, StageWorld},
-    states::has_room,
-    surfaces::sample_surface_place,
-};
 use crate::{
     Error,
+    evolution::{
+        Schedule,
+        activities::{Activity, DAY_MIN, Doing, Habit, activities, day, habits},
+        beyond::Transition,
+        evolve::{changes_of, no_evolution},
+        layout::{Layout, Placement},
+        record::{ActivityRecord, ChangeRecord, EvolutionOutcome, EvolutionRecord},
+        stage::{Access, StageWorld},
+        states::has_room,
+        surfaces::sample_surface_place,
+    },
     house::{House, HouseDelta},
     rng::Stream,
 };

@@ -1,18 +1,17 @@
 //! What hangs in the air comes down: the part of AI2-THOR's physics that ProcTHOR's generator uses
 //! (it drops baseball bats from near the ceiling, a few degrees askew, and reads where they lie).
 
-use super::{
-    layout::{Layout, Placement, TOUCH_M, bottom_m},
-    placement::{round_to, turned_deg},
-    plan::overlap_m,
-};
 use crate::{
     Error,
     assets::{
         catalogue::{Catalogue, UnknownAssets},
         placement::Place,
     },
-    geometry::polygon_contains,
+    evolution::{
+        layout::{Layout, Placement, TOUCH_M, bottom_m},
+        placement::{round_to, turned_deg},
+    },
+    geometry::{outline::overlap_m, polygon_contains},
     house::{House, HouseDelta},
     world::scene::Scene,
 };

@@ -6,14 +6,14 @@
 
 use serde::Deserialize;
 
-use super::{
-    layout::{Layout, Placement},
-    placement::round_to,
-    surfaces::sample_surface_place,
-};
 use crate::{
     Error,
     assets::catalogue::{Catalogue, UnknownAssets},
+    evolution::{
+        layout::{Layout, Placement},
+        placement::round_to,
+        surfaces::sample_surface_place,
+    },
     geometry::{Vec2, polygon_area_m2, polygon_contains},
     house::{House, HouseDelta},
     rng::Stream,

@@ -1,15 +1,15 @@
 //! One stage's world, and the reference pose of a goal in it.
 
-use super::{
-    Parameters,
-    appearance::appearance_of,
-    layout::Layout,
-    placement::round_to,
-    record::{Appearance, GoalRejection, PoseRecord},
-};
 use crate::{
     Error,
     assets::catalogue::{Catalogue, UnknownAssets},
+    evolution::{
+        Parameters,
+        appearance::appearance_of,
+        layout::Layout,
+        placement::round_to,
+        record::{Appearance, GoalRejection, PoseRecord},
+    },
     geometry::{Pose, Vec2, distance_2d_m},
     house::House,
     rng::Stream,

@@ -2,11 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use super::{
-    record::{EvolutionOutcome, EvolutionRecord, PoseRecord, RejectReason, Rejected, StateRecord},
-    stage::{Reference, StageWorld},
-};
 use crate::{
+    evolution::{
+        record::{
+            EvolutionOutcome, EvolutionRecord, PoseRecord, RejectReason, Rejected, StateRecord,
+        },
+        stage::{Reference, StageWorld},
+    },
     geometry::{Vec2, distance_2d_m},
     house::House,
 };

@@ -1,19 +1,18 @@
 //! Doors and furniture that open and close, lamps and screens that go on and off.
 
-use super::{
-    beyond::Transition,
-    layout::TOUCH_M,
-    plan::overlap_m,
-    record::{EvolutionRecord, StateChangeRecord},
-    stage::StageWorld,
-};
 use crate::{
     Error,
     assets::{
         part::Part,
         shapes::{drawn_openness, shows_light},
     },
-    geometry::Aabb,
+    evolution::{
+        beyond::Transition,
+        layout::TOUCH_M,
+        record::{EvolutionRecord, StateChangeRecord},
+        stage::StageWorld,
+    },
+    geometry::{Aabb, outline::overlap_m},
     house::{HouseDelta, StateChange},
     world::{
         footprint::{Footprint, footprint},

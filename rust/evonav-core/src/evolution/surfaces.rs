@@ -1,13 +1,12 @@
 //! Where small things can go: the surfaces of receptacles, as the shapes have them.
 
-use super::{
-    layout::{Item, Layout, Placement, TOUCH_M, bottom_m},
-    placement::{round_to, turned_deg},
-    plan::overlap_m,
-};
 use crate::{
     assets::catalogue::Catalogue,
-    geometry::{Vec2, add, polygon_contains, rotate, yaw_rotation},
+    evolution::{
+        layout::{Item, Layout, Placement, TOUCH_M, bottom_m},
+        placement::{round_to, turned_deg},
+    },
+    geometry::{Vec2, add, outline::overlap_m, polygon_contains, rotate, yaw_rotation},
     rng::Stream,
     world::footprint::convex_hull,
 };

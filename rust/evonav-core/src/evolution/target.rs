@@ -1,15 +1,18 @@
 //! The goal of a stage, and the view that shows it (paper, Sec. 3.2 and A.4).
 
-use super::{
-    Candidate, GoalBias,
-    generate::Generator,
-    record::{EvolutionRecord, RejectReason, Rejected, RejectionRecord, TargetRecord},
-    sample_goal,
-    stage::{Reference, StageWorld},
-    state::State,
-    target_scores,
+use crate::{
+    Error,
+    evolution::{
+        Candidate, GoalBias,
+        generate::Generator,
+        record::{EvolutionRecord, RejectReason, Rejected, RejectionRecord, TargetRecord},
+        sample_goal,
+        stage::{Reference, StageWorld},
+        state::State,
+        target_scores,
+    },
+    house::House,
 };
-use crate::{Error, house::House};
 
 /// A sampled target.
 pub(super) struct Goal {

@@ -1,12 +1,12 @@
 //! What moves as one: furniture with what stands on it, or an asset group.
 
-use super::{
-    layout::{Layout, Placement, overlap},
-    placement::{AT_WALL_M, Pose2, RoomPlan, Rules, round_to, turned_deg},
-    reserve::{self, Floor},
-};
 use crate::{
     assets::placement::Place,
+    evolution::{
+        layout::{Layout, Placement, overlap},
+        placement::{AT_WALL_M, Pose2, RoomPlan, Rules, round_to, turned_deg},
+        reserve::{self, Floor},
+    },
     geometry::{Vec2, Vec3, add, rotate, sub, yaw_rotation},
     world::footprint::Footprint,
 };

@@ -5,8 +5,7 @@ use std::collections::HashMap;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use super::House;
-use crate::{Error, geometry::Vec3};
+use crate::{Error, geometry::Vec3, house::House};
 
 /// What an evolution changes: the paper's ΔH, and what goes beyond it.
 ///

@@ -5,11 +5,14 @@ use std::collections::HashMap;
 
 use serde_json::Value;
 
-use super::{
-    EXTERIOR, House, Object, Opening, Room, Start, Surface, Wall,
-    node::{MAX_COORDINATE_M, Node},
+use crate::{
+    Error,
+    geometry::Vec2,
+    house::{
+        EXTERIOR, House, Object, Opening, Room, Start, Surface, Wall,
+        node::{MAX_COORDINATE_M, Node},
+    },
 };
-use crate::{Error, geometry::Vec2};
 
 /// Most rooms, walls (both sides), openings and objects of one house: some 20 times the largest
 /// recorded one.

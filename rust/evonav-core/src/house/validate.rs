@@ -2,10 +2,10 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::{House, Opening, Room, Wall};
 use crate::{
     Error,
     geometry::{Vec2, distance_2d_m, polygon_area_m2},
+    house::{House, Opening, Room, Wall},
 };
 
 /// Openings may stick out of their wall by this much (rounding of wall ends to millimetres).

@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 use crate::{
     Error,
     geometry::{Vec2, distance_2d_m},
+    grid::bits::BitGrid,
     memory::{
-        bits::BitGrid,
         occupancy::OccupancyMap,
         regions::find_regions,
         viewpoints::{place, place_at_border},

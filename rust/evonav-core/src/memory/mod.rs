@@ -1,9 +1,7 @@
 //! What an agent remembers: an occupancy map with frontiers, and object entries.
 
-pub mod bits;
 mod cleaning;
 pub mod cloud;
-pub mod components;
 pub mod dbscan;
 pub mod entry;
 pub mod frontiers;

@@ -1,7 +1,10 @@
 //! The agent's occupancy map: what it has seen of the floor so far.
 
 use crate::{
-    Error, geometry::Vec2, grid::GridSpec, memory::bits::BitGrid, sensors::raycast::VisibleCells,
+    Error,
+    geometry::Vec2,
+    grid::{GridSpec, bits::BitGrid},
+    sensors::raycast::VisibleCells,
 };
 
 /// Value of a cell in [`OccupancyMap::cells`].

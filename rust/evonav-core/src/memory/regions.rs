@@ -5,12 +5,11 @@ use std::f64::consts::{PI, TAU};
 use crate::{
     Error,
     geometry::{Vec2, distance_2d_m},
-    memory::{
+    grid::{
         bits::BitGrid,
         components::{Components, Run},
-        frontiers::FrontierConfig,
-        occupancy::OccupancyMap,
     },
+    memory::{frontiers::FrontierConfig, occupancy::OccupancyMap},
 };
 
 /// Regions and the cells that may serve as view positions.

@@ -2,8 +2,8 @@
 
 use crate::{
     geometry::{Vec2, distance_2d_m},
+    grid::bits::{BitGrid, ones},
     memory::{
-        bits::{BitGrid, ones},
         frontiers::{Frontier, FrontierConfig},
         occupancy::OccupancyMap,
         regions::mean_direction,

@@ -3,9 +3,8 @@
 use crate::{
     Error,
     geometry::{Vec2, Vec3},
-    grid::{GridSpec, MAX_CELLS},
-    memory::bits::BitGrid,
-    planning::{dilate::dilate_disk, fmm::Window, splat::Block},
+    grid::{GridSpec, MAX_CELLS, bits::BitGrid, dilate::dilate_disk},
+    planning::{fmm::Window, splat::Block},
     sensors::camera::Camera,
 };
 

@@ -1,10 +1,9 @@
 //! Where to explore: frontier cells, scored by how near they are.
 
 use crate::{
-    memory::bits::BitGrid,
+    grid::{bits::BitGrid, dilate::dilate_disk},
     planning::{
         bev::BevMap,
-        dilate::dilate_disk,
         fmm::{Until, march},
     },
 };

@@ -2,7 +2,7 @@
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
-use crate::memory::bits::BitGrid;
+use crate::grid::bits::BitGrid;
 
 /// A rectangle of cells of a larger grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,7 +76,7 @@ const ACCEPTED: u8 = 2;
 ///
 /// # Examples
 /// ```
-/// # use evonav_core::{memory::bits::BitGrid, planning::fmm::{Until, Window, march}};
+/// # use evonav_core::{grid::bits::BitGrid, planning::fmm::{Until, Window, march}};
 /// let mut passable = BitGrid::new(3, 9);
 /// (0..3).for_each(|row| passable.insert_run(row, 0, 9));
 /// let mut seeds = BitGrid::new(3, 9);

@@ -3,7 +3,6 @@
 
 pub mod bev;
 pub mod collision;
-pub mod dilate;
 pub mod explore;
 pub mod fmm;
 pub mod short_term;

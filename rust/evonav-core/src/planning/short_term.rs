@@ -3,10 +3,9 @@
 use crate::{
     Error,
     geometry::{Vec2, distance_2d_m},
-    memory::bits::BitGrid,
+    grid::{bits::BitGrid, dilate::dilate_disk},
     planning::{
         bev::BevMap,
-        dilate::dilate_disk,
         fmm::{Field, Until, Window, flood, march},
     },
 };

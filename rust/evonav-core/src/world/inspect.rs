@@ -5,15 +5,15 @@
 
 use serde::Serialize;
 
-use super::{
-    scene::{Body, BodyKind, Scene},
-    solid::Solid,
-};
 use crate::{
     Error,
     assets::catalogue::{Catalogue, UnknownAssets},
     geometry::{Mat3, Vec2, Vec3, compose, polygon_contains, rotate, sub, transposed},
     house::House,
+    world::{
+        scene::{Body, BodyKind, Scene},
+        solid::Solid,
+    },
 };
 
 /// Differences of poses that are rounding: house files keep four decimals of metres.

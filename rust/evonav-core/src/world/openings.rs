@@ -1,10 +1,10 @@
 //! What fills the holes in walls: doors with frame and leaf, doorframes, windows.
 
-use super::structure::WallFrame;
 use crate::{
     assets::{Asset, part::Part, shapes::lit},
     geometry::{Vec2, Vec3, add, compose, rotate, yaw_rotation},
     house::{House, Opening},
+    world::structure::WallFrame,
 };
 
 /// Width of a door frame's or window frame's bars, at most.

@@ -2,11 +2,6 @@
 
 use std::collections::HashMap;
 
-use super::{
-    openings::{door_parts, window_parts},
-    settle::fall_m,
-    structure::{Openings, SLAB_M, room_height_m, slab_parts, wall_parts},
-};
 use crate::{
     assets::{
         Asset,
@@ -17,6 +12,11 @@ use crate::{
     error::Error,
     geometry::{Aabb, IDENTITY, Mat3, Vec3, euler_rotation_deg},
     house::{House, Object, Opening, Room, Wall},
+    world::{
+        openings::{door_parts, window_parts},
+        settle::fall_m,
+        structure::{Openings, SLAB_M, room_height_m, slab_parts, wall_parts},
+    },
 };
 
 /// Colours of surfaces whose material is not known.

@@ -1,6 +1,6 @@
 //! Beds and what belongs on them.
 
-use super::{
+use crate::assets::shapes::{
     colour::{FABRICS, WOODS, liveliest, shade},
     sketch::{Sketch, Span, between, ends, inside},
 };

@@ -1,6 +1,6 @@
 //! Plants, pictures, openings seen as assets, ornaments and sports goods.
 
-use super::{
+use crate::assets::shapes::{
     colour::{DARK, STEEL, WOODS, shade},
     sketch::{Along, Sketch, between, ends, inside},
 };

@@ -1,6 +1,6 @@
 //! Food, and what it is eaten with.
 
-use super::{
+use crate::assets::shapes::{
     colour::{DARK, STEEL, WOODS, shade},
     sketch::{Along, Sketch, between},
 };

@@ -1,6 +1,6 @@
 //! What people sit on.
 
-use super::{
+use crate::assets::shapes::{
     colour::{DARK, FABRICS, STEEL, WOODS, shade},
     sketch::{Sketch, Span, between, ends, inside},
 };

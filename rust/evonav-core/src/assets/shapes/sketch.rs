@@ -2,14 +2,14 @@
 
 use serde::Serialize;
 
-use super::{
-    Condition,
-    colour::{self, Colour},
-};
 use crate::{
     assets::{
         Asset,
         part::{Part, Primitive, aabb_of},
+        shapes::{
+            Condition,
+            colour::{self, Colour},
+        },
     },
     geometry::{IDENTITY, Mat3, Vec3, add, compose, euler_rotation_deg, rotate, sub},
 };

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::{
+use crate::assets::shapes::{
     colour::{Colour, DARK, STEEL, WOODS, shade},
     sketch::{Along, Motion, Sketch, Span, between, ends, inside},
 };

@@ -1,6 +1,6 @@
 //! Tables and desks: a top, legs or a pedestal, and lower boards where things were seen on them.
 
-use super::{
+use crate::assets::shapes::{
     colour::{Colour, WOODS, shade},
     sketch::{Motion, Sketch, Span, between, ends, inside},
     storage,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::{
+use crate::assets::shapes::{
     colour::{CERAMIC, DARK, STEEL, shade},
     sketch::{Along, Motion, Sketch, between, ends, inside},
 };

@@ -1,6 +1,6 @@
 //! Connected components of a bit grid, by runs.
 
-use crate::memory::bits::BitGrid;
+use crate::grid::bits::BitGrid;
 
 /// Cells `start..end` of one row, all 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

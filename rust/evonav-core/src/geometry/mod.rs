@@ -1,5 +1,7 @@
 //! Poses, rotations, boxes and planar polygons in AI2-THOR's frame.
 
+pub mod outline;
+
 use serde::{Deserialize, Serialize};
 
 /// A point or a vector `[x, y, z]` in metres.

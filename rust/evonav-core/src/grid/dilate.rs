@@ -1,6 +1,6 @@
 //! Dilation of cells by a disk.
 
-use crate::memory::bits::BitGrid;
+use crate::grid::bits::BitGrid;
 
 /// Largest radius of [`dilate_disk`], in cells.
 pub const MAX_RADIUS: usize = 64;
@@ -17,7 +17,7 @@ pub const MAX_RADIUS: usize = 64;
 ///
 /// # Examples
 /// ```
-/// # use evonav_core::{memory::bits::BitGrid, planning::dilate::dilate_disk};
+/// # use evonav_core::grid::{bits::BitGrid, dilate::dilate_disk};
 /// let mut cells = BitGrid::new(5, 5);
 /// cells.insert(2, 2);
 /// assert_eq!(dilate_disk(&cells, 1).count(), 5);

@@ -1,0 +1,8 @@
+//! Regular grids on the ground plane, and operations on grids of bits.
+
+pub mod bits;
+pub mod components;
+pub mod dilate;
+mod spec;
+
+pub use spec::{GridSpec, MAX_CELLS};

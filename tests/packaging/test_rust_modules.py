@@ -1,0 +1,135 @@
+"""The core's Rust modules import each other one way: no circle of files, none of folders."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+SOURCE = Path(__file__).parents[2] / "rust" / "evonav-core" / "src"
+Module = tuple[str, ...]
+Graph = dict[str, set[str]]
+
+_COMMENT = re.compile(r"//.*")
+_USE = re.compile(r"^\s*(pub(?:\([^)]*\))?\s+)?use\s+([^;]+);", re.MULTILINE)
+_PATH = re.compile(r"\b((?:[A-Za-z_]\w*::)+[A-Za-z_]\w*)")
+
+
+def expand(tree: str) -> Iterator[list[str]]:
+    """Yield the single paths of a `use` tree such as `a::{b, c::{self, D}}`."""
+    head, brace, rest = tree.strip().partition("{")
+    prefix = [part for part in head.split(" as ")[0].strip().split("::") if part]
+    if not brace:
+        yield [part for part in prefix if part != "self"] if prefix[-1] == "self" else prefix
+        return
+    depth, start, inner = 0, 0, rest[: rest.rindex("}")]
+    for at, char in enumerate(inner + ","):
+        depth += (char == "{") - (char == "}")
+        if char == "," and depth == 0:
+            if inner[start:at].strip():
+                for path in expand(inner[start:at]):
+                    yield prefix + path
+            start = at + 1
+
+
+class Crate:
+    """The files of a crate, and where each path in them leads.
+
+    Args:
+        files: Text of every file by its path below `src`.
+    """
+
+    def __init__(self, files: dict[str, str]) -> None:
+        self.files = {name: _COMMENT.sub("", text) for name, text in files.items()}
+        self.modules = {self._module(name): name for name in files}
+        self.exports: dict[tuple[Module, str], list[str]] = {}
+        for module, name in self.modules.items():
+            for is_public, tree in _USE.findall(self.files[name]):
+                for path in expand(tree) if is_public else ():
+                    self.exports[module, path[-1]] = self._absolute(module, path)
+
+    @staticmethod
+    def _module(name: str) -> Module:
+        parts = Path(name).with_suffix("").parts
+        return parts[:-1] if parts[-1] in ("mod", "lib") else parts
+
+    def _absolute(self, module: Module, path: list[str]) -> list[str]:
+        """Return a path from the crate's root; other crates' paths stay as they are."""
+        if path[0] == "crate":
+            return path[1:]
+        here = list(module)
+        if path[0] in ("self", "super"):
+            while path and path[0] in ("self", "super"):
+                here = here[:-1] if path[0] == "super" else here
+                path = path[1:]
+            return here + path
+        return here + path if (*module, path[0]) in self.modules else ["::", *path]
+
+    def resolve(self, path: list[str]) -> str | None:
+        """Return the file that holds an item, behind re-exports; None if it is another crate's."""
+        for length in range(len(path), 0, -1):
+            module = tuple(path[:length])
+            if module in self.modules:
+                break
+        else:
+            return "lib.rs" if path and path[0] != "::" and ((), path[0]) not in self.exports else self._exported(path)
+        if length < len(path) and (module, path[length]) in self.exports:
+            return self.resolve(self.exports[module, path[length]])
+        return self.modules[module]
+
+    def _exported(self, path: list[str]) -> str | None:
+        return self.resolve(self.exports[(), path[0]]) if path and ((), path[0]) in self.exports else None
+
+    def imports(self) -> Graph:
+        """Return the files that each file names; a file's own re-exports are not counted."""
+        graph: Graph = {name: set() for name in self.files}
+        for module, name in self.modules.items():
+            text = self.files[name]
+            paths = [p for public, tree in _USE.findall(text) if not public for p in expand(tree)]
+            paths += [found.split("::") for found in _PATH.findall(_USE.sub("", text))]
+            targets = {self.resolve(self._absolute(module, path)) for path in paths}
+            graph[name] = {target for target in targets if target not in (None, name)}  # type: ignore[misc]
+        return graph
+
+
+def circles(graph: Graph) -> list[list[str]]:
+    """Return the strongly connected components with more than one node (Tarjan)."""
+    index: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    found: list[list[str]] = []
+
+    def visit(node: str) -> None:
+        index[node] = low[node] = len(index)
+        stack.append(node)
+        for other in sorted(graph[node]):
+            if other not in index:
+                visit(other)
+            if other in stack:
+                low[node] = min(low[node], low[other])
+        if low[node] == index[node]:
+            cut = stack.index(node)
+            component = sorted(stack[cut:])
+            del stack[cut:]
+            if len(component) > 1:
+                found.append(component)
+
+    for node in sorted(graph):
+        if node not in index:
+            visit(node)
+    return found
+
+
+def folders(graph: Graph) -> Graph:
+    """Return the same imports between the crate's top-level modules."""
+    top = lambda name: name.split("/")[0].removesuffix(".rs")  # noqa: E731
+    between: Graph = {top(name): set() for name in graph}
+    for name, targets in graph.items():
+        between[top(name)] |= {top(target) for target in targets} - {top(name)}
+    return between
+
+
+@pytest.fixture(scope="module")
+def graph() -> Graph:
+    files = {str(path.relative_to(SOURCE)): path.read_text() for path in SOURCE.rglob("*.rs")}
+    return Crate(files).imports()
