@@ -79,7 +79,7 @@ def as_conv(layer: nn.Module, weights: np.ndarray, bias: np.ndarray) -> nn.Conv2
 
 
 def packed(layers: dict[str, tuple[np.ndarray, np.ndarray]], classes: list[str]) -> bytes:
-    """The file: see `evonav_core::nn::weights`."""
+    """The file: see `evonav_core::perception::mini::weights`."""
     header: dict[str, Any] = {"format": "evonav-mini/2", "classes": classes, "layers": []}
     stem_or_down = {"stem", "down1", "down2", "down3"}
     for name, (weights, _) in layers.items():

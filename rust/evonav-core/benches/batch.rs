@@ -10,10 +10,10 @@ use evonav_core::{
     sensors::ground_truth::MaskFilter,
     simulator::{
         EmbeddedSimulator, SimulatorConfig,
+        actions::Strides,
         batch::{Batch, BatchConfig, Images},
-        field::GeodesicField,
-        motion::Strides,
-        slot::Slot,
+        batch_slot::Slot,
+        geodesic_field::GeodesicField,
     },
     world::collision::AgentBody,
 };

@@ -4,12 +4,14 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use evonav_core::{
+    perception::{
+        depth_noise::{DepthNoise, noisy_depth},
+        mask_noise::{MaskChange, SiteNoise, distort_masks, mask_outlines, surface_sites},
+    },
     rng::Stream,
     sensors::{
         camera::Camera,
-        depth_noise::{DepthNoise, noisy_depth},
         ground_truth::{MaskFilter, number_instances},
-        mask_noise::{MaskChange, SiteNoise, distort_masks, mask_outlines, surface_sites},
     },
 };
 

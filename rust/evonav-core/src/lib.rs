@@ -1,6 +1,6 @@
 //! Houses, simulator, mapping and evolution of evonav, in pure Rust.
 //!
-//! One way through: [`house`] -> [`assets`] -> [`world`] -> [`sensors`] -> [`memory`] -> [`planning`],
+//! One way through: [`house`] -> [`assets`] -> [`world`] -> [`sensors`] -> [`memory`] -> [`unigoal`],
 //! with [`evolution`] beside it. Metres and radians; AI2-THOR's frame (left-handed, y up, yaw
 //! clockwise from +z seen from above).
 
@@ -11,11 +11,11 @@ pub mod geometry;
 pub mod grid;
 pub mod house;
 pub mod memory;
-pub mod nn;
-pub mod planning;
+pub mod perception;
 pub mod rng;
 pub mod sensors;
 pub mod simulator;
+pub mod unigoal;
 pub mod world;
 
 pub use error::Error;

@@ -13,10 +13,10 @@ use evonav_core::{
     },
     simulator::{
         EmbeddedSimulator, SimulatorConfig,
+        actions::{Action, Strides, canonical_yaw_rad},
         batch::{Batch, BatchConfig, Images},
-        field::GeodesicField,
-        motion::{Action, Strides, canonical_yaw_rad},
-        slot::Slot,
+        batch_slot::Slot,
+        geodesic_field::GeodesicField,
     },
     world::collision::AgentBody,
 };

@@ -2,10 +2,10 @@
 
 use evonav_core::{
     Error,
-    nn::{
-        conv::{Conv, ConvShape, Tensor},
+    perception::mini::{
+        convolution::{Conv, ConvShape, Tensor},
+        instances::{MIN_AGREEMENT, MIN_LINK, Resemblance, refine, segments},
         network::{Network, SIDE_CELLS, SIDE_PX, input},
-        segments::{MIN_AGREEMENT, MIN_LINK, Resemblance, refine, segments},
         weights::from_half,
     },
 };

@@ -1,15 +1,15 @@
 //! Simulated errors against plain twins, and their rates.
 
 use evonav_core::{
-    rng::Stream,
-    sensors::{
-        camera::Camera,
+    perception::{
         depth_noise::{DepthNoise, noisy_depth},
         mask_noise::{
             Blob, MaskChange, Outline, SiteNoise, distort_masks, mask_outlines, paint_blobs,
             surface_sites,
         },
     },
+    rng::Stream,
+    sensors::camera::Camera,
 };
 use proptest::{collection::vec, prelude::*};
 

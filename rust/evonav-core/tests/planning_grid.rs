@@ -5,11 +5,11 @@ use std::collections::{BTreeSet, VecDeque};
 use evonav_core::{
     geometry::Pose,
     grid::{GridSpec, bits::BitGrid, dilate::dilate_disk},
-    planning::{
-        collision::{Strip, strip_cells},
-        explore::keep_large,
-        fmm::{Field, Until, Window, flood, march},
-        short_term::short_term_goal,
+    unigoal::{
+        collision_strip::{Strip, strip_cells},
+        exploration::keep_large,
+        fast_marching::{Field, Until, Window, flood, march},
+        path_planning::short_term_goal,
     },
 };
 use proptest::{collection::vec, prelude::*, sample::select};

@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use evonav_core::{
     grid::bits::BitGrid,
-    planning::{
-        bev::{BevConfig, BevMap, DepthView},
-        explore::{ExploreConfig, choose_frontier, frontier_cells},
-        short_term::{PlanConfig, plan},
-    },
     sensors::camera::Camera,
+    unigoal::{
+        bev_map::{BevConfig, BevMap, DepthView},
+        exploration::{ExploreConfig, choose_frontier, frontier_cells},
+        path_planning::{PlanConfig, plan},
+    },
 };
 use proptest::{collection::vec, prelude::*, sample::select};
 

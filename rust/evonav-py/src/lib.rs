@@ -1,20 +1,16 @@
 //! Python bindings of `evonav-core`: they convert, release the GIL and map errors, nothing else.
 
 mod arrays;
-mod batch;
 mod camera;
 mod error;
-mod evolution;
+mod generation;
 mod house;
-mod inspect;
+mod inspection;
 mod memory;
-mod nn;
-mod noise;
-mod objects;
-mod planning;
+mod perception;
 mod sensors;
 mod simulator;
-mod snapshots;
+mod unigoal;
 
 use pyo3::prelude::*;
 
@@ -23,17 +19,14 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     error::register(module)?;
     house::register(module)?;
-    inspect::register(module)?;
+    inspection::register(module)?;
     sensors::register(module)?;
-    noise::register(module)?;
-    memory::register(module)?;
-    nn::register(module)?;
-    planning::register(module)?;
     camera::register(module)?;
+    perception::register(module)?;
+    memory::register(module)?;
+    unigoal::register(module)?;
     simulator::register(module)?;
-    batch::register(module)?;
-    snapshots::register(module)?;
-    evolution::register(module)?;
+    generation::register(module)?;
     // PyO3 lists every name in `__all__`, which the stub would have to repeat.
     module.delattr("__all__")
 }

@@ -1,9 +1,7 @@
 //! What a camera at a pose perceives.
 
 pub mod camera;
-pub mod depth_noise;
 pub mod ground_truth;
-pub mod mask_noise;
 pub mod raster;
 pub mod raster_count;
 mod raster_fill;

@@ -15,9 +15,9 @@ use crate::{
         raster::{FrameBuffer, Want},
     },
     simulator::{
-        field::GeodesicField,
-        motion::{Action, Strides, act, set_down},
-        slot::Slot,
+        actions::{Action, Strides, act, set_down},
+        batch_slot::Slot,
+        geodesic_field::GeodesicField,
     },
 };
 

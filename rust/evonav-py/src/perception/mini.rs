@@ -1,11 +1,11 @@
-//! `evonav_core::nn`. Shapes, units and errors: `_core.pyi`.
+//! `evonav_core::perception::mini`. Shapes, units and errors: `_core.pyi`.
 
 use evonav_core::{
     Error,
-    nn::{
+    perception::mini::{
         detector,
+        instances::Resemblance,
         network::{self, Network},
-        segments::Resemblance,
     },
 };
 use numpy::{

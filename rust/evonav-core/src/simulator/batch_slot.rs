@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     Error,
     geometry::{Pose, Vec2, distance_2d_m},
-    simulator::{EmbeddedSimulator, field::GeodesicField},
+    simulator::{EmbeddedSimulator, geodesic_field::GeodesicField},
 };
 
 /// Every target of a task has a free place this near that can be reached.
@@ -25,11 +25,11 @@ pub struct Slot {
     pub(super) pose: Pose,
     /// By body of the house, what its pixels get in images of labels; 0: nothing.
     pub labels: Arc<[u8]>,
-    /// Distances to its goal; see [`Batch::aim`](super::batch::Batch::aim).
+    /// Distances to its goal; see [`Batch::aim`](crate::simulator::batch::Batch::aim).
     pub(super) field: Option<Arc<GeodesicField>>,
     /// The distance from where it stands, if it was asked for there.
     pub(super) known_m: Option<f64>,
-    /// Positions that could be reached when a target was first cut off; see [`Batch::plan`](super::batch::Batch::plan).
+    /// Positions that could be reached when a target was first cut off; see [`Batch::plan`](crate::simulator::batch::Batch::plan).
     reachable_m: Option<Vec<Vec2>>,
 }
 

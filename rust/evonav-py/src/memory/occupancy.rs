@@ -176,7 +176,5 @@ fn pair<'py>(
 /// Adds the classes to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Frontier>()?;
-    module.add_class::<OccupancyMap>()?;
-    module.add_class::<crate::objects::ObjectEntry>()?;
-    module.add_class::<crate::objects::ObjectMap>()
+    module.add_class::<OccupancyMap>()
 }

@@ -1,16 +1,16 @@
-//! `evonav_core::planning`. Shapes, units and errors: `_core.pyi`.
+//! `evonav_core::unigoal`. Shapes, units and errors: `_core.pyi`.
 
 use evonav_core::{
     Error,
     geometry::{Pose, Vec3},
     grid::{bits::BitGrid, dilate::dilate_disk},
-    planning::{
-        bev::{self, BevConfig, DepthView},
-        collision::{Strip, strip_cells},
-        explore::{ExploreConfig, choose_frontier, frontier_cells},
-        short_term::{PlanConfig, plan},
-    },
     sensors::camera::Camera,
+    unigoal::{
+        bev_map::{self, BevConfig, DepthView},
+        collision_strip::{Strip, strip_cells},
+        exploration::{ExploreConfig, choose_frontier, frontier_cells},
+        path_planning::{PlanConfig, plan},
+    },
 };
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -22,7 +22,7 @@ type Mask<'py> = Bound<'py, PyArray2<bool>>;
 
 /// UniGoal's map seen from above.
 #[pyclass(module = "evonav._core")]
-struct BevMap(bev::BevMap);
+struct BevMap(bev_map::BevMap);
 
 #[pymethods]
 impl BevMap {
@@ -56,7 +56,7 @@ impl BevMap {
             stride_px,
             category_points,
         };
-        bev::BevMap::new(centre_m, num_categories, config).map(Self).map_err(error::to_py)
+        bev_map::BevMap::new(centre_m, num_categories, config).map(Self).map_err(error::to_py)
     }
 
     #[pyo3(signature = (depth_m, categories, *, position_m, yaw_rad, horizon_rad, vertical_fov_rad))]

@@ -2,9 +2,9 @@
 
 use crate::{
     grid::{bits::BitGrid, dilate::dilate_disk},
-    planning::{
-        bev::BevMap,
-        fmm::{Until, march},
+    unigoal::{
+        bev_map::BevMap,
+        fast_marching::{Until, march},
     },
 };
 

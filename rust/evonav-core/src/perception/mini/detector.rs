@@ -2,9 +2,9 @@
 
 use crate::{
     Error,
-    nn::{
+    perception::mini::{
+        instances::{Resemblance, refine, segments},
         network::{Network, input},
-        segments::{Resemblance, refine, segments},
     },
 };
 

@@ -6,10 +6,10 @@ use evonav_core::{
     geometry::{Pose, Vec2, Vec3},
     sensors::ground_truth::MaskFilter,
     simulator::{
+        actions::Strides,
         batch::{Batch, BatchConfig, Images},
-        field::GeodesicField,
-        motion::Strides,
-        slot::Slot,
+        batch_slot::Slot,
+        geodesic_field::GeodesicField,
     },
 };
 use numpy::{
@@ -17,7 +17,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 
-use crate::{arrays, error, simulator::PyEmbeddedSimulator};
+use crate::{arrays, error, simulator::embedded::PyEmbeddedSimulator};
 
 /// By agent, whether its action was carried out, and its distance.
 type Stepped<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f64>>);

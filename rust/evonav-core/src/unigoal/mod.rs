@@ -1,9 +1,9 @@
 //! UniGoal's geometry: a bird's-eye map fused from depth, distances by fast marching, exploration
 //! targets, short-term goals and what collisions teach.
 
-pub mod bev;
-pub mod collision;
-pub mod explore;
-pub mod fmm;
-pub mod short_term;
-pub mod splat;
+pub mod bev_map;
+pub mod collision_strip;
+pub mod exploration;
+pub mod fast_marching;
+pub mod path_planning;
+pub mod voxel_columns;

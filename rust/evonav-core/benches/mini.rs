@@ -3,10 +3,10 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use evonav_core::nn::{
+use evonav_core::perception::mini::{
     detector::{DetectorConfig, detect},
+    instances::{Resemblance, refine, segments},
     network::{Network, input},
-    segments::{Resemblance, refine, segments},
 };
 
 const WEIGHTS: &[u8] = include_bytes!("../../../python/evonav/data/mini.weights");

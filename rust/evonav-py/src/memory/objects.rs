@@ -18,7 +18,7 @@ use crate::{arrays, error};
 
 /// An object entry as it was when asked for.
 #[pyclass(frozen, get_all, module = "evonav._core")]
-pub struct ObjectEntry {
+struct ObjectEntry {
     id: u64,
     label: String,
     label_counts: Vec<(String, u32)>,
@@ -54,7 +54,7 @@ impl ObjectEntry {
 
 /// What was detected, gathered into lasting entries.
 #[pyclass(module = "evonav._core")]
-pub struct ObjectMap(objects::ObjectMap);
+struct ObjectMap(objects::ObjectMap);
 
 type Update = (Vec<Option<u64>>, Vec<u64>, Vec<(u64, u64)>);
 
@@ -273,4 +273,10 @@ impl ViewSlices<'_> {
             features: self.features,
         }
     }
+}
+
+/// Adds the classes to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<ObjectEntry>()?;
+    module.add_class::<ObjectMap>()
 }

@@ -4,9 +4,9 @@ use crate::{
     Error,
     geometry::{Vec2, distance_2d_m},
     grid::{bits::BitGrid, dilate::dilate_disk},
-    planning::{
-        bev::BevMap,
-        fmm::{Field, Until, Window, flood, march},
+    unigoal::{
+        bev_map::BevMap,
+        fast_marching::{Field, Until, Window, flood, march},
     },
 };
 

@@ -5,12 +5,12 @@ use std::{f64::consts::FRAC_PI_2, hint::black_box};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use evonav_core::{
     grid::dilate::dilate_disk,
-    planning::{
-        bev::{BevConfig, BevMap, DepthView},
-        explore::{ExploreConfig, choose_frontier},
-        short_term::{PlanConfig, plan},
-    },
     sensors::camera::Camera,
+    unigoal::{
+        bev_map::{BevConfig, BevMap, DepthView},
+        exploration::{ExploreConfig, choose_frontier},
+        path_planning::{PlanConfig, plan},
+    },
 };
 
 const SIDE_PX: usize = 300;
@@ -44,7 +44,7 @@ fn look(x: f64, z: f64, yaw_rad: f64) -> (Camera, Vec<f32>) {
     (camera, (0..SIDE_PX * SIDE_PX).map(depth).collect())
 }
 
-fn bench_planning(c: &mut Criterion) {
+fn bench_unigoal(c: &mut Criterion) {
     let mut map = BevMap::new([2.0, 2.0], 16, BevConfig::default()).expect("a valid map");
     // Nine rooms, four looks in each.
     for room in 0..9_u32 {
@@ -83,5 +83,5 @@ fn bench_planning(c: &mut Criterion) {
     });
 }
 
-criterion_group!(benches, bench_planning);
+criterion_group!(benches, bench_unigoal);
 criterion_main!(benches);

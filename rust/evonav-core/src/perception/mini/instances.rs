@@ -2,8 +2,8 @@
 
 use crate::{
     Error,
-    nn::{
-        conv::Tensor,
+    perception::mini::{
+        convolution::Tensor,
         network::{SIDE_CELLS, samples},
     },
 };
@@ -172,7 +172,7 @@ impl Default for Resemblance {
 ///
 /// # Arguments
 /// * `cells` - instance of each cell of the network's grid.
-/// * `rgb`, `depth_m`, `size_px` - as for [`super::network::input`].
+/// * `rgb`, `depth_m`, `size_px` - as for [`crate::perception::mini::network::input`].
 /// * `weigh` - how differences count.
 ///
 /// # Returns

@@ -1,10 +1,5 @@
 //! One house, instantiated: what an agent can see and where it can go.
 
-pub mod batch;
-pub mod field;
-pub mod motion;
-pub mod slot;
-
 use std::sync::OnceLock;
 
 use crate::{

@@ -4,8 +4,8 @@ use crate::{
     Error,
     geometry::{Vec2, Vec3},
     grid::{GridSpec, MAX_CELLS, bits::BitGrid, dilate::dilate_disk},
-    planning::{fmm::Window, splat::Block},
     sensors::camera::Camera,
+    unigoal::{fast_marching::Window, voxel_columns::Block},
 };
 
 /// What counts as what in a [`BevMap`] (UniGoal's constants).

@@ -2,8 +2,8 @@
 //!
 //! Sums have one order, whatever the number of threads: the same picture gives the same bits.
 
-pub mod conv;
+pub mod convolution;
 pub mod detector;
+pub mod instances;
 pub mod network;
-pub mod segments;
 pub mod weights;

@@ -2,8 +2,8 @@
 
 use crate::{
     Error,
-    nn::{
-        conv::{Conv, Tensor},
+    perception::mini::{
+        convolution::{Conv, Tensor},
         weights::Weights,
     },
 };

@@ -9,7 +9,7 @@ use crate::{Error, geometry::Vec2, simulator::EmbeddedSimulator, world::paths::D
 /// # Examples
 /// ```
 /// # use std::sync::Arc;
-/// # use evonav_core::simulator::{EmbeddedSimulator, field::GeodesicField};
+/// # use evonav_core::simulator::{EmbeddedSimulator, geodesic_field::GeodesicField};
 /// # fn of(world: Arc<EmbeddedSimulator>) -> Result<(), evonav_core::Error> {
 /// let start = world.start().position_m;
 /// let field = GeodesicField::new(world, [start[0], start[2]])?;

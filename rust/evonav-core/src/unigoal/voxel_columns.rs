@@ -3,7 +3,7 @@
 use crate::{
     geometry::Vec2,
     grid::GridSpec,
-    planning::bev::{BevConfig, DepthView},
+    unigoal::bev_map::{BevConfig, DepthView},
 };
 
 /// Points in a column of voxels, by height; each point counts by its nearness to a voxel's centre.

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::{
     Error,
-    nn::conv::{Conv, ConvShape},
+    perception::mini::convolution::{Conv, ConvShape},
 };
 
 const MAGIC: &[u8; 8] = b"EVONAVNN";

@@ -2,8 +2,9 @@
 
 use evonav_core::{
     geometry::Vec3,
+    perception::{depth_noise, mask_noise},
     rng::Stream,
-    sensors::{camera::Camera, depth_noise, mask_noise},
+    sensors::camera::Camera,
 };
 use numpy::{
     PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray2, PyUntypedArrayMethods,
