@@ -7,7 +7,7 @@ use evonav_core::{
     assets::UnknownAssets,
     geometry::{Pose, Vec2},
     house::House,
-    sensors::ground_truth::MaskFilter,
+    sensors::instance_masks::MaskFilter,
     simulator::{
         EmbeddedSimulator, SimulatorConfig,
         actions::Strides,

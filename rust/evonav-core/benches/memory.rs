@@ -7,12 +7,10 @@ use evonav_core::{
     grid::GridSpec,
     memory::{
         frontiers::{FrontierConfig, extract},
-        object_config::ObjectMapConfig,
-        objects::{DetectedView, ObjectMap},
+        objects::{DetectedView, ObjectMap, ObjectMapConfig, sight_lines::SightConfig},
         occupancy::OccupancyMap,
-        sight_lines::SightConfig,
     },
-    sensors::{camera::Camera, raycast::visible_cells, unproject::MaskedDepth},
+    sensors::{camera::Camera, unproject::MaskedDepth, visible_cells::visible_cells},
 };
 
 const SIDE_PX: usize = 300;

@@ -11,7 +11,7 @@ use evonav_core::{
     rng::Stream,
     sensors::{
         camera::Camera,
-        ground_truth::{MaskFilter, number_instances},
+        instance_masks::{MaskFilter, number_instances},
     },
 };
 

@@ -9,11 +9,10 @@ use evonav_core::{
     house::House,
     sensors::{
         camera::{Camera, View},
-        ground_truth::instance_areas,
-        raster::{FrameBuffer, Want, render},
-        raster_count::visible_px,
-        raycast3d::RayCaster,
-        visibility::visible_bodies,
+        instance_masks::instance_areas,
+        raster::{FrameBuffer, Want, render, visible_px},
+        ray_caster::RayCaster,
+        visible_bodies::visible_bodies,
     },
     world::{mesh::SceneMesh, scene::Scene},
 };

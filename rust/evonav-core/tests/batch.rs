@@ -8,7 +8,7 @@ use evonav_core::{
     geometry::{Pose, Vec2, distance_2d_m},
     house::House,
     sensors::{
-        ground_truth::MaskFilter,
+        instance_masks::MaskFilter,
         raster::{FrameBuffer, Want},
     },
     simulator::{

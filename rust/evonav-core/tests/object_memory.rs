@@ -3,11 +3,8 @@
 use std::collections::BTreeMap;
 
 use evonav_core::{
-    memory::{
-        cloud::Cloud,
-        dbscan::dbscan,
-        object_config::ObjectMapConfig,
-        objects::{DetectedView, ObjectMap, Update},
+    memory::objects::{
+        DetectedView, ObjectMap, ObjectMapConfig, Update, cloud::Cloud, dbscan::dbscan,
         voxels::voxel_filter,
     },
     sensors::{

@@ -9,8 +9,8 @@ use evonav_core::{
         occupancy::{BLOCKED, FREE, OccupancyMap, UNKNOWN},
     },
     sensors::{
-        ground_truth::{MaskFilter, instance_areas, mask_extents, number_instances},
-        raycast::{VisibleCells, visible_cells},
+        instance_masks::{MaskFilter, instance_areas, mask_extents, number_instances},
+        visible_cells::{VisibleCells, visible_cells},
     },
 };
 use proptest::{collection::vec, prelude::*, sample::select};

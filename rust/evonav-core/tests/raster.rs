@@ -7,8 +7,8 @@ use evonav_core::{
     sensors::{
         camera::{CLIP_M, Camera, View},
         raster::{FrameBuffer, Want, render, render_view},
-        raycast3d::RayCaster,
-        visibility::{visibility_points, visible_bodies},
+        ray_caster::RayCaster,
+        visible_bodies::{visibility_points, visible_bodies},
     },
     world::{
         mesh::{SceneMesh, Triangle},

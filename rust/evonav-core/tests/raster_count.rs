@@ -5,8 +5,7 @@ use evonav_core::{
     geometry::{Aabb, euler_rotation_deg},
     sensors::{
         camera::Camera,
-        raster::{FrameBuffer, Want, render},
-        raster_count::visible_px,
+        raster::{FrameBuffer, Want, render, visible_px},
     },
     world::{
         mesh::SceneMesh,

@@ -2,9 +2,8 @@
 
 use evonav_core::{
     geometry::Vec3,
-    memory::{
-        object_config::ObjectMapConfig,
-        objects::{DetectedView, ObjectMap},
+    memory::objects::{
+        DetectedView, ObjectMap, ObjectMapConfig,
         sight_lines::{SightConfig, visible_shares},
     },
     sensors::{

@@ -8,7 +8,7 @@ use std::{
 use evonav_core::{
     geometry::Vec2,
     grid::GridSpec,
-    sensors::raycast::{VisibleCells, visible_cells},
+    sensors::visible_cells::{VisibleCells, visible_cells},
 };
 use proptest::{collection::vec, prelude::*, sample::select};
 

@@ -2,7 +2,7 @@
 
 use evonav_core::{
     grid::GridSpec,
-    sensors::{ground_truth, raycast},
+    sensors::{self, instance_masks},
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -28,7 +28,14 @@ fn visible_cells<'py>(
     let spec = GridSpec { rows, cols, cell_m, corner_m };
     let seen = py
         .detach(|| {
-            raycast::visible_cells(cells, &spec, origin_m, yaw_rad, horizontal_fov_rad, range_m)
+            sensors::visible_cells::visible_cells(
+                cells,
+                &spec,
+                origin_m,
+                yaw_rad,
+                horizontal_fov_rad,
+                range_m,
+            )
         })
         .map_err(error::to_py)?;
     Ok((arrays::rows_of(py, seen.free)?, arrays::rows_of(py, seen.blocked)?))
@@ -47,9 +54,9 @@ fn number_instances<'py>(
 ) -> PyResult<(Bound<'py, PyArray2<i32>>, Bound<'py, PyArray1<i64>>)> {
     let (image, shape) = arrays::row_major("instances", &instances)?;
     let is_detectable = is_detectable.as_slice()?;
-    let filter = ground_truth::MaskFilter { min_area_px, max_box_fraction };
+    let filter = instance_masks::MaskFilter { min_area_px, max_box_fraction };
     let masks = py
-        .detach(|| ground_truth::number_instances(image, shape[1], is_detectable, filter))
+        .detach(|| instance_masks::number_instances(image, shape[1], is_detectable, filter))
         .map_err(error::to_py)?;
     let instances = masks.instances.into_iter().map(|index| index as i64).collect();
     Ok((arrays::image_of(py, masks.labels, shape)?, PyArray1::from_vec(py, instances)))
@@ -64,7 +71,7 @@ fn instance_areas<'py>(
 ) -> PyResult<Bound<'py, PyArray1<i64>>> {
     let (image, _) = arrays::row_major("instances", &instances)?;
     let areas =
-        py.detach(|| ground_truth::instance_areas(image, num_instances)).map_err(error::to_py)?;
+        py.detach(|| instance_masks::instance_areas(image, num_instances)).map_err(error::to_py)?;
     Ok(PyArray1::from_vec(py, areas))
 }
 
@@ -78,9 +85,9 @@ fn mask_extents<'py>(
 ) -> PyResult<Bound<'py, PyArray2<i64>>> {
     let (image, shape) = arrays::row_major("masks", &masks)?;
     let extents = py
-        .detach(|| ground_truth::mask_extents(image, shape[1], num_masks))
+        .detach(|| instance_masks::mask_extents(image, shape[1], num_masks))
         .map_err(error::to_py)?;
-    let row = |extent: ground_truth::Extent| {
+    let row = |extent: instance_masks::Extent| {
         let [[top, bottom], [left, right]] = [extent.rows, extent.cols];
         [extent.area_px, left, top, right, bottom].map(|px| px as i64)
     };

@@ -15,8 +15,7 @@ use crate::{
     rng::Stream,
     sensors::{
         camera::Camera,
-        raster::{FrameBuffer, Want, render},
-        raster_count::visible_px,
+        raster::{FrameBuffer, Want, render, visible_px},
     },
     world::{
         collision::AgentBody,

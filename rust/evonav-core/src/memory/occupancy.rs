@@ -4,7 +4,7 @@ use crate::{
     Error,
     geometry::Vec2,
     grid::{GridSpec, bits::BitGrid},
-    sensors::raycast::VisibleCells,
+    sensors::visible_cells::VisibleCells,
 };
 
 /// Value of a cell in [`OccupancyMap::cells`].

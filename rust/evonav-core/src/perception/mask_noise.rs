@@ -3,7 +3,7 @@
 use crate::{
     Error,
     rng::Stream,
-    sensors::{camera::Camera, ground_truth::runs},
+    sensors::{camera::Camera, instance_masks::runs},
 };
 
 /// Largest margin that a mask may gain or lose.

@@ -1,12 +1,9 @@
 //! What a camera at a pose perceives.
 
 pub mod camera;
-pub mod ground_truth;
+pub mod instance_masks;
 pub mod raster;
-pub mod raster_count;
-mod raster_fill;
-mod raster_shade;
-pub mod raycast;
-pub mod raycast3d;
+pub mod ray_caster;
 pub mod unproject;
-pub mod visibility;
+pub mod visible_bodies;
+pub mod visible_cells;

@@ -2,7 +2,7 @@
 
 use crate::{
     Error,
-    sensors::{camera::Camera, ground_truth::runs},
+    sensors::{camera::Camera, instance_masks::runs},
 };
 
 /// A point in the world frame. Single precision: 8 micrometres at 100 m.

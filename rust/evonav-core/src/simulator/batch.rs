@@ -11,7 +11,7 @@ use crate::{
     Error,
     geometry::Vec2,
     sensors::{
-        ground_truth::{MaskFilter, number_instances},
+        instance_masks::{MaskFilter, number_instances},
         raster::{FrameBuffer, Want},
     },
     simulator::{

@@ -11,8 +11,8 @@ use crate::{
     sensors::{
         camera::{Camera, View},
         raster::{FrameBuffer, Want, render_view},
-        raycast3d::RayCaster,
-        visibility::visible_bodies,
+        ray_caster::RayCaster,
+        visible_bodies::visible_bodies,
     },
     world::{
         collision::AgentBody,

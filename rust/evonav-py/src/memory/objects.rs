@@ -3,12 +3,7 @@
 use evonav_core::{
     Error,
     geometry::Pose,
-    memory::{
-        entry::Entry,
-        object_config::ObjectMapConfig,
-        objects::{self, DetectedView},
-        sight_lines::SightConfig,
-    },
+    memory::objects::{self, DetectedView, Entry, ObjectMapConfig, sight_lines::SightConfig},
     sensors::{camera::Camera, unproject::MaskedDepth},
 };
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};

@@ -3,7 +3,7 @@
 use evonav_core::{
     grid::GridSpec,
     memory::{frontiers, occupancy},
-    sensors::raycast::VisibleCells,
+    sensors::visible_cells::VisibleCells,
 };
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;

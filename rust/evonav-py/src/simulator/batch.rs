@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use evonav_core::{
     geometry::{Pose, Vec2, Vec3},
-    sensors::ground_truth::MaskFilter,
+    sensors::instance_masks::MaskFilter,
     simulator::{
         actions::Strides,
         batch::{Batch, BatchConfig, Images},

@@ -3,7 +3,7 @@
 use std::{borrow::Cow, sync::LazyLock};
 
 use crate::{
-    memory::voxels::{Voxel, VoxelIndex, voxel_of},
+    memory::objects::voxels::{Voxel, VoxelIndex, voxel_of},
     sensors::unproject::Point,
 };
 

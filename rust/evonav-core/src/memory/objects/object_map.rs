@@ -7,11 +7,11 @@
 use crate::{
     Error,
     geometry::{Vec3, distance_2d_m},
-    memory::{
+    memory::objects::{
+        Entry, ObjectMapConfig,
         cleaning::{centroid_m, clean, denoise},
         cloud::Cloud,
-        entry::{Entry, Sighting},
-        object_config::ObjectMapConfig,
+        entry::Sighting,
         sight_lines::{SightConfig, reach_m, visible_shares},
     },
     sensors::unproject::{MaskedDepth, Point, unproject_masks},

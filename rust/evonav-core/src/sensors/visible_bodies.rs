@@ -3,7 +3,7 @@
 use crate::{
     Error,
     geometry::{Vec2, Vec3, add, sub},
-    sensors::{camera::View, raycast3d::RayCaster},
+    sensors::{camera::View, ray_caster::RayCaster},
     world::{
         collision::distance_squared,
         footprint::footprint,

@@ -1,4 +1,4 @@
-//! Single rays through a scene: line of sight and picking. Whole images are [`super::raster`]'s.
+//! Single rays through a scene: line of sight and picking. Whole images are [`crate::sensors::raster`]'s.
 
 use parry3d_f64::{
     bounding_volume::Aabb,

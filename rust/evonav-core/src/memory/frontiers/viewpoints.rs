@@ -4,9 +4,8 @@ use crate::{
     geometry::{Vec2, distance_2d_m},
     grid::bits::{BitGrid, ones},
     memory::{
-        frontiers::{Frontier, FrontierConfig},
+        frontiers::{Frontier, FrontierConfig, regions::mean_direction},
         occupancy::OccupancyMap,
-        regions::mean_direction,
     },
 };
 

@@ -4,8 +4,8 @@ use std::borrow::Cow;
 
 use crate::{
     geometry::{Aabb, Vec3},
-    memory::{
-        cloud::Cloud, dbscan::largest_cluster, object_config::ObjectMapConfig, voxels::voxel_filter,
+    memory::objects::{
+        ObjectMapConfig, cloud::Cloud, dbscan::largest_cluster, voxels::voxel_filter,
     },
     sensors::unproject::Point,
 };

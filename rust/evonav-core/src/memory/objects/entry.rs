@@ -2,7 +2,7 @@
 
 use crate::{
     geometry::{Aabb, Vec3},
-    memory::{cloud::Cloud, object_config::ObjectMapConfig},
+    memory::objects::{ObjectMapConfig, cloud::Cloud},
     sensors::unproject::Point,
 };
 

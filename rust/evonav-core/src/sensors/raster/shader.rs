@@ -7,9 +7,9 @@
 
 use crate::{
     geometry::Vec3,
-    sensors::{
-        raster::Optics,
-        raster_fill::{Canvas, LANES},
+    sensors::raster::{
+        canvas::{Canvas, LANES},
+        lens::Optics,
     },
     world::mesh::{Face, dot},
 };

@@ -7,7 +7,7 @@
 use crate::{
     Error,
     geometry::{Aabb, Vec3},
-    memory::voxels::{Voxel, VoxelIndex},
+    memory::objects::voxels::{Voxel, VoxelIndex},
     sensors::unproject::Point,
 };
 

@@ -6,8 +6,11 @@ use crate::{
     Error,
     sensors::{
         camera::{Camera, View},
-        raster::{FrameBuffer, Lens, Want, draw_part},
-        raster_fill::LANES,
+        raster::{
+            canvas::LANES,
+            lens::Lens,
+            render::{FrameBuffer, Want, draw_part},
+        },
     },
     world::mesh::SceneMesh,
 };
@@ -15,7 +18,7 @@ use crate::{
 /// Share of its depth by which a part must be behind a body to be left out.
 const BEHIND: f64 = 1e-4;
 
-/// Number of pixels that [`super::raster::render`] gives a body; `None` if they are fewer than
+/// Number of pixels that [`crate::sensors::raster::render`] gives a body; `None` if they are fewer than
 /// `least_px`.
 ///
 /// Draws the part of the image that holds the body, and of the other bodies what may be before it.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::{
     geometry::Aabb,
-    memory::{
+    memory::objects::{
         dbscan::distance2,
         voxels::{Blocks, Voxel, VoxelSet, place, voxel_of},
     },

@@ -1,0 +1,9 @@
+//! Frontiers: where the known floor ends and exploring may go on, by 3D-Mem's rules.
+
+mod frontier;
+mod frontier_set;
+mod regions;
+mod viewpoints;
+
+pub use frontier::{Frontier, FrontierConfig};
+pub use frontier_set::{Frontiers, extract};

@@ -1,0 +1,14 @@
+//! Object entries: what an agent remembers of the objects that it detected.
+
+mod cleaning;
+pub mod cloud;
+mod config;
+pub mod dbscan;
+mod entry;
+mod object_map;
+pub mod sight_lines;
+pub mod voxels;
+
+pub use config::ObjectMapConfig;
+pub use entry::Entry;
+pub use object_map::{Comparison, DetectedView, ObjectMap, Update};

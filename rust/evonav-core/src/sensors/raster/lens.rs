@@ -1,0 +1,196 @@
+//! From the world to the image: which parts are in view, and where their corners fall.
+
+use std::ops::Range;
+
+use crate::{
+    geometry::{Aabb, Mat3, Vec2, Vec3, rotate, sub},
+    sensors::camera::{Camera, View},
+    world::mesh::{Face, SceneMesh, dot},
+};
+
+/// Vertices of the part and corners of the face at hand.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scratch {
+    pub visible: Vec<(f64, u32)>,
+    pub local_m: Vec<Vec3>,
+    pub projected_px: Vec<Vec2>,
+    pub clipped_m: Vec<Vec3>,
+    pub polygon_px: Vec<Vec2>,
+}
+
+/// How depth and image points hang together.
+///
+/// The canvas holds a *nearness*, which is linear in the image on every plane: inverse depth in a
+/// perspective view, depth taken from [`Lens::horizon_m`] in an orthographic one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Optics {
+    /// Pixels per metre at depth 1.
+    Perspective { focal_px: f64 },
+    /// Pixels per metre at any depth.
+    Orthographic { pixels_per_m: f64 },
+}
+
+/// A view, ready for use.
+pub(super) struct Lens {
+    axes: Mat3,
+    eye_m: Vec3,
+    pub optics: Optics,
+    centre_px: Vec2,
+    pub clip_m: Vec2,
+    /// Inward normals of near plane, far plane and the image's borders, and the least `normal . p`
+    /// of points in view.
+    frustum: [(Vec3, f64); 6],
+}
+
+impl Lens {
+    pub fn new(view: &View) -> Self {
+        let axes = view.axes();
+        let Camera { height_px, position_m: eye_m, .. } = view.camera;
+        let ([near_m, far_m], [u, v]) = (view.clip_m, view.camera.centre_px());
+        let optics = match view.half_height_m {
+            None => Optics::Perspective { focal_px: view.camera.focal_px() },
+            Some(half_m) => Optics::Orthographic { pixels_per_m: height_px as f64 / 2.0 / half_m },
+        };
+        // A border is met where the image coordinate is its half size: `focal_px x = u z`, or
+        // `pixels_per_m x = u`.
+        let (scale, [slope_u, slope_v], [least_u, least_v]) = match optics {
+            Optics::Perspective { focal_px } => (focal_px, [u, v], [0.0; 2]),
+            Optics::Orthographic { pixels_per_m } => (pixels_per_m, [0.0; 2], [-u, -v]),
+        };
+        let local = [
+            ([0.0, 0.0, 1.0], near_m),
+            ([0.0, 0.0, -1.0], -far_m),
+            ([scale, 0.0, slope_u], least_u),
+            ([-scale, 0.0, slope_u], least_u),
+            ([0.0, scale, slope_v], least_v),
+            ([0.0, -scale, slope_v], least_v),
+        ];
+        let mut lens = Self {
+            axes,
+            eye_m,
+            optics,
+            centre_px: [u, v],
+            clip_m: view.clip_m,
+            frustum: [([0.0; 3], 0.0); 6],
+        };
+        lens.frustum = local.map(|(normal, least)| (lens.to_world(normal), least));
+        lens
+    }
+
+    fn to_world(&self, local: Vec3) -> Vec3 {
+        std::array::from_fn(|i| (0..3).map(|j| self.axes[j][i] * local[j]).sum::<f64>())
+    }
+
+    /// Leaves out of view what is outside some pixels or beyond a depth, in a perspective view.
+    pub fn narrow(&mut self, columns: &Range<usize>, rows: &Range<usize>, far_m: f64) {
+        let Optics::Perspective { focal_px } = self.optics else { return };
+        // The first and the last pixel's outer borders, and a pixel more for rounding.
+        let [low, high] = [[columns.start, rows.start], [columns.end, rows.end]];
+        let slope = |axis: usize, at_px: f64| at_px - self.centre_px[axis];
+        let low = [0, 1].map(|axis| slope(axis, low[axis] as f64 - 1.0));
+        let high = [0, 1].map(|axis| slope(axis, high[axis] as f64 + 1.0));
+        let local = [
+            ([0.0, 0.0, -1.0], -far_m.min(self.clip_m[1])),
+            ([focal_px, 0.0, -low[0]], 0.0),
+            ([-focal_px, 0.0, high[0]], 0.0),
+            ([0.0, focal_px, -low[1]], 0.0),
+            ([0.0, -focal_px, high[1]], 0.0),
+        ];
+        for (index, (normal, least)) in local.into_iter().enumerate() {
+            self.frustum[index + 1] = (self.to_world(normal), least);
+        }
+    }
+
+    /// Depth of nearness 0 in an orthographic view: beyond the far plane, so that all is positive.
+    pub fn horizon_m(&self) -> f64 {
+        self.clip_m[1] + 1.0
+    }
+
+    /// Nearness of the far plane.
+    pub fn far_nearness(&self) -> f32 {
+        match self.optics {
+            Optics::Perspective { .. } => (1.0 / self.clip_m[1]) as f32,
+            Optics::Orthographic { .. } => (self.horizon_m() - self.clip_m[1]) as f32,
+        }
+    }
+
+    pub fn to_image(&self, local_m: Vec3) -> Vec2 {
+        let scale = match self.optics {
+            Optics::Perspective { focal_px } => focal_px / local_m[2],
+            Optics::Orthographic { pixels_per_m } => pixels_per_m,
+        };
+        [self.centre_px[0] + scale * local_m[0], self.centre_px[1] + scale * local_m[1]]
+    }
+
+    /// Whether some of the box may be in view.
+    pub fn may_see(&self, aabb: &Aabb) -> bool {
+        let (centre, size) = (sub(aabb.centre_m(), self.eye_m), aabb.size_m());
+        self.frustum.iter().all(|(n, least)| {
+            let reach: f64 = (0..3).map(|k| 0.5 * size[k] * n[k].abs()).sum();
+            dot(*n, centre) + reach >= *least
+        })
+    }
+
+    /// Parts in view, nearest first.
+    pub fn collect_visible(&self, mesh: &SceneMesh, visible: &mut Vec<(f64, u32)>) {
+        visible.clear();
+        visible.extend(
+            mesh.parts
+                .iter()
+                .enumerate()
+                .filter(|(_, part)| self.may_see(&part.aabb))
+                .map(|(i, part)| (self.nearest_m(&part.aabb), i as u32)),
+        );
+        visible.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    }
+
+    /// Smallest planar depth of the box.
+    fn nearest_m(&self, aabb: &Aabb) -> f64 {
+        let forward = self.axes[2];
+        let corner: Vec3 =
+            std::array::from_fn(|k| if forward[k] > 0.0 { aabb.min_m[k] } else { aabb.max_m[k] });
+        dot(forward, sub(corner, self.eye_m))
+    }
+
+    /// Takes a part's vertices to the camera's frame and the image; whether the near plane cuts it.
+    pub fn transform(&self, vertices_m: &[Vec3], scratch: &mut Scratch) -> bool {
+        scratch.local_m.clear();
+        scratch.projected_px.clear();
+        let mut is_clipped = false;
+        for &vertex in vertices_m {
+            let local = rotate(&self.axes, sub(vertex, self.eye_m));
+            is_clipped |= local[2] < self.clip_m[0];
+            scratch.local_m.push(local);
+            scratch.projected_px.push(self.to_image(local));
+        }
+        is_clipped
+    }
+
+    /// Nearness as a function of the image point, `plane . [u, v, 1]`, and what the shader lights
+    /// the face by: the camera's distance from its plane, or the cosine between normal and look.
+    ///
+    /// `None` for a face that is turned away, or so nearly edge-on that no pixel centre can be
+    /// inside.
+    pub fn nearness_plane(&self, face: &Face) -> Option<(Vec3, f64)> {
+        let height_m = dot(face.normal, self.eye_m) - face.offset_m;
+        let (a, b, at_centre, facing) = match self.optics {
+            Optics::Perspective { focal_px } => {
+                if height_m <= 1e-9 {
+                    return None;
+                }
+                let normal = rotate(&self.axes, face.normal);
+                let [a, b] = [0, 1].map(|i| -normal[i] / (height_m * focal_px));
+                (a, b, -normal[2] / height_m, height_m)
+            }
+            Optics::Orthographic { pixels_per_m } => {
+                let normal = rotate(&self.axes, face.normal);
+                if normal[2] >= -1e-9 {
+                    return None;
+                }
+                let [a, b] = [0, 1].map(|i| normal[i] / (normal[2] * pixels_per_m));
+                (a, b, self.horizon_m() + height_m / normal[2], -normal[2])
+            }
+        };
+        Some(([a, b, at_centre - a * self.centre_px[0] - b * self.centre_px[1]], facing))
+    }
+}

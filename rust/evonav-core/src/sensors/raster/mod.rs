@@ -1,0 +1,10 @@
+//! Depth, instance and colour images of a scene: a scanline z-buffer on one thread.
+
+mod canvas;
+mod lens;
+mod render;
+mod shader;
+mod visible_px;
+
+pub use render::{FrameBuffer, Want, render, render_view};
+pub use visible_px::visible_px;

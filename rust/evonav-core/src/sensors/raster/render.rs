@@ -1,0 +1,212 @@
+//! Depth, instance and colour images of a scene: a scanline z-buffer on one thread.
+//!
+//! Parts of houses are convex and few-sided, so whole polygons are drawn rather than triangles,
+//! faces turned away are never drawn, and a face's inverse depth is the exact plane equation
+//! instead of an interpolation between corners. Colours come after visibility.
+
+use crate::{
+    Error,
+    geometry::Vec3,
+    sensors::{
+        camera::{Camera, View},
+        raster::{
+            canvas::{Canvas, LANES},
+            lens::{Lens, Optics, Scratch},
+            shader::Shader,
+        },
+    },
+    world::mesh::{PartMesh, SceneMesh},
+};
+
+/// Images to make besides depth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Want {
+    /// Shaded colours.
+    pub rgb: bool,
+    /// Body of each pixel.
+    pub instances: bool,
+}
+
+/// The images of one view, row-major, and the working memory to make the next without allocating.
+#[derive(Debug, Clone, Default)]
+pub struct FrameBuffer {
+    /// `(H, W)` planar z in metres, infinity where nothing is.
+    pub depth_m: Vec<f32>,
+    /// `(H, W)` 0 where nothing is, else body index + 1; empty if not wanted.
+    pub instances: Vec<i32>,
+    /// `(H, W, 3)` sRGB; empty if not wanted.
+    pub rgb: Vec<u8>,
+    pub(super) canvas: Canvas,
+    shader: Shader,
+    pub(super) scratch: Scratch,
+}
+
+impl FrameBuffer {
+    /// Hands out depth, colours and instances, as vectors of their own.
+    pub fn take(&mut self) -> (Vec<f32>, Vec<u8>, Vec<i32>) {
+        let Self { depth_m, rgb, instances, .. } = self;
+        (std::mem::take(depth_m), std::mem::take(rgb), std::mem::take(instances))
+    }
+}
+
+/// [`render_view`] with AI2-THOR's clip planes.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] as [`Camera::check`].
+pub fn render(
+    mesh: &SceneMesh,
+    camera: &Camera,
+    want: Want,
+    out: &mut FrameBuffer,
+) -> Result<(), Error> {
+    render_view(mesh, &View::from(*camera), want, out)
+}
+
+/// Renders one view into `out`.
+///
+/// Depth has an error under 0.1 mm within 10 m. Of surfaces at equal depth the one drawn first
+/// stays; the order is a function of mesh and view alone, and so is every pixel.
+///
+/// # Errors
+/// [`Error::InvalidArgument`] as [`View::check`].
+///
+/// # Complexity
+/// O(parts + faces in view + pixels they cover).
+pub fn render_view(
+    mesh: &SceneMesh,
+    view: &View,
+    want: Want,
+    out: &mut FrameBuffer,
+) -> Result<(), Error> {
+    view.check()?;
+    let lens = Lens::new(view);
+    let Camera { width_px, height_px, .. } = view.camera;
+    // Nothing beyond the far plane is nearer than an empty pixel.
+    out.canvas.clear(width_px, height_px, lens.far_nearness());
+    if want.rgb {
+        out.shader.begin(mesh.faces.len(), [width_px, height_px], lens.optics);
+    }
+    lens.collect_visible(mesh, &mut out.scratch.visible);
+    for index in 0..out.scratch.visible.len() {
+        let part = &mesh.parts[out.scratch.visible[index].1 as usize];
+        draw_part(mesh, part, &lens, want, out);
+    }
+    resolve(mesh, &lens, want, out);
+    Ok(())
+}
+
+pub(super) fn draw_part(
+    mesh: &SceneMesh,
+    part: &PartMesh,
+    lens: &Lens,
+    want: Want,
+    out: &mut FrameBuffer,
+) {
+    let FrameBuffer { canvas, shader, scratch, .. } = out;
+    let is_clipped = lens.transform(&mesh.vertices_m[part.vertices.clone()], scratch);
+    for index in part.faces.clone() {
+        let face = &mesh.faces[index];
+        let Some((plane, facing)) = lens.nearness_plane(face) else { continue };
+        let Scratch { local_m, projected_px, clipped_m, polygon_px, .. } = scratch;
+        polygon_px.clear();
+        let corners = mesh.corners_of(face);
+        if is_clipped {
+            clip_near(corners.iter().map(|&i| local_m[i as usize]), lens.clip_m[0], clipped_m);
+            if clipped_m.len() < 3 {
+                continue;
+            }
+            polygon_px.extend(clipped_m.iter().map(|&p| lens.to_image(p)));
+        } else {
+            polygon_px.extend(corners.iter().map(|&i| projected_px[i as usize]));
+        }
+        let tag = if want.rgb { index as u32 } else { face.body } + 1;
+        if want.rgb {
+            shader.light(index, face, facing);
+        }
+        canvas.fill(polygon_px, plane, tag);
+    }
+}
+
+/// The part of a polygon in front of the near plane.
+fn clip_near(
+    corners_m: impl Iterator<Item = Vec3> + Clone,
+    near_m: f64,
+    clipped_m: &mut Vec<Vec3>,
+) {
+    clipped_m.clear();
+    let next = corners_m.clone().cycle().skip(1);
+    for (a, b) in corners_m.zip(next) {
+        if a[2] >= near_m {
+            clipped_m.push(a);
+        }
+        if (a[2] >= near_m) != (b[2] >= near_m) {
+            // From the nearer end whichever way the edge runs: neighbours get the same point.
+            let (near, far) = if a[2] < b[2] { (a, b) } else { (b, a) };
+            let t = (near_m - near[2]) / (far[2] - near[2]);
+            clipped_m.push(std::array::from_fn(|i| near[i] + t * (far[i] - near[i])));
+        }
+    }
+}
+
+/// Turns the canvas into images.
+fn resolve(mesh: &SceneMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
+    let FrameBuffer { depth_m, instances, rgb, canvas, shader, .. } = out;
+    let num_pixels = canvas.width_px * canvas.height_px;
+    depth_m.resize(num_pixels, 0.0);
+    let (empty, horizon_m) = (lens.far_nearness(), lens.horizon_m() as f32);
+    let depth_or_none = |w: f32, depth_m: f32| if w > empty { depth_m } else { f32::INFINITY };
+    match lens.optics {
+        Optics::Perspective { .. } => {
+            unpad(canvas, &canvas.nearness, depth_m, |b| b.map(|w| depth_or_none(w, 1.0 / w)));
+        }
+        Optics::Orthographic { .. } => {
+            let depth = |w: f32| depth_or_none(w, horizon_m - w);
+            unpad(canvas, &canvas.nearness, depth_m, |block| block.map(depth));
+        }
+    }
+    instances.resize(if want.instances { num_pixels } else { 0 }, 0);
+    match want {
+        Want { instances: true, rgb: true } => {
+            unpad(canvas, &canvas.tags, instances, |block| bodies_of(mesh, block));
+        }
+        Want { instances: true, rgb: false } => {
+            unpad(canvas, &canvas.tags, instances, |block| block.map(|tag| tag as i32));
+        }
+        Want { instances: false, .. } => {}
+    }
+    rgb.resize(if want.rgb { 3 * num_pixels } else { 0 }, 0);
+    if want.rgb {
+        shader.shade(canvas, rgb);
+    }
+}
+
+/// Rows of padded blocks to rows of exactly the image's width.
+fn unpad<T: Copy, U: Copy>(
+    canvas: &Canvas,
+    blocks: &[[T; LANES]],
+    image: &mut [U],
+    of_block: impl Fn(&[T; LANES]) -> [U; LANES],
+) {
+    let rows = blocks.chunks_exact(canvas.blocks_per_row());
+    for (row, blocks) in image.chunks_exact_mut(canvas.width_px).zip(rows) {
+        let (whole, rest) = row.as_chunks_mut();
+        for (pixels, block) in whole.iter_mut().zip(blocks) {
+            *pixels = of_block(block);
+        }
+        if let Some(block) = blocks.last() {
+            rest.copy_from_slice(&of_block(block)[..rest.len()]);
+        }
+    }
+}
+
+/// Instance ids of face tags. Most blocks lie within one face.
+fn bodies_of(mesh: &SceneMesh, tags: &[u32; LANES]) -> [i32; LANES] {
+    let body_of = |tag: u32| match tag.checked_sub(1) {
+        Some(face) => mesh.faces[face as usize].body as i32 + 1,
+        None => 0,
+    };
+    if tags.iter().all(|&tag| tag == tags[0]) {
+        return [body_of(tags[0]); LANES];
+    }
+    tags.map(body_of)
+}
