@@ -4,7 +4,7 @@ use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use evonav_core::{
-    assets::catalogue::{Catalogue, UnknownAssets},
+    assets::{Catalogue, UnknownAssets},
     geometry::Vec2,
     house::House,
     rng::Stream,

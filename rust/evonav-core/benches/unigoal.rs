@@ -7,7 +7,9 @@ use evonav_core::{
     grid::dilate::dilate_disk,
     sensors::camera::Camera,
     unigoal::{
-        bev_map::{BevConfig, BevMap, DepthView},
+        bev_config::BevConfig,
+        bev_map::BevMap,
+        depth_view::DepthView,
         exploration::{ExploreConfig, choose_frontier},
         path_planning::{PlanConfig, plan},
     },

@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use evonav_core::{
     Error,
-    assets::catalogue::UnknownAssets,
+    assets::UnknownAssets,
     geometry::{Pose, Vec2, distance_2d_m},
     house::House,
     sensors::{

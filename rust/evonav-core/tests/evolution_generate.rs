@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use evolved::always;
 use evonav_core::{
-    assets::{Catalogue, UnknownAssets, part::Part, placement::Place},
+    assets::{Catalogue, UnknownAssets, part::Part, placement_rule::Place},
     evolution::{
         Generation, Group, Mode, Parameters, asset_groups, generate_task,
         record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason},

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use evonav_core::{
     assets::{
-        catalogue::{Catalogue, UnknownAssets},
+        Catalogue, UnknownAssets,
         part::{Part, Primitive},
     },
     evolution::{SpawnRequest, Spawned, random_spawn, settled},

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use evonav_core::{
     Error,
-    assets::{Catalogue, UnknownAssets, placement::Place},
+    assets::{Catalogue, UnknownAssets, placement_rule::Place},
     house::House,
 };
 use recorded::data_set;

@@ -6,7 +6,9 @@ use evonav_core::{
     grid::bits::BitGrid,
     sensors::camera::Camera,
     unigoal::{
-        bev_map::{BevConfig, BevMap, DepthView},
+        bev_config::BevConfig,
+        bev_map::BevMap,
+        depth_view::DepthView,
         exploration::{ExploreConfig, choose_frontier, frontier_cells},
         path_planning::{PlanConfig, plan},
     },

@@ -6,9 +6,10 @@ use evonav_core::{
     assets::{
         Asset, Catalogue,
         part::{Part, aabb_of},
-        shapes::{Condition, drawn_openness, shape_in, shape_of, shows_light},
+        shapes::{drawn_openness, shape_in, shape_of, shows_light},
     },
     geometry::Vec3,
+    house::Condition,
 };
 use proptest::prelude::*;
 

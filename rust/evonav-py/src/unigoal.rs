@@ -6,8 +6,10 @@ use evonav_core::{
     grid::{bits::BitGrid, dilate::dilate_disk},
     sensors::camera::Camera,
     unigoal::{
-        bev_map::{self, BevConfig, DepthView},
+        bev_config::BevConfig,
+        bev_map::{self},
         collision_strip::{Strip, strip_cells},
+        depth_view::DepthView,
         exploration::{ExploreConfig, choose_frontier, frontier_cells},
         path_planning::{PlanConfig, plan},
     },

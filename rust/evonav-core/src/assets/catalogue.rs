@@ -5,10 +5,8 @@ use std::{collections::HashMap, sync::OnceLock};
 use serde::Deserialize;
 
 use crate::{
-    Error,
-    assets::{Asset, Split, groups::GroupDefinition, placement::PlacementRule, unknown},
+    assets::{Asset, Split, group_definition::GroupDefinition, placement_rule::PlacementRule},
     geometry::Vec3,
-    house::{House, Object},
 };
 
 /// Facts about 1,653 assets of 109 categories and 1,245 materials.
@@ -18,16 +16,6 @@ pub struct Catalogue {
     categories: HashMap<String, Category>,
     materials: HashMap<String, [u8; 3]>,
     groups: Vec<GroupDefinition>,
-}
-
-/// What to do about an asset id that the catalogue does not hold (Objaverse assets).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum UnknownAssets {
-    /// Refuse the house, naming the object.
-    #[default]
-    Error,
-    /// Take a size from the object's place and its category, as [`Catalogue::asset_of`] says.
-    CategoryDefault,
 }
 
 /// What is known of a category beyond its assets.
@@ -174,41 +162,6 @@ impl Catalogue {
     /// Median edge lengths of a category's assets.
     pub fn median_size_m(&self, category: &str) -> Option<Vec3> {
         self.categories.get(category).map(|category| category.median_size_m)
-    }
-
-    /// Asset of an object of `house`.
-    ///
-    /// With [`UnknownAssets::CategoryDefault`] an asset that the catalogue does not hold gets
-    /// * as category its `objectType`, without Objaverse's prefix `Obja`;
-    /// * the proportions of the nearest catalogue category (by name), or of a block;
-    /// * the height that its place implies: twice the height of its centre above the floor or
-    ///   the surface under it, since positions are box centres;
-    /// * on a wall, the depth that keeps it flush with the wall.
-    ///
-    /// # Errors
-    /// [`Error::House`] naming the object and its `assetId` if the asset is unknown and `unknown`
-    /// is [`UnknownAssets::Error`].
-    pub fn asset_of(
-        &self,
-        house: &House,
-        object: &Object,
-        unknown: UnknownAssets,
-    ) -> Result<Asset, Error> {
-        match (self.get(&object.asset_id), unknown) {
-            (Some(asset), _) => Ok(asset.clone()),
-            (None, UnknownAssets::CategoryDefault) => {
-                Ok(unknown::category_default(self, house, object))
-            }
-            (None, UnknownAssets::Error) => Err(Error::House {
-                house: house.name.clone(),
-                object: object.id.clone(),
-                field: "assetId".to_owned(),
-                message: format!(
-                    "is {:?}, of which the catalogue knows no size; category defaults would guess one",
-                    object.asset_id
-                ),
-            }),
-        }
     }
 
     /// Where a category stands; `None` if it was never annotated.

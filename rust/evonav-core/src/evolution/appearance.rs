@@ -3,9 +3,10 @@
 use crate::{
     assets::{
         Asset,
-        shapes::{Condition, lit, looks_in, shape_in},
+        shapes::{lit, looks_in, shape_in},
     },
     evolution::record::{Appearance, Tint},
+    house::Condition,
     sensors::raster::FrameBuffer,
 };
 

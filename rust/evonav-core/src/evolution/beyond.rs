@@ -4,10 +4,7 @@
 
 use crate::{
     Error,
-    assets::{
-        Asset, Split,
-        catalogue::{Catalogue, UnknownAssets},
-    },
+    assets::{Asset, Catalogue, Split, UnknownAssets},
     evolution::{
         Occurrence,
         generate::Generator,

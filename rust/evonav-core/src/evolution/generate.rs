@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::{
     Error,
-    assets::catalogue::{Catalogue, UnknownAssets},
+    assets::{Catalogue, UnknownAssets},
     evolution::{
         Extensions, Given, Parameters,
         beyond::Transition,

@@ -7,10 +7,7 @@
 
 use crate::{
     Error,
-    assets::{
-        catalogue::{Catalogue, UnknownAssets},
-        groups::GroupDefinition,
-    },
+    assets::{Catalogue, UnknownAssets, group_definition::GroupDefinition},
     evolution::{layout::Layout, unit::Unit},
     geometry::{Vec2, Vec3, distance_2d_m, rotate, yaw_rotation},
     house::House,

@@ -3,11 +3,7 @@
 use crate::{
     Error,
     assets::{
-        Asset,
-        catalogue::{Catalogue, UnknownAssets},
-        part::Part,
-        placement::Place,
-        shapes::shape_in,
+        Asset, Catalogue, UnknownAssets, part::Part, placement_rule::Place, shapes::shape_in,
     },
     evolution::{
         placement::{round_to, turned_deg},

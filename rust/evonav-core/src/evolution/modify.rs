@@ -1,7 +1,7 @@
 //! The three room modifications (paper, Sec. 3.2).
 
 use crate::{
-    assets::{catalogue::Catalogue, placement::Place},
+    assets::{Catalogue, placement_rule::Place},
     evolution::{
         Mode, Parameters,
         groups::{Group, groups_of, rearranged},

@@ -1,7 +1,7 @@
 //! Where furniture can go: ProcTHOR's corner, edge and middle places on a room's floor.
 
 use crate::{
-    assets::placement::Place,
+    assets::placement_rule::Place,
     evolution::{
         layout::{Layout, Placement},
         reserve::{self, Floor},

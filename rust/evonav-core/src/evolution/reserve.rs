@@ -4,7 +4,7 @@
 //! houses hold to them.
 
 use crate::{
-    assets::placement::Place,
+    assets::placement_rule::Place,
     evolution::layout::TOUCH_M,
     geometry::{Vec2, distance_2d_m, outline::overlap_m},
     house::{House, Opening},

@@ -3,10 +3,7 @@
 
 use crate::{
     Error,
-    assets::{
-        catalogue::{Catalogue, UnknownAssets},
-        placement::Place,
-    },
+    assets::{Catalogue, UnknownAssets, placement_rule::Place},
     evolution::{
         layout::{Layout, Placement, TOUCH_M, bottom_m},
         placement::{round_to, turned_deg},

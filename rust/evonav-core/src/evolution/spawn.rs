@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::{
     Error,
-    assets::catalogue::{Catalogue, UnknownAssets},
+    assets::{Catalogue, UnknownAssets},
     evolution::{
         layout::{Layout, Placement},
         placement::round_to,

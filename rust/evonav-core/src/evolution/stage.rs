@@ -2,7 +2,7 @@
 
 use crate::{
     Error,
-    assets::catalogue::{Catalogue, UnknownAssets},
+    assets::{Catalogue, UnknownAssets},
     evolution::{
         Parameters,
         appearance::appearance_of,

@@ -1,7 +1,7 @@
 //! Where small things can go: the surfaces of receptacles, as the shapes have them.
 
 use crate::{
-    assets::catalogue::Catalogue,
+    assets::Catalogue,
     evolution::{
         layout::{Item, Layout, Placement, TOUCH_M, bottom_m},
         placement::{round_to, turned_deg},

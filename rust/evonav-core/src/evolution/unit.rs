@@ -1,7 +1,7 @@
 //! What moves as one: furniture with what stands on it, or an asset group.
 
 use crate::{
-    assets::placement::Place,
+    assets::placement_rule::Place,
     evolution::{
         layout::{Layout, Placement, overlap},
         placement::{AT_WALL_M, Pose2, RoomPlan, Rules, round_to, turned_deg},

@@ -1,8 +1,6 @@
 //! The typed view of a house document. Schemas 0.0.1 (openings with `boundingBox`, materials as
 //! strings) and 1.0.0 (`holePolygon`, materials as objects) are read alike.
 
-use std::collections::HashMap;
-
 use serde_json::Value;
 
 use crate::{
@@ -263,6 +261,3 @@ fn assign_rooms(house: &mut House) {
         };
     }
 }
-
-/// Indices by object id.
-pub(super) type ObjectIndex = HashMap<String, usize>;

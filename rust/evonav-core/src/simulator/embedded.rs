@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use crate::{
     Error,
-    assets::catalogue::{Catalogue, UnknownAssets},
+    assets::{Catalogue, UnknownAssets},
     geometry::{Pose, Vec2, Vec3},
     grid::GridSpec,
     house::{House, HouseDelta},

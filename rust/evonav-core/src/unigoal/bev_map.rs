@@ -3,114 +3,11 @@
 use crate::{
     Error,
     geometry::{Vec2, Vec3},
-    grid::{GridSpec, MAX_CELLS, bits::BitGrid, dilate::dilate_disk},
-    sensors::camera::Camera,
-    unigoal::{fast_marching::Window, voxel_columns::Block},
+    grid::{GridSpec, bits::BitGrid, dilate::dilate_disk},
+    unigoal::{
+        bev_config::BevConfig, depth_view::DepthView, fast_marching::Window, voxel_columns::Block,
+    },
 };
-
-/// What counts as what in a [`BevMap`] (UniGoal's constants).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BevConfig {
-    /// Edge of the map.
-    pub size_m: f64,
-    /// Edge of a cell and of a voxel.
-    pub cell_m: f64,
-    /// Depth and width of the block of voxels before the camera.
-    pub block_m: f64,
-    /// Heights `[lowest, highest]` of the block over the floor.
-    pub heights_m: Vec2,
-    /// Surfaces from this height on are obstacles ...
-    pub obstacle_min_m: f64,
-    /// ... up to this much over the camera.
-    pub obstacle_above_camera_m: f64,
-    /// Depths beyond this are no measurements.
-    pub max_depth_m: f64,
-    /// Pixels from one that is used to the next, along rows and columns.
-    pub stride_px: usize,
-    /// Points of a category in a cell that make it certain.
-    pub category_points: u8,
-}
-
-impl Default for BevConfig {
-    fn default() -> Self {
-        Self {
-            size_m: 36.0,
-            cell_m: 0.05,
-            block_m: 5.0,
-            heights_m: [-0.8, 3.6],
-            obstacle_min_m: 0.35,
-            obstacle_above_camera_m: 0.01,
-            max_depth_m: 29.7,
-            stride_px: 2,
-            category_points: 5,
-        }
-    }
-}
-
-impl BevConfig {
-    /// Checks the values.
-    ///
-    /// # Errors
-    /// [`Error::InvalidArgument`] naming the first field outside its domain.
-    pub fn check(&self) -> Result<(), Error> {
-        let is_length = |v: f64| v.is_finite() && v > 0.0;
-        Error::require("cell_m", self.cell_m, "finite and > 0", is_length)?;
-        Error::require("size_m", self.size_m, "finite and > 0", is_length)?;
-        Error::require("max_depth_m", self.max_depth_m, "finite and > 0", is_length)?;
-        let num_cells = (self.size_m / self.cell_m).powi(2);
-        Error::require("size_m / cell_m", num_cells.sqrt(), "at most 8192 cells", |n| {
-            n * n <= MAX_CELLS as f64
-        })?;
-        Error::require("block_m", self.block_m, "10 to 160 cells", |v| {
-            (10.0..=160.0).contains(&(v / self.cell_m))
-        })?;
-        let [low, high] = self.heights_m;
-        Error::require("heights_m[0]", low, "finite and <= 0", |v| v.is_finite() && v <= 0.0)?;
-        Error::require("heights_m[1]", high, "at most 250 cells over heights_m[0]", |v| {
-            v > 0.0 && (v - low) / self.cell_m <= 250.0
-        })?;
-        Error::require("obstacle_min_m", self.obstacle_min_m, "> 0 and below heights_m[1]", |v| {
-            v > 0.0 && v < high
-        })?;
-        Error::require(
-            "obstacle_above_camera_m",
-            self.obstacle_above_camera_m,
-            "finite",
-            f64::is_finite,
-        )?;
-        Error::require("stride_px", self.stride_px, "at least 1", |n| n > 0)?;
-        Error::require("category_points", self.category_points, "at least 1", |n| n > 0)
-    }
-}
-
-/// A depth image, and perhaps a category for each pixel.
-#[derive(Debug, Clone, Copy)]
-pub struct DepthView<'a> {
-    /// Where it was taken; heights count from the floor.
-    pub camera: Camera,
-    /// Planar depth, row-major.
-    pub depth_m: &'a [f32],
-    /// Category index of each pixel, -1 for none.
-    pub categories: Option<&'a [i32]>,
-}
-
-impl DepthView<'_> {
-    fn check(&self, num_categories: usize) -> Result<(), Error> {
-        self.camera.check()?;
-        let num = self.camera.width_px * self.camera.height_px;
-        Error::require("depth_m", self.depth_m.len(), "one value a pixel", |n| n == num)?;
-        let Some(categories) = self.categories else { return Ok(()) };
-        Error::require("categories", categories.len(), "one value a pixel", |n| n == num)?;
-        let is_known = |c: &i32| *c >= -1 && i64::from(*c) < num_categories as i64;
-        match categories.iter().find(|c| !is_known(c)) {
-            None => Ok(()),
-            Some(category) => {
-                let expected = format!("-1 to {}", num_categories as i64 - 1);
-                Err(Error::invalid("categories", category, &expected))
-            }
-        }
-    }
-}
 
 /// What one task has shown so far. Nothing that was seen is ever taken back.
 #[derive(Debug, Clone)]

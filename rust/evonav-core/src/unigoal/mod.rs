@@ -1,8 +1,10 @@
 //! UniGoal's geometry: a bird's-eye map fused from depth, distances by fast marching, exploration
 //! targets, short-term goals and what collisions teach.
 
+pub mod bev_config;
 pub mod bev_map;
 pub mod collision_strip;
+pub mod depth_view;
 pub mod exploration;
 pub mod fast_marching;
 pub mod path_planning;

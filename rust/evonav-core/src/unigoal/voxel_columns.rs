@@ -3,7 +3,7 @@
 use crate::{
     geometry::Vec2,
     grid::GridSpec,
-    unigoal::bev_map::{BevConfig, DepthView},
+    unigoal::{bev_config::BevConfig, depth_view::DepthView},
 };
 
 /// Points in a column of voxels, by height; each point counts by its nearness to a voxel's centre.

@@ -1,10 +1,7 @@
 //! What a body covers of the ground plane, seen by an agent of some height.
 
 use crate::{
-    assets::{
-        catalogue::{Catalogue, UnknownAssets},
-        part::Part,
-    },
+    assets::{Catalogue, UnknownAssets, part::Part},
     error::Error,
     geometry::{Vec2, Vec3, add, rotate},
     house::House,

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::{
     Error,
-    assets::catalogue::{Catalogue, UnknownAssets},
+    assets::{Catalogue, UnknownAssets},
     geometry::{Mat3, Vec2, Vec3, compose, polygon_contains, rotate, sub, transposed},
     house::House,
     world::{

@@ -4,8 +4,7 @@ use std::collections::HashMap;
 
 use crate::{
     assets::{
-        Asset,
-        catalogue::{Catalogue, UnknownAssets},
+        Asset, Catalogue, UnknownAssets,
         part::{Part, aabb_of},
         shapes::{lit, shape_in, shape_of},
     },

@@ -7,7 +7,7 @@ use std::{
 };
 
 use evonav_core::{
-    assets::catalogue::{Catalogue, UnknownAssets},
+    assets::{Catalogue, UnknownAssets},
     house::House,
     world::{
         collision::AgentBody,

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex};
 
 use evonav_core::{
-    assets::catalogue::{Catalogue, UnknownAssets},
+    assets::{Catalogue, UnknownAssets},
     evolution::{SpawnRequest, random_spawn, settled},
     geometry::{Pose, Vec2, Vec3},
     house::{House, HouseDelta},

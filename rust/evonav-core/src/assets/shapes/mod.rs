@@ -18,7 +18,10 @@ mod storage;
 mod tables;
 mod vessels;
 
-use crate::assets::{Asset, part::Part};
+use crate::{
+    assets::{Asset, part::Part},
+    house::Condition,
+};
 pub(crate) use colour::lit;
 use sketch::Sketch;
 pub use sketch::{Detail, Looks};
@@ -30,15 +33,6 @@ pub use sketch::{Detail, Looks};
 /// Sizes that are not positive are taken as 1 mm.
 pub fn shape_of(asset: &Asset) -> Vec<Part> {
     shape_in(asset, Condition::default())
-}
-
-/// What is known of a thing's state.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Condition {
-    /// 0 closed, 1 open; `None` as [`shape_of`] draws it.
-    pub openness: Option<f64>,
-    /// Whether a lamp or screen is lit; `None` as [`shape_of`] draws it.
-    pub is_on: Option<bool>,
 }
 
 /// The parts of an asset in a state, in the object frame.

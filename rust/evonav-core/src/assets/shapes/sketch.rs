@@ -6,12 +6,10 @@ use crate::{
     assets::{
         Asset,
         part::{Part, Primitive, aabb_of},
-        shapes::{
-            Condition,
-            colour::{self, Colour},
-        },
+        shapes::colour::{self, Colour},
     },
     geometry::{IDENTITY, Mat3, Vec3, add, compose, euler_rotation_deg, rotate, sub},
+    house::Condition,
 };
 
 /// From where to where along one axis, metres.

@@ -1,10 +1,21 @@
 //! Sizes for assets that the catalogue does not hold, from where the house puts them.
 
 use crate::{
-    assets::{Asset, catalogue::Catalogue},
+    Error,
+    assets::{Asset, Catalogue},
     geometry::{Vec2, Vec3, distance_2d_m},
     house::{House, Object},
 };
+
+/// What to do about an asset id that the catalogue does not hold (Objaverse assets).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum UnknownAssets {
+    /// Refuse the house, naming the object.
+    #[default]
+    Error,
+    /// Take a size from the object's place and its category, as [`Catalogue::asset_of`] says.
+    CategoryDefault,
+}
 
 /// Objaverse words and the ProcTHOR category of about the same proportions; first match counts.
 const ALIKE: [(&str, &str); 40] = [
@@ -60,8 +71,43 @@ const MAX_CHILD_HEIGHT_M: f64 = 0.4;
 /// Wall objects of the recorded houses hang within 0.2 m of their wall.
 const MAX_WALL_DISTANCE_M: f64 = 0.25;
 
+impl Catalogue {
+    /// Asset of an object of `house`.
+    ///
+    /// With [`UnknownAssets::CategoryDefault`] an asset that the catalogue does not hold gets
+    /// * as category its `objectType`, without Objaverse's prefix `Obja`;
+    /// * the proportions of the nearest catalogue category (by name), or of a block;
+    /// * the height that its place implies: twice the height of its centre above the floor or
+    ///   the surface under it, since positions are box centres;
+    /// * on a wall, the depth that keeps it flush with the wall.
+    ///
+    /// # Errors
+    /// [`Error::House`] naming the object and its `assetId` if the asset is unknown and `unknown`
+    /// is [`UnknownAssets::Error`].
+    pub fn asset_of(
+        &self,
+        house: &House,
+        object: &Object,
+        unknown: UnknownAssets,
+    ) -> Result<Asset, Error> {
+        match (self.get(&object.asset_id), unknown) {
+            (Some(asset), _) => Ok(asset.clone()),
+            (None, UnknownAssets::CategoryDefault) => Ok(category_default(self, house, object)),
+            (None, UnknownAssets::Error) => Err(Error::House {
+                house: house.name.clone(),
+                object: object.id.clone(),
+                field: "assetId".to_owned(),
+                message: format!(
+                    "is {:?}, of which the catalogue knows no size; category defaults would guess one",
+                    object.asset_id
+                ),
+            }),
+        }
+    }
+}
+
 /// The asset that [`Catalogue::asset_of`] describes.
-pub(super) fn category_default(catalogue: &Catalogue, house: &House, object: &Object) -> Asset {
+fn category_default(catalogue: &Catalogue, house: &House, object: &Object) -> Asset {
     let object_type = object.object_type.as_deref().unwrap_or("Unknown");
     let category =
         object_type.strip_prefix("Obja").filter(|rest| !rest.is_empty()).unwrap_or(object_type);

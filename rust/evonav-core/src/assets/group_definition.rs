@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use crate::{
-    assets::placement::Place,
+    assets::placement_rule::Place,
     geometry::{Vec2, Vec3},
 };
 
