@@ -15,7 +15,7 @@ use evonav_core::{
         batch_slot::Slot,
         geodesic_field::GeodesicField,
     },
-    world::collision::AgentBody,
+    world::navigation::AgentBody,
 };
 
 const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");

@@ -5,11 +5,12 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::{
-        Extensions, Occurrence, Parameters, Schedule, SpawnRequest, generate_task, random_spawn,
-    },
+    generation::{Extensions, Occurrence, Parameters, Schedule, generate_task},
     house::House,
-    world::scene::Scene,
+    world::{
+        layout::{SpawnRequest, random_spawn},
+        scene::Scene,
+    },
 };
 
 const HOUSE: &str = include_str!("../tests/data/house_100_objects.json");

@@ -8,9 +8,8 @@ use evonav_core::{
     assets::{Asset, Catalogue, UnknownAssets},
     house::{House, HouseDelta, ObjectMove},
     world::{
-        collision::AgentBody,
         mesh::SceneMesh,
-        navigation::{Navigation, NavigationConfig},
+        navigation::{AgentBody, Navigation, NavigationConfig},
         scene::Scene,
     },
 };

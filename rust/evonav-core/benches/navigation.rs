@@ -9,8 +9,7 @@ use evonav_core::{
     house::House,
     rng::Stream,
     world::{
-        collision::AgentBody,
-        navigation::{Navigation, NavigationConfig},
+        navigation::{AgentBody, Navigation, NavigationConfig},
         scene::Scene,
     },
 };

@@ -6,7 +6,9 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use evonav_core::{
     perception::{
         depth_noise::{DepthNoise, noisy_depth},
-        mask_noise::{MaskChange, SiteNoise, distort_masks, mask_outlines, surface_sites},
+        false_detections::{SiteNoise, surface_sites},
+        mask_distortion::{MaskChange, distort_masks},
+        mask_outlines::mask_outlines,
     },
     rng::Stream,
     sensors::{

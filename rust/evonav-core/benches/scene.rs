@@ -7,7 +7,7 @@ use evonav_core::{
     assets::{Catalogue, UnknownAssets, shapes::shape_of},
     house::House,
     world::{
-        inspect::{Tolerances, inspect},
+        inspection::{Tolerances, inspect},
         scene::Scene,
     },
 };

@@ -1,12 +1,12 @@
 //! Houses, simulator, mapping and evolution of evonav, in pure Rust.
 //!
 //! One way through: [`house`] -> [`assets`] -> [`world`] -> [`sensors`] -> [`memory`] -> [`unigoal`],
-//! with [`evolution`] beside it. Metres and radians; AI2-THOR's frame (left-handed, y up, yaw
+//! with [`generation`] beside it. Metres and radians; AI2-THOR's frame (left-handed, y up, yaw
 //! clockwise from +z seen from above).
 
 pub mod assets;
 pub mod error;
-pub mod evolution;
+pub mod generation;
 pub mod geometry;
 pub mod grid;
 pub mod house;

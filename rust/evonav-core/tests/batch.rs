@@ -18,7 +18,7 @@ use evonav_core::{
         batch_slot::Slot,
         geodesic_field::GeodesicField,
     },
-    world::collision::AgentBody,
+    world::navigation::AgentBody,
 };
 use proptest::{collection::vec, prelude::*};
 

@@ -7,15 +7,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use evonav_core::{
     assets::{Catalogue, UnknownAssets, part::Part},
-    evolution::{
+    generation::{
         Extensions, Generation, Occurrence, Parameters, Schedule, generate_task,
         record::{EvolutionOutcome, GeneratedTask},
     },
     geometry::{Aabb, Vec2, Vec3},
     house::House,
     world::{
-        collision::AgentBody,
-        navigation::{Navigation, NavigationConfig},
+        navigation::{AgentBody, Navigation, NavigationConfig},
         scene::{BodyKind, Scene},
     },
 };

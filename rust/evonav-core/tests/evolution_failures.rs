@@ -7,7 +7,7 @@ mod evolved;
 use evolved::always;
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::{
+    generation::{
         Generation, Mode, Parameters, generate_task,
         record::{EvolutionOutcome, EvolutionRecord, GeneratedTask, ModificationFailure},
     },

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use evolved::always;
 use evonav_core::{
     assets::{Catalogue, UnknownAssets, part::Part, placement_rule::Place},
-    evolution::{
+    generation::{
         Generation, Group, Mode, Parameters, asset_groups, generate_task,
         record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason},
     },
@@ -22,9 +22,8 @@ use evonav_core::{
         raster::{FrameBuffer, Want, render},
     },
     world::{
-        collision::AgentBody,
         mesh::SceneMesh,
-        navigation::{Navigation, NavigationConfig},
+        navigation::{AgentBody, Navigation, NavigationConfig},
         scene::Scene,
     },
 };

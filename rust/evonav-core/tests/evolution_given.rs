@@ -5,7 +5,7 @@
 
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::{
+    generation::{
         Generation, Given, GivenStage, Parameters, generate_given, generate_task,
         record::{EvolutionOutcome, GeneratedTask, RejectReason},
     },
@@ -82,7 +82,7 @@ proptest! {
             for (given, stage) in stages.iter().zip(&task.stages) {
                 assert_eq!(given.goal_id.as_ref(), Some(&stage.target.id));
             }
-            let is_triggered = |stage: &evonav_core::evolution::record::GeneratedStage| {
+            let is_triggered = |stage: &evonav_core::generation::record::GeneratedStage| {
                 !matches!(
                     stage.evolution.outcome,
                     EvolutionOutcome::NotTriggered | EvolutionOutcome::FirstStage

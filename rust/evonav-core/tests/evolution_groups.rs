@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::asset_groups,
+    generation::asset_groups,
     house::House,
 };
 use recorded::{house_lines, house_of};

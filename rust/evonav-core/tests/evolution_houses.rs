@@ -14,15 +14,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use evolved::always;
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::{
+    generation::{
         Generation, Mode, generate_task,
         record::{EvolutionOutcome, GeneratedStage, GeneratedTask},
     },
     geometry::{Vec2, Vec3, polygon_contains},
     house::House,
     world::{
-        collision::AgentBody,
-        navigation::{Navigation, NavigationConfig},
+        navigation::{AgentBody, Navigation, NavigationConfig},
         scene::Scene,
     },
 };

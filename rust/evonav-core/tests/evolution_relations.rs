@@ -11,7 +11,7 @@ use evonav_core::{
         part::{Part, Primitive},
         shapes::shape_of,
     },
-    evolution::{
+    generation::{
         Generation, Parameters, generate_task,
         record::{Anchor, Determiner, Relations},
     },

@@ -1,7 +1,7 @@
 //! The generator's draws against the probabilities that the paper states.
 
 use evonav_core::{
-    evolution::{
+    generation::{
         Candidate, GoalBias, Mode, Parameters, RoomHistory, evolved_room_weight, goal_room_weights,
         sample_evolved_room, sample_goal, target_scores,
     },

@@ -9,10 +9,12 @@ use evonav_core::{
         Catalogue, UnknownAssets,
         part::{Part, Primitive},
     },
-    evolution::{SpawnRequest, Spawned, random_spawn, settled},
     geometry::{Vec3, sub},
     house::House,
-    world::scene::{Body, BodyKind, Scene},
+    world::{
+        layout::{SpawnRequest, Spawned, random_spawn, settled},
+        scene::{Body, BodyKind, Scene},
+    },
 };
 use proptest::prelude::*;
 use serde_json::{Value, json};

@@ -2,12 +2,11 @@
 
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::{Generation, Parameters, generate_task, record::RejectReason},
+    generation::{Generation, Parameters, generate_task, record::RejectReason},
     geometry::Vec2,
     house::House,
     world::{
-        collision::AgentBody,
-        navigation::{Navigation, NavigationConfig},
+        navigation::{AgentBody, Navigation, NavigationConfig},
         scene::Scene,
     },
 };

@@ -4,11 +4,8 @@ use std::f64::consts::TAU;
 
 use evonav_core::{
     assets::part::{Part, Primitive},
-    geometry::{Vec2, Vec3, euler_rotation_deg, sub},
-    world::{
-        collision::distance_squared,
-        footprint::{convex_hull, footprint},
-    },
+    geometry::{Vec2, Vec3, euler_rotation_deg, outline::distance_squared, sub},
+    world::footprint::{convex_hull, footprint},
 };
 use proptest::prelude::*;
 

@@ -7,8 +7,7 @@ use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     house::{House, HouseDelta},
     world::{
-        collision::AgentBody,
-        navigation::{Navigation, NavigationConfig},
+        navigation::{AgentBody, Navigation, NavigationConfig},
         scene::Scene,
     },
 };

@@ -8,7 +8,7 @@ use evonav_core::{
     geometry::{Aabb, Vec3, add, euler_rotation_deg, rotate, sub},
     house::{House, HouseDelta, ObjectMove},
     world::{
-        inspect::{Finding, FindingKind, Inspector, Tolerances, inspect_houses},
+        inspection::{Finding, FindingKind, Inspector, Tolerances, inspect_houses},
         scene::{Body, BodyKind, OrientedBox, Scene},
     },
 };

@@ -4,9 +4,7 @@ use evonav_core::{
     assets::part::{Part, Primitive},
     geometry::{Aabb, Vec2, Vec3, distance_2d_m, yaw_rotation},
     world::{
-        collision::AgentBody,
-        navigation::{Navigation, NavigationConfig},
-        paths::path_length_m,
+        navigation::{AgentBody, Navigation, NavigationConfig, path_length_m},
         scene::{Body, BodyKind, OrientedBox, Scene},
     },
 };

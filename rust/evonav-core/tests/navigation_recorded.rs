@@ -5,7 +5,7 @@ mod recorded;
 
 use std::collections::BTreeMap;
 
-use evonav_core::{geometry::Vec2, world::collision::AgentBody};
+use evonav_core::{geometry::Vec2, world::navigation::AgentBody};
 use recorded::{bundled_lines, data_set, house_of, lines, navigation_of, scene_of};
 use serde_json::Value;
 

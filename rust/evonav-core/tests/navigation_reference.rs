@@ -14,7 +14,7 @@ use evonav_core::{
     geometry::{Vec2, distance_2d_m},
     grid::GridSpec,
     rng::Stream,
-    world::{collision::AgentBody, navigation::Navigation, paths::path_length_m},
+    world::navigation::{AgentBody, Navigation, path_length_m},
 };
 use recorded::{house_lines, house_of, navigation_of, scene_of};
 

@@ -3,10 +3,9 @@
 use evonav_core::{
     perception::{
         depth_noise::{DepthNoise, noisy_depth},
-        mask_noise::{
-            Blob, MaskChange, Outline, SiteNoise, distort_masks, mask_outlines, paint_blobs,
-            surface_sites,
-        },
+        false_detections::{Blob, SiteNoise, paint_blobs, surface_sites},
+        mask_distortion::{MaskChange, distort_masks},
+        mask_outlines::{Outline, mask_outlines},
     },
     rng::Stream,
     sensors::camera::Camera,

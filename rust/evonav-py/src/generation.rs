@@ -2,7 +2,7 @@
 
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::{self, Generation, Given, Parameters},
+    generation::{Generation, Given, Parameters, generate_given},
 };
 use pyo3::{prelude::*, types::PyBytes};
 
@@ -11,7 +11,7 @@ use crate::{error, house::House};
 /// JSON of the record, stage houses, and reference images (RGB, row by row).
 type Generated<'py> = (String, Vec<String>, Vec<Bound<'py, PyBytes>>);
 
-/// Units and errors: `_core.pyi` and `evonav_core::evolution::generate_given`.
+/// Units and errors: `_core.pyi` and `evonav_core::generation::generate_given`.
 #[pyfunction]
 #[pyo3(signature = (house, *, seed, label, parameters_json, allow_unknown_assets, given_json="{}"))]
 fn generate_task<'py>(
@@ -30,7 +30,7 @@ fn generate_task<'py>(
             let parameters = Parameters::from_json(parameters_json)?;
             let given = Given::from_json(given_json)?;
             let (house, catalogue) = (&house.inner, Catalogue::bundled());
-            evolution::generate_given(house, catalogue, unknown, seed, label, &parameters, &given)
+            generate_given(house, catalogue, unknown, seed, label, &parameters, &given)
                 .map(|generated| (generated.to_json(), generated))
         })
         .map_err(error::to_py)?;

@@ -2,13 +2,13 @@
 
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    world::inspect::{Tolerances, inspect_houses},
+    world::inspection::{Tolerances, inspect_houses},
 };
 use pyo3::prelude::*;
 
 use crate::{error, house::House};
 
-/// Units and errors: `_core.pyi` and `evonav_core::world::inspect`.
+/// Units and errors: `_core.pyi` and `evonav_core::world::inspection`.
 #[pyfunction]
 #[pyo3(signature = (source, stage, *, touch_m, rest_m, allow_unknown_assets))]
 fn inspect_house(

@@ -96,3 +96,25 @@ pub fn gap_m(a: &[Vec2], b: &[Vec2]) -> f64 {
         .flat_map(|p| edges(b).map(move |q| segment_distance_m(p, q)))
         .fold(f64::INFINITY, f64::min)
 }
+
+/// Squared distance of a point from a convex polygon (0 inside), a segment or a point.
+pub fn distance_squared(outline_m: &[Vec2], point_m: Vec2) -> f64 {
+    let mut best = f64::INFINITY;
+    let mut is_inside = outline_m.len() > 2;
+    for (i, &a) in outline_m.iter().enumerate() {
+        let b = outline_m[(i + 1) % outline_m.len()];
+        let edge = [b[0] - a[0], b[1] - a[1]];
+        let offset = [point_m[0] - a[0], point_m[1] - a[1]];
+        // The nearest edge is one that has the point on its outer side.
+        if outline_m.len() > 2 && edge[0] * offset[1] - edge[1] * offset[0] >= 0.0 {
+            continue;
+        }
+        is_inside = false;
+        let length_squared = edge[0] * edge[0] + edge[1] * edge[1];
+        let t = ((edge[0] * offset[0] + edge[1] * offset[1]) / length_squared).clamp(0.0, 1.0);
+        let t = if t.is_nan() { 0.0 } else { t };
+        let gap = [offset[0] - t * edge[0], offset[1] - t * edge[1]];
+        best = best.min(gap[0] * gap[0] + gap[1] * gap[1]);
+    }
+    if is_inside { 0.0 } else { best }
+}

@@ -2,10 +2,9 @@
 
 use crate::{
     Error,
-    geometry::{Vec2, Vec3, add, sub},
+    geometry::{Vec2, Vec3, add, outline::distance_squared, sub},
     sensors::{camera::View, ray_caster::RayCaster},
     world::{
-        collision::distance_squared,
         footprint::footprint,
         mesh::SceneMesh,
         scene::{BodyKind, Scene},

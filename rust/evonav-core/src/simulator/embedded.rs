@@ -15,9 +15,8 @@ use crate::{
         visible_bodies::visible_bodies,
     },
     world::{
-        collision::AgentBody,
         mesh::SceneMesh,
-        navigation::{Navigation, NavigationConfig},
+        navigation::{AgentBody, Navigation, NavigationConfig},
         scene::{Body, Scene},
     },
 };

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::{Error, geometry::Vec2, simulator::EmbeddedSimulator, world::paths::DistanceField};
+use crate::{
+    Error, geometry::Vec2, simulator::EmbeddedSimulator, world::navigation::DistanceField,
+};
 
 /// Shortest distances to one point of a house, and the house they hold in.
 ///

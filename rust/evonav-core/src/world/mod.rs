@@ -1,14 +1,8 @@
-//! A house instantiated: bodies in the world frame, collision, navigation.
+//! A house instantiated: bodies in the world frame, collision, navigation, and where things can stand.
 
-pub mod collision;
 pub mod footprint;
-pub mod inspect;
+pub mod inspection;
+pub mod layout;
 pub mod mesh;
 pub mod navigation;
-mod openings;
-pub mod paths;
 pub mod scene;
-mod settle;
-mod solid;
-mod structure;
-mod tangents;

@@ -1,6 +1,6 @@
 //! Parameters under which every transition evolves.
 
-use evonav_core::evolution::{Mode, Parameters};
+use evonav_core::generation::{Mode, Parameters};
 
 /// Every transition evolves, by one mode.
 pub fn always(mode: Mode, num_stages: usize) -> Parameters {

@@ -10,8 +10,7 @@ use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     house::House,
     world::{
-        collision::AgentBody,
-        navigation::{Navigation, NavigationConfig},
+        navigation::{AgentBody, Navigation, NavigationConfig},
         scene::Scene,
     },
 };

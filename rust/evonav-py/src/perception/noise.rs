@@ -1,8 +1,10 @@
-//! `evonav_core::sensors::{mask_noise, depth_noise}`. Shapes, units and errors: `_core.pyi`.
+//! `evonav_core::perception`. Shapes, units and errors: `_core.pyi`.
 
 use evonav_core::{
     geometry::Vec3,
-    perception::{depth_noise, mask_noise},
+    perception::{
+        self, depth_noise, false_detections, mask_distortion::MaskChange, mask_outlines::Outline,
+    },
     rng::Stream,
     sensors::camera::Camera,
 };
@@ -45,10 +47,9 @@ fn mask_outlines<'py>(
     let (masks, shape) = arrays::row_major("masks", &masks)?;
     let (depth_m, _) = arrays::row_major("depth_m", &depth_m)?;
     let outlines = py
-        .detach(|| mask_noise::mask_outlines(masks, depth_m, shape[1], num_masks))
+        .detach(|| perception::mask_outlines::mask_outlines(masks, depth_m, shape[1], num_masks))
         .map_err(error::to_py)?;
-    let row =
-        |one: mask_noise::Outline| [one.num_sides as f64, one.num_cut as f64, one.mean_depth_m];
+    let row = |one: Outline| [one.num_sides as f64, one.num_cut as f64, one.mean_depth_m];
     arrays::rows_of(py, outlines.into_iter().map(row).collect())
 }
 
@@ -64,7 +65,7 @@ fn distort_masks<'py>(
     let rows = arrays::rows("changes", &changes)?.iter().zip(margins_px.as_slice()?);
     let changes = rows.map(
         |(&[becomes, rest_becomes, by_col, split_px, top, left, bottom, right], &margin_px)| {
-            mask_noise::MaskChange {
+            MaskChange {
                 becomes,
                 rest_becomes,
                 is_split_by_col: by_col != 0,
@@ -75,8 +76,9 @@ fn distort_masks<'py>(
         },
     );
     let changes: Vec<_> = changes.collect();
-    let found =
-        py.detach(|| mask_noise::distort_masks(masks, shape[1], &changes)).map_err(error::to_py)?;
+    let found = py
+        .detach(|| perception::mask_distortion::distort_masks(masks, shape[1], &changes))
+        .map_err(error::to_py)?;
     arrays::image_of(py, found, shape)
 }
 
@@ -104,15 +106,16 @@ fn surface_sites<'py>(
 ) -> PyResult<(Bound<'py, PyArray2<i64>>, Bound<'py, PyArray2<f64>>)> {
     let (depth_m, [height_px, width_px]) = arrays::row_major("depth_m", &depth_m)?;
     let camera = Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad };
-    let noise = mask_noise::SiteNoise {
+    let noise = false_detections::SiteNoise {
         cell_m,
         stride_px,
         persistence,
         lasting: stream(seed, &lasting),
         passing: stream(seed, &passing),
     };
-    let sites =
-        py.detach(|| mask_noise::surface_sites(depth_m, &camera, &noise)).map_err(error::to_py)?;
+    let sites = py
+        .detach(|| false_detections::surface_sites(depth_m, &camera, &noise))
+        .map_err(error::to_py)?;
     let pixels = sites.iter().map(|site| site.pixel.map(|px| px as i64)).collect();
     let values = sites.iter().map(|s| [s.depth_m, s.latent, s.what[0], s.what[1], s.how]).collect();
     Ok((arrays::rows_of(py, pixels)?, arrays::rows_of(py, values)?))
@@ -132,13 +135,13 @@ fn paint_blobs(
     let rows = arrays::rows("blobs", &blobs)?.iter().zip(arrays::rows("radii_px", &radii_px)?);
     // Negative places become places outside the image, which the core refuses.
     let blobs: Vec<_> = rows
-        .map(|(&[row, col, number], &radii_px)| mask_noise::Blob {
+        .map(|(&[row, col, number], &radii_px)| false_detections::Blob {
             pixel: [row, col].map(|px| usize::try_from(px).unwrap_or(usize::MAX)),
             radii_px,
             number: number as i32,
         })
         .collect();
-    mask_noise::paint_blobs(masks, surfaces, width_px, &blobs).map_err(error::to_py)
+    false_detections::paint_blobs(masks, surfaces, width_px, &blobs).map_err(error::to_py)
 }
 
 /// A depth image as a camera that errs would give it.

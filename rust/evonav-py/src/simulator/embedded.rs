@@ -4,7 +4,6 @@ use std::sync::{Arc, Mutex};
 
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    evolution::{SpawnRequest, random_spawn, settled},
     geometry::{Pose, Vec2, Vec3},
     house::{House, HouseDelta},
     sensors::{
@@ -13,8 +12,8 @@ use evonav_core::{
     },
     simulator::{EmbeddedSimulator, SimulatorConfig},
     world::{
-        collision::AgentBody,
-        navigation,
+        layout::{SpawnRequest, random_spawn, settled},
+        navigation::{self, AgentBody},
         scene::{Body, BodyKind, OrientedBox, Scene},
     },
 };

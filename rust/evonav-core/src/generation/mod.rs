@@ -1,0 +1,24 @@
+//! Task generation: which room evolves, what moves where, and which object is the goal
+//! (paper, Sec. 3.2 and A.1-A.4).
+
+mod algorithm;
+mod extension_parameters;
+mod extensions;
+mod mode;
+mod overrides;
+mod parameters;
+mod placement;
+pub mod record;
+mod stage;
+mod task;
+
+pub use algorithm::{
+    evolved_room::{RoomHistory, evolved_room_weight, sample_evolved_room},
+    goal::{Candidate, GoalBias, goal_room_weights, sample_goal, target_scores},
+};
+pub use extension_parameters::{Extensions, Occurrence, Schedule};
+pub use mode::Mode;
+pub use overrides::{Given, GivenStage};
+pub use parameters::Parameters;
+pub use placement::asset_groups::{Group, asset_groups};
+pub use task::{Generation, generate_given, generate_task};

@@ -1,0 +1,151 @@
+//! The generator's fixed hyperparameters.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, generation::Extensions};
+
+/// Θ (paper, Sec. A.2), and the numbers that the paper leaves open.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameters {
+    /// K is drawn uniformly from these.
+    pub num_stages: Vec<usize>,
+    /// Chance that a transition evolves the house.
+    pub evolve_probability: f64,
+    /// Factor of rooms that the reference trajectory has visited.
+    pub visited_factor: f64,
+    /// Factor of rooms that changed within `changed_room_window`.
+    pub recently_changed_factor: f64,
+    /// Transitions back in which a change counts as recent.
+    pub changed_room_window: usize,
+    /// Chance of [`crate::generation::Mode::SalientObject`], relative to the two others.
+    pub salient_object_probability: f64,
+    /// Chance of [`crate::generation::Mode::RetainGroup`].
+    pub retain_group_probability: f64,
+    /// Chance of [`crate::generation::Mode::FullShuffle`].
+    pub full_shuffle_probability: f64,
+    /// Factor on the goal weight of the room that just changed.
+    pub changed_room_multiplier: f64,
+    /// Factor on the goal weight of the previous stage's goal room.
+    pub previous_goal_room_multiplier: f64,
+    /// Weight of the salient object that just moved among its room's objects, which weigh 1.
+    pub moved_object_multiplier: f64,
+    /// Weight of each object that stood on it and moved with it.
+    pub moved_children_multiplier: f64,
+    /// Whether what hangs on walls, which no modification moves, may be a goal. The paper uses it
+    /// as an anchor of instructions; leaving it out of the goals brings the share of relocated
+    /// goals to the published one.
+    pub goals_on_walls: bool,
+    /// Least distance of the reference pose from the target, ground plane.
+    pub reference_min_m: f64,
+    /// Largest distance of the reference pose from the target, ground plane.
+    pub reference_max_m: f64,
+    /// Edge of the reference image.
+    pub reference_image_px: usize,
+    /// Fewest pixels of a target that counts as visible.
+    pub reference_min_visible_px: usize,
+    /// An object that moved farther than this is relocated.
+    pub relocated_min_m: f64,
+    /// Places tried for an object before it stays where it is.
+    pub placement_tries: usize,
+    /// Times that a room's modification is tried, with fresh places, before it is given up.
+    pub modification_tries: usize,
+    /// What goes beyond the paper.
+    #[serde(default)]
+    pub extensions: Extensions,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            num_stages: vec![3, 4, 5],
+            evolve_probability: 0.5,
+            visited_factor: 3.0,
+            recently_changed_factor: 0.5,
+            changed_room_window: 1,
+            salient_object_probability: 0.5,
+            retain_group_probability: 0.4,
+            full_shuffle_probability: 0.1,
+            changed_room_multiplier: 9.0,
+            previous_goal_room_multiplier: 0.2,
+            moved_object_multiplier: 9.0,
+            moved_children_multiplier: 9.0,
+            goals_on_walls: false,
+            reference_min_m: 1.0,
+            reference_max_m: 1.5,
+            reference_image_px: 300,
+            reference_min_visible_px: 50,
+            relocated_min_m: 0.1,
+            placement_tries: 100,
+            modification_tries: 3,
+            extensions: Extensions::default(),
+        }
+    }
+}
+
+impl Parameters {
+    /// Reads the JSON that Python's `GenerationParameters` writes, and checks every value.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] naming the field.
+    pub fn from_json(json: &str) -> Result<Self, Error> {
+        let parameters: Self = serde_json::from_str(json)
+            .map_err(|e| Error::invalid("parameters", e, "generation parameters as JSON"))?;
+        parameters.check()?;
+        Ok(parameters)
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// [`Error::InvalidArgument`] naming the field.
+    pub fn check(&self) -> Result<(), Error> {
+        let is_stage_count = |&n: &usize| (1..=64).contains(&n);
+        if self.num_stages.is_empty() || !self.num_stages.iter().all(is_stage_count) {
+            let found = format!("{:?}", self.num_stages);
+            return Err(Error::invalid("num_stages", found, "counts of 1..=64, at least one"));
+        }
+        let is_weight = |v: f64| v.is_finite() && (0.0..=1e9).contains(&v);
+        for (name, value) in [
+            ("visited_factor", self.visited_factor),
+            ("recently_changed_factor", self.recently_changed_factor),
+            ("salient_object_probability", self.salient_object_probability),
+            ("retain_group_probability", self.retain_group_probability),
+            ("full_shuffle_probability", self.full_shuffle_probability),
+            ("changed_room_multiplier", self.changed_room_multiplier),
+            ("previous_goal_room_multiplier", self.previous_goal_room_multiplier),
+            ("moved_object_multiplier", self.moved_object_multiplier),
+            ("moved_children_multiplier", self.moved_children_multiplier),
+            ("relocated_min_m", self.relocated_min_m),
+            ("reference_min_m", self.reference_min_m),
+            ("reference_max_m", self.reference_max_m),
+        ] {
+            Error::require(name, value, "in 0..=1e9", is_weight)?;
+        }
+        let is_probability = |v: f64| (0.0..=1.0).contains(&v);
+        Error::require("evolve_probability", self.evolve_probability, "in 0..=1", is_probability)?;
+        let modes = self.mode_weights().iter().sum::<f64>();
+        Error::require("salient_object_probability", modes, "a positive sum over modes", |v| {
+            v > 0.0
+        })?;
+        let is_image = |v: usize| (16..=4096).contains(&v);
+        Error::require("reference_image_px", self.reference_image_px, "in 16..=4096", is_image)?;
+        let least = self.reference_min_m;
+        let expected = "at least reference_min_m";
+        Error::require("reference_max_m", self.reference_max_m, expected, |v| v >= least)?;
+        let is_tries = |v: usize| (1..=100_000).contains(&v);
+        Error::require("placement_tries", self.placement_tries, "in 1..=100000", is_tries)?;
+        let is_tries = |v: usize| (1..=1000).contains(&v);
+        Error::require("modification_tries", self.modification_tries, "in 1..=1000", is_tries)?;
+        self.extensions.check()
+    }
+
+    /// Weights of the three modes, in the order of [`crate::generation::Mode::ALL`].
+    pub fn mode_weights(&self) -> [f64; 3] {
+        [
+            self.salient_object_probability,
+            self.retain_group_probability,
+            self.full_shuffle_probability,
+        ]
+    }
+}

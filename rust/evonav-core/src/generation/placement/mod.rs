@@ -1,0 +1,7 @@
+//! Where furniture can go in a room.
+
+pub mod asset_groups;
+pub mod movable_group;
+pub mod place_search;
+pub mod reach;
+pub mod room_outline;

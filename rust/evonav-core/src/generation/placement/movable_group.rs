@@ -1,0 +1,247 @@
+//! What moves as one: furniture with what stands on it, or an asset group.
+
+use crate::{
+    assets::placement_rule::Place,
+    generation::placement::room_outline::{AT_WALL_M, RoomPlan},
+    geometry::{Vec2, Vec3, add, rotate, sub, yaw_rotation},
+    world::{
+        footprint::Footprint,
+        layout::{
+            Layout, Placed, Placement,
+            contact::overlap,
+            free_floor::{self, Floor},
+            rounding::{ROUND_DEG, ROUND_M, round_to, turned_deg},
+        },
+    },
+};
+
+/// Objects that move as one.
+#[derive(Debug, Clone)]
+pub struct Unit {
+    /// Objects that stand on the floor, the main one first.
+    pub roots: Vec<usize>,
+    /// ProcTHOR's definition of the group that they are, if they are one.
+    pub definition: Option<usize>,
+    /// All objects, each root with all that it bears behind it.
+    members: Vec<Member>,
+    /// Ways in which it should stand, and in which it may.
+    anchors: [Vec<Place>; 2],
+    /// Centre of the main root.
+    pivot_m: Vec3,
+    /// Yaw of the unit's frame: its back is at -z.
+    yaw_deg: f64,
+    /// Box of the roots' outlines in that frame, about the pivot: `[x, z]`.
+    pub min_m: Vec2,
+    /// Largest corner.
+    pub max_m: Vec2,
+}
+
+/// A pose of a unit's frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Pose2 {
+    /// Centre of the unit's main object.
+    pub point_m: Vec2,
+    /// Yaw.
+    pub yaw_deg: f64,
+    /// How it stands there.
+    pub anchor: Place,
+}
+
+/// How strictly ProcTHOR's rules are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rules {
+    /// Corner, edge or middle by the category, and free floor around.
+    All,
+    /// What stands in corners may also stand along walls, and with less than the free floor.
+    Relaxed,
+}
+
+/// An object of a unit as it stands before it is moved.
+#[derive(Debug, Clone)]
+struct Member {
+    index: usize,
+    is_root: bool,
+    placement: Placement,
+    solids: Vec<Footprint>,
+}
+
+impl Unit {
+    /// The roots and all that they bear, where they stand.
+    ///
+    /// # Arguments
+    /// * `roots` - the main one first; at least one.
+    /// * `definition` - index of the definition of the group that the roots are.
+    /// * `anchors` - ways in which it should stand, and in which it may; where empty, the way it
+    ///   stands now.
+    pub fn new(
+        layout: &Layout,
+        roots: &[usize],
+        definition: Option<usize>,
+        anchors: [&[Place]; 2],
+        plan: &RoomPlan,
+    ) -> Self {
+        let mut unit = Self {
+            roots: roots.to_vec(),
+            definition,
+            members: Vec::new(),
+            anchors: anchors.map(<[Place]>::to_vec),
+            pivot_m: layout.items[roots[0]].placement.position_m,
+            yaw_deg: layout.items[roots[0]].placement.rotation_deg[1],
+            min_m: [0.0; 2],
+            max_m: [0.0; 2],
+        };
+        for &root in roots {
+            for index in layout.with_supported(root) {
+                let item = &layout.items[index];
+                let (placement, solids) = (item.placement, item.solids.clone());
+                unit.members.push(Member { index, is_root: index == root, placement, solids });
+            }
+        }
+        unit.measure();
+        if unit.anchors[1].is_empty() {
+            unit.turn_back_to_wall(plan);
+        }
+        unit
+    }
+
+    /// Centre of the main root.
+    pub fn centre_m(&self) -> Vec2 {
+        [self.pivot_m[0], self.pivot_m[2]]
+    }
+
+    /// Moves a root, with what it bears, about in the unit.
+    ///
+    /// # Arguments
+    /// * `centre_m`, `yaw_deg` - of the root in the unit's frame about the main root.
+    pub fn arrange(&mut self, layout: &Layout, root: usize, centre_m: Vec2, yaw_deg: f64) {
+        let frame = yaw_rotation(self.yaw_deg.to_radians());
+        let to = add(rotate(&frame, [centre_m[0], 0.0, centre_m[1]]), self.pivot_m);
+        let family = layout.with_supported(root);
+        let Some(from) = self.members.iter().find(|m| m.index == root).map(|m| m.placement) else {
+            return;
+        };
+        let turn_deg = self.yaw_deg + yaw_deg - from.rotation_deg[1];
+        let turn = yaw_rotation(turn_deg.to_radians());
+        for member in self.members.iter_mut().filter(|m| family.contains(&m.index)) {
+            let offset = rotate(&turn, sub(member.placement.position_m, from.position_m));
+            let [x_deg, y_deg, z_deg] = member.placement.rotation_deg;
+            member.placement.position_m =
+                [to[0] + offset[0], member.placement.position_m[1], to[2] + offset[2]];
+            member.placement.rotation_deg = [x_deg, turned_deg(y_deg + turn_deg), z_deg];
+            member.solids = layout.items[member.index].solids_at(&member.placement);
+        }
+        self.measure();
+    }
+
+    /// Whether no root, with what it bears, is in another.
+    pub fn is_sound(&self) -> bool {
+        let families = self.members.chunk_by(|_, next| !next.is_root).collect::<Vec<_>>();
+        let touch = |a: &[Member], b: &[Member]| {
+            a.iter().any(|a| b.iter().any(|b| overlap(&a.solids, &b.solids)))
+        };
+        (1..families.len()).all(|i| !families[..i].iter().any(|other| touch(other, families[i])))
+    }
+
+    /// Sets the box for the present frame.
+    fn measure(&mut self) {
+        let into_frame = yaw_rotation(-self.yaw_deg.to_radians());
+        self.min_m = [f64::INFINITY; 2];
+        self.max_m = [f64::NEG_INFINITY; 2];
+        for solid in self.members.iter().filter(|m| m.is_root).flat_map(|m| &m.solids) {
+            for p in &solid.outline_m {
+                let offset = [p[0] - self.pivot_m[0], 0.0, p[1] - self.pivot_m[2]];
+                let local = rotate(&into_frame, offset);
+                for (axis, value) in [local[0], local[2]].into_iter().enumerate() {
+                    self.min_m[axis] = self.min_m[axis].min(value);
+                    self.max_m[axis] = self.max_m[axis].max(value);
+                }
+            }
+        }
+    }
+
+    /// Distance of the middle of its back from the nearest wall.
+    fn back_gap_m(&self, plan: &RoomPlan) -> f64 {
+        let from_frame = yaw_rotation(self.yaw_deg.to_radians());
+        let middle_x = 0.5 * (self.min_m[0] + self.max_m[0]);
+        let back = add(rotate(&from_frame, [middle_x, 0.0, self.min_m[1]]), self.pivot_m);
+        plan.wall_distance_m([back[0], back[2]])
+    }
+
+    /// Takes the side at a wall as the back, and the number of such sides as the way it stands: for
+    /// what ProcTHOR's annotations do not tell of.
+    fn turn_back_to_wall(&mut self, plan: &RoomPlan) {
+        let quarters = (0..4).map(|quarter| {
+            let mut turned = self.clone();
+            turned.yaw_deg = self.yaw_deg + 90.0 * f64::from(quarter);
+            turned.measure();
+            turned
+        });
+        let mut at_wall: Vec<Self> =
+            quarters.filter(|turned| turned.back_gap_m(plan) < AT_WALL_M).collect();
+        // What stands in a corner also stands at an edge.
+        let anchors = match at_wall.len() {
+            0 => vec![Place::Middle],
+            1 => vec![Place::Edge],
+            _ => vec![Place::Corner, Place::Edge],
+        };
+        if !at_wall.is_empty() {
+            *self = at_wall.swap_remove(0);
+        }
+        self.anchors = [anchors.clone(), anchors];
+    }
+
+    /// Ways in which it stands by the rules.
+    pub fn anchors(&self, rules: Rules) -> &[Place] {
+        let [preferred, all] = &self.anchors;
+        if rules == Rules::All { preferred } else { all }
+    }
+
+    /// The floor that it keeps as it stands.
+    pub fn reserve_now(&self, plan: &RoomPlan) -> Floor {
+        let is_at_wall = self.back_gap_m(plan) < AT_WALL_M;
+        let anchor = if is_at_wall { Place::Edge } else { Place::Middle };
+        let pose = Pose2 { point_m: self.centre_m(), yaw_deg: self.yaw_deg, anchor };
+        self.reserve_at(&pose)
+    }
+
+    /// The floor that it keeps at a pose of its frame.
+    pub fn reserve_at(&self, pose: &Pose2) -> Floor {
+        let turn = yaw_rotation(pose.yaw_deg.to_radians());
+        let to_world = |[x, z]: Vec2| {
+            let offset = rotate(&turn, [x, 0.0, z]);
+            [pose.point_m[0] + offset[0], pose.point_m[1] + offset[2]]
+        };
+        free_floor::around(pose.anchor, self.min_m, self.max_m, to_world)
+    }
+
+    /// All members, the unit's frame being at a pose.
+    pub fn placed_at(&self, pose: &Pose2) -> Vec<Placed> {
+        let turn_deg = round_to(pose.yaw_deg - self.yaw_deg, ROUND_DEG);
+        let turn = yaw_rotation(turn_deg.to_radians());
+        let moved = |[x, z]: Vec2| {
+            let offset = rotate(&turn, [x - self.pivot_m[0], 0.0, z - self.pivot_m[2]]);
+            [pose.point_m[0] + offset[0], pose.point_m[1] + offset[2]]
+        };
+        let placed = |member: &Member| {
+            let old = member.placement;
+            let [x_deg, y_deg, z_deg] = old.rotation_deg;
+            let [x_m, z_m] = moved([old.position_m[0], old.position_m[2]]);
+            let placement = Placement {
+                position_m: [round_to(x_m, ROUND_M), old.position_m[1], round_to(z_m, ROUND_M)],
+                rotation_deg: [x_deg, turned_deg(y_deg + turn_deg), z_deg],
+                parent: old.parent,
+            };
+            let solids = member.solids.iter().map(|solid| Footprint {
+                outline_m: solid.outline_m.iter().map(|&point| moved(point)).collect(),
+                ..*solid
+            });
+            Placed {
+                index: member.index,
+                is_root: member.is_root,
+                placement,
+                solids: solids.collect(),
+            }
+        };
+        self.members.iter().map(placed).collect()
+    }
+}

@@ -1,0 +1,15 @@
+//! What generation leaves on record; the JSON that Python's `evonav.tasks.oracle` reads.
+
+mod evolution;
+mod target;
+mod task;
+
+pub use evolution::{
+    ActivityRecord, ChangeRecord, EvolutionOutcome, EvolutionRecord, ModificationFailure,
+    ObjectRecord, RoomWeightRecord, StateChangeRecord,
+};
+pub use target::{Anchor, Appearance, Determiner, Relations, TargetRecord, Tint};
+pub use task::{
+    GeneratedStage, GeneratedTask, GoalRejection, PoseRecord, RejectReason, Rejected,
+    RejectionRecord, StateRecord,
+};

@@ -1,0 +1,122 @@
+//! Where small things can go: the surfaces of receptacles, as the shapes have them.
+
+use crate::{
+    assets::Catalogue,
+    geometry::{Vec2, add, outline::overlap_m, polygon_contains, rotate, yaw_rotation},
+    rng::Stream,
+    world::{
+        footprint::convex_hull,
+        layout::{
+            Item, Layout, Placement,
+            contact::{TOUCH_M, bottom_m},
+            rounding::{round_to, turned_deg},
+        },
+    },
+};
+
+/// Share of a small thing's outline, about its middle, that must lie over its support.
+const SUPPORTED_SHARE: f64 = 0.8;
+/// Height difference between a recorded surface and the top of the part that bears it.
+const SURFACE_M: f64 = 0.02;
+/// Height difference between parts that bear one thing.
+const LEVEL_M: f64 = 0.003;
+/// Rounding of places.
+const ROUND_M: f64 = 1e-4;
+
+/// Part of what they stand on, wherever that goes.
+pub const FITTINGS: [&str; 3] = ["Faucet", "ShowerHead", "Sink"];
+
+/// Whether something never leaves what it stands on.
+pub fn is_fitting(item: &Item) -> bool {
+    FITTINGS.contains(&item.asset.category.as_str())
+}
+
+/// Receptacles among `room_items` on which an object may stand, and how often its category was seen
+/// on theirs (`receptacles.json` of the `procthor` package).
+pub fn receptacles_for(
+    layout: &Layout,
+    catalogue: &Catalogue,
+    index: usize,
+    room_items: &[usize],
+) -> (Vec<usize>, Vec<f64>) {
+    let category = &layout.items[index].asset.category;
+    let can_bear = |&other: &usize| {
+        let receptacle = &layout.items[other];
+        receptacle.is_on_floor
+            && !receptacle.asset.surfaces_m.is_empty()
+            && catalogue.can_rest_on(category, &receptacle.asset.category)
+    };
+    let found: Vec<usize> =
+        room_items.iter().copied().filter(|other| *other != index).filter(can_bear).collect();
+    let share =
+        |&on: &usize| catalogue.rest_probability(category, &layout.items[on].asset.category);
+    let weights = found.iter().map(share).collect();
+    (found, weights)
+}
+
+/// Draws a place for one small object on one of `receptacles`; `None` when this draw overhangs,
+/// touches something, or is where the object already is (within `min_move_m`).
+pub fn sample_surface_place(
+    layout: &Layout,
+    index: usize,
+    receptacles: &[usize],
+    min_move_m: f64,
+    stream: &mut Stream,
+) -> Option<Placement> {
+    let receptacle_index = *receptacles.get(stream.below(receptacles.len()))?;
+    let (item, receptacle) = (&layout.items[index], &layout.items[receptacle_index]);
+    let surfaces = &receptacle.asset.surfaces_m;
+    let height_m = bottom_m(&receptacle.solids) + surfaces.get(stream.below(surfaces.len()))?;
+    let yaw_deg = receptacle.placement.rotation_deg[1];
+    let [size_x, _, size_z] = receptacle.asset.size_m;
+    let local = [(stream.uniform() - 0.5) * size_x, 0.0, (stream.uniform() - 0.5) * size_z];
+    let centre =
+        add(rotate(&yaw_rotation(yaw_deg.to_radians()), local), receptacle.placement.position_m);
+    let rise_m = item.rise_m();
+    let [x_deg, _, z_deg] = item.placement.rotation_deg;
+    let mut place = Placement {
+        position_m: [
+            round_to(centre[0], ROUND_M),
+            round_to(height_m + rise_m, ROUND_M),
+            round_to(centre[2], ROUND_M),
+        ],
+        rotation_deg: [x_deg, turned_deg(yaw_deg + 90.0 * stream.below(4) as f64), z_deg],
+        parent: Some(receptacle_index),
+    };
+    let moved_m: f64 = (0..3)
+        .map(|i| (place.position_m[i] - item.placement.position_m[i]).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    if item.placement.parent == place.parent && moved_m <= min_move_m {
+        return None;
+    }
+    let solids = item.solids_at(&place);
+    let outline = convex_hull(solids.iter().flat_map(|s| s.outline_m.iter().copied()).collect());
+    // The parts under it may end a little above or below the recorded height.
+    let bearing: Vec<_> = receptacle
+        .solids
+        .iter()
+        .filter(|solid| (solid.top_m - height_m).abs() < SURFACE_M)
+        .filter(|solid| overlap_m(&solid.outline_m, &outline) > TOUCH_M)
+        .collect();
+    let top_m = bearing.iter().map(|solid| solid.top_m).fold(f64::NEG_INFINITY, f64::max);
+    if !top_m.is_finite() {
+        return None;
+    }
+    place.position_m[1] = round_to(top_m + rise_m, ROUND_M);
+    // It stands level: no part under it is higher than what is under its middle and its corners.
+    let is_borne = |p: Vec2| {
+        let mut level = bearing.iter().filter(|solid| top_m - solid.top_m < LEVEL_M);
+        level.any(|solid| polygon_contains(&solid.outline_m, p))
+    };
+    let shrunk = |p: &Vec2| {
+        [0, 1].map(|i| {
+            let middle = place.position_m[2 * i];
+            middle + SUPPORTED_SHARE * (p[i] - middle)
+        })
+    };
+    let is_valid = is_borne([place.position_m[0], place.position_m[2]])
+        && outline.iter().map(shrunk).all(is_borne)
+        && layout.is_clear(&[(index, place)]);
+    is_valid.then_some(place)
+}

@@ -1,0 +1,14 @@
+//! Where an agent can stand, how it can move, and the shortest way.
+
+mod agent_body;
+mod free_space;
+pub(crate) mod obstacle;
+mod obstacles;
+mod tangents;
+mod visibility_graph;
+
+pub use agent_body::AgentBody;
+pub use free_space::{Navigation, NavigationConfig, map_spec};
+pub use obstacle::Obstacle;
+pub use obstacles::Obstacles;
+pub use visibility_graph::{DistanceField, VisibilityGraph, path_length_m};

@@ -1,0 +1,217 @@
+//! The agent's capsule against the world, exactly, on the ground plane.
+//!
+//! An upright capsule that slides over a flat floor has two degrees of freedom, so collision is
+//! a question in the plane: each convex part leaves the projection of its slice between the step
+//! height and the agent's height (a convex polygon, [`crate::world::footprint`]), and the agent
+//! is in collision when its axis comes closer to that polygon than the capsule's radius *at
+//! those heights*: the rounded ends pass over low things and under high ones. That is exact for
+//! upright prisms, which nearly all parts are, and on the safe side for tapering ones; there is
+//! no cell size, so no gap is too narrow or too wide by a cell.
+
+use crate::{
+    Error,
+    geometry::Vec2,
+    world::{
+        navigation::{
+            AgentBody,
+            obstacle::{Obstacle, Sweep, obstacles_of},
+        },
+        scene::{Body, BodyKind},
+    },
+};
+
+/// Edge of a bucket of the broad phase.
+const BUCKET_M: f64 = 0.5;
+/// Most buckets along an axis, whatever a house file says its size is.
+const MAX_BUCKETS: f64 = 1024.0;
+/// Margin of bucket look-ups, far above rounding and far below any geometry.
+const HAIR_M: f64 = 1e-7;
+
+/// Everything that blocks an agent, ready for exact queries.
+#[derive(Debug, Clone)]
+pub struct Obstacles {
+    obstacles: Vec<Obstacle>,
+    corner_m: Vec2,
+    bucket_m: f64,
+    shape: [usize; 2],
+    /// Bucket `i` holds `items[starts[i]..starts[i + 1]]`.
+    starts: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Obstacles {
+    /// Obstacles for `agent` among `bodies`: all but floors and ceilings, in what they have
+    /// between `step_height_m` and the agent's height.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`] naming the body if a part's geometry is not finite.
+    pub fn build(bodies: &[Body], agent: AgentBody, step_height_m: f64) -> Result<Self, Error> {
+        let mut obstacles = Vec::new();
+        for (index, body) in bodies.iter().enumerate() {
+            if matches!(body.kind, BodyKind::Floor | BodyKind::Ceiling) {
+                continue;
+            }
+            obstacles.extend(obstacles_of(body, index, agent, step_height_m)?);
+        }
+        let mut obstacles = Self::with_buckets(obstacles);
+        obstacles.drop_covered_by_others();
+        Ok(obstacles)
+    }
+
+    /// The polygons, in the order of the bodies they come from.
+    pub fn iter(&self) -> impl Iterator<Item = &Obstacle> {
+        self.obstacles.iter()
+    }
+
+    /// Whether the agent fits at a point.
+    pub fn is_clear(&self, point_m: Vec2) -> bool {
+        let Some([row, col]) = self.bucket_of(point_m) else { return true };
+        self.bucket(row, col).iter().all(|&i| !self.obstacles[i as usize].blocks(point_m))
+    }
+
+    /// Whether a point is in collision or so close to it that it may lie between a rounded corner
+    /// and the corner's tangents.
+    pub(super) fn is_hugged(&self, point_m: Vec2) -> bool {
+        let Some([row, col]) = self.bucket_of(point_m) else { return false };
+        self.bucket(row, col).iter().any(|&i| self.obstacles[i as usize].hugs(point_m))
+    }
+
+    /// Whether the agent can slide straight from one point to the other.
+    ///
+    /// The answer is the same in both directions.
+    pub fn is_clear_between(&self, from_m: Vec2, to_m: Vec2) -> bool {
+        self.first_between(from_m, to_m).is_none()
+    }
+
+    /// Index in the scene of a body that a straight move touches: the way to name the collider.
+    pub fn blocker_between(&self, from_m: Vec2, to_m: Vec2) -> Option<usize> {
+        self.first_between(from_m, to_m).map(|obstacle| obstacle.body)
+    }
+
+    fn first_between(&self, from_m: Vec2, to_m: Vec2) -> Option<&Obstacle> {
+        let (a, b) = if from_m <= to_m { (from_m, to_m) } else { (to_m, from_m) };
+        let sweep = Sweep::new(a, b);
+        let mut hit = None;
+        self.buckets_along(a, b, |bucket| {
+            let mut obstacles = bucket.iter().map(|&i| &self.obstacles[i as usize]);
+            hit = obstacles.find(|obstacle| obstacle.blocks_sweep(&sweep));
+            hit.is_none()
+        });
+        hit
+    }
+
+    /// Calls `visit` for the buckets under a segment until it returns false; whether it never did.
+    fn buckets_along(&self, a: Vec2, b: Vec2, mut visit: impl FnMut(&[u32]) -> bool) -> bool {
+        let cell = |value: f64, axis: usize| {
+            (((value - self.corner_m[axis]) / self.bucket_m).floor()).max(0.0) as usize
+        };
+        let is_outside = (0..2).any(|i| a[i].max(b[i]) < self.corner_m[i]);
+        if is_outside || self.obstacles.is_empty() {
+            return true;
+        }
+        let last_row = cell(a[1].max(b[1]) + HAIR_M, 1).min(self.shape[0] - 1);
+        for row in cell(a[1].min(b[1]) - HAIR_M, 1)..=last_row {
+            // Stretch of the segment inside this row of buckets.
+            let low = self.corner_m[1] + row as f64 * self.bucket_m - HAIR_M;
+            let high = low + self.bucket_m + 2.0 * HAIR_M;
+            let at = |height: f64| ((height - a[1]) / (b[1] - a[1])).clamp(0.0, 1.0);
+            let is_level = (b[1] - a[1]).abs() < HAIR_M;
+            let span = if is_level { [0.0, 1.0] } else { [at(low), at(high)] };
+            let [x0, x1] = span.map(|t| a[0] + t * (b[0] - a[0]));
+            if x0.max(x1) + HAIR_M < self.corner_m[0] {
+                continue;
+            }
+            let last_col = cell(x0.max(x1) + HAIR_M, 0).min(self.shape[1] - 1);
+            for col in cell(x0.min(x1) - HAIR_M, 0)..=last_col {
+                if !visit(self.bucket(row, col)) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    fn with_buckets(obstacles: Vec<Obstacle>) -> Self {
+        let mut corner_m = [f64::INFINITY; 2];
+        let mut far_m = [f64::NEG_INFINITY; 2];
+        for obstacle in &obstacles {
+            for axis in 0..2 {
+                corner_m[axis] = corner_m[axis].min(obstacle.min_m[axis]);
+                far_m[axis] = far_m[axis].max(obstacle.max_m[axis]);
+            }
+        }
+        if obstacles.is_empty() {
+            (corner_m, far_m) = ([0.0; 2], [0.0; 2]);
+        }
+        let extent_m = (far_m[0] - corner_m[0]).max(far_m[1] - corner_m[1]);
+        let bucket_m = BUCKET_M.max(extent_m / MAX_BUCKETS);
+        let count = |axis: usize| ((far_m[axis] - corner_m[axis]) / bucket_m) as usize + 1;
+        let shape = [count(1), count(0)];
+        let mut built =
+            Self { obstacles, corner_m, bucket_m, shape, starts: Vec::new(), items: Vec::new() };
+        built.fill_buckets();
+        built
+    }
+
+    /// Counting sort of the obstacles into every bucket that their box touches.
+    fn fill_buckets(&mut self) {
+        let mut starts = vec![0_u32; self.shape[0] * self.shape[1] + 1];
+        for obstacle in &self.obstacles {
+            self.buckets_under(obstacle, |bucket| starts[bucket + 1] += 1);
+        }
+        for i in 1..starts.len() {
+            starts[i] += starts[i - 1];
+        }
+        let mut next = starts.clone();
+        let mut items = vec![0_u32; starts.last().copied().unwrap_or(0) as usize];
+        for (i, obstacle) in self.obstacles.iter().enumerate() {
+            self.buckets_under(obstacle, |bucket| {
+                items[next[bucket] as usize] = i as u32;
+                next[bucket] += 1;
+            });
+        }
+        (self.starts, self.items) = (starts, items);
+    }
+
+    fn buckets_under(&self, obstacle: &Obstacle, mut visit: impl FnMut(usize)) {
+        let cell = |value: f64, axis: usize| {
+            let last = self.shape[1 - axis] - 1;
+            (((value - self.corner_m[axis]) / self.bucket_m).max(0.0) as usize).min(last)
+        };
+        for row in cell(obstacle.min_m[1], 1)..=cell(obstacle.max_m[1], 1) {
+            for col in cell(obstacle.min_m[0], 0)..=cell(obstacle.max_m[0], 0) {
+                visit(row * self.shape[1] + col);
+            }
+        }
+    }
+
+    fn bucket(&self, row: usize, col: usize) -> &[u32] {
+        let i = row * self.shape[1] + col;
+        &self.items[self.starts[i] as usize..self.starts[i + 1] as usize]
+    }
+
+    fn bucket_of(&self, point_m: Vec2) -> Option<[usize; 2]> {
+        let cell = [1, 0].map(|i| ((point_m[i] - self.corner_m[i]) / self.bucket_m).floor());
+        let is_inside = (0..2).all(|i| cell[i] >= 0.0 && cell[i] < self.shape[i] as f64);
+        is_inside.then_some(cell.map(|v| v as usize))
+    }
+
+    /// Leaves out what lies wholly under another body: most of what stands on furniture.
+    fn drop_covered_by_others(&mut self) {
+        let is_covered = |i: usize| {
+            let obstacle = &self.obstacles[i];
+            self.bucket_of(obstacle.outline_m[0]).is_some_and(|[row, col]| {
+                self.bucket(row, col).iter().any(|&j| {
+                    let other = &self.obstacles[j as usize];
+                    j as usize != i
+                        && other.covers(obstacle)
+                        && !(obstacle.covers(other) && i < j as usize)
+                })
+            })
+        };
+        let keep: Vec<bool> = (0..self.obstacles.len()).map(|i| !is_covered(i)).collect();
+        let mut keep = keep.into_iter();
+        self.obstacles.retain(|_| keep.next().unwrap_or(true));
+        self.fill_buckets();
+    }
+}
