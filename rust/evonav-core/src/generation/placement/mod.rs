@@ -5,3 +5,4 @@ pub mod movable_group;
 pub mod place_search;
 pub mod reach;
 pub mod room_outline;
+pub mod step_grid;
