@@ -1,4 +1,4 @@
-"""The core's Rust modules import each other one way: no circle of files, none of folders."""
+"""The Rust core's modules import each other in one direction: neither files nor folders form a circle."""
 
 import re
 from collections.abc import Iterator
@@ -67,18 +67,12 @@ class Crate:
 
     def resolve(self, path: list[str]) -> str | None:
         """Return the file that holds an item, behind re-exports; None if it is another crate's."""
-        for length in range(len(path), 0, -1):
-            module = tuple(path[:length])
-            if module in self.modules:
-                break
-        else:
-            return "lib.rs" if path and path[0] != "::" and ((), path[0]) not in self.exports else self._exported(path)
-        if length < len(path) and (module, path[length]) in self.exports:
-            return self.resolve(self.exports[module, path[length]])
-        return self.modules[module]
-
-    def _exported(self, path: list[str]) -> str | None:
-        return self.resolve(self.exports[(), path[0]]) if path and ((), path[0]) in self.exports else None
+        if path[:1] == ["::"]:
+            return None
+        length = next(n for n in range(len(path), -1, -1) if tuple(path[:n]) in self.modules)
+        module = tuple(path[:length])
+        exported = self.exports.get((module, path[length])) if length < len(path) else None
+        return self.resolve(exported) if exported else self.modules[module]
 
     def imports(self) -> Graph:
         """Return the files that each file names; a file's own re-exports are not counted."""
@@ -120,16 +114,60 @@ def circles(graph: Graph) -> list[list[str]]:
     return found
 
 
-def folders(graph: Graph) -> Graph:
-    """Return the same imports between the crate's top-level modules."""
-    top = lambda name: name.split("/")[0].removesuffix(".rs")  # noqa: E731
-    between: Graph = {top(name): set() for name in graph}
+def siblings(graph: Graph, folder: tuple[str, ...]) -> Graph:
+    """Return the imports between the files and folders directly below `folder`."""
+    depth = len(folder)
+    between: Graph = {}
     for name, targets in graph.items():
-        between[top(name)] |= {top(target) for target in targets} - {top(name)}
+        parts = Path(name).parts
+        if parts[:depth] != folder:
+            continue
+        inside = {Path(target).parts for target in targets if Path(target).parts[:depth] == folder}
+        here = between.setdefault(parts[depth], set())
+        here |= {target[depth] for target in inside} - {parts[depth]}
     return between
 
 
 @pytest.fixture(scope="module")
 def graph() -> Graph:
-    files = {str(path.relative_to(SOURCE)): path.read_text() for path in SOURCE.rglob("*.rs")}
+    files = {path.relative_to(SOURCE).as_posix(): path.read_text("utf-8") for path in SOURCE.rglob("*.rs")}
     return Crate(files).imports()
+
+
+def test_files_do_not_import_each_other_in_a_circle(graph: Graph) -> None:
+    assert circles(graph) == []
+
+
+def test_folders_do_not_import_each_other_in_a_circle(graph: Graph) -> None:
+    folders = {Path(name).parent.parts[:depth] for name in graph for depth in range(len(Path(name).parts))}
+    found = {folder: circles(siblings(graph, folder)) for folder in folders}
+    assert not any(found.values()), {folder: circle for folder, circle in found.items() if circle}
+
+
+def test_a_circle_through_a_re_export_is_found() -> None:
+    files = {
+        "lib.rs": "pub mod a;\npub mod b;\npub use b::deep::Deep;\n",
+        "a.rs": "use crate::{Deep, b::deep::{self, Other}};\n// use crate::c;\n",
+        "b/mod.rs": "pub mod deep;\nmod side;\npub use deep::Deep;\n",
+        "b/deep.rs": "fn f() { super::side::g() }\n",
+        "b/side.rs": "use crate::a::A;\n",
+    }
+    graph = Crate(files).imports()
+    assert graph == {
+        "lib.rs": set(),
+        "a.rs": {"b/deep.rs"},
+        "b/mod.rs": set(),
+        "b/deep.rs": {"b/side.rs"},
+        "b/side.rs": {"a.rs"},
+    }
+    assert circles(graph) == [["a.rs", "b/deep.rs", "b/side.rs"]]
+    assert circles(siblings(graph, ())) == [["a.rs", "b"]]
+
+
+@pytest.mark.parametrize("crate", ["evonav-core", "evonav-py"])
+def test_files_and_folders_stay_small(crate: str) -> None:
+    source = SOURCE.parents[1] / crate / "src"
+    lengths = {path: path.read_text("utf-8").count("\n") for path in source.rglob("*.rs")}
+    assert not {path.name: length for path, length in lengths.items() if length > 400}
+    numbers = {folder.name: len(list(folder.glob("*.rs"))) for folder in {path.parent for path in lengths}}
+    assert not {name: number for name, number in numbers.items() if number > 15}
