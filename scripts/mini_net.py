@@ -1,4 +1,4 @@
-"""The mini detector's network in torch, as `train_mini.py` trains it. `evonav_core::perception::mini` runs the same layers."""
+"""The mini detector's network in torch; `evonav_core::perception::mini` runs the same layers."""
 
 import math
 
