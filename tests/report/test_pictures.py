@@ -32,11 +32,13 @@ def test_a_png_is_the_drawing(tmp_path: Path) -> None:
     assert 0.02 < (left < 128).any(axis=2).mean() < 0.6  # letters are drawn, on white
 
 
-def test_a_pdf_is_one_page_of_the_drawings_size(tmp_path: Path) -> None:
-    pytest.importorskip("resvg_py", reason="resvg is not installed")
+def test_a_pdf_is_one_page_of_vectors_in_the_drawings_size(tmp_path: Path) -> None:
+    pytest.importorskip("typst", reason="typst is not installed")
     data = write_picture(SVG, tmp_path / "x.PDF").read_bytes()
     assert data.startswith(b"%PDF-")
-    (box,) = re.findall(rb"/MediaBox \[ ?([\d. ]+?) ?\]", data)
+    assert b"/Subtype/Image" not in data  # a picture's dictionary is never compressed
+    assert write_picture(SVG, tmp_path / "y.pdf").read_bytes() == data
+    (box,) = re.findall(rb"/MediaBox ?\[ ?([\d. ]+?) ?\]", data)
     # 96 units an inch in the drawing, 72 points an inch on the page.
     assert [float(value) for value in box.split()] == pytest.approx([0, 0, 40 * 0.75, 20 * 0.75])
 
@@ -49,19 +51,21 @@ def test_what_cannot_be_written_is_told_first(tmp_path: Path, monkeypatch: pytes
         write_picture(SVG, tmp_path / "file" / "x.svg")
     real = builtins.__import__
 
-    def without_resvg(name: str, *args: object, **kwargs: object) -> object:
-        if name == "resvg_py":
-            raise ImportError("No module named 'resvg_py'")
+    def without_extras(name: str, *args: object, **kwargs: object) -> object:
+        if name in ("resvg_py", "typst"):
+            raise ImportError(f"No module named {name!r}")
         return real(name, *args, **kwargs)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(builtins, "__import__", without_resvg)
-    with pytest.raises(StoreError, match=r"pip install 'evonav\[viz\]'"):
-        write_picture(SVG, tmp_path / "x.png")
+    monkeypatch.setattr(builtins, "__import__", without_extras)
+    for suffix in ("png", "pdf"):
+        with pytest.raises(StoreError, match=r"pip install 'evonav\[viz\]'"):
+            write_picture(SVG, tmp_path / f"x.{suffix}")
     assert write_picture(SVG, tmp_path / "x.svg").read_text("utf-8") == SVG
 
 
 def test_a_strip_for_a_paper(tmp_path: Path, write_run: WriteRun) -> None:
     pytest.importorskip("resvg_py", reason="resvg is not installed")
+    pytest.importorskip("typst", reason="typst is not installed")
     for suffix in ("svg", "png", "pdf"):
         result = CliRunner().invoke(app, ["strip", str(write_run(suffix)), "--out", str(tmp_path / f"x.{suffix}")])
         assert result.exit_code == 0, result.output

@@ -37,7 +37,7 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
         "--perception predicted: models",
     ),
     "video": (("imageio", "av"), "videos of episodes"),
-    "viz": (("matplotlib", "resvg-py"), "plots; maps as PNG and PDF"),
+    "viz": (("matplotlib", "resvg-py", "typst"), "plots; maps as PNG and PDF"),
     "vlm": (("openai",), "--decision vlm: a model behind an endpoint"),
     "yolo": (("open-clip-torch", "torch", "ultralytics"), "--perception predicted:3d-mem, AGPL-3.0"),
 }

@@ -1,39 +1,46 @@
-"""Our own SVG drawings as files: as they are, or as PNG and PDF for papers and slides (extra `viz`)."""
+"""Write SVG drawings as files: as they are, or as PNG and PDF for papers and slides (extra `viz`)."""
 
 from importlib.util import find_spec
-from io import BytesIO
 from pathlib import Path
+from types import ModuleType
 from typing import Any
-
-from PIL import Image
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.parallel.folders import write_atomically
 
 SUFFIXES = (".svg", ".png", ".pdf")
 ZOOM = 3
-"""Dots of a PNG or PDF to a unit of the drawing, 96 of which are an inch."""
+"""Dots of a PNG to a unit of the drawing, 96 of which are an inch."""
+FONT = "DejaVu Sans"
+"""A font that matplotlib brings along, for machines without the usual ones."""
+_PAGE = b"""#set document(date: none)
+#set page(width: auto, height: auto, margin: 0pt)
+#image(bytes(sys.inputs.svg), format: "svg")
+"""
+"""A page as large as the drawing on it, in typst's language."""
 
 
 def check_picture(path: Path) -> None:
-    """Whether a picture could be written there, before the work is done.
+    """Check that a picture could be written there, before the work is done.
 
     Raises:
         InvalidArgumentError: The file's suffix is of no format.
-        StoreError: What draws it is not installed.
+        StoreError: The library for its format is not installed.
     """
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise InvalidArgumentError(f"argument `path` is {str(path)!r}, expected a file {', '.join(SUFFIXES)}")
-    if suffix != ".svg":
+    if suffix == ".png":
         _resvg()
+    elif suffix == ".pdf":
+        _typst()
 
 
 def write_picture(svg: str, path: Path) -> Path:
-    """Writes a drawing; a PDF is a page as large as the drawing that holds it at 288 dots an inch.
+    """Write a drawing; a PDF is one page as large as the drawing, with lines and text as vectors.
 
     Args:
-        svg: The drawing, whole.
+        svg: The drawing, as an SVG document.
         path: `.svg`, `.png` or `.pdf` file; folders are made.
 
     Returns:
@@ -41,16 +48,11 @@ def write_picture(svg: str, path: Path) -> Path:
 
     Raises:
         InvalidArgumentError: The file's suffix is of no format.
-        StoreError: What draws it is not installed, or the file cannot be written.
+        StoreError: The library for its format is not installed, or the file cannot be written.
     """
     check_picture(path)
     suffix = path.suffix.lower()
-    data = svg.encode() if suffix == ".svg" else _png(svg)
-    if suffix == ".pdf":
-        buffer = BytesIO()
-        with Image.open(BytesIO(data)) as picture:
-            picture.convert("RGB").save(buffer, "PDF", resolution=96.0 * ZOOM, quality=95)
-        data = buffer.getvalue()
+    data = svg.encode() if suffix == ".svg" else png_of(svg, zoom=ZOOM) if suffix == ".png" else _pdf(svg)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -59,21 +61,48 @@ def write_picture(svg: str, path: Path) -> Path:
     return path
 
 
-def _png(svg: str) -> bytes:
-    fonts: dict[str, Any] = {}
-    if (plots := find_spec("matplotlib")) is not None and plots.origin is not None:
-        # Where the machine has no fonts, or not those that resvg takes for the usual ones, words would be missing.
-        fonts = {
-            "font_dirs": [str(Path(plots.origin).parent / "mpl-data" / "fonts" / "ttf")],
-            **dict.fromkeys(("font_family", "serif_family", "sans_serif_family"), "DejaVu Sans"),
-            "monospace_family": "DejaVu Sans Mono",
-        }
-    return bytes(_resvg().svg_to_bytes(svg_string=svg, zoom=ZOOM, background="#ffffff", **fonts))
+def png_of(svg: str, *, zoom: float = 1.0, background: str | None = "#ffffff") -> bytes:
+    """Return a drawing as a PNG.
+
+    Args:
+        svg: The drawing, as an SVG document.
+        zoom: Dots to a unit of the drawing.
+        background: Colour below the drawing; `None`: transparent.
+
+    Raises:
+        StoreError: resvg is not installed.
+    """
+    families = dict.fromkeys(("font_family", "serif_family", "sans_serif_family"), FONT)
+    fonts: dict[str, Any] = {"font_dirs": _font_folders(), **families} if _font_folders() else {}
+    return bytes(_resvg().svg_to_bytes(svg_string=svg, zoom=zoom, background=background, **fonts))
 
 
-def _resvg() -> Any:  # noqa: ANN401 - resvg is not there for the type checker
+def _pdf(svg: str) -> bytes:
+    # Without a date, the same drawing is the same file.
+    return bytes(_typst().compile(_PAGE, format="pdf", sys_inputs={"svg": svg}, font_paths=_font_folders()))
+
+
+def _font_folders() -> list[str]:
+    """Return the folder of matplotlib's fonts, where it is installed."""
+    plots = find_spec("matplotlib")
+    if plots is None or plots.origin is None:
+        return []
+    return [str(Path(plots.origin).parent / "mpl-data" / "fonts" / "ttf")]
+
+
+def _resvg() -> ModuleType:
     try:
         import resvg_py
     except ImportError as error:
-        raise StoreError(f"pictures as PNG and PDF need resvg ({error}): pip install 'evonav[viz]'") from error
-    return resvg_py
+        raise StoreError(f"pictures as PNG need resvg ({error}): pip install 'evonav[viz]'") from error
+    module: ModuleType = resvg_py
+    return module
+
+
+def _typst() -> ModuleType:
+    try:
+        import typst
+    except ImportError as error:
+        raise StoreError(f"pictures as PDF need typst ({error}): pip install 'evonav[viz]'") from error
+    module: ModuleType = typst
+    return module
