@@ -1,6 +1,6 @@
-"""Gymnasium environments over the embedded simulator; importing this registers `evonav/LifelongNav-v0`.
+"""Gymnasium environments over the embedded simulator; importing this package registers `evonav/LifelongNav-v0`.
 
-The environments themselves are imported when they are first used, so that naming the id costs nothing.
+The environments are imported on first use, so the id alone costs nothing.
 """
 
 import lazy_loader

@@ -1,4 +1,4 @@
-"""What an environment is: camera, actions, observations, reward."""
+"""Define the settings of an environment: camera, actions, observations, reward."""
 
 import math
 from dataclasses import dataclass, field
@@ -26,14 +26,14 @@ OBSERVATIONS = (
     "is_action_success",
     "has_arrived",
 )
-"""Keys that an observation may have; docs/gym.md says what each is."""
+"""Keys that an observation may have; docs/gym.md describes them."""
 ACTIONS = (Action.MOVE_FORWARD, Action.TURN_LEFT, Action.TURN_RIGHT, Action.STOP)
-"""Discrete actions, by number: AI2-THOR's MoveAhead, RotateLeft and RotateRight, and the end of the stage."""
+"""Discrete actions by number: AI2-THOR's MoveAhead, RotateLeft and RotateRight, and the end of the stage."""
 STOP = ACTIONS.index(Action.STOP)
 
 STEP_COST = 0.01
 SUCCESS_REWARD = 2.5
-"""Of the `progress` reward: habitat's "point goal" numbers."""
+"""Reward of a success under `progress`: the value of habitat's point goal task."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,35 +41,35 @@ class NavConfig:
     """Settings of an environment; `gymnasium.make` takes them by name."""
 
     action_mode: ActionMode = "actions"
-    """`actions`: one of `ACTIONS` a step. `waypoints`: a point to go towards along planner waypoints."""
+    """`actions`: one of `ACTIONS` a step. `waypoints`: a point to approach along the planner's waypoints."""
     waypoint_frame: WaypointFrame = "relative"
-    """What the point's two numbers are; see `evonav.gym.spaces.waypoint_m`."""
+    """Meaning of the point's two numbers; see `evonav.gym.spaces.waypoint_m`."""
     waypoint_range_m: float = 5.0
-    """Metres that a number of 1 stands for."""
+    """Length in metres of a number of 1."""
     observations: tuple[str, ...] = tuple(name for name in OBSERVATIONS if name != "semantic")
     width_px: int = 128
     height_px: int = 128
     hfov_deg: float = 90.0
-    """From the left to the right border."""
+    """Horizontal field of view in degrees."""
     turn_deg: float = SimulatorConfig().turn_deg
     move_m: float = SimulatorConfig().move_m
     max_steps: int | None = None
-    """Steps a stage; by default the protocol's, 500 actions or 50 waypoint rounds."""
+    """Number of steps of a stage; by default the protocol's, 500 actions or 50 waypoint rounds."""
     success_radius_m: float = ProtocolConfig().success_radius_m
     reward: Reward = "progress"
     reference_image_px: int = 300
-    """Side of `reference_image`; images of another size are resampled."""
+    """Side of `reference_image` in pixels; images of another size are resampled."""
     allow_unknown_assets: bool = False
-    """Draw assets that the catalogue does not hold in the usual size of their category, instead of refusing a house."""
+    """Whether to draw assets that the catalogue lacks in the usual size of their category, not to refuse the house."""
     oracle_info: bool = False
-    """Whether `info["oracle"]` tells where the target is. For debugging and imitation, never for evaluation."""
+    """Whether `info["oracle"]` contains the target. For debugging and imitation, never for evaluation."""
     protocol: ProtocolConfig = field(default=ProtocolConfig(), repr=False)
 
     def __post_init__(self) -> None:
-        """Checks what the simulator does not.
+        """Check what the simulator does not.
 
         Raises:
-            InvalidArgumentError: A setting is none of its choices or outside its domain.
+            InvalidArgumentError: A setting is out of range.
         """
         for name, choices in (("action_mode", ActionMode), ("waypoint_frame", WaypointFrame), ("reward", Reward)):
             if getattr(self, name) not in get_args(choices):
@@ -111,17 +111,17 @@ class NavConfig:
 
     @property
     def budget(self) -> int:
-        """Steps a stage."""
+        """Number of steps of a stage."""
         if self.max_steps is not None:
             return self.max_steps
         return self.protocol.max_actions if self.action_mode == "actions" else self.protocol.max_rounds
 
     @property
     def min_mask_px(self) -> int:
-        """Pixels from which on an object is in `semantic`: ground-truth perception's own."""
+        """Smallest number of pixels of an object in `semantic`: that of ground-truth perception."""
         perception = GroundTruthPerception()
         return max(perception.min_area_px, round(perception.min_area_fraction * self.width_px * self.height_px))
 
     def has(self, name: str) -> bool:
-        """Whether an observation has a key."""
+        """Return whether an observation has a key."""
         return name in self.observations

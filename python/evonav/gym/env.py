@@ -1,4 +1,4 @@
-"""One environment: the embedded simulator and the evaluator's motion, a step at a time."""
+"""Run one environment: the embedded simulator and the evaluator's motion, one step at a time."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -25,10 +25,11 @@ Info = dict[str, Any]
 
 
 class LifelongNavEnv(gymnasium.Env[Observation, Any]):
-    """Lifelong navigation: an episode is a whole task, its stages one after the other in a house that changes.
+    """Lifelong navigation: an episode is a whole task, with its stages in sequence in a house that changes.
 
-    A stage ends when the agent stops or its steps are used up; the next begins where the agent stands, and only the
-    last ends the episode (`terminated`; nothing is ever truncated). docs/gym.md has spaces, rewards and infos.
+    A stage ends when the agent stops or its steps are used up. The next one begins where the agent stands. Only the
+    last one ends the episode (`terminated`; nothing is ever truncated). docs/gym.md describes spaces, rewards and
+    infos.
 
     Example:
         >>> import evonav.gym, gymnasium
@@ -49,18 +50,18 @@ class LifelongNavEnv(gymnasium.Env[Observation, Any]):
         render_mode: str | None = None,
         **settings: Any,  # noqa: ANN401 - fields of NavConfig
     ) -> None:
-        """An environment over some tasks.
+        """Make an environment over some tasks.
 
         Args:
-            tasks: A folder of tasks; by default the bundled ones.
-            subset: Of the folder, such as `train-90`.
+            tasks: Folder of tasks; by default the bundled ones.
+            subset: Named subset of the folder, such as `train-90`.
             config: All settings at once.
             render_mode: `rgb_array`, or none.
-            **settings: Fields of `NavConfig`, over those of `config`.
+            **settings: Fields of `NavConfig`, which override those of `config`.
 
         Raises:
-            InvalidArgumentError: A setting is outside its domain.
-            TaskError: The folder holds no task, or not the subset.
+            InvalidArgumentError: A setting is out of range.
+            TaskError: The folder has no tasks, or not the subset.
         """
         self.config = replace(config or NavConfig(), **settings)
         self.render_mode = render_mode
@@ -75,14 +76,14 @@ class LifelongNavEnv(gymnasium.Env[Observation, Any]):
         self._results: list[Info] = []
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, Info]:
-        """Begins a task.
+        """Begin a task.
 
         Args:
-            seed: Of the draw of this task and all that follow.
-            options: `{"task": TASK_ID}` for a task of one's choice.
+            seed: Seed for the choice of this task and all later ones.
+            options: `{"task": TASK_ID}` to choose a task.
 
         Raises:
-            InvalidArgumentError: There is no such task.
+            InvalidArgumentError: The task does not exist.
             TaskError: The task is malformed.
         """
         super().reset(seed=seed)
@@ -96,10 +97,10 @@ class LifelongNavEnv(gymnasium.Env[Observation, Any]):
         return self._observation(motion.Motion((), is_success=True)), self._info()
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, Info]:  # noqa: ANN401 - of either mode
-        """Acts; the observation after a stage's last step is the next stage's first.
+        """Execute an action; the observation after a stage's last step is the next stage's first.
 
         Raises:
-            ResetNeeded: The task is over, or none was begun.
+            ResetNeeded: The task is over, or was not begun.
         """
         if self._task is None:
             raise ResetNeeded("the task is over, or none was begun: call reset first")
@@ -121,13 +122,13 @@ class LifelongNavEnv(gymnasium.Env[Observation, Any]):
         return observation, reward, is_last, False, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """What the agent sees, `(H, W, 3)`, in mode `rgb_array`."""
+        """Return the agent's view, `(H, W, 3)`, in mode `rgb_array`."""
         if self.render_mode != "rgb_array":
             return None
         return self._simulator.render(rgb=True, instances=False).rgb
 
     def close(self) -> None:
-        """Lets go of the house."""
+        """Release the house."""
         self._task = None
         self._simulator.close()
 
@@ -197,12 +198,12 @@ class LifelongNavEnv(gymnasium.Env[Observation, Any]):
 
 
 def as_row(pose: Pose) -> NDArray[np.float64]:
-    """`(5,)`: x, y, z, yaw, horizon."""
+    """Return `(5,)` numbers: x, y, z, yaw, horizon."""
     return np.array([*pose.position_m, pose.yaw_rad, pose.horizon_rad])
 
 
 def oracle_info(run: StageRun) -> Info:
-    """What `NavConfig.oracle_info` adds."""
+    """Return the entries that `NavConfig.oracle_info` adds."""
     return {
         "target_m": np.array(run.target_m),
         "geodesic_distance_m": run.distance_m,

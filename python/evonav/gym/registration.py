@@ -1,4 +1,4 @@
-"""The environment's id. Naming it imports neither the simulator nor tasks."""
+"""Register the environment's id without importing the simulator or tasks."""
 
 import gymnasium
 
@@ -6,7 +6,7 @@ ENV_ID = "evonav/LifelongNav-v0"
 
 
 def register() -> None:
-    """Makes `gymnasium.make` and `gymnasium.make_vec` know the id; safe to call twice."""
+    """Register the id for `gymnasium.make` and `gymnasium.make_vec`; safe to call twice."""
     if ENV_ID not in gymnasium.registry:
         gymnasium.register(
             id=ENV_ID,

@@ -1,4 +1,4 @@
-"""Which tasks an environment draws from, and what it needs to know of a task."""
+"""Choose the tasks of an environment, and read what it needs of them."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -18,18 +18,18 @@ from evonav.world.pose import Pose
 
 @dataclass(frozen=True, slots=True)
 class StageTask:
-    """One stage of a task. But for the goal, oracle data."""
+    """One stage of a task; everything except the goal is oracle data."""
 
     goal: StageInput
     house_json: str
     house_sha256: str
     target_m: tuple[float, float]
-    """`(x, z)`."""
+    """The target's `(x, z)`."""
 
 
 @dataclass(frozen=True, slots=True)
 class NavTask:
-    """A task."""
+    """One task, in the form that environments need."""
 
     task_id: str
     start: Pose
@@ -37,18 +37,18 @@ class NavTask:
 
 
 class TaskSource:
-    """The tasks of a folder, each read when it is first drawn."""
+    """The tasks of a folder, each read when it is first chosen."""
 
     def __init__(self, tasks: Path | str | None = None, *, subset: str | None = None) -> None:
-        """Lists the tasks.
+        """List the tasks.
 
         Args:
-            tasks: A folder of tasks as `evonav generate` makes them; by default the bundled ones, which are of the
-                test split.
-            subset: Of the folder, such as `train-90`; by default all.
+            tasks: Folder of tasks as `evonav generate` makes them; by default the bundled ones, which are of the test
+                split.
+            subset: Named subset of the folder, such as `train-90`; by default all tasks.
 
         Raises:
-            TaskError: The folder holds no task, or not the subset.
+            TaskError: The folder has no tasks, or not the subset.
         """
         folder = _bundled() if tasks is None else Path(tasks)
         self.roots = tuple(task_roots(folder) if subset is None else subset_roots(folder, subset))
@@ -58,14 +58,14 @@ class TaskSource:
         return len(self.roots)
 
     def draw(self, random: np.random.Generator) -> int:
-        """Number of a task, each as likely as any other."""
+        """Draw the number of a task uniformly."""
         return int(random.integers(len(self.roots)))
 
     def find(self, task_id: str) -> int:
-        """Number of a task.
+        """Return the number of a task.
 
         Raises:
-            InvalidArgumentError: There is none of that name.
+            InvalidArgumentError: The task does not exist.
         """
         for number, root in enumerate(self.roots):
             if root.name == task_id:
@@ -73,19 +73,19 @@ class TaskSource:
         raise InvalidArgumentError(f"option `task` is {task_id!r}: {self.roots[0].parent} holds no such task")
 
     def task(self, number: int) -> NavTask:
-        """Reads a task.
+        """Read a task.
 
         Raises:
-            TaskError: It is malformed.
+            TaskError: The task is malformed.
         """
         return self._load(self.roots[number])
 
 
 def read_task(root: Path) -> NavTask:
-    """A task, of which evolution, rooms and categories are left behind.
+    """Read a task without evolution, rooms and categories.
 
     Raises:
-        TaskError: It is malformed.
+        TaskError: The task is malformed.
     """
     task = load_task(root)
     if task.num_stages > MAX_STAGES:

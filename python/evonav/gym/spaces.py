@@ -1,4 +1,4 @@
-"""Spaces of observations and actions, and what their numbers mean."""
+"""Define the spaces of observations and actions, and the meaning of their numbers."""
 
 import math
 import string
@@ -16,16 +16,16 @@ from evonav.tasks.public import StageInput
 
 MAX_STAGES = 64
 MAX_INSTRUCTION = 2000
-"""Longest instruction and most stages that a task file may hold."""
+"""Largest length of an instruction and largest number of stages that a task file may contain."""
 _CHARACTERS = string.ascii_letters + string.digits + string.punctuation + " "
 _REACH_M = 1000.0
-"""No house is as large."""
+"""Bound of positions in metres: larger than any house."""
 _STRUCTURE = ("Doorframe", "Doorway", "Window")
 
 
 @lru_cache(maxsize=1)
 def vocabulary() -> tuple[str, ...]:
-    """The closed vocabulary of categories: those of the asset catalogue, and `Other` for all else."""
+    """Return the closed vocabulary of categories: those of the asset catalogue, and `Other` for all others."""
     names = {category for _, category, _ in _core.assets()}
     return (*sorted(names.difference(_STRUCTURE)), "Other")
 
@@ -36,19 +36,19 @@ def _indices() -> dict[str, int]:
 
 
 def category_index(category: str) -> int:
-    """Index of a category in the vocabulary, that of `Other` if it is not in it."""
+    """Return the index of a category in the vocabulary, or that of `Other`."""
     return _indices().get(category, len(vocabulary()) - 1)
 
 
 def body_labels(bodies: list[tuple[str, str, str, Any, Any]]) -> NDArray[np.uint8]:
-    """Labels of `semantic`, `(N,)`: 1 + category of the bodies that are objects, 0 for walls and the like."""
+    """Return the labels of `semantic`, `(N,)`: 1 + category for objects, 0 for walls and other structure."""
     kinds = ((kind, category) for _, category, kind, _, _ in bodies)
     labels = (1 + category_index(category) if kind == "object" else 0 for kind, category in kinds)
     return np.fromiter(labels, np.uint8, len(bodies))
 
 
 def observation_space(config: NavConfig) -> spaces.Dict:
-    """Of one environment."""
+    """Return the observation space of one environment."""
     image = (config.height_px, config.width_px)
     side = config.reference_image_px
     all_spaces: dict[str, spaces.Space[Any]] = {
@@ -71,21 +71,21 @@ def observation_space(config: NavConfig) -> spaces.Dict:
 
 
 def action_space(config: NavConfig) -> spaces.Space[Any]:
-    """Of one environment."""
+    """Return the action space of one environment."""
     if config.action_mode == "actions":
         return spaces.Discrete(len(ACTIONS))
     return spaces.Box(-1.0, 1.0, (3,), np.float32)
 
 
 def relative_poses(poses: NDArray[np.float64], origins: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Poses as the task's start sees them.
+    """Return poses relative to the start of the task.
 
     Args:
         poses: `(B, 5)`: x, y, z, yaw, horizon.
-        origins: `(B, 5)`: the poses that the tasks began at.
+        origins: `(B, 5)`: the start poses of the tasks.
 
     Returns:
-        `(B, 4)`: metres to the right of and ahead of the start, sine and cosine of the turn since, clockwise.
+        `(B, 4)`: metres to the right and ahead of the start, sine and cosine of the turn since then, clockwise.
     """
     dx_m, dz_m = poses[:, 0] - origins[:, 0], poses[:, 2] - origins[:, 2]
     sin, cos = np.sin(origins[:, 3]), np.cos(origins[:, 3])
@@ -97,18 +97,19 @@ def relative_poses(poses: NDArray[np.float64], origins: NDArray[np.float64]) -> 
 def waypoint_m(
     config: NavConfig, action: NDArray[np.float32], pose: NDArray[np.float64], origin: NDArray[np.float64]
 ) -> tuple[float, float] | None:
-    """The point that a waypoint action asks for.
+    """Return the requested point of a waypoint action.
 
     Args:
         config: Frame and range.
-        action: `(3,)` in -1..1. The stage ends if the third is above 0. The first two are, times the range: metres to
-            the right and ahead of the agent (`relative`), or of where the task began (`start`); or (`polar`) distance,
-            -1 for none and 1 for the range, and bearing, -1..1 for half a turn to the left and to the right.
+        action: `(3,)` in -1..1. The stage ends if the third is above 0. The first two are multiplied by the range.
+            `relative`: metres to the right and ahead of the agent. `start`: the same relative to the task's start.
+            `polar`: distance, from -1 for zero to 1 for the range, and bearing, from -1 for half a turn to the left to
+            1 for half a turn to the right.
         pose: `(5,)`: the agent's x, y, z, yaw, horizon.
-        origin: `(5,)`: the pose that the task began at.
+        origin: `(5,)`: the start pose of the task.
 
     Returns:
-        `(x, z)`, or `None` to stop. An action that is not a number is clipped to one that is.
+        `(x, z)`, or `None` to stop. Numbers outside the range are clipped, and NaN counts as 0.
     """
     a, b, stop = np.nan_to_num(np.clip(action.astype(np.float64), -1.0, 1.0)).tolist()
     if stop > 0.0:
@@ -125,13 +126,13 @@ def waypoint_m(
 
 
 def instruction_text(goal: StageInput) -> str:
-    """The instruction as an element of its space: other characters than ASCII's become `?`."""
+    """Return the instruction as an element of its space: characters beyond ASCII become `?`."""
     text = goal.unified_instruction[:MAX_INSTRUCTION]
     return "".join(character if character in _CHARACTERS else "?" for character in text)
 
 
 def reference_image(goal: StageInput, side_px: int) -> NDArray[np.uint8]:
-    """The goal's image, `(S, S, 3)`, a copy."""
+    """Return the goal's image, `(S, S, 3)`, as a copy."""
     if goal.reference_image.shape[:2] == (side_px, side_px):
         return goal.reference_image.copy()
     resized = Image.fromarray(goal.reference_image).resize((side_px, side_px), Image.Resampling.BOX)

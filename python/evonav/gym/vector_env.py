@@ -1,4 +1,4 @@
-"""Many environments at once: all agents are stepped and drawn inside Rust, in parallel and without Python's lock."""
+"""Run many environments at once: Rust moves and renders all agents in parallel, without Python's lock."""
 
 import math
 import os
@@ -37,7 +37,7 @@ class _Episode:
 
     random: np.random.Generator
     number: int
-    """Of the task in the source."""
+    """Number of the task in the source."""
     next_number: int
     at: StageWorld
     run: StageRun
@@ -46,10 +46,10 @@ class _Episode:
 
 
 class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
-    """B environments that are to the bit `LifelongNavEnv`, each with a seed of its own.
+    """B environments that equal `LifelongNavEnv` bit by bit, each with a seed of its own.
 
-    What ends is begun anew by the next step (`AutoresetMode.NEXT_STEP`), whose action for it is not carried out and
-    whose reward is 0. The next houses are built meanwhile on a background thread.
+    An episode that has ended restarts at the next step (`AutoresetMode.NEXT_STEP`), whose action is ignored and whose
+    reward is 0. A background thread builds the next houses in the meantime.
 
     Example:
         >>> import evonav.gym, gymnasium
@@ -78,23 +78,23 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         cache_mb: int = 512,
         **settings: Any,  # noqa: ANN401 - fields of NavConfig
     ) -> None:
-        """Environments over some tasks.
+        """Make environments over some tasks.
 
         Args:
-            tasks: A folder of tasks; by default the bundled ones.
-            num_envs: B.
-            subset: Of the folder, such as `train-90`.
+            tasks: Folder of tasks; by default the bundled ones.
+            num_envs: Number B of environments.
+            subset: Named subset of the folder, such as `train-90`.
             config: All settings at once.
             render_mode: `rgb_array`, or none.
-            num_threads: That step and draw; by default one a core. Results do not depend on it.
-            copy: Whether every step returns arrays of its own. If not, the images of a step are written over by the
-                next one's, which saves their memory from being mapped anew.
-            cache_mb: Memory for houses that no agent is in.
-            **settings: Fields of `NavConfig`, over those of `config`.
+            num_threads: Threads that move and render; by default one per core. Results do not depend on it.
+            copy: Whether every step returns arrays of its own. Otherwise a step overwrites the images of the previous
+                one, which saves the allocation of their memory.
+            cache_mb: Memory for houses without an agent.
+            **settings: Fields of `NavConfig`, which override those of `config`.
 
         Raises:
-            InvalidArgumentError: A setting is outside its domain.
-            TaskError: The folder holds no task, or not the subset.
+            InvalidArgumentError: A setting is out of range.
+            TaskError: The folder has no tasks, or not the subset.
         """
         self.config = replace(config or NavConfig(), **settings)
         self.num_envs, self.render_mode, self._copies = num_envs, render_mode, copy
@@ -125,11 +125,11 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, Infos]:
-        """Begins a task in every environment.
+        """Begin a task in every environment.
 
         Args:
-            seed: Environment `i`'s is `seed + i`, or one is given for each.
-            options: `{"task": TASK_ID}` for one task in all of them.
+            seed: Seed of environment 0; environment `i` has `seed + i`. Or one seed for each.
+            options: `{"task": TASK_ID}` to choose one task for all of them.
         """
         seeds = [seed] * self.num_envs if seed is None else seed
         if isinstance(seeds, int):
@@ -157,10 +157,10 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         self,
         actions: Any,  # noqa: ANN401 - of either mode
     ) -> tuple[Observations, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Infos]:
-        """Acts in every environment.
+        """Execute an action in every environment.
 
         Raises:
-            InvalidArgumentError: There is not one action an environment, or one is none.
+            InvalidArgumentError: The number of actions is wrong, or an action is invalid.
             ResetNeeded: No task was begun.
         """
         if not self._episodes:
@@ -189,7 +189,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         return self._observations(), rewards, terminations, np.zeros(self.num_envs, np.bool_), self._infos(ended)
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """What the agents see, `(H, W, 3)` each, in mode `rgb_array`."""
+        """Return the agents' views, `(H, W, 3)` each, in mode `rgb_array`."""
         if self.render_mode != "rgb_array":
             return None
         rgb = np.empty((self.num_envs, self.config.height_px, self.config.width_px, 3), np.uint8)
@@ -197,19 +197,19 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         return tuple(rgb)
 
     def close_extras(self, **_: Any) -> None:  # noqa: ANN401 - Gymnasium's signature
-        """Ends the background thread."""
+        """End the background thread."""
         self.loader.close()
 
     def _begin_task(self, index: int, number: int, random: np.random.Generator) -> _Episode:
         at = self.loader.get(number, 1)
-        # One draw a task, made a task ahead: the next house can be built meanwhile.
+        # Each task is drawn one task ahead, so that its house can be built in the meantime.
         next_number = self.loader.source.draw(random)
         run, start = self._begin_stage(index, (number, next_number), at, at.task.start)
         self._origins[index] = as_row(start)
         return _Episode(random, number, next_number, at, run, [])
 
     def _begin_stage(self, index: int, numbers: tuple[int, int], at: StageWorld, pose: Pose) -> tuple[StageRun, Pose]:
-        """Puts an agent into a stage; `numbers` are of this task and the next."""
+        """Put an agent into a stage; `numbers` are those of this task and the next."""
         simulator = at.world.entered()
         start = simulator.enter(pose)
         self._batch.place(
@@ -230,7 +230,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         return run, start
 
     def _end_stage(self, index: int, episode: _Episode, end: Pose, *, is_stop: bool) -> Infos:
-        """Measures a stage and begins the next, if there is one."""
+        """Measure a stage and begin the next one, if there is one."""
         at = episode.at
         episode.results.append(episode.run.result(at.stage, end, is_stop=is_stop))
         ended: Infos = {"stage_result": dict(episode.results[-1])}
@@ -243,7 +243,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         return ended
 
     def _move(self, actions: NDArray[Any], is_reset: list[bool]) -> tuple[list[float], list[float], list[bool]]:
-        """Discrete actions: lengths of the ways, distances left, and who stopped."""
+        """Execute discrete actions; return path lengths, remaining distances, and who stopped."""
         numbers = np.where(is_reset, STOP, actions)
         if not ((numbers >= 0) & (numbers <= STOP)).all():
             raise InvalidArgumentError(f"argument `actions` holds {numbers.tolist()}, expected 0 to {STOP}")
@@ -256,7 +256,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         return lengths_m, distances_m.tolist(), (numbers == STOP).tolist()
 
     def _navigate(self, actions: NDArray[Any], is_reset: list[bool]) -> tuple[list[float], list[float], list[bool]]:
-        """Waypoint actions: paths are found in Rust, and followed as the evaluator follows them."""
+        """Execute waypoint actions: Rust finds the paths, which agents follow as in an evaluation."""
         targets_m = [
             None if skips else spaces.waypoint_m(self.config, action, pose, origin)
             for action, pose, origin, skips in zip(actions, self._poses, self._origins, is_reset, strict=True)
@@ -308,7 +308,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         return {name: seen[name] for name in config.observations}
 
     def _drawn(self) -> Observations:
-        """Images of all agents, drawn straight into the arrays that are returned."""
+        """Render the images of all agents directly into the returned arrays."""
         shape = (self.num_envs, self.config.height_px, self.config.width_px)
         kinds = {"depth": (shape, np.float32), "rgb": ((*shape, 3), np.uint8), "semantic": (shape, np.uint8)}
         wanted = {name: kind for name, kind in kinds.items() if self.config.has(name)}

@@ -1,4 +1,4 @@
-"""What an agent remembers: occupancy, frontiers, object entries."""
+"""An agent's memory: occupancy, frontiers, object entries and views."""
 
 from evonav.memory.objects import Comparison, ObjectEntry, ObjectMap, ObjectMapConfig, ObjectUpdate
 from evonav.memory.occupancy import Conflicts, Frontier, FrontierConfig, OccupancyMap

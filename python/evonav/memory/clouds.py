@@ -1,6 +1,6 @@
-"""Points of every detection of every kept view, thinned: what a stored view knows in three dimensions.
+"""Store sampled points of every detection of every stored view: the view's content in three dimensions.
 
-MSGNav keeps depth images to turn a mask of an old view into points. Thinned points of the masks say the same in a
+MSGNav stores depth images to turn a mask of an old view into points. Sampled points of the masks contain the same in a
 hundredth of the space.
 """
 
@@ -14,37 +14,37 @@ from evonav.sensors.observation import View
 
 Point3 = tuple[float, float, float]
 Box = tuple[Point3, Point3]
-"""Middle and edges of an axis-aligned box, metres."""
+"""Centre and edges of an axis-aligned box, in metres."""
 
 
 @dataclass(frozen=True, slots=True)
 class ViewClouds:
-    """The detections of one view, as millimetres from its camera."""
+    """The points of one view's detections, in millimetres relative to its camera."""
 
     camera_m: Point3
     offsets_mm: NDArray[np.int16]
-    """`(N, 3)`, detection by detection."""
+    """`(N, 3)` points, detection by detection."""
     ends: NDArray[np.int64]
-    """`(D,)` where each detection's points end."""
+    """`(D,)` end index of each detection's points."""
     boxes_m: tuple[Box | None, ...]
-    """Around each detection's points; `None` for one without depth."""
+    """Box around each detection's points; `None` for a detection without depth."""
 
     def points_m(self, index: int) -> NDArray[np.float32]:
-        """`(N, 3)` points of a detection, world frame."""
+        """Return the `(N, 3)` points of a detection, world frame."""
         first = int(self.ends[index - 1]) if index else 0
         offsets_m = self.offsets_mm[first : int(self.ends[index])].astype(np.float32) * np.float32(1e-3)
         return offsets_m + np.array(self.camera_m, np.float32)
 
 
 def clouds_of(view: View, *, max_points: int = 500) -> ViewClouds:
-    """The points behind the masks of a view.
+    """Return the points behind the masks of a view.
 
     Args:
-        view: Its masks, depth, pose and intrinsics are used.
-        max_points: Of a detection, every n-th of its pixels.
+        view: View with masks, depth, pose and intrinsics.
+        max_points: Largest number of points of a detection, taken evenly from its pixels.
 
     Raises:
-        InvalidArgumentError: An array does not fit, or holds NaN.
+        InvalidArgumentError: An array has the wrong shape, or contains NaN.
     """
     camera_m = view.pose.position_m
     points_m, ends = _core.unproject_masks(

@@ -1,4 +1,4 @@
-"""The object map: detections gathered into lasting entries."""
+"""Merge detections into lasting object entries: the object map."""
 
 from dataclasses import asdict, dataclass
 
@@ -17,135 +17,135 @@ class ObjectMapConfig:
     """ConceptGraphs' pipeline with 3D-Mem's parameters."""
 
     min_points: int = 16
-    """Fewest pixels with a depth of a detection."""
+    """Smallest number of a detection's pixels with a depth."""
     max_points: int = 5000
     """A mask is thinned to about this many points."""
     min_box_m3: float = 1e-6
-    """Smallest volume of a detection's box, whose edges count as a voxel's at least."""
+    """Smallest volume of a detection's box; each of its edges counts as at least one voxel."""
     voxel_m: float = 0.01
-    """Edge of the voxels that clouds are thinned by."""
+    """Edge of the voxels that thin the clouds."""
     cluster_radius_m: float = 0.1
     """DBSCAN's radius for cleaning clouds."""
     cluster_min_points: int = 10
     """DBSCAN's neighbours of a core point."""
     max_distance_m: float = 3.5
-    """Detections and unconfirmed entries farther from the agent than this, on the ground plane, do not count."""
+    """Ground-plane distance from the agent beyond which detections and unconfirmed entries do not count."""
     overlap_radius_m: float = 0.025
-    """Two points nearer than this are the same place."""
+    """Distance below which two points are the same place."""
     visual_weight: float = 1.0
-    """What visual similarity counts for beside overlap; 0 matches by overlap alone, whatever the label."""
+    """Weight of visual similarity relative to overlap; 0 matches by overlap alone, whatever the label."""
     match_threshold: float = 1.2
     """A detection joins an entry if overlap plus weighted visual similarity exceeds this."""
     views_per_cleanup: int = 12
-    """Views between two clean-ups; 0 for none."""
+    """Number of views between two clean-ups; 0 for none."""
     min_detections: int = 2
     """Entries with fewer detections are dropped at a clean-up if far from the agent."""
     merge_overlap: float = 0.7
-    """Entries merge at a clean-up if one lies in the other by more than this part ..."""
+    """Share of an entry that must lie in another for a clean-up to merge them."""
     merge_similarity: float = 0.7
-    """... and they look alike by more than this."""
+    """Visual similarity that a merge requires in addition."""
 
 
 @dataclass(frozen=True, slots=True)
 class SightConfig:
-    """When a line from an eye to a point is open (MSGNav's parameters)."""
+    """Conditions for a line of sight from an eye to a point (MSGNav's parameters)."""
 
     radius_m: float = 0.05
-    """A remembered point nearer to a sample of a line than this closes the line."""
+    """Distance from a sample of a line within which a remembered point blocks it."""
     step_m: float = 0.05
-    """Between two samples of a line."""
+    """Distance between two samples of a line."""
     margin_m: float = 0.15
-    """The first and the last stretch of a line, which are not sampled."""
+    """Length of the first and the last part of a line, which are not sampled."""
     max_samples: int = 1000
-    """Of a line; of a longer one they lie farther apart."""
+    """Largest number of samples of a line; longer lines are sampled more coarsely."""
     max_targets: int = 1000
-    """A target is thinned to at most so many points."""
+    """Largest number of points of a target, which is thinned."""
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectUpdate:
-    """What an update did."""
+    """The effects of an update."""
 
     entry_ids: tuple[int | None, ...]
     """Entry of each detection; `None` if it was filtered out."""
     removed: tuple[int, ...]
-    """Entries that the clean-up dropped."""
+    """Entries that the clean-up removed."""
     merged: tuple[tuple[int, int], ...]
-    """Entries that the clean-up merged: the one that is gone, and the one that it became."""
+    """Entries that the clean-up merged: the removed one, and the one that absorbed it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """How the detections of one view compare with an entry."""
+    """The detections of one view compared with an entry."""
 
     overlap: NDArray[np.float64]
-    """`(N,)` part of a detection's points that lie by the entry's."""
+    """`(N,)` share of a detection's points that lie by the entry's."""
     distance_m: NDArray[np.float64]
-    """`(N,)` from a detection's centroid to the middle of the entry's box; `inf` if it was filtered out."""
+    """`(N,)` distance from a detection's centroid to the centre of the entry's box; `inf` if it was filtered out."""
 
 
 class ObjectMap:
-    """What was detected so far, as entries: beliefs, which go stale when an object moves.
+    """The detections so far, as entries: beliefs, which become stale when an object moves.
 
-    A detection joins the entry with the largest sum of spatial similarity (the part of its points within
+    A detection joins the entry with the largest sum of spatial similarity (the share of its points within
     `overlap_radius_m` of the entry's) and visual similarity (cosine of features; without features, 1 for the same
-    label), if that exceeds `match_threshold`; else it becomes an entry. Simulator ids play no part.
+    label), if that exceeds `match_threshold`. Otherwise it becomes an entry. Simulator ids are not used.
     """
 
     def __init__(self, config: ObjectMapConfig | None = None) -> None:
-        """A map without entries, in stage 1.
+        """Make a map without entries, in stage 1.
 
         Raises:
-            InvalidArgumentError: A parameter is outside its domain; the message names it.
+            InvalidArgumentError: A parameter is out of range; the message names it.
         """
         self.config = config or ObjectMapConfig()
         self._map = _core.ObjectMap(**asdict(self.config))
 
     def __len__(self) -> int:
-        """Number of entries."""
+        """Return the number of entries."""
         return len(self._map)
 
     @property
     def entries(self) -> list[ObjectEntry]:
-        """Entries as they are now, by ascending id."""
+        """The present entries, by ascending id."""
         return self._map.entries
 
     @property
     def num_views(self) -> int:
-        """Views taken over so far."""
+        """Number of views integrated so far."""
         return self._map.num_views
 
     def entry(self, entry_id: int) -> ObjectEntry | None:
-        """The entry of an id, if it is still there."""
+        """Return the entry with an id, or `None` if it no longer exists."""
         return self._map.entry(entry_id)
 
     def points_m(self, entry_id: int) -> NDArray[np.float32] | None:
-        """`(N, 3)` points of an entry, world frame, if it is still there."""
+        """Return an entry's `(N, 3)` points, world frame, or `None` if it no longer exists."""
         return self._map.points_m(entry_id)
 
     def begin_stage(self, stage: int) -> None:
-        """Starts a stage: entries stay, the count of views to the next clean-up starts over."""
+        """Begin a stage: entries stay, and the count of views to the next clean-up restarts."""
         self._map.begin_stage(stage)
 
     def remove(self, entry_id: int) -> bool:
-        """Takes an entry out; whether there was one."""
+        """Remove an entry; return whether it existed."""
         return self._map.remove(entry_id)
 
     def clear(self) -> None:
-        """Forgets all entries; the map is as new, ids included."""
+        """Remove all entries; the map is as new, ids included."""
         self._map.clear()
 
     def update(self, view: View) -> ObjectUpdate:
-        """Takes over one view.
+        """Integrate one view.
 
-        Every `views_per_cleanup` views, entries are denoised, those seen fewer than `min_detections` times and far
-        away are dropped, and those that lie in one another are merged.
+        After every `views_per_cleanup` views, entries are denoised, those seen fewer than `min_detections` times and
+        far away are removed, and overlapping similar ones are merged.
 
         Args:
-            view: Its detections, depth, pose and intrinsics are used.
+            view: View with detections, depth, pose and intrinsics.
 
         Raises:
-            InvalidArgumentError: An array does not fit, or holds NaN; the map is then unchanged.
+            InvalidArgumentError: An array has the wrong shape or contains NaN; the map does not change then.
         """
         found = view.detections
         entry_ids, removed, merged = self._map.update(
@@ -162,10 +162,10 @@ class ObjectMap:
         return ObjectUpdate(tuple(entry_ids), tuple(removed), tuple(merged))
 
     def compare(self, entry_id: int, view: View) -> Comparison:
-        """Compares the detections of a view, at any distance, with an entry; nothing changes.
+        """Compare the detections of a view, at any distance, with an entry; the map does not change.
 
         Raises:
-            InvalidArgumentError: There is no such entry, or an array does not fit.
+            InvalidArgumentError: The entry does not exist, or an array has the wrong shape.
         """
         found = view.detections
         compared = self._map.compare(
@@ -185,30 +185,30 @@ class ObjectMap:
     def visible_shares(
         self, target_m: NDArray[np.float32], eyes_m: NDArray[np.float64], config: SightConfig | None = None
     ) -> NDArray[np.float64]:
-        """How much of an object can be seen from some places, past the points of all entries and its own.
+        """Return the visible share of an object from several places; the points of all entries may occlude it.
 
-        Walls are in no entry: one sees through them.
+        Walls are not entries, so they do not occlude.
 
         Args:
             target_m: `(N, 3)` points of the object, world frame.
-            eyes_m: `(E, 3)` places of the eyes, world frame.
-            config: When a line is open.
+            eyes_m: `(E, 3)` positions of the eyes, world frame.
+            config: Conditions for a line of sight.
 
         Returns:
-            `(E,)` shares of the target's points in 0..1; 0 without points.
+            `(E,)` shares of the target's points, 0 to 1; 0 without points.
 
         Raises:
-            InvalidArgumentError: A place is not finite, or a parameter is outside its domain; the message names it.
+            InvalidArgumentError: A position is not finite, or a parameter is out of range; the message names it.
         """
         return self._map.visible_shares(target_m, eyes_m, **asdict(config or SightConfig()))
 
     def is_supported(self, entry_id: int, view: View, *, max_distance_m: float = 0.5, min_overlap: float = 0.2) -> bool:
-        """Whether a view still shows the object of an entry where it was.
+        """Return whether a view still shows the object of an entry in its place.
 
-        That is, some detection with the entry's label overlaps it, or has its centroid by the middle of its box.
+        It does if some detection with the entry's label overlaps it, or has its centroid near the centre of its box.
 
         Raises:
-            InvalidArgumentError: There is no such entry, or an array does not fit.
+            InvalidArgumentError: The entry does not exist, or an array has the wrong shape.
         """
         compared = self.compare(entry_id, view)
         entry = self._map.entry(entry_id)

@@ -1,4 +1,4 @@
-"""The agent's occupancy map and its frontiers."""
+"""Maintain the agent's occupancy map and its frontiers."""
 
 import math
 from dataclasses import dataclass
@@ -18,54 +18,54 @@ UNKNOWN, FREE, BLOCKED = 0, 1, 2
 
 @dataclass(frozen=True, slots=True)
 class FrontierConfig:
-    """When free cells are a frontier (3D-Mem's parameters, and a last resort of our own)."""
+    """Conditions for free cells to be a frontier (3D-Mem's parameters, and a last resort of our own)."""
 
     min_cells: int = 20
-    """Fewest cells of a region."""
+    """Smallest number of cells of a region."""
     min_border_cells: int = 3
-    """Without such regions, groups of so many unknown cells beside free ones are frontiers; 0: never, as in 3D-Mem."""
+    """Fallback without such regions: smallest group of unknown cells beside free ones; 0 for none, as in 3D-Mem."""
     max_span_deg: float = 150.0
-    """A region wider than this, seen from the agent, is split."""
+    """Angle seen from the agent above which a region is split."""
     clearance_m: float = 0.5
-    """A view position is moved away from an obstacle nearer than this ..."""
+    """Distance from an obstacle within which a view position is moved away."""
     push_step_m: float = 0.05
-    """... in steps of this ..."""
+    """Step in which the view position is moved away."""
     max_push_m: float = 0.3
-    """... and at most this far."""
+    """Largest distance that the view position is moved away."""
 
 
 @dataclass(frozen=True, slots=True)
 class Conflicts:
-    """Seen cells whose state contradicts the map."""
+    """Observed cells whose state contradicts the map."""
 
     freed: NDArray[np.int32]
-    """`(N, 2)` `[row, col]`: remembered blocked, now seen free."""
+    """`(N, 2)` `[row, col]`: remembered as blocked, now seen free."""
     obstructed: NDArray[np.int32]
-    """`(N, 2)` `[row, col]`: remembered free, now seen blocked."""
+    """`(N, 2)` `[row, col]`: remembered as free, now seen blocked."""
 
     def __len__(self) -> int:
-        """Number of contradicting cells."""
+        """Return the number of contradicting cells."""
         return len(self.freed) + len(self.obstructed)
 
 
 class OccupancyMap:
-    """Unknown, free and blocked cells, which of them were seen from close by (*explored*), and the frontiers.
+    """Unknown, free and blocked cells, the cells seen from near (*explored*), and the frontiers.
 
-    Cells are told only by `integrate`; the last observation of a cell wins.
+    Only `integrate` sets cells; the last observation of a cell counts.
     """
 
     def __init__(
         self, map_frame: MapFrame, frontiers: FrontierConfig | None = None, *, explored_range_m: float = 1.7
     ) -> None:
-        """A map of unknown cells.
+        """Make a map of unknown cells.
 
         Args:
             map_frame: Shape and place of the cells.
             frontiers: Parameters of the frontiers.
-            explored_range_m: Seen cells nearer than this are explored (3D-Mem: 1.7 m).
+            explored_range_m: Distance within which seen cells are explored (3D-Mem: 1.7 m).
 
         Raises:
-            InvalidArgumentError: A parameter is outside its domain; the message names it.
+            InvalidArgumentError: A parameter is out of range; the message names it.
         """
         frontiers = frontiers or FrontierConfig()
         self.map_frame = map_frame
@@ -85,66 +85,66 @@ class OccupancyMap:
 
     @property
     def cells(self) -> NDArray[np.uint8]:
-        """`(R, C)` copy: `UNKNOWN`, `FREE` or `BLOCKED`."""
+        """Cells, an `(R, C)` copy: `UNKNOWN`, `FREE` or `BLOCKED`."""
         return self._map.cells
 
     @property
     def explored(self) -> NDArray[np.bool_]:
-        """`(R, C)` copy: whether the cell was seen from close by."""
+        """Explored cells, an `(R, C)` copy: `True` if the cell was seen from near."""
         return self._map.explored
 
     def conflicts(self, seen: VisibleOccupancy) -> Conflicts:
-        """Seen cells that contradict the map, which stays as it is."""
+        """Return the seen cells that contradict the map, which does not change."""
         return Conflicts(*self._map.conflicts(seen.free, seen.blocked))
 
     def integrate(self, seen: VisibleOccupancy, origin_m: tuple[float, float]) -> Conflicts:
-        """Takes over what one view saw.
+        """Integrate the cells that one view saw.
 
         Args:
-            seen: Cells of this map.
-            origin_m: `(x, z)` of the camera.
+            seen: Observed cells of this map.
+            origin_m: The camera's `(x, z)`.
 
         Returns:
-            What contradicted the map before.
+            The cells that contradicted the map before.
 
         Raises:
-            InvalidArgumentError: A cell is off the map (which then stays as it is), or a number is not finite.
+            InvalidArgumentError: A cell is off the map, or a number is not finite; the map does not change then.
         """
         return Conflicts(
             *self._map.integrate(seen.free, seen.blocked, origin_m=origin_m, explored_range_m=self.explored_range_m)
         )
 
     def explore_around(self, centre_m: tuple[float, float], radius_m: float = 0.7) -> None:
-        """Marks the free cells around `(x, z)` explored: where the agent has been, it has looked."""
+        """Mark the free cells around `(x, z)` as explored: where the agent has been, it has looked."""
         self._map.explore_around(centre_m, radius_m)
 
     def assume_free(self, centre_m: tuple[float, float], radius_m: float = 0.6) -> None:
-        """Takes the unknown cells around `(x, z)` for free and explored until seen; they never make a conflict."""
+        """Treat the unknown cells around `(x, z)` as free and explored until seen; they never cause a conflict."""
         self._map.assume_free(centre_m, radius_m)
 
     def forget(self, cells: NDArray[np.int32]) -> None:
-        """Makes `(N, 2)` `[row, col]` cells unknown and unexplored."""
+        """Make `(N, 2)` `[row, col]` cells unknown and unexplored."""
         self._map.forget(cells)
 
     def clear(self) -> None:
-        """Forgets cells and frontiers; frontier ids go on counting."""
+        """Remove cells and frontiers; frontier ids continue."""
         self._map.clear()
 
     def clear_frontiers(self) -> None:
-        """Drops the frontiers; ids go on counting."""
+        """Remove the frontiers; ids continue."""
         self._map.clear_frontiers()
 
     @property
     def frontiers(self) -> list[Frontier]:
-        """Those of the last `update_frontiers`, by ascending id."""
+        """The frontiers of the last `update_frontiers`, by ascending id."""
         return self._map.frontiers
 
     def update_frontiers(self, agent_m: tuple[float, float]) -> list[Frontier]:
-        """Brings the frontiers up to date with the cells.
+        """Update the frontiers by the cells.
 
-        A frontier whose region has hardly changed keeps its id, position and direction.
+        A frontier whose region has hardly changed has the same id, position and direction as before.
 
         Args:
-            agent_m: `(x, z)`; frontiers lie on the free floor connected to it.
+            agent_m: The agent's `(x, z)`; frontiers lie on the free floor connected to it.
         """
         return self._map.update_frontiers(agent_m)

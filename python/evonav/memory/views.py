@@ -1,4 +1,4 @@
-"""Views kept for prompts and for looking again: a small picture each, and what was detected in them."""
+"""Store views for prompts and for a second look: a small image each, with its detections."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,10 +14,10 @@ from evonav.world.pose import Pose
 from evonav.world.simulator import Intrinsics
 
 JPEG_QUALITY = 90
-"""About 20 KB a view of 300 x 300, a tenth of its pixels: an episode keeps hundreds."""
+"""Quality of stored images: about 20 KB for 300 x 300 pixels, a tenth of the raw data; an episode has hundreds."""
 
 Box = tuple[int, int, int, int]
-"""Left, top, right, bottom in pixels; right and bottom are one past the last."""
+"""Left, top, right, bottom in pixels; right and bottom are exclusive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Seen:
     """One detection of a view."""
 
     entry_id: int | None
-    """The entry that it joined, as it was called then; `None` if it was filtered out."""
+    """Id that the entry of this detection had then; `None` if the detection was filtered out."""
     label: str
     confidence: float
     area_px: int
@@ -34,24 +34,24 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class StoredView:
-    """A view as kept."""
+    """A stored view."""
 
     id: int
-    """Counts up from 0."""
+    """Number of the view, from 0."""
     stage: int
     round: int
-    """Of the stage."""
+    """Round of the stage."""
     pose: Pose
-    """The camera's own."""
+    """Pose of the camera itself."""
     intrinsics: Intrinsics
     seen: tuple[Seen, ...]
-    """In the order of the detections."""
+    """The view's detections, in their order."""
     jpeg: bytes | None
-    """`None` when the view came without colours."""
+    """The image; `None` if the view had no colours."""
 
 
 class ViewStore:
-    """Views in the order in which they came."""
+    """Views in the order of their arrival."""
 
     def __init__(self) -> None:
         self.views: list[StoredView] = []
@@ -60,13 +60,13 @@ class ViewStore:
         self._latest: dict[int, int] = {}
 
     def add(self, view: View, entry_ids: Sequence[int | None], *, stage: int, round_: int) -> StoredView:
-        """Keeps a view.
+        """Store a view.
 
         Args:
-            view: As observed.
-            entry_ids: Entry of each detection, as `ObjectMap.update` tells.
-            stage: Of the task.
-            round_: Of the stage.
+            view: The observed view.
+            entry_ids: Entry of each detection, as in `ObjectUpdate`.
+            stage: Stage of the task.
+            round_: Round of the stage.
         """
         boxes = boxes_of(view.detections)
         seen = tuple(
@@ -88,7 +88,7 @@ class ViewStore:
         return stored
 
     def follow(self, merged: Mapping[int, int] | Sequence[tuple[int, int]]) -> None:
-        """Takes note of entries that became others; pairs as `ObjectUpdate.merged` has them."""
+        """Record that entries were absorbed by others; pairs are those of `ObjectUpdate.merged`."""
         for old, new in dict(merged).items():
             self._became[old] = new
             target = self.resolve(new)
@@ -99,30 +99,30 @@ class ViewStore:
                 self._best[target] = best
 
     def resolve(self, entry_id: int) -> int:
-        """The entry that an entry has become by now."""
+        """Return the entry that an entry has become."""
         while entry_id in self._became:
             entry_id = self._became[entry_id]
         return entry_id
 
     def best(self, entry_id: int) -> tuple[StoredView, Seen] | None:
-        """The view that shows an entry largest, and where in it; `None` if none does."""
+        """Return the view that shows an entry largest, and its detection there; `None` if no view shows it."""
         found = self._best.get(self.resolve(entry_id))
         return None if found is None else (self.views[found[0]], found[1])
 
     def seen_in(self, view: StoredView, entry_id: int) -> Seen | None:
-        """Where a view shows an entry, the largest part if there are several; `None` if it does not."""
+        """Return the largest detection of an entry in a view; `None` if the view does not show it."""
         entry_id = self.resolve(entry_id)
         shown = (one for one in view.seen if one.entry_id is not None and self.resolve(one.entry_id) == entry_id)
         return max(shown, key=lambda one: one.area_px, default=None)
 
     def latest(self, entry_id: int) -> StoredView | None:
-        """The view that an entry was last seen in."""
+        """Return the view in which an entry was last seen."""
         found = self._latest.get(self.resolve(entry_id))
         return None if found is None else self.views[found]
 
 
 def pixels_of(view: StoredView, size_px: int | None = None) -> NDArray[np.uint8] | None:
-    """`(H, W, 3)` RGB of a view, its longer edge at most `size_px`; `None` when it came without colours."""
+    """Return the `(H, W, 3)` image of a view, its longer edge at most `size_px`; `None` if it had no colours."""
     if view.jpeg is None:
         return None
     with Image.open(BytesIO(view.jpeg)) as image:
@@ -133,7 +133,7 @@ def pixels_of(view: StoredView, size_px: int | None = None) -> NDArray[np.uint8]
 
 
 def crop_of(view: StoredView, box_px: Box, margin_px: int = 20) -> NDArray[np.uint8] | None:
-    """A part of a view with a margin around it (3D-Mem: 20 px)."""
+    """Return a part of a view with a margin around it (3D-Mem: 20 px)."""
     picture = pixels_of(view)
     if picture is None:
         return None
@@ -144,7 +144,7 @@ def crop_of(view: StoredView, box_px: Box, margin_px: int = 20) -> NDArray[np.ui
 
 
 def boxes_of(detections: Detections) -> list[tuple[int, Box]]:
-    """Pixels and bounding box of each detection; `(0, (0, 0, 0, 0))` of one without pixels."""
+    """Return number of pixels and bounding box of each detection; `(0, (0, 0, 0, 0))` for one without pixels."""
     extents = _core.mask_extents(detections.masks, num_masks=len(detections.labels))
     return [(area_px, (left, top, right, bottom)) for area_px, left, top, right, bottom in extents.tolist()]
 
