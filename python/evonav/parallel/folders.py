@@ -1,4 +1,4 @@
-"""What every command that fills a folder does: one writer at a time, one configuration, whole files, checksums."""
+"""Write folders safely: one writer at a time, one configuration, whole files, checksums."""
 
 import errno
 import hashlib
@@ -26,12 +26,12 @@ _NETWORK = frozenset(
      "fuse.sshfs", "fuse.glusterfs", "fuse.ceph", "fuse.s3fs", "fuse.gcsfuse")
 )  # fmt: skip
 _UNLOCKED = frozenset(("nolock", "local_lock=all", "local_lock=flock", "nobrl"))
-"""Options of mounts whose locks another machine does not see."""
+"""Mount options under which another machine does not see a lock."""
 
 
 @contextmanager
 def writing(folder: Path) -> Iterator[None]:
-    """Keeps a second writer out of a folder, which is made if need be; a writer that died keeps nobody out.
+    """Lock a folder against a second writer; the folder is made if needed, and the lock ends with the process.
 
     Raises:
         StoreError: Another process is writing there, the folder cannot be made, or its file system has no locks.
@@ -40,8 +40,8 @@ def writing(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         file = (folder / LOCK_NAME).open("a+")
     except OSError as error:
-        said = error.strerror or error
-        raise StoreError(f"{folder}: cannot be made or written: {said}; name another folder") from error
+        reason = error.strerror or error
+        raise StoreError(f"{folder}: cannot be made or written: {reason}; name another folder") from error
     with file:
         kind, options = _mount_of(folder)
         if kind in _NETWORK and any(option in _UNLOCKED for option in options.split(",")):
@@ -66,13 +66,13 @@ def writing(folder: Path) -> Iterator[None]:
         yield
 
 
-def check_same_run(stored: Mapping[str, Any], asked: Mapping[str, Any], folder: Path) -> None:
-    """A folder holds one run: the same configuration, or an error that names what differs.
+def check_same_run(stored: Mapping[str, Any], requested: Mapping[str, Any], folder: Path) -> None:
+    """Check that a folder holds a run of the same configuration.
 
     Raises:
-        StoreError: Any entry differs; nested ones are named with dots.
+        StoreError: An entry differs; the message names each, nested ones with dots.
     """
-    there, here = _flat(stored), _flat(asked)
+    there, here = _flat(stored), _flat(requested)
     differing = sorted(key for key in there.keys() | here.keys() if there.get(key) != here.get(key))
     if differing:
         lines = "; ".join(f"{key}: there {there.get(key)!r}, asked {here.get(key)!r}" for key in differing)
@@ -80,7 +80,7 @@ def check_same_run(stored: Mapping[str, Any], asked: Mapping[str, Any], folder: 
 
 
 def write_atomically(path: Path, data: str | bytes) -> None:
-    """Writes beside and renames, so that a reader sees the old file or the new one, also after a loss of power.
+    """Replace a file as a whole: a reader sees the old or the new one, also after a loss of power.
 
     Raises:
         StoreError: It cannot be written.
@@ -100,28 +100,28 @@ def write_atomically(path: Path, data: str | bytes) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Makes what a folder lists outlast a loss of power, where the system can do that."""
+    """Write a folder's list of files to disk, where the system can do that."""
     if os.name != "posix":
         return
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # file systems that have no such thing
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # not supported by this file system
             raise
     finally:
         os.close(descriptor)
 
 
 def put_folder(written: Path, root: Path, *, aside: Path) -> None:
-    """Moves a folder to its place, where one of the same name is replaced.
+    """Move a folder to its place, and replace a folder of the same name.
 
-    Killed at any moment, it leaves the old one or the new one in place, or the old one whole at `aside`.
+    If the process is killed, the old or the new folder is in place, or the old one is whole at `aside`.
 
     Args:
-        written: What is moved.
-        root: To where.
-        aside: In the same file system, where the old one is put for as long as it takes; whatever is there goes.
+        written: The folder to move.
+        root: Its place.
+        aside: A path in the same file system for the old folder meanwhile; what is there is removed.
 
     Raises:
         OSError: It cannot be moved.
@@ -136,12 +136,12 @@ def put_folder(written: Path, root: Path, *, aside: Path) -> None:
 
 
 def is_on_network(path: Path) -> bool:
-    """Whether a path is on a file system of another machine, as far as this one tells."""
+    """Return whether a path is on a network file system, as far as the system tells."""
     return _mount_of(path)[0] in _NETWORK
 
 
 def _mount_of(path: Path) -> tuple[str, str]:
-    """Type and options of the file system that holds a path; empty where the system does not tell."""
+    """Return type and options of the file system that holds a path; empty where the system does not tell."""
     try:
         lines = _MOUNTS.read_text().splitlines()
         path = path.resolve()
@@ -158,7 +158,7 @@ def _mount_of(path: Path) -> tuple[str, str]:
 
 
 def sha256_of_file(path: Path) -> str:
-    """SHA-256 of a file's bytes, hexadecimal, a piece at a time.
+    """Return the SHA-256 of a file's bytes, hexadecimal.
 
     Raises:
         OSError: It cannot be read.

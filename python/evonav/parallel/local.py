@@ -1,4 +1,4 @@
-"""Workers of `evonav.parallel.pool` as processes of this machine."""
+"""Run workers of `evonav.parallel.pool` as processes of this machine."""
 
 import multiprocessing
 import os
@@ -11,37 +11,37 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from types import ModuleType
 
-from evonav.parallel.pool import Pulse, Worker, WorkerLostError, end_work, load_work, steps
+from evonav.parallel.pool import Heartbeat, Worker, WorkerLostError, end_work, load_work, steps
 
 END_TIMEOUT_S = 5.0
-"""For a worker to end what it has started, before it is killed."""
+"""Time that a worker has to end cleanly before it is killed."""
 
 
 class ProcessHost:
-    """Processes of this machine."""
+    """Starts processes on this machine."""
 
     def __init__(self, work: str, settings: str) -> None:
-        """Starts nothing yet."""
+        """Remember the work and its settings; no process is started."""
         self._work, self._settings = work, settings
 
     def start(self) -> "WorkerProcess":
-        """Another process."""
+        """Start another process."""
         return WorkerProcess(self._work, self._settings)
 
     def wait(self, workers: Sequence[Worker], timeout_s: float) -> Sequence[Worker]:
-        """Those with something to receive."""
+        """Wait until a worker has a message, and return all that have one."""
         connections = {worker.connection: worker for worker in workers if isinstance(worker, WorkerProcess)}
         return [connections[ready] for ready in wait(list(connections), timeout_s) if isinstance(ready, Connection)]
 
     def close(self) -> None:
-        """Nothing is left."""
+        """Do nothing: all processes have ended."""
 
 
 class WorkerProcess:
-    """A process that works until its parent hangs up or dies."""
+    """A process that runs jobs until its parent closes the connection or dies."""
 
     def __init__(self, work: str, settings: str) -> None:
-        """Starts it."""
+        """Start the process."""
         context = multiprocessing.get_context("spawn")
         self.connection, far_end = context.Pipe()
         with one_thread_each(), _without_main():
@@ -50,12 +50,12 @@ class WorkerProcess:
         far_end.close()
 
     def send(self, text: str) -> None:
-        """Gives it a job."""
+        """Send a job."""
         with suppress(BrokenPipeError):
             self.connection.send_bytes(text.encode())
 
     def receive(self) -> tuple[str, str]:
-        """What it says next."""
+        """Return the next message."""
         try:
             kind, _, text = self.connection.recv_bytes().decode().partition(" ")
         except (EOFError, OSError):
@@ -63,20 +63,20 @@ class WorkerProcess:
         return kind, text
 
     def close(self) -> None:
-        """Ends it at once."""
+        """End the process at once."""
         end_process(self._process, self.connection)
 
 
 def _serve(connection: Connection, name: str, settings: str) -> None:
-    """A worker's life: jobs in, what they say out."""
+    """Receive jobs and send their messages, until the parent closes the connection."""
     end_with_parent()
 
     def say(kind: str, text: str = "") -> None:
         connection.send_bytes(f"{kind} {text}".encode())
 
-    with suppress(EOFError, OSError):  # of the connection: the parent hung up
+    with suppress(EOFError, OSError):  # the parent closed the connection
         try:
-            work = load_work(name, settings, Pulse(lambda: say("alive")))
+            work = load_work(name, settings, Heartbeat(lambda: say("alive")))
         except Exception:
             say("broken", traceback.format_exc())
             return
@@ -91,9 +91,9 @@ def _serve(connection: Connection, name: str, settings: str) -> None:
 
 @contextmanager
 def _without_main() -> Iterator[None]:
-    """Hides the script that is running from a child that is started inside.
+    """Hide the running script from a child that is started inside.
 
-    It would be run again there, and one without `if __name__ == "__main__"` would begin anew what it is at.
+    The child would run it again, and a script without `if __name__ == "__main__"` would start its own work anew.
     """
     main = sys.modules["__main__"]
     sys.modules["__main__"] = ModuleType("__main__")
@@ -104,7 +104,7 @@ def _without_main() -> Iterator[None]:
 
 
 def end_with_parent() -> None:
-    """Makes a child leave interrupts to its parent, and end with it by way of every `finally`."""
+    """Make a child ignore interrupts and end with its parent, running every `finally`."""
 
     def end(number: int, _: object) -> None:
         raise SystemExit(128 + number)
@@ -121,14 +121,14 @@ def end_with_parent() -> None:
 
 
 def cause_of_death(process: multiprocessing.process.BaseProcess) -> str:
-    """How a process ended that has hung up."""
+    """Return how a process ended: its signal or its exit code."""
     process.join(timeout=5.0)
     code = process.exitcode
     return f"killed by signal {-code}" if code is not None and code < 0 else f"exit code {code}"
 
 
 def end_process(process: multiprocessing.process.BaseProcess, connection: Connection) -> None:
-    """Hangs up on a child and ends it; safe to call twice."""
+    """Close the connection to a child and end it; safe to call twice."""
     connection.close()
     if process.is_alive():
         process.terminate()
@@ -140,7 +140,7 @@ def end_process(process: multiprocessing.process.BaseProcess, connection: Connec
 
 @contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Gives children that are started inside one thread each: the parallelism is over jobs."""
+    """Give children that are started inside one thread each: the parallelism is over jobs."""
     names = ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
     added = [name for name in names if name not in os.environ]
     os.environ.update(dict.fromkeys(added, "1"))

@@ -1,9 +1,10 @@
-"""Jobs on workers that may die or hang: in this process, in processes of this machine, or on a Ray cluster.
+"""Run jobs on workers that may die or hang: in this process, in processes of this machine, or on a Ray cluster.
 
-A job is a text and so is its answer: nothing that a worker sends is unpickled. What workers do is named, not sent:
-`module:factory`. `factory(settings, alive)` is called once a worker and gives its `Work`, which turns a job's text into
-its answer's, at once or, where it is a generator, with news on the way; `alive()` says within a job that it goes on. A
-worker that dies has its job tried again by another, a job that says nothing for too long ends its worker.
+A job and its answer are text: nothing that a worker sends is unpickled. The work is named, not sent, as
+`module:factory`. `factory(settings, alive)` is called once in each worker and returns its `Work`, which turns a job's
+text into the answer's text. A work that is a generator yields progress messages first. A job calls `alive()` to show
+that it is still running. If a worker dies, another one repeats its job; if a job is silent for too long, its worker is
+killed.
 """
 
 import importlib
@@ -22,75 +23,74 @@ from evonav.errors import EvonavError, InvalidArgumentError
 EngineName = Literal["local", "ray"]
 FailureKind = Literal["crash", "timeout", "error"]
 Work = Callable[[str], str | Generator[str, None, str]]
-"""May have a method `close`, called when its worker ends."""
+"""Turns the text of a job into its answer. It may have a method `close`, which is called when its worker ends."""
 
 MAX_LOSSES = 2
-"""Workers that a job may lose before it is given up, unless said otherwise."""
+"""Default number of workers that a job may lose before it fails."""
 MAX_FAILED_STARTS = 5
-"""Workers that may die before they are ready with no job done meanwhile: then no more are started, and if none is at
-work, none can be had."""
+"""Failed starts in a row after which no worker is started; if none is running, the pool fails."""
 START_TIMEOUT_S = 300.0
-"""For a worker to be ready."""
-SIGN_OF_LIFE_S = 5.0
-"""Between two that a worker gives, at least."""
+"""Longest time until a worker is ready."""
+HEARTBEAT_S = 5.0
+"""Shortest time between two heartbeats of a worker."""
 
 
 class EngineError(EvonavError):
-    """Workers cannot be had: they do not start, or what starts them is not installed."""
+    """Workers do not start, or a library that starts them is not installed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """Something to do."""
+    """One unit of work."""
 
     key: int
-    """The caller's."""
+    """Chosen by the caller; answers carry it."""
     text: str
     timeout_s: float | None = None
-    """Without a word of it; default: the pool's."""
+    """Longest silence before the job is abandoned; default: the pool's."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What became of a job: a text or a failure; or, before that, news of it."""
+    """A message of a job: progress, its result, or its failure."""
 
     key: int
     text: str = ""
     is_end: bool = True
-    """Whether it is more than news."""
+    """False for progress, true for a result or a failure."""
     failure: FailureKind | None = None
     detail: str = ""
-    """Of a failure: a traceback, or one line."""
+    """A traceback or one line, if the job failed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Resources:
-    """What a Ray cluster sets aside for each worker."""
+    """Resources that a Ray cluster reserves for each worker."""
 
     num_cpus: float = 1.0
     num_gpus: float = 0.0
-    """May be a part of one."""
+    """May be a fraction of a GPU."""
 
 
 class Pool(Protocol):
-    """Where jobs are done, in any order."""
+    """Runs jobs in any order."""
 
     capacity: int
-    """Jobs that it takes before one must have ended."""
+    """Number of jobs that may be open at once."""
 
     def submit(self, job: Job) -> None:
-        """Takes a job."""
+        """Accept a job."""
 
     def next_answer(self) -> Answer:
-        """Waits for what some job says next. Call only while a submitted job has not ended."""
+        """Wait for the next message of any job. Call only while a submitted job is open."""
 
     def __enter__(self) -> "Pool":
-        """Nothing."""
+        """Return the pool."""
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
     ) -> None:
-        """Ends all workers at once."""
+        """End all workers at once."""
 
 
 def open_pool(
@@ -104,21 +104,21 @@ def open_pool(
     resources: Resources | None = None,
     max_losses: int = MAX_LOSSES,
 ) -> Pool:
-    """Workers, to be used in a `with` statement.
+    """Open a pool of workers, to be used in a `with` statement.
 
     Args:
         work: `module:factory`.
-        settings: What the factory is called with.
+        settings: Text with which the factory is called.
         engine: Processes of this machine, or Ray actors.
-        num_workers: 0 works in this process (engine `local` only), where nothing is contained but exceptions.
-        timeout_s: After which a job that has said nothing is given up.
-        ray_address: Of a cluster; default: one on this machine.
-        resources: Of each worker, for engine `ray`; default: a CPU.
-        max_losses: Workers that a job may lose before it is given up.
+        num_workers: 0 runs jobs in this process (engine `local` only), where a crash is not contained.
+        timeout_s: Longest silence of a job before it is abandoned.
+        ray_address: Address of a cluster; default: one on this machine.
+        resources: Reserved for each worker, engine `ray` only; default: one CPU.
+        max_losses: Number of workers that a job may lose before it fails.
 
     Raises:
-        EngineError: Ray is not installed or not to be reached.
-        InvalidArgumentError: Of the arguments.
+        EngineError: Ray is not installed or cannot be reached.
+        InvalidArgumentError: There are too few workers, or an address is given without Ray.
     """
     if num_workers < (1 if engine == "ray" else 0):
         raise InvalidArgumentError(f"num_workers = {num_workers}: too few for engine {engine}")
@@ -137,11 +137,11 @@ def open_pool(
 
 
 def answers(pool: Pool, jobs: Iterable[Job]) -> Iterator[Answer]:
-    """Has jobs done that say nothing before their end, in any order, and keeps the pool busy meanwhile.
+    """Run jobs that send no progress, in any order, and yield their answers.
 
     Args:
-        pool: Who does it.
-        jobs: Taken as there is room for them.
+        pool: The pool that runs them; it is kept busy.
+        jobs: Taken one by one, as the pool has room.
     """
     left, num_open = iter(jobs), 0
     while True:
@@ -160,73 +160,73 @@ class WorkerLostError(EngineError):
 
 
 class Worker(Protocol):
-    """The pool's side of a worker. It says `ready` once, and then what its jobs say."""
+    """The pool's side of a worker, which sends `ready` once and then the messages of its jobs."""
 
     def send(self, text: str) -> None:
-        """Gives it a job; the loss of the worker shows in `receive`."""
+        """Send a job; if the worker is lost, `receive` raises."""
 
     def receive(self) -> tuple[str, str]:
-        """What it says next; there is something to receive.
+        """Return the next message; call only when there is one.
 
         Returns:
-            `("ready", "")`; of a job `("alive", "")`, `("news", text)`, and at its end `("done", answer)` or
-            `("error", traceback)`; or `("broken", traceback)` where the factory has failed.
+            `("ready", "")`; during a job `("alive", "")` and `("progress", text)`, and at its end `("done", answer)` or
+            `("error", traceback)`; `("broken", traceback)` if the factory failed.
 
         Raises:
-            WorkerLostError: There will be no more.
+            WorkerLostError: The worker ended.
         """
 
     def close(self) -> None:
-        """Ends it at once; safe to call twice."""
+        """End the worker at once; safe to call twice."""
 
 
 class Host(Protocol):
-    """What starts workers."""
+    """Starts workers."""
 
     def start(self) -> Worker:
-        """Another worker."""
+        """Start another worker."""
 
     def wait(self, workers: Sequence[Worker], timeout_s: float) -> Sequence[Worker]:
-        """Those with something to receive, as soon as there is one."""
+        """Wait until a worker has a message, and return all that have one."""
 
     def close(self) -> None:
-        """After all workers were closed."""
+        """Release the host, after all workers are closed."""
 
 
 class InlinePool:
-    """Jobs in this process, one after the other: for debuggers and for short work."""
+    """Runs jobs in this process, one after the other: for debuggers and for short work."""
 
     capacity = 1
 
     def __init__(self, work: str, settings: str) -> None:
-        """Makes what does the jobs."""
+        """Load the work."""
         self._work = load_work(work, settings, lambda: None)
         self._key = 0
         self._job: Generator[tuple[str, str]] | None = None
 
     def submit(self, job: Job) -> None:
-        """Takes a job."""
+        """Accept a job."""
         self._key, self._job = job.key, steps(self._work, job.text)
 
     def next_answer(self) -> Answer:
-        """Does the job until it says something."""
+        """Run the job until its next message."""
         assert self._job is not None, "`submit` comes first"
         kind, text = next(self._job)
         return _answer(self._key, kind, text)
 
     def __enter__(self) -> "InlinePool":
-        """Nothing."""
+        """Return the pool."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Ends what the job is at."""
+        """End the job that is running."""
         if self._job is not None:
             self._job.close()
         end_work(self._work)
 
 
 class _Slot:
-    """A worker and what it is at."""
+    """A worker and the job that it runs."""
 
     def __init__(self, worker: Worker) -> None:
         self.worker = worker
@@ -240,11 +240,11 @@ class _Slot:
 
 
 class WorkerPool:
-    """Jobs on workers, each of which has one at a time."""
+    """Runs jobs on workers, one at a time on each."""
 
     def __init__(self, host: Host, num_workers: int, timeout_s: float, max_losses: int) -> None:
-        """Starts nothing yet."""
-        self.capacity = 2 * num_workers  # one at work and one waiting, so that no worker ever does
+        """Prepare a pool; workers start with the first jobs."""
+        self.capacity = 2 * num_workers  # one running and one waiting, so that no worker waits
         self._host = host
         self._num_workers = num_workers
         self._timeout_s = timeout_s
@@ -256,12 +256,12 @@ class WorkerPool:
         self._num_failed_starts = 0
 
     def submit(self, job: Job) -> None:
-        """Takes a job, and has it begun if a worker is free."""
+        """Accept a job, and start it if a worker is free."""
         self._queue.append(job)
         self._assign()
 
     def next_answer(self) -> Answer:
-        """Waits for what some job says next."""
+        """Wait for the next message of any job."""
         while not self._answers:
             self._assign()
             busy = [slot for slot in self._slots if not slot.is_idle]
@@ -343,53 +343,53 @@ class WorkerPool:
         self._slots.remove(slot)
 
     def __enter__(self) -> "WorkerPool":
-        """Nothing."""
+        """Return the pool."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Ends all workers at once."""
+        """End all workers at once."""
         for slot in list(self._slots):
             self._close(slot)
         self._host.close()
 
 
 def load_work(work: str, settings: str, alive: Callable[[], None]) -> Work:
-    """What a worker does."""
+    """Import `module:factory` and return the work that it makes."""
     module, _, factory = work.partition(":")
     function: Work = getattr(importlib.import_module(module), factory)(settings, alive)
     return function
 
 
 def end_work(work: Work) -> None:
-    """Lets what does the jobs give back what it holds."""
+    """Call the work's `close`, if it has one."""
     close = getattr(work, "close", None)
     if close is not None:
         close()
 
 
 def steps(work: Work, text: str) -> Generator[tuple[str, str]]:
-    """What a job says: its news, then its answer or the traceback of what it raised."""
+    """Run a job and yield its messages: progress, then its answer or the traceback of its exception."""
     try:
-        said = work(text)
-        if isinstance(said, str):
-            answer = said
+        result = work(text)
+        if isinstance(result, str):
+            answer = result
         else:
-            with closing(said):
-                answer = yield from _news(said)
+            with closing(result):
+                answer = yield from _progress(result)
     except Exception:
         yield "error", traceback.format_exc()
     else:
         yield "done", answer
 
 
-def _news(said: Generator[str, None, str]) -> Generator[tuple[str, str], None, str]:
+def _progress(job: Generator[str, None, str]) -> Generator[tuple[str, str], None, str]:
     while True:
         try:
-            text = next(said)
+            text = next(job)
         except StopIteration as end:
             answer: str = end.value
             return answer
-        yield "news", text
+        yield "progress", text
 
 
 def _answer(key: int, kind: str, text: str) -> Answer:
@@ -399,14 +399,14 @@ def _answer(key: int, kind: str, text: str) -> Answer:
 
 
 @dataclass(slots=True)
-class Pulse:
-    """A worker's `alive`: passes on one sign of life in a while."""
+class Heartbeat:
+    """A worker's `alive`: sends at most one heartbeat every `HEARTBEAT_S`."""
 
-    tell: Callable[[], None]
-    told_s: float = field(default_factory=time.monotonic)
+    send: Callable[[], None]
+    last_s: float = field(default_factory=time.monotonic)
 
     def __call__(self) -> None:
-        """The job goes on."""
-        if time.monotonic() - self.told_s >= SIGN_OF_LIFE_S:
-            self.told_s = time.monotonic()
-            self.tell()
+        """Send a heartbeat, if it is time."""
+        if time.monotonic() - self.last_s >= HEARTBEAT_S:
+            self.last_s = time.monotonic()
+            self.send()

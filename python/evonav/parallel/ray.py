@@ -13,7 +13,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.parallel.pool import (
     START_TIMEOUT_S,
     EngineError,
-    Pulse,
+    Heartbeat,
     Resources,
     Worker,
     WorkerLostError,
@@ -26,67 +26,67 @@ _END_TIMEOUT_S = 5.0
 
 
 class RayHost:
-    """Actors of a Ray cluster."""
+    """Starts actors of a Ray cluster."""
 
     def __init__(self, work: str, settings: str, num_workers: int, address: str | None, resources: Resources) -> None:
-        """Joins a cluster, or begins one on this machine, unless this process is in one.
+        """Join a cluster, or start one on this machine, unless this process is already in one.
 
         Args:
-            work: As for `evonav.parallel.pool.open_pool`.
-            settings: Likewise.
-            num_workers: For which a cluster that is begun has CPUs.
-            address: Of the cluster to join.
-            resources: Of each worker.
+            work: `module:factory`, see `evonav.parallel.pool.open_pool`.
+            settings: Text with which the factory is called.
+            num_workers: A cluster that is started here has CPUs for so many workers.
+            address: Address of the cluster to join.
+            resources: Reserved for each worker.
 
         Raises:
-            EngineError: Ray is not installed, or the cluster is not to be reached or has not enough for one worker.
-            InvalidArgumentError: `resources` make no sense.
+            EngineError: Ray is not installed, or the cluster cannot be reached or has too little for one worker.
+            InvalidArgumentError: `resources` are negative or have no CPU.
         """
         if not (resources.num_cpus > 0.0 and resources.num_gpus >= 0.0):
-            raise InvalidArgumentError(f"{resources}: a worker needs a part of a CPU, and no less than no GPU")
+            raise InvalidArgumentError(f"{resources}: a worker needs num_cpus > 0 and num_gpus >= 0")
         try:
             import ray
         except ImportError as error:
             raise EngineError(f"engine ray needs Ray: pip install 'evonav[ray]' ({error})") from None
         self._ray: Any = ray
         self._work, self._settings = work, settings
-        self._has_begun = not ray.is_initialized()
-        if self._has_begun:
+        self._is_owner = not ray.is_initialized()
+        if self._is_owner:
             num_cpus = math.ceil(num_workers * resources.num_cpus)
-            begin = {"num_cpus": num_cpus, "include_dashboard": False} if address is None else {"address": address}
+            cluster = {"num_cpus": num_cpus, "include_dashboard": False} if address is None else {"address": address}
             try:
-                ray.init(**begin, log_to_driver=False, logging_level="ERROR")
+                ray.init(**cluster, log_to_driver=False, logging_level="ERROR")
             except (ConnectionError, RuntimeError, ValueError) as error:
                 raise EngineError(f"Ray cannot be reached at {address or 'this machine'}: {error}") from error
-        self.max_workers = self._most(resources)
+        self.max_workers = self._room_for(resources)
         if self.max_workers < 1:
             self.close()
             needs = f"{resources.num_cpus:g} CPU" + (f", {resources.num_gpus:g} GPU" if resources.num_gpus else "")
-            raise EngineError(f"the Ray cluster has not enough for a worker ({needs})")
+            raise EngineError(f"the Ray cluster has too little for one worker ({needs})")
         options = {"num_cpus": resources.num_cpus, "num_gpus": resources.num_gpus, "max_restarts": 0}
         self._actor = ray.remote(**options)(_Actor)
 
-    def _most(self, resources: Resources) -> int:
-        """Workers that the cluster has room for."""
-        there: dict[str, float] = self._ray.cluster_resources()
-        asked = {"CPU": resources.num_cpus, "GPU": resources.num_gpus}
-        return min(math.floor(there.get(name, 0.0) / amount) for name, amount in asked.items() if amount)
+    def _room_for(self, resources: Resources) -> int:
+        """Return how many workers fit into the cluster."""
+        available: dict[str, float] = self._ray.cluster_resources()
+        needed = {"CPU": resources.num_cpus, "GPU": resources.num_gpus}
+        return min(math.floor(available.get(name, 0.0) / amount) for name, amount in needed.items() if amount)
 
     def start(self) -> "RayWorker":
-        """Another actor."""
+        """Start another actor."""
         return RayWorker(self._ray, self._actor.remote(self._work, self._settings))
 
     def wait(self, workers: Sequence[Worker], timeout_s: float) -> Sequence[Worker]:
-        """Those with something to receive."""
-        news = {worker.news: worker for worker in workers if isinstance(worker, RayWorker)}
-        ready, _ = self._ray.wait(list(news), num_returns=1, timeout=timeout_s)
+        """Wait until a worker has a message, and return all that have one."""
+        messages = {worker.message: worker for worker in workers if isinstance(worker, RayWorker)}
+        ready, _ = self._ray.wait(list(messages), num_returns=1, timeout=timeout_s)
         if ready:
-            ready, _ = self._ray.wait(list(news), num_returns=len(news), timeout=0)
-        return [news[one] for one in ready]
+            ready, _ = self._ray.wait(list(messages), num_returns=len(messages), timeout=0)
+        return [messages[one] for one in ready]
 
     def close(self) -> None:
-        """Leaves the cluster, if it was this that joined it."""
-        if self._has_begun:
+        """Leave the cluster, if this host joined or started it."""
+        if self._is_owner:
             self._ray.shutdown()
 
 
@@ -94,30 +94,30 @@ class RayWorker:
     """The pool's side of an actor."""
 
     def __init__(self, ray: Any, actor: Any) -> None:  # noqa: ANN401 - Ray is not imported here
-        """Asks it to say when it is ready."""
+        """Ask the actor for its first message."""
         self._ray, self._actor = ray, actor
         self._is_idle = False
-        self.news: Any = actor.next.remote()
+        self.message: Any = actor.next.remote()
 
     def send(self, text: str) -> None:
-        """Gives it a job."""
+        """Send a job."""
         self._is_idle = False
         self._actor.begin.remote(text)
-        self.news = self._actor.next.remote()
+        self.message = self._actor.next.remote()
 
     def receive(self) -> tuple[str, str]:
-        """What it says next."""
+        """Return the next message."""
         try:
-            kind, text = self._ray.get(self.news, timeout=START_TIMEOUT_S)
+            kind, text = self._ray.get(self.message, timeout=START_TIMEOUT_S)
         except self._ray.exceptions.RayError as error:
             raise WorkerLostError(f"the Ray actor died ({type(error).__name__})") from None
-        self._is_idle = kind not in ("alive", "news")
+        self._is_idle = kind not in ("alive", "progress")
         if not self._is_idle:
-            self.news = self._actor.next.remote()
+            self.message = self._actor.next.remote()
         return kind, text
 
     def close(self) -> None:
-        """Ends it: one that is idle may give back what it holds."""
+        """End the actor; an idle one closes its work first."""
         with suppress(self._ray.exceptions.RayError):
             if self._is_idle:
                 self._is_idle = False
@@ -126,13 +126,13 @@ class RayWorker:
 
 
 class _Actor:
-    """A worker's life, in Ray's hands. Its jobs are done in one thread, while calls fetch what they say."""
+    """An actor that runs jobs in a thread of its own, while calls fetch their messages."""
 
     def __init__(self, work: str, settings: str) -> None:
         for name in ("RAYON_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
             os.environ.setdefault(name, "1")
         self._jobs: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-        self._said: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
+        self._messages: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._serve, args=(work, settings), daemon=True)
         self._thread.start()
 
@@ -140,7 +140,7 @@ class _Actor:
         self._jobs.put(text)
 
     def next(self) -> tuple[str, str]:
-        return self._said.get()
+        return self._messages.get()
 
     def end(self) -> None:
         self._jobs.put(None)
@@ -148,15 +148,15 @@ class _Actor:
 
     def _serve(self, name: str, settings: str) -> None:
         try:
-            work = load_work(name, settings, Pulse(lambda: self._said.put(("alive", ""))))
+            work = load_work(name, settings, Heartbeat(lambda: self._messages.put(("alive", ""))))
         except Exception:
-            self._said.put(("broken", traceback.format_exc()))
+            self._messages.put(("broken", traceback.format_exc()))
             return
         try:
-            self._said.put(("ready", ""))
+            self._messages.put(("ready", ""))
             while (text := self._jobs.get()) is not None:
                 for step in steps(work, text):
-                    self._said.put(step)
+                    self._messages.put(step)
             end_work(work)
-        except BaseException:  # a job that ends its process ends it here too
+        except BaseException:  # a job that ends its process also ends the actor
             os._exit(1)
