@@ -10,7 +10,7 @@ import pytest
 
 from evonav.decision.noisy import GARBAGE, NoiseRates, Noisy
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.query import Asker
+from evonav.decision.query import QuerySession
 from evonav.decision.question import AnswerError, Question, Reply
 from evonav.decision.scripted import Scripted
 from evonav.errors import InvalidArgumentError
@@ -42,7 +42,7 @@ class Letter(Question[str]):
             raise AnswerError("invalid", "no letter", text)
         return text
 
-    def words(self, answer: str) -> str:
+    def answer_text(self, answer: str) -> str:
         return answer
 
     def alternatives(self, answer: str) -> list[str]:
@@ -105,7 +105,7 @@ def test_lost_and_refused_questions_reach_no_model_and_delays_are_waited() -> No
     inner = Scripted(lambda _: "a", needs_images=True)
     waits: list[float] = []
     model = Noisy(inner, NoiseRates(lost=0.5, refusal=0.5, delay=0.25), 0, sleep=waits.append)
-    asker = Asker(model)
+    asker = QuerySession(model)
     assert asker.ask(Letter()) is None
     assert inner.questions == []
     assert waits == [0.25] * 3

@@ -8,12 +8,12 @@ import pytest
 from test_noisy import Letter
 
 from evonav.decision.backends import own
-from evonav.decision.custom_model import OwnClient
+from evonav.decision.custom_model import CustomClient
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.question import AnswerError, Question, Reply
 from evonav.decision.vlm.decision import VlmDecision
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.response_cache import ExchangeStore
+from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import DecisionError, InvalidArgumentError
 from evonav.evaluation.records.store import RunStore
 
@@ -60,28 +60,28 @@ class Failing:
 
 
 def test_asked_once_and_kept_by_attempt(tmp_path: Path) -> None:
-    store = ExchangeStore(tmp_path / "e.sqlite")
+    store = ResponseCache(tmp_path / "e.sqlite")
     asking = Asking()
-    model = VlmDecision(OwnClient("mine", asking, store=store), structured="off")
+    model = VlmDecision(CustomClient("mine", asking, store=store), structured="off")
     assert [model.answer(Letter(), attempt).answer for attempt in (0, 0, 1, 0)] == ["a", "a", "b", "a"]
     assert len(asking.prompts) == 2
-    replay = VlmDecision(OwnClient("mine", asking, store=store, mode="replay"), structured="off")
+    replay = VlmDecision(CustomClient("mine", asking, store=store, mode="replay"), structured="off")
     assert replay.answer(Letter(), 1).answer == "b"
-    for client in (replay.client, OwnClient("other", asking, store=store, mode="replay")):
+    for client in (replay.client, CustomClient("other", asking, store=store, mode="replay")):
         with pytest.raises(VlmError, match="not_recorded"):
             client.ask(Prompt.of(Text("never asked")))
 
 
 def test_lost_answers_are_lost_and_kept_and_bugs_are_told(tmp_path: Path) -> None:
-    store = ExchangeStore(tmp_path / "e.sqlite")
+    store = ResponseCache(tmp_path / "e.sqlite")
     failing = Failing(TimeoutError("too slow"))
-    model = VlmDecision(OwnClient("mine", failing, store=store), structured="off")
+    model = VlmDecision(CustomClient("mine", failing, store=store), structured="off")
     for _ in range(2):
         with pytest.raises(AnswerError, match="too slow") as caught:
             model.answer(Letter())
         assert caught.value.fault == "lost"
     assert failing.num == 1
-    broken = VlmDecision(OwnClient("mine", Failing(KeyError("x")), store=store), structured="off")
+    broken = VlmDecision(CustomClient("mine", Failing(KeyError("x")), store=store), structured="off")
     with pytest.raises(DecisionError, match="mine: KeyError"):
         broken.answer(Letter(), 1)
     assert len(store) == 0
@@ -116,12 +116,12 @@ class Heavy:
 
 def test_models_are_loaded_once_and_only_to_be_asked(tmp_path: Path) -> None:
     path = str(tmp_path / "e.sqlite")
-    models = [own(seed, path="test_own:Heavy", exchanges=path) for seed in range(2)]
+    models = [own(seed, path="test_own:Heavy", cache=path) for seed in range(2)]
     assert models[0].needs_images is False
     assert Heavy.num_made == 0
     assert [model.answer(Letter(), attempt).answer for attempt, model in enumerate(models)] == ["a", "a"]
     assert Heavy.num_made == 1
-    replay = own(5, path="test_own:Heavy", exchanges=path, mode="replay")
+    replay = own(5, path="test_own:Heavy", cache=path, mode="replay")
     assert replay.answer(Letter(), 1).answer == "a"
     assert Heavy.num_made == 1
 

@@ -67,13 +67,13 @@ def test_all_agents_ask(asked: dict[str, list[tuple[Question[Any], Reply[Any]]]]
 def test_words_are_what_the_grammar_reads(asked: dict[str, list[tuple[Question[Any], Reply[Any]]]]) -> None:
     for kind, pairs in asked.items():
         for question, reply in pairs:
-            assert question.parse(question.words(reply.answer)) == reply.answer, kind
+            assert question.parse(question.answer_text(reply.answer)) == reply.answer, kind
             if kind not in WITH_CASE:
-                question.parse(question.words(reply.answer).upper())
+                question.parse(question.answer_text(reply.answer).upper())
             others = list(question.alternatives(reply.answer))
             assert reply.answer not in others, kind
             for other in others:
-                assert question.parse(question.words(other)) == other, kind
+                assert question.parse(question.answer_text(other)) == other, kind
 
 
 def test_schemas_are_strict_and_hold_every_answer(asked: dict[str, list[tuple[Question[Any], Reply[Any]]]]) -> None:
@@ -83,7 +83,7 @@ def test_schemas_are_strict_and_hold_every_answer(asked: dict[str, list[tuple[Qu
             assert schema is not None
             check_strict(dict(schema))
             for answer in (reply.answer, *question.alternatives(reply.answer)):
-                words = question.words(answer)
+                words = question.answer_text(answer)
                 is_array = question.answer_schema()["type"] == "array"
                 content = {"answer": words.split("\n") if is_array else words, "reason": "Because\nof it."}
                 jsonschema.validate(content, schema)

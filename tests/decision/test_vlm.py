@@ -18,7 +18,7 @@ from evonav.decision.prompts import Picture, Prompt, Text, Turn
 from evonav.decision.vlm.account import Account, Price, Usage, image_tokens, read_prices
 from evonav.decision.vlm.client import Answer, VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.response_cache import ExchangeStore, Failure, key_of
+from evonav.decision.vlm.response_cache import Failure, ResponseCache, key_of
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError
 from vlm_stub import KEY, Stub, images_in, serving
 
@@ -89,10 +89,10 @@ def test_conversations_and_schemas_are_sent(stub: Stub, config: VlmConfig) -> No
 
 def test_what_was_kept_is_had_again_without_a_server(config: VlmConfig, path: Path) -> None:
     with serving(lambda _: {"text": "A mug. ☕"}) as stub:
-        store = ExchangeStore(path)
+        store = ResponseCache(path)
         first = VlmClient(replace(config, base_url=stub.url), store=store, mode="record").ask(QUESTION)
         store.close()
-    store = ExchangeStore(path)
+    store = ResponseCache(path)
     # Nobody listens there any more, and a replay does not even need a key.
     client = VlmClient(replace(config, base_url=stub.url, api_key=None), store=store, mode="replay")
     again = client.ask(QUESTION)
@@ -103,18 +103,18 @@ def test_what_was_kept_is_had_again_without_a_server(config: VlmConfig, path: Pa
     assert told(client, Prompt.of(Text("And this?"))) == "not_recorded"
     assert told(client, Prompt.of(Text("What is this?"), Picture(IMAGE[::-1]), Text("One word."))) == "not_recorded"
     # Where the answer comes from is no part of the question, but the model is.
-    assert VlmClient(replace(config, base_url="http://elsewhere"), store=store, mode="replay").is_kept(QUESTION)
-    assert not VlmClient(replace(config, model="other"), store=store, mode="replay").is_kept(QUESTION)
+    assert VlmClient(replace(config, base_url="http://elsewhere"), store=store, mode="replay").is_cached(QUESTION)
+    assert not VlmClient(replace(config, model="other"), store=store, mode="replay").is_cached(QUESTION)
 
 
 def test_replay_imports_no_client(config: VlmConfig, path: Path) -> None:
-    VlmClient(config, store=ExchangeStore(path), mode="record").ask(Prompt.of(Text("Hello?")))
+    VlmClient(config, store=ResponseCache(path), mode="record").ask(Prompt.of(Text("Hello?")))
     script = f"""
 import sys
-from evonav.decision.vlm.response_cache import ExchangeStore
+from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.vlm.client import VlmClient, VlmConfig
-client = VlmClient(VlmConfig("gpt-4o"), store=ExchangeStore({str(path)!r}), mode="replay")
+client = VlmClient(VlmConfig("gpt-4o"), store=ResponseCache({str(path)!r}), mode="replay")
 print(client.ask(Prompt.of(Text("Hello?"))).text)
 assert not {{"openai", "httpx", "httpx2"}} & sys.modules.keys()
 """
@@ -123,7 +123,7 @@ assert not {{"openai", "httpx", "httpx2"}} & sys.modules.keys()
 
 
 def test_modes(stub: Stub, config: VlmConfig, path: Path) -> None:
-    store = ExchangeStore(path)
+    store = ResponseCache(path)
     VlmClient(config, store=store, mode="live").ask(QUESTION)
     assert len(store) == 0
     auto = VlmClient(config, store=store)
@@ -140,7 +140,7 @@ def test_modes(stub: Stub, config: VlmConfig, path: Path) -> None:
 def test_the_same_exchanges_make_the_same_rows_and_images_are_kept_once(config: VlmConfig, tmp_path: Path) -> None:
     dumps = []
     for order in (1, -1):
-        store = ExchangeStore(tmp_path / f"{order}.sqlite")
+        store = ResponseCache(tmp_path / f"{order}.sqlite")
         client = VlmClient(config, store=store, mode="record")
         questions = [Prompt.of(Text(f"Number {i}?"), Picture(IMAGE)) for i in range(4)]
         for question in questions[::order]:
@@ -155,7 +155,7 @@ def test_the_same_exchanges_make_the_same_rows_and_images_are_kept_once(config: 
 
 def test_keys_are_in_no_file_and_no_words(stub: Stub, config: VlmConfig, path: Path) -> None:
     stub.script = [{"status": 401, "raw": json.dumps({"error": {"message": f"Incorrect key: {KEY}"}}).encode()}]
-    client = VlmClient(config, store=ExchangeStore(path))
+    client = VlmClient(config, store=ResponseCache(path))
     assert told(client) == "unauthorized"
     # Not even if the model says them, or a server that fails.
     stub.script = [
@@ -261,7 +261,7 @@ def test_a_server_that_hangs_or_is_gone(stub: Stub, config: VlmConfig) -> None:
 
 
 def test_answers_that_are_none_are_kept_but_broken_ones_are_not(stub: Stub, config: VlmConfig, path: Path) -> None:
-    client = VlmClient(config, store=ExchangeStore(path))
+    client = VlmClient(config, store=ResponseCache(path))
     stub.script = [{"raw": b"{}"}, {"text": "No", "finish_reason": "length"}]
     assert [told(client) for _ in range(3)] == ["malformed", "truncated", "truncated"]
     assert len(stub.requests) == 2
@@ -269,7 +269,7 @@ def test_answers_that_are_none_are_kept_but_broken_ones_are_not(stub: Stub, conf
 
 def test_the_first_outcome_kept_is_everybodys(path: Path) -> None:
     """Two processes that asked the same: the second to come back takes over what the first has kept."""
-    first, second = ExchangeStore(path), ExchangeStore(path)
+    first, second = ResponseCache(path), ResponseCache(path)
     for number, (ours, theirs) in enumerate(
         (({"a": 1}, {"a": 2}), (Failure("timeout", "late"), {"a": 3}), ({"a": 4}, Failure("server", "500")))
     ):
@@ -350,4 +350,4 @@ def test_bad_settings_and_files_are_told(config: VlmConfig, tmp_path: Path) -> N
             replace(config, **changes)
     (tmp_path / "text").write_text("no database, and long enough to be taken for one" * 20)
     with pytest.raises(StoreError, match="text"):
-        ExchangeStore(tmp_path / "text")
+        ResponseCache(tmp_path / "text")

@@ -11,7 +11,7 @@ import pytest
 
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.mock_server import FAULTS, MockReply, faulty, without_schemas
-from evonav.decision.vlm.response_cache import ExchangeStore
+from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
@@ -54,7 +54,7 @@ class Run:
                 "max_retries": 2,
                 **(server or {}),
             },
-            "exchanges": str(self.folder / "exchanges.sqlite"),
+            "cache": str(self.folder / "exchanges.sqlite"),
             "mode": "auto" if url else "replay",
         }
         backend = Backend(
@@ -303,7 +303,7 @@ def test_failures_can_be_asked_again(run: Run, tmp_path: Path) -> None:
         stub.script = [FAULTS["malformed"], {**FAULTS["server_error"], "headers": {"Retry-After-Ms": "5"}}]
         first = run("first", stub.url, agents=["fu"], server={"max_retries": 0})
         assert counters(first[0])["lost_answers"] == 1
-        store = ExchangeStore(tmp_path / "exchanges.sqlite")
+        store = ResponseCache(tmp_path / "exchanges.sqlite")
         assert store.num_failures == store.forget_failures() > 0
         assert counters(run("again", stub.url, agents=["fu"])[0])["lost_answers"] == 0
 

@@ -332,7 +332,7 @@ def test_an_unreached_object_leads_to_the_frontier_nearest_to_it_or_to_the_agent
     ]
     assert unsupported
     for belief, action in unsupported:
-        (asked,) = belief.asked
+        (asked,) = belief.queries
         (chosen,) = [c for i, c in enumerate(asked.question.objects) if asked.text.startswith(f"Object {i}\n")]
         near_m = chosen.ground_m if towards == "object" else asked.question.position_m
         distances = sorted(math.dist(f.position_m, near_m) for f in belief.frontiers)

@@ -142,7 +142,7 @@ def replace_id(node, entry_id):
 def test_objects_shown_are_the_selected_ones_and_their_neighbours_and_images_cover_their_edges():
     agent = MsgNav(decision=script("Continue Exploration", subgraph="1"))
     run(agent, stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=8))
-    for question in asked(agent._asker.model, "graph"):
+    for question in asked(agent._queries.model, "graph"):
         first = next(node for node in question.objects if node.entry_id == 1)
         assert {node.entry_id for node in question.objects} == {1, *first.neighbour_ids}
         assert all(1 in (a, b) and numbers for a, b, numbers in question.edges)
@@ -375,11 +375,11 @@ def test_it_looks_with_seven_views_every_round_and_never_clears_its_map(moved):
 def test_answers_go_through_the_grammar():
     agent = MsgNav(decision=script("Continue Exploration"))
     run(agent, stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=2))
-    question = asked(agent._asker.model, "graph")[-1]
+    question = asked(agent._queries.model, "graph")[-1]
     assert isinstance(question, GraphQuestion)
     first = question.objects[0].entry_id
     for text in (f"Object {first}", "Image 0, garbage can", "Continue Exploration"):
-        assert question.words(question.parse(text.lower() + "\nsince it is so.")).lower() == text.lower()
+        assert question.answer_text(question.parse(text.lower() + "\nsince it is so.")).lower() == text.lower()
     for text in ("Object 9999", "Image 99, chair", "Image 0", "Image 0,", "Frontier 0", "I think Object 1", ""):
         with pytest.raises(Exception, match="invalid"):
             question.parse(text)

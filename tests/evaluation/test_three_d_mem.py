@@ -77,7 +77,7 @@ def object_if_any(question):
     if not objects:
         return "Frontier 0"
     here = question.position_m
-    return question.words(
+    return question.answer_text(
         max(objects, key=lambda c: math.dist(question.snapshots[c.snapshot].objects[c.index].ground_m, here))
     )
 

@@ -47,7 +47,7 @@ def scripted(**said):
     def script(question):
         words = said.get(question.kind.replace("-", "_"))
         if words is None:
-            return question.words(rules.answer(question).answer)
+            return question.answer_text(rules.answer(question).answer)
         return words(question) if callable(words) else words
 
     return Scripted(script)
@@ -173,7 +173,7 @@ def test_the_scene_graph_stays_and_the_goal_graph_goes():
 
 def test_a_wrong_number_of_relation_lines_drops_the_edges():
     def one_too_many(question):
-        return question.words(TextMatch().answer(question).answer) + "\nchair_1 and bed_2: chair_1 is on bed_2"
+        return question.answer_text(TextMatch().answer(question).answer) + "\nchair_1 and bed_2: chair_1 is on bed_2"
 
     stage = stage_case(1, "GarbageCan|1")
     wrong, right = UniGoal(decision=scripted(scene_relations=one_too_many)), UniGoal(decision=scripted())
@@ -182,8 +182,8 @@ def test_a_wrong_number_of_relation_lines_drops_the_edges():
     assert len(right._graphs.scene.edges) >= 1
     assert wrong._graphs.scene.edges == []
     assert [n.name for n in wrong._graphs.scene.nodes] == [n.name for n in right._graphs.scene.nodes]
-    asked = [q for q in wrong._asker.model.questions if isinstance(q, RelationLinesQuestion)]
-    assert wrong._asker.counters["invalid_answers"] == len(asked)  # no second try
+    asked = [q for q in wrong._queries.model.questions if isinstance(q, RelationLinesQuestion)]
+    assert wrong._queries.counters["invalid_answers"] == len(asked)  # no second try
 
 
 CHAIR_TEXT = "Please navigate to the chair next to the dining table."
@@ -202,7 +202,7 @@ def test_decomposition_is_given_up_after_ten_tries():
 def test_a_group_score_that_is_no_number_is_zero():
     agent = UniGoal(decision=scripted(group_score="quite likely"))
     (record,) = run(agent, stage_case(1, "GarbageCan|1"))
-    assert any(isinstance(q, GroupScoreQuestion) for q in agent._asker.model.questions)
+    assert any(isinstance(q, GroupScoreQuestion) for q in agent._queries.model.questions)
     assert {tuple(e.details.items()) for e in record.trace if e.details.get("mid_term_m") is not None} == set()
 
 
@@ -248,7 +248,7 @@ def test_a_partly_found_goal_is_predicted_by_the_transform_of_two_anchors():
     assert advice.stage == "partial"
     # The layout's x axis is the way from table to chair: +z, twice as long. Its y axis then points to -x.
     assert advice.mid_term_m == pytest.approx((0.0, 3.0))
-    assert any(isinstance(question, LayoutQuestion) for question in agent._asker.model.questions)
+    assert any(isinstance(question, LayoutQuestion) for question in agent._queries.model.questions)
 
 
 def test_a_goals_noun_is_compared_as_the_word_that_it_goes_under():

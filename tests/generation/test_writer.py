@@ -14,7 +14,7 @@ import pytest
 
 from evonav.decision.vlm.account import Account, Price
 from evonav.decision.vlm.client import VlmClient, VlmConfig
-from evonav.decision.vlm.response_cache import ExchangeStore
+from evonav.decision.vlm.response_cache import ResponseCache
 from evonav.errors import TaskError
 from evonav.generation.instructions import prompts
 from evonav.generation.instructions.writer import estimate_texts, write_texts
@@ -145,7 +145,7 @@ def test_a_replay_writes_the_same_bytes_without_a_server(stub: Stub, folder: Pat
     copy = tmp_path / "copy"
     for task in load_tasks(folder):
         write_task(task, copy)
-    store = ExchangeStore(tmp_path / "exchanges.sqlite")
+    store = ResponseCache(tmp_path / "exchanges.sqlite")
     write_texts(folder, client_of(stub, store=store))
     num_asked = len(stub.requests)
     config = VlmConfig("gpt-4o", base_url="http://127.0.0.1:9/v1", max_concurrency=1)

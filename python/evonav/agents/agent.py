@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.query import Asked
+from evonav.decision.query import QueryLogEntry
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import StageInput, TaskInfo
 from evonav.world.simulator import Action
@@ -142,8 +142,8 @@ class Belief:
     """`(R, C)`: 0 unknown, 1 free, 2 blocked."""
     map_frame: MapFrame
     """Of `cells`; need not be the task's own."""
-    asked: tuple[Asked, ...]
-    """Questions of the round, with their answers."""
+    queries: tuple[QueryLogEntry, ...]
+    """The questions of the round with their answers."""
     explored: NDArray[np.bool_] | None = None
     """`(R, C)`: cells that were seen from close by, where the agent tells them apart."""
 

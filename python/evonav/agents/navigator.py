@@ -15,7 +15,7 @@ from evonav.agents.agent import Belief, EntryBelief, FrontierBelief, NavigateTo,
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels
-from evonav.decision.query import Asked
+from evonav.decision.query import QueryLogEntry
 from evonav.memory import Frontier, ObjectMap, ObjectMapConfig
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE
@@ -202,11 +202,11 @@ class Navigator:
         """The object memory."""
         return [belief_of(entry) for entry in self.objects.entries]
 
-    def belief(self, asked: Sequence[Asked], candidate_ids: Sequence[int] = ()) -> Belief:
+    def belief(self, queries: Sequence[QueryLogEntry], candidate_ids: Sequence[int] = ()) -> Belief:
         """All of it, for pictures.
 
         Args:
-            asked: Questions of the round.
+            queries: The questions of the round with their answers.
             candidate_ids: Entries that the last question offered.
         """
         cells: NDArray[np.uint8] = self.explorer.map.cells
@@ -216,7 +216,7 @@ class Navigator:
             frontiers=[FrontierBelief(f.id, f.position_m, f.direction_rad) for f in self.explorer.frontiers],
             cells=cells,
             map_frame=self.explorer.map.map_frame,
-            asked=tuple(asked),
+            queries=tuple(queries),
             explored=self.explorer.map.explored,
         )
 

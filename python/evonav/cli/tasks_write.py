@@ -52,7 +52,7 @@ def write(
     """
     from evonav.decision.vlm.account import Account, read_prices
     from evonav.decision.vlm.client import VlmClient, VlmConfig
-    from evonav.decision.vlm.response_cache import ExchangeStore
+    from evonav.decision.vlm.response_cache import ResponseCache
     from evonav.errors import InvalidArgumentError
     from evonav.generation.instructions.writer import estimate_texts, write_texts
 
@@ -61,7 +61,7 @@ def write(
         raise InvalidArgumentError(f"{prices}: has no prices of {vlm_model!r}")
     account = Account(table.get(vlm_model), max_cost)
     config = VlmConfig(vlm_model, base_url=vlm_base_url, max_concurrency=vlm_workers)
-    store = None if vlm_exchanges is None else ExchangeStore(vlm_exchanges)
+    store = None if vlm_exchanges is None else ResponseCache(vlm_exchanges)
     client = VlmClient(config, store=store, mode=None if vlm_mode is None else vlm_mode.value, account=account)
     if dry_run:
         estimate = estimate_texts(folder, client, limit=limit)

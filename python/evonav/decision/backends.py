@@ -43,7 +43,7 @@ def vlm(
     images: bool = True,
     request: Mapping[str, Any] | None = None,
     server: Mapping[str, Any] | None = None,
-    exchanges: str | None = None,
+    cache: str | None = None,
     mode: Any = None,  # noqa: ANN401 - JSON, checked
     keeps_images: bool = True,
     ledger: str | None = None,
@@ -61,7 +61,7 @@ def vlm(
         images: Whether the model is shown images.
         request: What else requests say, by the names of `VlmConfig`; what is not given is `SAMPLING`.
         server: How the server is reached, by the names of `VlmConfig`.
-        exchanges: File of exchanges.
+        cache: File of recorded exchanges.
         mode: Default `auto` with a file, else `live`.
         keeps_images: Whether that file gets the images too.
         ledger: File that books what all processes of the run spend.
@@ -78,9 +78,9 @@ def vlm(
     from evonav.decision.vlm.client import VlmClient
     from evonav.decision.vlm.decision import VlmDecision
     from evonav.decision.vlm.ledger import Ledger
-    from evonav.decision.vlm.response_cache import ExchangeStore
+    from evonav.decision.vlm.response_cache import ResponseCache
 
-    store = None if exchanges is None else ExchangeStore(Path(exchanges))
+    store = None if cache is None else ResponseCache(Path(cache))
     config = vlm_config(model, request, server)
     booked = Account(
         None if price is None else Price(*price),
@@ -96,7 +96,7 @@ def own(
     seed: int,
     *,
     path: str,
-    exchanges: str | None = None,
+    cache: str | None = None,
     mode: str | None = None,
     keeps_images: bool = True,
     ledger: str | None = None,
@@ -108,7 +108,7 @@ def own(
     Args:
         seed: Of the agent; handed to what has a parameter `seed`.
         path: Import path `module:name` of a class, or of a function that makes the object.
-        exchanges: File of exchanges, of one with `ask`.
+        cache: File of recorded exchanges, for a model with `ask`.
         mode: Default `auto` with a file, else `live`.
         keeps_images: Whether that file gets the images too.
         ledger: File that counts the run's questions.
@@ -119,18 +119,18 @@ def own(
         InvalidArgumentError: It cannot be imported or made, or is none such.
         StoreError: The file of exchanges cannot be opened.
     """
-    from evonav.decision.custom_model import OwnClient, own_model
+    from evonav.decision.custom_model import CustomClient, load_custom_model
     from evonav.decision.vlm.account import Account
     from evonav.decision.vlm.decision import VlmDecision
     from evonav.decision.vlm.ledger import Ledger
-    from evonav.decision.vlm.response_cache import ExchangeStore
+    from evonav.decision.vlm.response_cache import ResponseCache
 
-    model = own_model(path, seed)
+    model = load_custom_model(path, seed)
     if hasattr(model, "answer"):
         return _with_noise(cast("DecisionModel", model), noise, seed)
     booked = Account(ledger=None if ledger is None else Ledger(ledger), model=account or path)
-    store = None if exchanges is None else ExchangeStore(Path(exchanges))
-    client = OwnClient(path, model, store=store, mode=mode, account=booked, keeps_images=keeps_images)
+    store = None if cache is None else ResponseCache(Path(cache))
+    client = CustomClient(path, model, store=store, mode=mode, account=booked, keeps_images=keeps_images)
     needs_images = bool(getattr(model, "needs_images", True))
     return _with_noise(VlmDecision(client, structured="off", needs_images=needs_images), noise, seed)
 

@@ -11,11 +11,11 @@ from evonav.decision.vlm.account import Account, Usage
 from evonav.decision.vlm.answer import Answer
 from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure
 from evonav.decision.vlm.images import png_of
-from evonav.decision.vlm.response_cache import ExchangeStore, Failure, JsonObject, image_name, key_of
+from evonav.decision.vlm.response_cache import Failure, JsonObject, ResponseCache, image_name, key_of
 from evonav.errors import DecisionError, InvalidArgumentError
 
 
-class OwnModel(Protocol):
+class CustomModel(Protocol):
     """What a model of your own has at least. `needs_images = False` on it leaves images out."""
 
     def ask(self, prompt: Prompt) -> str:
@@ -27,15 +27,15 @@ class OwnModel(Protocol):
         ...
 
 
-class OwnClient:
+class CustomClient:
     """Asks a model of your own, and keeps what came as `VlmClient` does; content-addressed by name and prompt."""
 
     def __init__(
         self,
         name: str,
-        model: OwnModel,
+        model: CustomModel,
         *,
-        store: ExchangeStore | None = None,
+        store: ResponseCache | None = None,
         mode: str | None = None,
         account: Account | None = None,
         keeps_images: bool = True,
@@ -70,11 +70,11 @@ class OwnClient:
     def check(self) -> None:
         """There is nothing to find out."""
 
-    def is_kept(self, prompt: Prompt, attempt: int = 0) -> bool:
+    def is_cached(self, prompt: Prompt, attempt: int = 0) -> bool:
         """Whether what came of a question is kept."""
-        return self.store is not None and self.store.outcome(key_of(self.kept_request(prompt, attempt))) is not None
+        return self.store is not None and self.store.outcome(key_of(self.cached_request(prompt, attempt))) is not None
 
-    def kept_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
+    def cached_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
         """What an exchange is found by."""
         turns = [
             {
@@ -95,7 +95,7 @@ class OwnClient:
             DecisionError: The model broke.
             StoreError: The exchanges cannot be read or written.
         """
-        kept = self.kept_request(prompt, attempt)
+        kept = self.cached_request(prompt, attempt)
         key = key_of(kept)
         outcome = None if self.store is None or self.mode == "live" else self.store.outcome(key)
         is_replayed = outcome is not None
@@ -155,7 +155,7 @@ class _MadeWhenAsked:
         return answer
 
 
-def own_model(path: str, seed: int) -> OwnModel | DecisionModel:
+def load_custom_model(path: str, seed: int) -> CustomModel | DecisionModel:
     """What `module:name` makes: a class's instance, or what a function returns.
 
     Made once a process and used for all its episodes, unless it has a parameter `seed`: then once an episode.
@@ -177,7 +177,7 @@ def own_model(path: str, seed: int) -> OwnModel | DecisionModel:
         return _MadeWhenAsked(path, factory, seed)
     model = _made(path, factory, seed)
     if callable(getattr(model, "answer", None)) or callable(getattr(model, "ask", None)):
-        return cast("OwnModel | DecisionModel", model)
+        return cast("CustomModel | DecisionModel", model)
     raise InvalidArgumentError(f"decision `{path}`: a {type(model).__name__} has neither `ask` nor `answer`")
 
 

@@ -147,7 +147,7 @@ class Noisy:
             self.counts["no_other"] += 1
             return reply
         other = others[draws.randrange(len(others))]
-        return Reply(other, f"{question.words(other)}\nA wrong answer on purpose (noise).")
+        return Reply(other, f"{question.answer_text(other)}\nA wrong answer on purpose (noise).")
 
     def _draws(self, kind: str, attempt: int) -> random.Random:
         name = f"noise\0{self._seed}\0{kind}\0{self._num_asked[kind]}\0{attempt}"

@@ -1,4 +1,4 @@
-"""Asking until there is an answer: a stated number of times, every failure counted."""
+"""Ask a decision model until it gives a valid answer, a limited number of times, and count every failure."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -12,45 +12,46 @@ _COUNTERS: dict[Fault, str] = {"invalid": "invalid_answers", "refusal": "refusal
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """A question and what came of one try at it, for pictures and diagnoses."""
+class QueryLogEntry:
+    """A question and the outcome of one try to answer it, for pictures and diagnoses."""
 
     question: Question[Any]
     text: str
-    """The answer as it came."""
+    """The model's unparsed answer."""
     outcome: Literal["answered", "invalid", "refusal", "lost"]
 
 
-class Asker:
+class QuerySession:
     """Puts an agent's questions to its decision model.
 
     Counters, cumulative over a task: `decisions` (tries), `invalid_answers`, `refusals`, `lost_answers` (timeouts, lost
-    connections, a server's errors), `failed_decisions` (questions given up: the agent then follows its fallback).
+    connections, a server's errors), `failed_decisions` (questions without a valid answer in any try: the agent then
+    follows its fallback).
     """
 
     def __init__(self, model: DecisionModel, *, num_tries: int = 3) -> None:
-        """Asks `model`, at most `num_tries` times a question."""
+        """Create a session that asks `model` each question at most `num_tries` times."""
         self.model = model
         self.num_tries = num_tries
         self.counters: Counter[str] = Counter()
-        self.asked: list[Asked] = []
-        """Since `begin_round`."""
+        self.log: list[QueryLogEntry] = []
+        """Every try since `begin_round`, in order."""
 
     def begin_round(self) -> None:
-        """Forgets what was asked in the last round."""
-        self.asked.clear()
+        """Clear the log of the last round."""
+        self.log.clear()
 
     @property
     def reason(self) -> str:
-        """Why the model last answered as it did, in its words: what follows the first line."""
-        return " ".join(self.asked[-1].text.splitlines()[1:]) if self.asked else ""
+        """The reason that the model gave with its last answer: all lines after the first."""
+        return " ".join(self.log[-1].text.splitlines()[1:]) if self.log else ""
 
     def ask(self, question: Question[A], num_tries: int | None = None) -> A | None:
-        """The first valid answer; `None`, a failed decision, when there is none in all tries.
+        """Return the first valid answer, or `None`, a failed decision, if no try gives one.
 
         Args:
-            question: What is asked.
-            num_tries: Instead of the asker's own, for a question whose number of tries is part of the algorithm.
+            question: The question.
+            num_tries: Number of tries in place of the session's own, where it is part of an algorithm.
 
         Raises:
             DecisionError: Asking again would not help.
@@ -61,9 +62,9 @@ class Asker:
                 reply = self.model.answer(question, attempt)
             except AnswerError as error:
                 self.counters[_COUNTERS[error.fault]] += 1
-                self.asked.append(Asked(question, error.text or str(error), error.fault))
+                self.log.append(QueryLogEntry(question, error.text or str(error), error.fault))
                 continue
-            self.asked.append(Asked(question, reply.text, "answered"))
+            self.log.append(QueryLogEntry(question, reply.text, "answered"))
             return reply.answer
         self.counters["failed_decisions"] += 1
         return None

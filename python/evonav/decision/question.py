@@ -69,7 +69,7 @@ class Question(ABC, Generic[A]):
         """
 
     @abstractmethod
-    def words(self, answer: A) -> str:
+    def answer_text(self, answer: A) -> str:
         """An answer as a model should have put it: `parse(words(answer)) == answer`."""
 
     def answer_schema(self) -> Mapping[str, Any]:
@@ -102,7 +102,7 @@ class ClosedQuestion(Question[A]):
 
     def answer_schema(self) -> Mapping[str, Any]:
         """One of the choices."""
-        return {"type": "string", "enum": [self.words(choice) for choice in self.choices()]}
+        return {"type": "string", "enum": [self.answer_text(choice) for choice in self.choices()]}
 
     def alternatives(self, answer: A) -> Sequence[A]:
         """Every other choice."""
@@ -123,7 +123,7 @@ class YesNoQuestion(ClosedQuestion[bool]):
             raise AnswerError("invalid", f"neither yes nor no: {first_line(text)[:80]!r}", text)
         return match[1].lower() == "yes"
 
-    def words(self, answer: bool) -> str:
+    def answer_text(self, answer: bool) -> str:
         """`yes` or `no`."""
         return "yes" if answer else "no"
 

@@ -14,7 +14,7 @@ from PIL import Image
 from evonav.agents.agent import Agent, Belief, InspectableAgent
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.prompts import Picture
-from evonav.decision.query import Asked
+from evonav.decision.query import QueryLogEntry
 from evonav.decision.question import Question
 from evonav.evaluation.protocol import AgentFailedError, StageOutcome
 from evonav.evaluation.records.convert import STALE_MARGIN_M, distance_to_box_m, entry_record, pose_record
@@ -156,12 +156,12 @@ class Tracer:
                 candidate_ids=tuple(belief.candidate_ids),
                 frontiers=tuple(TracedFrontier(f.frontier_id, f.position_m, f.direction_rad) for f in belief.frontiers),
                 map=_map_of(belief),
-                asked=tuple(self._question(asked) for asked in belief.asked),
+                asked=tuple(self._question(asked) for asked in belief.queries),
             )
         except Exception as error:  # a picture is not worth an episode: the page says what is missing
             return replace(seen, note=f"the agent tells no belief: {type(error).__name__}: {error}")
 
-    def _question(self, asked: Asked) -> TracedQuestion:
+    def _question(self, asked: QueryLogEntry) -> TracedQuestion:
         parts: list[tuple[str, str | bytes]] = []
         for turn in asked.question.prompt().turns:
             for part in turn.parts:

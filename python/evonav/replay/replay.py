@@ -15,7 +15,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from evonav.agents.registry import imported
-from evonav.decision.custom_model import own_model
+from evonav.decision.custom_model import load_custom_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
@@ -80,10 +80,10 @@ class RunReplay:
             backend = replace(backend, perception_host_options={"models": models})
         self.backend = backend
         self._why_not = ""
-        if "exchanges" in inspect.signature(imported(backend.decision)).parameters:
+        if "cache" in inspect.signature(imported(backend.decision)).parameters:
             path = exchanges or run_dir / EXCHANGES_NAME
             if path.is_file():
-                self.backend = replace(self.backend, decision_host_options={"exchanges": str(path), "mode": "replay"})
+                self.backend = replace(self.backend, decision_host_options={"cache": str(path), "mode": "replay"})
             elif not _answers_itself(backend):
                 self._why_not = f"The model's answers were not kept: {path} not found."
 
@@ -173,7 +173,7 @@ class RunReplay:
 def _answers_itself(backend: Backend) -> bool:
     """Whether the model is one of the user's own that is put the questions themselves: nothing of it is kept."""
     path = backend.decision_options.get("path")
-    return path is not None and hasattr(own_model(str(path), 0), "answer")
+    return path is not None and hasattr(load_custom_model(str(path), 0), "answer")
 
 
 def _loss(record: StageRecord) -> Loss | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
 from evonav.decision.prompts import Prompt, Text
-from evonav.decision.query import Asker
+from evonav.decision.query import QuerySession
 from evonav.decision.question import AnswerError, DecisionModel, Question, first_line
 from evonav.decision.text.matcher import Matcher
 from evonav.memory import ObjectMap, OccupancyMap
@@ -41,7 +41,7 @@ class WhichObject(Question[int]):
             raise AnswerError("invalid", f"no number from 0 to {len(self.labels)}", text)
         return int(answer)
 
-    def words(self, answer: int) -> str:
+    def answer_text(self, answer: int) -> str:
         """The number."""
         return str(answer)
 
@@ -56,13 +56,13 @@ class AskingAgent:
 
     def __init__(self, decision: DecisionModel | None = None) -> None:
         self.sensing = Sensing()
-        self.asker = None if decision is None else Asker(decision)
+        self.queries = None if decision is None else QuerySession(decision)
 
     def begin_task(self, task: TaskInfo) -> None:
         """A new house."""
         self.map, self.objects = OccupancyMap(task.map_frame), ObjectMap()
-        if self.asker is not None:
-            self.asker.counters.clear()
+        if self.queries is not None:
+            self.queries.counters.clear()
 
     def begin_stage(self, stage: StageInput) -> None:
         """A new goal."""
@@ -97,9 +97,9 @@ class AskingAgent:
         if not fitting:
             return None
         nearest = min(fitting, key=lambda entry_id: math.dist(places[entry_id], here))
-        if self.asker is None:
+        if self.queries is None:
             return nearest, places[nearest]
-        answer = self.asker.ask(WhichObject(self.goal, tuple(entry.label for entry in known)))
+        answer = self.queries.ask(WhichObject(self.goal, tuple(entry.label for entry in known)))
         if answer == 0:
             self.refused |= set(places)
             return None
@@ -109,7 +109,7 @@ class AskingAgent:
     def diagnostics(self) -> RoundDiagnostics:
         """What it goes to, and how the model did."""
         choice = "none" if self.target is None else f"object {self.target[0]}"
-        counters = {} if self.asker is None else dict(self.asker.counters)
+        counters = {} if self.queries is None else dict(self.queries.counters)
         return RoundDiagnostics(choice=choice, num_entries=len(self.objects), counters=counters)
 
     def entries(self) -> list[EntryBelief]:

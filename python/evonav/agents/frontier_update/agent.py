@@ -10,7 +10,7 @@ from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import ChooseQuestion
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.decision.candidates import ObjectCandidate, Point2
-from evonav.decision.query import Asker
+from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.decision import TextMatch
 from evonav.decision.text.matcher import Matcher
@@ -48,7 +48,7 @@ class FrontierUpdate:
             encoder()  # a missing extra is told before the episode
         model: DecisionModel = decision or TextMatch()
         self.sensing = Sensing(needs_rgb=model.needs_images)
-        self._asker = Asker(model, num_tries=self.config.num_tries)
+        self._queries = QuerySession(model, num_tries=self.config.num_tries)
         self._matcher = Matcher()
         self._counters: Counter[str] = Counter()
         self._details: dict[str, Any] = {}
@@ -61,7 +61,7 @@ class FrontierUpdate:
         self._task = task
         self._counters.clear()
         self._details = {}
-        self._asker.counters.clear()
+        self._queries.counters.clear()
         self._navigator = Navigator(task.map_frame, self.config.navigator)
 
     def begin_stage(self, stage: StageInput) -> None:
@@ -71,7 +71,7 @@ class FrontierUpdate:
 
     def act(self, observation: Observation) -> AgentAction:
         """Stops at the object it was committed to; else looks, decides and goes on."""
-        self._asker.begin_round()
+        self._queries.begin_round()
         self._candidates = ()
         navigator = self._navigator
         reached = navigator.reached(observation)
@@ -128,11 +128,11 @@ class FrontierUpdate:
             heading_view=navigator.heading_view() if with_images else None,
         )
         self._candidates = tuple(candidate.entry_id for candidate in question.objects)
-        choice = self._asker.ask(question)
+        choice = self._queries.ask(question)
         if choice is not None and choice.kind == "object":
             return self._go_to_object(question.objects[choice.index], frontiers, here)
         if choice is not None:
-            return self._go_to_frontier(frontiers[choice.index], self._asker.reason)
+            return self._go_to_frontier(frontiers[choice.index], self._queries.reason)
         nearest = nearest_frontier(frontiers, here)
         if nearest is not None and self.config.on_failed_decision == "nearest_frontier":
             return self._go_to_frontier(nearest, "no valid answer")
@@ -156,7 +156,7 @@ class FrontierUpdate:
             if frontier is not None:
                 return self._go_to_frontier(frontier, f"towards object {chosen.entry_id}, which the map does not reach")
             goal_m = chosen.ground_m  # the planner ends at the nearest free point
-        return self._approach(Target(chosen.entry_id, goal_m, chosen.ground_m), self._asker.reason)
+        return self._approach(Target(chosen.entry_id, goal_m, chosen.ground_m), self._queries.reason)
 
     def _approach(self, target: Target, reason: str = "") -> AgentAction:
         self._tell(f"object {target.entry_id}", reason, target.entry_id)
@@ -174,7 +174,7 @@ class FrontierUpdate:
         """Notes a round for `diagnostics`."""
         explorer = self._navigator.explorer
         counters = {
-            **self._asker.counters,
+            **self._queries.counters,
             "conflicts": explorer.num_conflicts,
             "cells_cleared": explorer.num_cells_cleared,
             "frontiers_reset": explorer.num_frontiers_reset,
@@ -194,4 +194,4 @@ class FrontierUpdate:
 
     def belief(self) -> Belief:
         """Entries, map, frontiers, and what was asked."""
-        return self._navigator.belief(self._asker.asked, self._candidates)
+        return self._navigator.belief(self._queries.log, self._candidates)

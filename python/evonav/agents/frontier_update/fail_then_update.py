@@ -60,7 +60,7 @@ class FailThenUpdate(FrontierUpdate):
         first = 0 if self._verification.verify_views == "all" else -1
         images = [pixels_of(view, navigator.config.image_px) for view in navigator.round_views[first:]]
         self._counters["verifications"] += 1
-        is_present = self._asker.ask(
+        is_present = self._queries.ask(
             VerifyQuestion(
                 goal=self._goal,
                 entry=navigator.candidate(entry, with_images=self.sensing.needs_rgb),

@@ -66,7 +66,7 @@ class ChooseQuestion(ClosedQuestion[Choice]):
             raise AnswerError("invalid", f"there is no {line[:80]}", text)
         return choice
 
-    def words(self, answer: Choice) -> str:
+    def answer_text(self, answer: Choice) -> str:
         """`Object i` or `Frontier i`."""
         return f"{answer.kind.capitalize()} {answer.index}"
 

@@ -30,7 +30,7 @@ from evonav.agents.msgnav.scene_graph import Subgraph
 from evonav.agents.navigator import Navigator, NavigatorConfig
 from evonav.agents.visible_viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
 from evonav.decision.candidates import ObjectCandidate, Point2
-from evonav.decision.query import Asker
+from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.decision import TextMatch
 from evonav.memory import Frontier
@@ -95,7 +95,7 @@ class MsgNav:
         model: DecisionModel = decision or TextMatch()
         every_round = ViewSchedule(7, 40.0)
         self.sensing = Sensing(every_round, every_round, needs_rgb=model.needs_images)
-        self._asker = Asker(model, num_tries=self.config.num_tries)
+        self._queries = QuerySession(model, num_tries=self.config.num_tries)
         self._counters: Counter[str] = Counter()
         self._diagnostics = RoundDiagnostics()
 
@@ -103,7 +103,7 @@ class MsgNav:
         """Forgets everything."""
         self._task = task
         self._counters.clear()
-        self._asker.counters.clear()
+        self._queries.counters.clear()
         self._memory = GraphMemory(Navigator(task.map_frame, self.config.navigator), max_edge_m=self.config.max_edge_m)
 
     def begin_stage(self, stage: StageInput) -> None:
@@ -116,7 +116,7 @@ class MsgNav:
 
     def act(self, observation: Observation) -> AgentAction:
         """Looks; goes on to what it is committed to; there it asks whether that is the goal; else it decides."""
-        self._asker.begin_round()
+        self._queries.begin_round()
         self._candidates = ()
         self._memory.observe(observation)
         target = self._followed()
@@ -154,7 +154,7 @@ class MsgNav:
         entry = navigator.objects.entry(target.candidate.entry_id) if target.view_id is None else None
         images = [pixels_of(view, config.navigator.image_px) for view in views] if self.sensing.needs_rgb else []
         self._counters["verifications"] += 1
-        is_found = self._asker.ask(
+        is_found = self._queries.ask(
             ArrivalQuestion(
                 goal=self._goal,
                 target=target.candidate if entry is None else navigator.candidate(entry),
@@ -188,13 +188,13 @@ class MsgNav:
         nodes = memory.nodes()
         subgraph = Subgraph((), (), ())
         if nodes:
-            selected = self._asker.ask(SubgraphQuestion(self._goal, nodes, here, self.config.max_selected))
+            selected = self._queries.ask(SubgraphQuestion(self._goal, nodes, here, self.config.max_selected))
             if selected is None:
                 return self._random_frontier()
             subgraph = memory.graph.subgraph(selected)
         question = self._graph_question(nodes, subgraph, observation)
         self._candidates = subgraph.entry_ids
-        choice = self._asker.ask(question)
+        choice = self._queries.ask(question)
         if choice is None:
             return self._random_frontier()
         if choice.kind == "explore":
@@ -214,7 +214,7 @@ class MsgNav:
         viewpoint = self._viewpoint(points_m, here)
         if viewpoint.found != "circle":
             self._counters[f"viewpoints_{viewpoint.found}"] += 1
-        return self._approach(MsgNavTarget(candidate, viewpoint, view_id, points_m), self._asker.reason)
+        return self._approach(MsgNavTarget(candidate, viewpoint, view_id, points_m), self._queries.reason)
 
     def _graph_question(
         self, nodes: Sequence[GraphObject], subgraph: Subgraph, observation: Observation
@@ -262,14 +262,16 @@ class MsgNav:
         if len(frontiers) < 2:
             return self._go_to_frontier(frontiers[0], "the only one") if frontiers else self._give_up()
         with_images = self.sensing.needs_rgb
-        index = self._asker.ask(
+        index = self._queries.ask(
             FrontierImagesQuestion(
                 goal=self._goal,
                 frontiers=[navigator.frontier_candidate(f, here, with_images=with_images) for f in frontiers],
                 surroundings=[navigator.candidate(entry) for entry in navigator.objects.entries],
             )
         )
-        return self._random_frontier() if index is None else self._go_to_frontier(frontiers[index], self._asker.reason)
+        return (
+            self._random_frontier() if index is None else self._go_to_frontier(frontiers[index], self._queries.reason)
+        )
 
     def _random_frontier(self) -> AgentAction:
         """What follows every invalid answer; drawn from the task's seed, the stage and the round alone."""
@@ -293,7 +295,7 @@ class MsgNav:
     def _tell(self, choice: str, reason: str, target: MsgNavTarget | None = None) -> None:
         """Notes a round for `diagnostics`."""
         entry_id = target.candidate.entry_id if target is not None and target.view_id is None else None
-        counters = {**self._asker.counters, **self._counters, "edges": len(self._memory.graph)}
+        counters = {**self._queries.counters, **self._counters, "edges": len(self._memory.graph)}
         details = {"reason": reason} if reason else {}
         self._diagnostics = self._memory.navigator.told(choice, entry_id, counters, details)
 
@@ -307,7 +309,7 @@ class MsgNav:
 
     def belief(self) -> Belief:
         """Entries, map, frontiers, and what was asked."""
-        return self._memory.navigator.belief(self._asker.asked, self._candidates)
+        return self._memory.navigator.belief(self._queries.log, self._candidates)
 
 
 def _candidate_of(label: str, points_m: NDArray[np.float32]) -> ObjectCandidate:

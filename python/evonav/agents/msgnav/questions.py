@@ -71,7 +71,7 @@ class SubgraphQuestion(Question[tuple[int, ...]]):
             raise AnswerError("invalid", f"no line is the id of an object: {first_line(text)[:80]!r}", text)
         return tuple(ids[: self.max_ids])
 
-    def words(self, answer: tuple[int, ...]) -> str:
+    def answer_text(self, answer: tuple[int, ...]) -> str:
         """One id a line."""
         return "\n".join(map(str, answer))
 
@@ -155,7 +155,7 @@ class GraphQuestion(Question[GraphChoice]):
         expected = "neither `Object id`, `Image i, category` nor `Continue Exploration`"
         raise AnswerError("invalid", f"{expected}: {line[:80]!r}", text)
 
-    def words(self, answer: GraphChoice) -> str:
+    def answer_text(self, answer: GraphChoice) -> str:
         """As the grammar has it."""
         if answer.kind == "object":
             return f"Object {answer.id}"
@@ -220,7 +220,7 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
             raise AnswerError("invalid", f"no frontier of the list: {line[:80]!r}", text)
         return int(match[1])
 
-    def words(self, answer: int) -> str:
+    def answer_text(self, answer: int) -> str:
         """`Frontier i`."""
         return f"Frontier {answer}"
 

@@ -60,7 +60,7 @@ def choose(matcher: Matcher, question: "GraphQuestion") -> tuple[GraphChoice, st
     rejected_ids = {past.id for past in question.history if past.kind == "object"}
     left = [candidate for candidate in around if candidate.entry_id not in rejected_ids]
     named = [
-        (matcher.relations_held(goal, candidate, around), -index)
+        (matcher.relation_share(goal, candidate, around), -index)
         for index, candidate in enumerate(left)
         if matcher.names_goal(goal, candidate)
     ]
@@ -128,6 +128,6 @@ def arrive(matcher: Matcher, question: "ArrivalQuestion") -> tuple[bool, str]:
     ]
     if not here:
         return False, f"no {goal.noun} seen here"
-    held = max(matcher.relations_held(goal, seen, question.seen) for seen in here)
+    held = max(matcher.relation_share(goal, seen, question.seen) for seen in here)
     is_last_chance = question.num_frontiers == 0 or question.num_rounds_left <= config.hurry_rounds
     return held >= config.min_relations or is_last_chance, f"{goal.noun} seen here, {held:.0%} of what is said fits"

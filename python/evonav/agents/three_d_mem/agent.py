@@ -12,7 +12,7 @@ from evonav.agents.three_d_mem.candidates import SnapshotCandidate
 from evonav.agents.three_d_mem.memory import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
 from evonav.decision.candidates import ObjectCandidate
-from evonav.decision.query import Asker
+from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.decision import TextMatch
 from evonav.memory import Frontier
@@ -50,7 +50,7 @@ class ThreeDMem:
         self.config = config or ThreeDMemConfig()
         model: DecisionModel = decision or TextMatch()
         self.sensing = Sensing(needs_rgb=model.needs_images)
-        self._asker = Asker(model, num_tries=self.config.num_tries)
+        self._queries = QuerySession(model, num_tries=self.config.num_tries)
         self._counters: Counter[str] = Counter()
         self._candidates: tuple[int, ...] = ()
         self._details: dict[str, Any] = {}
@@ -59,7 +59,7 @@ class ThreeDMem:
     def begin_task(self, task: TaskInfo) -> None:
         """Forgets everything."""
         self._counters.clear()
-        self._asker.counters.clear()
+        self._queries.counters.clear()
         self._navigator = Navigator(task.map_frame, self.config.navigator)
         self._snapshots = SnapshotMemory(self.config.recluster_reach_m)
 
@@ -70,7 +70,7 @@ class ThreeDMem:
 
     def act(self, observation: Observation) -> AgentAction:
         """Stops at the object it was committed to; else looks, clusters, decides and goes on."""
-        self._asker.begin_round()
+        self._queries.begin_round()
         self._candidates = ()
         navigator = self._navigator
         self._details = {"num_snapshots_before": len(self._snapshots.snapshots)}
@@ -109,11 +109,11 @@ class ThreeDMem:
             heading_view=navigator.heading_view() if with_images else None,
         )
         self._candidates = tuple(entry_id for snapshot in shown for entry_id in snapshot.entry_ids)
-        choice = self._asker.ask(question)
+        choice = self._queries.ask(question)
         if choice is None:
             self._counters["aborts_no_answer"] += 1
             return self._stop(NO_ANSWER)
-        reason = self._asker.reason
+        reason = self._queries.reason
         if choice.snapshot is None:
             return self._go_to_frontier(frontiers[choice.index], reason)
         self._details["snapshot"] = shown[choice.snapshot].view.id
@@ -125,7 +125,7 @@ class ThreeDMem:
         names = sorted({entries[entry_id].label for snapshot in snapshots for entry_id in snapshot.entry_ids})
         kept: tuple[str, ...] = ()
         if names:
-            answer = self._asker.ask(PrefilterQuestion(self._goal, names, self.config.max_classes))
+            answer = self._queries.ask(PrefilterQuestion(self._goal, names, self.config.max_classes))
             kept = answer or ()  # without an answer there are no snapshots, as in the original
         self._details["prefilter"] = list(kept)
         useful = [
@@ -171,7 +171,7 @@ class ThreeDMem:
         """Notes a round for `diagnostics`."""
         explorer = self._navigator.explorer
         counters = {
-            **self._asker.counters,
+            **self._queries.counters,
             **self._counters,
             "conflicts": explorer.num_conflicts,
             "cells_cleared": explorer.num_cells_cleared,
@@ -193,4 +193,4 @@ class ThreeDMem:
 
     def belief(self) -> Belief:
         """Entries, map, frontiers, and what was asked."""
-        return self._navigator.belief(self._asker.asked, self._candidates)
+        return self._navigator.belief(self._queries.log, self._candidates)

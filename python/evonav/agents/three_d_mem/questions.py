@@ -26,7 +26,7 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
     goal: StageInput
     class_names: Sequence[str]
     """Of what is in snapshots; each once, sorted."""
-    max_kept: int = 10
+    max_classes: int = 10
 
     def prompt(self) -> Prompt:
         """The names. How many are kept is not said, as in the original."""
@@ -53,12 +53,12 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
         """
         known = {name.lower(): name for name in self.class_names}
         lines = [line.lower() for line in lines_of(text)]
-        names = tuple(dict.fromkeys(known[line] for line in lines if line in known))[: self.max_kept]
+        names = tuple(dict.fromkeys(known[line] for line in lines if line in known))[: self.max_classes]
         if not names and _NONE not in lines:
             raise AnswerError("invalid", f"no name of the list: {first_line(text)[:80]!r}", text)
         return names
 
-    def words(self, answer: tuple[str, ...]) -> str:
+    def answer_text(self, answer: tuple[str, ...]) -> str:
         """A name a line."""
         return "\n".join(answer) or _NONE
 
@@ -68,7 +68,7 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
 
     def alternatives(self, answer: tuple[str, ...]) -> Sequence[tuple[str, ...]]:
         """The same without its best name, and all that it leaves out."""
-        others = tuple(name for name in self.class_names if name not in answer)[: self.max_kept]
+        others = tuple(name for name in self.class_names if name not in answer)[: self.max_classes]
         return [names for names in dict.fromkeys((answer[1:], others)) if names != answer]
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
@@ -131,7 +131,7 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
             raise AnswerError("invalid", f"there is no {line[:80]}", text)
         return choice
 
-    def words(self, answer: SnapshotChoice) -> str:
+    def answer_text(self, answer: SnapshotChoice) -> str:
         """`Snapshot i, Object j` or `Frontier i`."""
         if answer.snapshot is None:
             return f"Frontier {answer.index}"

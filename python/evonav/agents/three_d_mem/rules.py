@@ -19,7 +19,7 @@ def prefilter(matcher: Matcher, question: "PrefilterQuestion") -> tuple[tuple[st
     goal = matcher.parsed(question.goal)
     scores = {name: matcher.label_score(goal, name) for name in question.class_names}
     ranked = sorted((name for name in scores if scores[name] > 0.0), key=lambda name: (-scores[name], name))
-    return tuple(ranked[: question.max_kept]), f"{len(ranked)} of {len(scores)} classes are spoken of"
+    return tuple(ranked[: question.max_classes]), f"{len(ranked)} of {len(scores)} classes are spoken of"
 
 
 def choose_snapshot(matcher: Matcher, question: "SnapshotQuestion") -> tuple[SnapshotChoice, str]:

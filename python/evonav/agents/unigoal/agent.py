@@ -28,7 +28,7 @@ from evonav.agents.unigoal.goals import GoalConfig, GoalWatch
 from evonav.agents.unigoal.graphs import Advice, GraphConfig, GraphReasoner
 from evonav.agents.unigoal.object_graph import SceneNode
 from evonav.agents.unigoal.planner import PlannedStep, PlannerConfig, UniGoalPlanner
-from evonav.decision.query import Asker
+from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.decision import TextMatch
 from evonav.memory.occupancy import BLOCKED, FREE
@@ -66,15 +66,15 @@ class UniGoal:
     def __init__(self, config: UniGoalConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or UniGoalConfig()
         model: DecisionModel = decision or TextMatch()
-        self._asker = Asker(model, num_tries=self.config.num_tries)
+        self._queries = QuerySession(model, num_tries=self.config.num_tries)
         self._diagnostics = RoundDiagnostics()
         self._task: TaskInfo | None = None
 
     def begin_task(self, task: TaskInfo) -> None:
         """Forgets everything; the map begins where the agent first stands."""
         self._task = task
-        self._asker.counters.clear()
-        self._graphs = GraphReasoner(self.config.graph, self._asker)
+        self._queries.counters.clear()
+        self._graphs = GraphReasoner(self.config.graph, self._queries)
         self._random = random.Random(f"unigoal wander {task.seed}")  # noqa: S311 - not for secrets
         self._bev: BevMap | None = None
         self._num_given_up = 0
@@ -90,7 +90,7 @@ class UniGoal:
 
     def act(self, observation: Observation) -> AgentAction:
         """One primitive action."""
-        self._asker.begin_round()
+        self._queries.begin_round()
         view, pose = observation.views[-1], observation.pose
         bev, planner, watch = self._ready(pose)
         planner.observe(pose, is_own_move=not observation.is_guided)
@@ -200,7 +200,7 @@ class UniGoal:
             chosen_entry=None if node is None else self._entry(node),
             num_entries=len(self._graphs.scene.nodes),
             counters={
-                **self._asker.counters,
+                **self._queries.counters,
                 "collisions": counters.collisions,
                 "stuck": counters.stuck,
                 "unreachable": counters.unreachable,
@@ -236,7 +236,7 @@ class UniGoal:
             frontiers=[] if target_m is None else [FrontierBelief(0, target_m, 0.0)],
             cells=cells,
             map_frame=frame,
-            asked=tuple(self._asker.asked),
+            queries=tuple(self._queries.log),
         )
 
 

@@ -21,7 +21,7 @@ from evonav.agents.unigoal.scene_questions import (
     RoomQuestion,
 )
 from evonav.decision.candidates import ObjectCandidate
-from evonav.decision.query import Asker
+from evonav.decision.query import QuerySession
 from evonav.decision.text.language import ROOMS, canonical
 from evonav.decision.text.matcher import Matcher
 from evonav.sensors.observation import View
@@ -84,14 +84,14 @@ class Advice:
 class GraphReasoner:
     """Scene graph of the task, goal graph of the stage."""
 
-    def __init__(self, config: GraphConfig, asker: Asker) -> None:
+    def __init__(self, config: GraphConfig, asker: QuerySession) -> None:
         self.config = config
         self.scene = ObjectGraph(config.scene)
         self.goal_graph: GoalGraph | None = None
         self.subgraphs: tuple[GoalGraph, ...] = ()
         self.category: str | None = None
         """Of the goal's detections; `None` if the detector has no word for it."""
-        self._asker = asker
+        self._queries = asker
         self._matcher = Matcher()
 
     def begin_stage(self, goal: StageInput) -> None:
@@ -102,7 +102,7 @@ class GraphReasoner:
 
     def understand(self) -> None:
         """Reads the goal, once a stage: objects, relations, subgraphs, the detector's category."""
-        goal, ask = self._goal, self._asker.ask
+        goal, ask = self._goal, self._queries.ask
         text: str | None = goal.unified_instruction
         objects: tuple[str, ...]
         if self.config.goal_input == "image":
@@ -127,7 +127,7 @@ class GraphReasoner:
         """Takes over a view, and relates what is new. A wrong number of relations: these pairs get none."""
         pairs = self.scene.update(view)
         if pairs:
-            self.scene.relate(pairs, self._asker.ask(RelationLinesQuestion(self._goal, pairs), 1))
+            self.scene.relate(pairs, self._queries.ask(RelationLinesQuestion(self._goal, pairs), 1))
 
     def advise(self, is_given_up: Callable[[SceneNode], bool]) -> Advice:
         """Matches the first subgraph (as released, the others are never used) with the scene.
@@ -168,7 +168,7 @@ class GraphReasoner:
         nodes = scene.neighbourhood(tuple(match.anchors.values()), config.correction_hops, config.correction_reach_m)
         ids = {node.id for node in nodes}
         edges = [edge for edge in scene.edges if {edge.subject_id, edge.object_id} <= ids]
-        verdicts = self._asker.ask(CorrectionQuestion(self._goal, self.subgraphs[0], nodes, edges))
+        verdicts = self._queries.ask(CorrectionQuestion(self._goal, self.subgraphs[0], nodes, edges))
         if verdicts is None:
             return
         for edge, verdict in zip(edges, verdicts[len(nodes) :], strict=True):
@@ -187,7 +187,7 @@ class GraphReasoner:
         """
         subgraph = self.subgraphs[0]
         anchors = {word: node for word, i in match.anchors.items() if (node := self.scene.node(i)) is not None}
-        layout = self._asker.ask(LayoutQuestion(self._goal, subgraph, anchors))
+        layout = self._queries.ask(LayoutQuestion(self._goal, subgraph, anchors))
         if layout is None:
             return None
         first, second = list(anchors)[:2]
@@ -206,13 +206,13 @@ class GraphReasoner:
             return None
         goal, subgraph = self._goal, self.subgraphs[0]
         rooms = tuple(sorted(groups))
-        room = self._asker.ask(RoomQuestion(goal, subgraph, rooms)) or rooms[0]
+        room = self._queries.ask(RoomQuestion(goal, subgraph, rooms)) or rooms[0]
         nodes, edges = self.scene.nodes, self.scene.edges
         best: tuple[float, Group] | None = None
         for group in groups[room]:
             ids = {node.id for node in group.nodes}
             inside = [edge for edge in edges if {edge.subject_id, edge.object_id} <= ids]
-            score = self._asker.ask(GroupScoreQuestion(goal, subgraph, group, inside, nodes), 1) or 0.0
+            score = self._queries.ask(GroupScoreQuestion(goal, subgraph, group, inside, nodes), 1) or 0.0
             if score > (0.0 if best is None else best[0]):
                 best = (score, group)
         return None if best is None else best[1]

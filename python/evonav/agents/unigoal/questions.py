@@ -65,7 +65,7 @@ class DescribeQuestion(Question[str]):
             raise AnswerError("invalid", "no description", text)
         return line
 
-    def words(self, answer: str) -> str:
+    def answer_text(self, answer: str) -> str:
         """The sentence."""
         return answer
 
@@ -104,7 +104,7 @@ class ObjectsQuestion(Question[tuple[str, ...]]):
             raise AnswerError("invalid", "an empty list", text)
         return objects
 
-    def words(self, answer: tuple[str, ...]) -> str:
+    def answer_text(self, answer: tuple[str, ...]) -> str:
         """`[a, b, ...]`."""
         return f"[{', '.join(answer)}]"
 
@@ -150,7 +150,7 @@ class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
             raise AnswerError("invalid", "no line", text)
         return tuple(edges)
 
-    def words(self, answer: tuple[GoalEdge, ...]) -> str:
+    def answer_text(self, answer: tuple[GoalEdge, ...]) -> str:
         """A line an edge."""
         lines = [relation_line(e.subject, e.object, e.subject, e.relation, e.object) for e in answer]
         return "\n".join(lines) or "none"
@@ -212,7 +212,7 @@ class DecomposeQuestion(Question[tuple[GoalGraph, ...]]):
             kept.append(known[key])
         return GoalGraph(tuple(node for node in self.graph.nodes if node in nodes), tuple(kept))
 
-    def words(self, answer: tuple[GoalGraph, ...]) -> str:
+    def answer_text(self, answer: tuple[GoalGraph, ...]) -> str:
         """JSON on one line."""
         parts = {f"subgraph_{i + 1}": json.loads(_json_of(graph)) for i, graph in enumerate(answer)}
         return json.dumps(parts)
@@ -259,7 +259,7 @@ class CategoryQuestion(ClosedQuestion[str]):
             raise AnswerError("invalid", f"no category: {line[:80]!r}", text)
         return line
 
-    def words(self, answer: str) -> str:
+    def answer_text(self, answer: str) -> str:
         """The category."""
         return answer
 

@@ -59,7 +59,7 @@ class RelationLinesQuestion(Question[tuple[str, ...]]):
             relations.append(read[1])
         return tuple(relations)
 
-    def words(self, answer: tuple[str, ...]) -> str:
+    def answer_text(self, answer: tuple[str, ...]) -> str:
         """A line a pair."""
         named = [(a.name, b.name, relation) for (a, b), relation in zip(self.pairs, answer, strict=True)]
         return "\n".join(relation_line(a, b, a, relation, b) for a, b, relation in named)
@@ -101,7 +101,7 @@ class RoomQuestion(ClosedQuestion[str]):
             raise AnswerError("invalid", f"names {len(named)} of the rooms: {line[:80]!r}", text)
         return named[0]
 
-    def words(self, answer: str) -> str:
+    def answer_text(self, answer: str) -> str:
         """The room."""
         return answer
 
@@ -149,7 +149,7 @@ class GroupScoreQuestion(Question[float]):
             raise AnswerError("invalid", f"no number from 0 to 1: {line[:80]!r}", text)
         return value
 
-    def words(self, answer: float) -> str:
+    def answer_text(self, answer: float) -> str:
         """The number."""
         return f"{answer:.3f}"
 
@@ -203,7 +203,7 @@ class LayoutQuestion(Question[Mapping[str, Point2]]):
             raise AnswerError("invalid", "two known objects at one place", text)
         return places
 
-    def words(self, answer: Mapping[str, Point2]) -> str:
+    def answer_text(self, answer: Mapping[str, Point2]) -> str:
         """A line an object."""
         return "\n".join(f"{word}: ({answer[word][0]:.3f}, {answer[word][1]:.3f})" for word in self.subgraph.nodes)
 
@@ -263,7 +263,7 @@ class CorrectionQuestion(Question[tuple[Verdict, ...]]):
                 verdicts.append(Verdict("delete" if match[1].lower() == "delete" else "keep"))
         return tuple(verdicts)
 
-    def words(self, answer: tuple[Verdict, ...]) -> str:
+    def answer_text(self, answer: tuple[Verdict, ...]) -> str:
         """A line a verdict."""
         return "\n".join(f"{index}: {verdict}" for index, verdict in enumerate(answer))
 

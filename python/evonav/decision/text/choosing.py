@@ -36,7 +36,7 @@ def choose_candidate(
     goal = matcher.parsed(stage)
     config = matcher.config
     named = [
-        (matcher.relations_held(goal, candidate, surroundings), index)
+        (matcher.relation_share(goal, candidate, surroundings), index)
         for index, candidate in enumerate(objects)
         if matcher.names_goal(goal, candidate)
     ]

@@ -30,4 +30,4 @@ class TextMatch:
             DecisionError: The question has no rule.
         """
         answer, reason = question.by_rule(self.matcher)
-        return Reply(answer, f"{question.words(answer)}\n{reason}")
+        return Reply(answer, f"{question.answer_text(answer)}\n{reason}")

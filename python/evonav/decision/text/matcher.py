@@ -94,7 +94,7 @@ class Matcher:
         said = [0.5 if r.kind == "on" else 0.4 for r in goal.relations if similarity(r.noun, label) >= 1.0]
         return max([0.9 * own if own >= 0.4 else 0.0, *said])
 
-    def relations_held(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
+    def relation_share(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
         """Share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.
 
         What is said of looks is left out: memory has no colours, and a thing that is small for its kind may be the

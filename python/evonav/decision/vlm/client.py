@@ -1,6 +1,6 @@
 """Asks a vision-language model behind any OpenAI-compatible endpoint.
 
-    client = VlmClient(VlmConfig("gpt-4o"), store=ExchangeStore("exchanges.sqlite"))
+    client = VlmClient(VlmConfig("gpt-4o"), store=ResponseCache("exchanges.sqlite"))
     answer = client.ask(Prompt.of(Text("What is this?"), Picture(image)))
 
 Retries of lost connections, of 429 and of 5xx are the SDK's, which honours `Retry-After`; what remains is a `VlmError`.
@@ -24,7 +24,7 @@ from evonav.decision.vlm.answer import Answer, is_malformed, read_answer, usage_
 from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure
 from evonav.decision.vlm.images import png_of
 from evonav.decision.vlm.pacing import Pace
-from evonav.decision.vlm.response_cache import ExchangeStore, Failure, JsonObject, image_name, key_of
+from evonav.decision.vlm.response_cache import Failure, JsonObject, ResponseCache, image_name, key_of
 from evonav.errors import DecisionError, InvalidArgumentError
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ class VlmClient:
         self,
         config: VlmConfig,
         *,
-        store: ExchangeStore | None = None,
+        store: ResponseCache | None = None,
         mode: Mode | None = None,
         account: Account | None = None,
         keeps_failures: bool = False,
@@ -148,7 +148,7 @@ class VlmClient:
             StoreError: The exchanges cannot be read or written.
             DecisionError: The package `openai` is missing.
         """
-        kept = self.kept_request(prompt, attempt)
+        kept = self.cached_request(prompt, attempt)
         key = key_of(kept)
         outcome = None if self.store is None or self.mode not in ("replay", "auto") else self.store.outcome(key)
         is_replayed = outcome is not None
@@ -195,11 +195,11 @@ class VlmClient:
         if self.mode != "replay":
             self._client()
 
-    def is_kept(self, prompt: Prompt, attempt: int = 0) -> bool:
+    def is_cached(self, prompt: Prompt, attempt: int = 0) -> bool:
         """Whether the store has what came of a question."""
-        return self.store is not None and self.store.outcome(key_of(self.kept_request(prompt, attempt))) is not None
+        return self.store is not None and self.store.outcome(key_of(self.cached_request(prompt, attempt))) is not None
 
-    def kept_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
+    def cached_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
         """The request as it is kept: images by name, and the attempt where nothing else would tell it apart."""
         request = self.request_of(prompt, image_name, attempt)
         return {**request, "attempt": attempt} if attempt and self.config.seed is None else request

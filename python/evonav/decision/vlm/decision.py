@@ -1,6 +1,6 @@
 """A vision-language model as a decision model: questions are put as prompts, and answers read by their grammar.
 
-    model = VlmDecision(VlmClient(VlmConfig("gpt-4o"), store=ExchangeStore("exchanges.sqlite"), keeps_failures=True))
+    model = VlmDecision(VlmClient(VlmConfig("gpt-4o"), store=ResponseCache("exchanges.sqlite"), keeps_failures=True))
 
 Where the server holds answers to a JSON Schema, the grammar's lines come in a field `answer` and the reason in another;
 what is in `answer` is read as any other answer is.
@@ -44,7 +44,7 @@ _LINES_AS_JSON = "Give the answer as JSON: its lines as the items of `answer`, i
 
 
 class Asks(Protocol):
-    """What has the answer to a prompt: `VlmClient`, or a model of your own behind `OwnClient`."""
+    """What has the answer to a prompt: `VlmClient`, or a model of your own behind `CustomClient`."""
 
     @property
     def never_asks(self) -> bool:
@@ -59,7 +59,7 @@ class Asks(Protocol):
         """
         ...
 
-    def is_kept(self, prompt: Prompt, attempt: int = 0) -> bool:
+    def is_cached(self, prompt: Prompt, attempt: int = 0) -> bool:
         """Whether what came of it is kept, so that nothing is asked."""
         ...
 
@@ -130,10 +130,10 @@ class VlmDecision:
         if self.structured == "off":
             return self.client.ask(plain, attempt), False
         as_json = with_schema(plain, question.answer_schema())
-        if self.structured == "on" or self.client.is_kept(as_json, attempt):
+        if self.structured == "on" or self.client.is_cached(as_json, attempt):
             return self.client.ask(as_json, attempt), True
         # In a replay, what is not kept as JSON was asked of a server that knew none.
-        if self._is_refused or self.client.never_asks or self.client.is_kept(plain, attempt):
+        if self._is_refused or self.client.never_asks or self.client.is_cached(plain, attempt):
             return self.client.ask(plain, attempt), False
         try:
             return self.client.ask(as_json, attempt), True

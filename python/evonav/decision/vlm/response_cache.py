@@ -60,7 +60,7 @@ class Failure:
     message: str
 
 
-class ExchangeStore(SharedFile):
+class ResponseCache(SharedFile):
     """Exchanges in one SQLite file (WAL); any number of threads and processes may use it."""
 
     def __init__(self, path: Path | str) -> None:

@@ -255,7 +255,7 @@ class DecisionSettings(Settings):
 
     def _keeping(self, run_dir: Path) -> dict[str, Any]:
         """Where exchanges are kept, and what is had from there."""
-        from evonav.decision.vlm.response_cache import ExchangeStore
+        from evonav.decision.vlm.response_cache import ResponseCache
         from evonav.evaluation.records.store import FILE_NAME
 
         mode = self.mode or "auto"
@@ -264,14 +264,14 @@ class DecisionSettings(Settings):
         path = run_dir / EXCHANGES_NAME if self.exchanges is None else Path(self.exchanges)
         if mode == "replay" and not path.is_file():
             raise StoreError(f"{path}: no exchanges here to replay")
-        store = ExchangeStore(path)
+        store = ResponseCache(path)
         is_new = len(store) == 0 and store.num_failures == 0
         store.close()
         if mode == "record" and not is_new and not (run_dir / FILE_NAME).exists():
             raise StoreError(f"{path}: holds exchanges already: record to a new file, or use mode auto")
         # Agents of one run ask the same questions: the first answer has to stay, or its replay would be another run.
         kept = "auto" if mode == "record" else mode
-        return {"exchanges": str(path.absolute()), "mode": kept, "keeps_images": self.exchange_images}
+        return {"cache": str(path.absolute()), "mode": kept, "keeps_images": self.exchange_images}
 
 
 @dataclass(frozen=True, slots=True)

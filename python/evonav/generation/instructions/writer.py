@@ -142,7 +142,7 @@ def estimate_texts(directory: Path | str, client: VlmClient, *, limit: int | Non
                 appearance_question(public.category, public.basic_instruction, image),
                 unified_question(public.basic_instruction, public.appearance_instruction, image),
             ):
-                is_kept = client.is_kept(question)
+                is_kept = client.is_cached(question)
                 num_questions += 1
                 num_kept += is_kept
                 usage += Usage() if is_kept else client.estimate(question)
