@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.paired import mcnemar, paired_effect
-from evonav.significance import wilson
+from evonav.statistics import mcnemar, paired_effect, wilson
 
 NUM_RESAMPLES = 2000
 

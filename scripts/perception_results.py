@@ -18,14 +18,13 @@ from results import PAGE, pooled_tasks, run_agents, spread, with_part
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
-from evonav.paired import PairedEffect, paired_effect
 from evonav.perception.words import read_word
 from evonav.report.paper.tables import PAPER, PaperResult
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
 from evonav.report.run import PAPER_ORDER, Run, load_run
 from evonav.report.tables.table import NONE, Table, percent
-from evonav.significance import Interval
+from evonav.statistics import Interval, PairedEffect, paired_effect
 
 PERCEPTIONS = (
     "noisy:perfect",

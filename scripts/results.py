@@ -24,7 +24,7 @@ from evonav.report.plots.specs import CurvePlot, Line
 from evonav.report.run import PAPER_ORDER, Run, load_run
 from evonav.report.tables.run_tables import effort_table
 from evonav.report.tables.table import NONE, Table, percent
-from evonav.significance import wilson
+from evonav.statistics import wilson
 from evonav.tasks.listing import TaskFile, task_files
 
 ROOT = Path(__file__).parents[1]

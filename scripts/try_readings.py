@@ -18,7 +18,7 @@ from evonav._core import assets
 from evonav.errors import HouseError
 from evonav.generation.statistics.room_mix import reweight
 from evonav.house import House, load_houses
-from evonav.significance import weighted_quantiles
+from evonav.statistics import weighted_quantiles
 
 MODES = ("SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE")
 SALIENT = 0

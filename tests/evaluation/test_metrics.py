@@ -1,9 +1,7 @@
-"""Measures against a second implementation, and intervals against their definition."""
+"""Measures against a second implementation, and the units of intervals."""
 
 import math
-from random import Random
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,17 +9,16 @@ from toy_house import episode_case
 
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import (
-    bootstrap_means,
-    paired_differences,
+    agent_pairs,
     rates,
     stage_soft_spl,
     stage_spl,
     summarise,
+    summary_json,
 )
 from evonav.evaluation.protocol import as_errored
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
-from evonav.significance import widened_tail, wilson
 
 LENGTHS = st.floats(0.0, 100.0)
 
@@ -41,30 +38,6 @@ def test_spl_is_the_papers_formula(is_success, path_m, reference_m):
 @given(LENGTHS, LENGTHS, LENGTHS, LENGTHS)
 def test_soft_spl_is_a_share(start_m, end_m, path_m, reference_m):
     assert 0.0 <= stage_soft_spl(start_m, end_m, path_m, reference_m) <= 1.0
-
-
-def test_wilson_is_the_published_interval():
-    # Newcombe, Statistics in Medicine 17 (1998), table I: 81/263 and 0/20.
-    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=5e-5)
-    assert wilson(0, 20) == pytest.approx((0.0, 0.1611), abs=5e-5)
-    assert wilson(0, 0) is None
-
-
-def test_bootstrap_resamples_tasks():
-    """Against a plain loop, and wider than if stages were independent."""
-    random = Random(3)
-    tasks = [f"t{i}" for i in range(12) for _ in range(random.choice((3, 4, 5)))]
-    level = {task: random.random() for task in tasks}
-    values = np.array([[float(random.random() < level[task]), level[task]] for task in tasks])
-    got = bootstrap_means(values, tasks)
-    names = sorted(set(tasks))
-    rows = {name: values[[i for i, task in enumerate(tasks) if task == name]] for name in names}
-    means = [np.concatenate([rows[random.choice(names)] for _ in names]).mean(axis=0) for _ in range(10_000)]
-    tail = widened_tail(len(set(tasks)))
-    assert got == pytest.approx(np.quantile(means, [tail, 1 - tail], axis=0).T, abs=0.015)
-    alone = bootstrap_means(values, [str(i) for i in range(len(tasks))])
-    assert got[1, 1] - got[1, 0] > alone[1, 1] - alone[1, 0]
-    assert bootstrap_means(values, tasks) == pytest.approx(got, abs=0.0)
 
 
 def made(agent, successes):
@@ -125,10 +98,45 @@ def test_errored_stages_are_no_failures():
 def test_pairs_are_compared_on_common_stages():
     a = made("a", [("t", 1, True, 1.0, False), ("t", 2, False, 0.0, False), ("u", 1, True, 0.5, False)])
     b = made("b", [("t", 1, False, 0.0, False), ("t", 2, True, 0.8, False), ("v", 1, True, 0.5, False)])
-    (pair,) = paired_differences({"a": a, "b": b})
+    (pair,) = agent_pairs({"a": a, "b": b})
     assert (pair.n, pair.num_only_a, pair.num_only_b) == (2, 1, 1)
-    assert pair.sr == 0.0
-    assert pair.spl == pytest.approx(-0.1)
+    assert pair.sr.difference == 0.0
+    assert pair.spl.difference == pytest.approx(-0.1)
+
+
+def test_a_house_with_several_tasks_is_one_unit():
+    """Tasks of one house are one piece of evidence: more of them leave an interval as wide as it was."""
+    outcomes = [(f"t{i}", 1, i % 3 > 0, 0.5, False) for i in range(12)]
+    once = [record.model_copy(update={"house": record.task_id}) for record in made("a", outcomes)]
+    twice = once + [record.model_copy(update={"task_id": f"{record.task_id}-again"}) for record in once]
+    assert rates(twice).sr_ci95 == rates(once).sr_ci95 is not None
+    none = [record.model_copy(update={"state": EndState.FAILURE, "spl": 0.0}) for record in twice]
+    (pair,) = agent_pairs({"none": none, "a": twice})
+    assert (pair.n, pair.num_tasks, pair.sr.num_clusters) == (24, 24, 12)
+    assert rates([record.model_copy(update={"house": ""}) for record in once]).sr_ci95 == rates(once).sr_ci95
+
+
+def test_few_houses_give_no_verdict_however_many_tasks():
+    outcomes = [(f"t{i}", 1, True, 1.0, False) for i in range(20)]
+    a = [record.model_copy(update={"house": f"house {i % 4}"}) for i, record in enumerate(made("a", outcomes))]
+    b = [
+        record.model_copy(update={"state": EndState.FAILURE, "spl": 0.0} if i % 3 else {}) for i, record in enumerate(a)
+    ]
+    (pair,) = agent_pairs({"a": a, "b": b})
+    assert pair.sr.ci95 is not None
+    assert pair.sr.ci95[1] < 0
+    assert pair.sr.verdict == "few"
+
+
+def test_the_summary_has_verdicts_that_allow_for_the_number_of_pairs():
+    outcomes = [(f"t{i:02}", 1, i < 6, 1.0, False) for i in range(24)]
+    some = [record.model_copy(update={"house": record.task_id}) for record in made("some", outcomes)]
+    none = [record.model_copy(update={"state": EndState.FAILURE, "spl": 0.0}) for record in some]
+    alone = summary_json([], agent_pairs({"none": none, "some": some}))["paired_differences"]
+    assert [(pair["sr_p"], pair["sr_holm_p"], pair["sr_verdict"]) for pair in alone] == [(0.03125, 0.03125, "b")]
+    three = summary_json([], agent_pairs({"none": none, "some": some, "others": some}))["paired_differences"]
+    told = [(pair["sr_p"], pair["sr_holm_p"], pair["sr_verdict"]) for pair in three]
+    assert told == [(0.03125, 0.09375, "tie"), (0.03125, 0.09375, "tie"), (1.0, 1.0, "equal")]
 
 
 def test_a_stage_is_recorded_once(tmp_path):

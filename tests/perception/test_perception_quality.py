@@ -15,13 +15,12 @@ from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.run.components import Backend
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
-from evonav.perception_benchmark.estimates import Houses
 from evonav.perception_benchmark.page import write_perception_report
 from evonav.perception_benchmark.records import read_record, read_records, record_path
 from evonav.perception_benchmark.scores import differences, scores
 from evonav.perception_benchmark.tables import perception_tables
 from evonav.perception_benchmark.tour import tour
-from evonav.significance import percentile_interval
+from evonav.statistics import ClusterBootstrap, percentile_interval
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 
@@ -64,7 +63,7 @@ def test_ground_truth_is_perfect(found):
     gt = found["gt"]
     names = ("ap50", "ap", "ap50_located", "precision", "recall", "f1", "located", "labelled", "iou")
     assert values(gt.overall, *names) == [1.0] * 9
-    assert gt.overall["recall"].interval == (1.0, 1.0)
+    assert gt.overall["recall"].ci95 is None  # houses agree
     assert values(gt.overall, "ece", "depth_relative", "depth_rmse_m", "depth_lost", "pose_offset_m") == [0.0] * 5
     assert values(gt.memory, "memory_precision", "wrong_label", "phantoms") == [1.0, 0.0, 0.0]
     assert gt.memory["position_error_m"].value < 0.3
@@ -81,7 +80,7 @@ def test_a_known_miss_rate_is_told(found):
     recall = erring.overall["recall"]
     assert recall.n == gt.overall["recall"].n > 100
     assert abs(recall.value - 2 / 3) < 3 * math.sqrt(2 / 9 / recall.n)
-    assert recall.interval[0] <= 2 / 3 <= recall.interval[1]
+    assert recall.ci95[0] <= 2 / 3 <= recall.ci95[1]
     assert values(erring.overall, "precision", "labelled", "iou") == [1.0, 1.0, 1.0]
     assert erring.overall["located"].value == recall.value
     # All confidences are the same, and so the curve is flat up to the recall of each category.
@@ -135,25 +134,25 @@ def test_differences_are_of_the_same_houses_in_every_resample(folder, found):
     (same,) = differences(twice)
     assert (same.word, same.less) == ("again", "once")
     assert {each.value for each in same.measures.values()} == {0.0}
-    assert {each.interval for each in same.measures.values()} == {(0.0, 0.0)}  # of one alone they are not
-    assert twice[0].overall["recall"].interval[0] < twice[0].overall["recall"].interval[1]
+    assert {each.ci95 for each in same.measures.values()} == {None}  # of one alone they are not
+    assert twice[0].overall["recall"].ci95[0] < twice[0].overall["recall"].ci95[1]
     pairs = {(each.word, each.less): each.measures for each in differences(list(found.values()))}
     assert len(pairs) == 6
     less_truth = pairs["missing_a_third", "gt"]["recall"]
     assert less_truth.value == pytest.approx(found["missing_a_third"].overall["recall"].value - 1)
-    assert less_truth.interval == pytest.approx([e - 1 for e in found["missing_a_third"].overall["recall"].interval])
+    assert less_truth.ci95 == pytest.approx([e - 1 for e in found["missing_a_third"].overall["recall"].ci95])
     rates = {}
     for word in ("missing_a_third", "confusing"):
         shares = [(r.house, np.array(r.truths.found) >= 0) for r in records[word]]
-        draws = Houses(records[word], 0).draws
+        draws = ClusterBootstrap([r.house for r in records[word]], num_resamples=2000).draws
         order = sorted({house for house, _ in shares})
         tops, alls = (
             np.array([sum(f(hits) for house, hits in shares if house == name) for name in order]) for f in (np.sum, len)
         )
         rates[word] = (draws @ tops) / (draws @ alls)
     gaps = rates["confusing"] - rates["missing_a_third"]
-    ends = percentile_interval(gaps[:, None], len(order))[0]
-    assert pairs["confusing", "missing_a_third"]["recall"].interval == pytest.approx(ends)
+    ends = percentile_interval(gaps, len(order))
+    assert pairs["confusing", "missing_a_third"]["recall"].ci95 == pytest.approx(ends)
 
 
 def test_what_has_moved_makes_entries_stale(folder, found):

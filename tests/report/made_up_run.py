@@ -46,7 +46,7 @@ def stage_map(task_id: str, stage: int) -> StageMap:
     x, y, z = OLD_TABLE_M if stage == 1 else NEW_TABLE_M
     return StageMap(
         task_id=task_id,
-        house="house-1",
+        house=f"house-of-{task_id}",
         stage=stage,
         rooms=(
             RoomFootprint(room_id="room|1", room_type="Kitchen", polygon_m=((0, 0), (0, 4), (5, 4), (5, 0))),
@@ -129,7 +129,7 @@ def stage_record(
     return StageRecord(
         agent=agent,
         task_id=task_id,
-        house="house-1",
+        house=f"house-of-{task_id}",
         stage=stage,
         num_stages=num_stages,
         state=state,

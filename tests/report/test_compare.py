@@ -110,11 +110,11 @@ def test_several_pairs_are_adjusted_and_a_tie_says_what_could_be_found(tmp_path:
     run = lettered_run(tmp_path / "run", {"a": "sf" * 12, "b": "ss" * 8 + "sf" * 4, "c": "sf" * 11 + "ss"})
     found = compare(read_sides([str(run)]))
     raw = [item.all.effects["success"].p for item in found]
-    assert [item.adjusted["success"] for item in found] == [
+    assert [item.all.effects["success"].adjusted_p for item in found] == [
         pytest.approx(min(1.0, p)) for p in (3 * raw[0], raw[1], 2 * raw[2])
     ]
     assert words.says(found[0]) == "b is ahead"
-    tie = words.sentence("a", "c", found[1].all.effects["success"], "success", 1.0)
+    tie = words.sentence("a", "c", found[1].all.effects["success"], "success")
     assert "a tie at this n (a true difference of" in tie
     by_rounds = compare(read_sides([str(run)]), measures=["num_rounds", "recall"])
     assert "recall" not in by_rounds[0].all.effects  # no stage has it

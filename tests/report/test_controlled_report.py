@@ -18,7 +18,7 @@ from evonav.controlled.rates import Crossover, _crossing, by_rate, crossover
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import EndState, TransitionRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.paired import mcnemar
+from evonav.statistics import mcnemar
 from evonav.tasks.dataset import SourceFile
 from evonav.tasks.manifest import GenerationParameters
 
@@ -130,12 +130,12 @@ def test_claims_say_what_holds_and_what_is_not_told_apart(tmp_path):
     names = tuple(f"task-{i}" for i in range(many))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("test_controlled_report.TASKS", names)
-        outcomes = {"fu": ([S] * many, [F] * many), "stage-reset": ([F] * many, [F] * (many - 1) + [S])}
+        outcomes = {"fu": ([S] * (many - 1) + [F], [F] * many), "stage-reset": ([F] * many, [F] * (many - 1) + [S])}
         folder = write_analysis(tmp_path / "many", "pairs", ARMS, outcomes, num_tasks=many)
     found = {claim.what: claim for claim in claims(load_analysis(folder))}
     assert found["fu less stage-reset, Fixed"].verdict == "holds"
     assert found["stage-reset less fu, Not Fixed"].verdict == "same direction, not significant"
-    assert found["fu, Fixed less Not Fixed"].effect.difference == 1.0
+    assert found["fu, Fixed less Not Fixed"].effect.difference == 11 / 12
     assert {claim.effect.n for claim in found.values()} == {12, 6}
 
 

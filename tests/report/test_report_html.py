@@ -220,9 +220,9 @@ def test_tasks_without_a_record_are_listed(tmp_path: Path) -> None:
 def test_statements_follow_the_numbers(write_run: WriteRun, tmp_path: Path) -> None:
     first, second = findings.statements(load_run(write_run()))
     assert first.startswith("ftu has the highest success rate, 91.7 [")
-    assert second.endswith("points on the 12 stages that both scored: ftu is ahead beyond the interval.")
+    assert second.endswith("points on the 12 stages that both scored: a tie at this n.")
     few = findings.statements(load_run(write_run("few", num_tasks=2)))
-    assert few[1] == "2 tasks are too few to tell agents apart."
+    assert few[1] == "2 houses are too few to tell agents apart."
     (partial,) = findings.statements(load_run(write_run("partial", is_complete=False)))
     assert partial.startswith("Not every agent has been scored on every stage")
     records = [stage_record(agent, "t", 1, EndState.SUCCESS) for agent in ("fu", "ftu")]

@@ -5,6 +5,7 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import perception_results
 import pytest
 from made_up_run import WriteRun, entry, record_run, stage_record
@@ -12,11 +13,12 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.evaluation.metrics.navigation import PairedDifference
+from evonav.evaluation.metrics.navigation import AgentPair
 from evonav.evaluation.records.schema import EndState
 from evonav.report.mechanisms import cause_share_table, counter_table, deeds_of, end_table, success_by_group
 from evonav.report.paper import tables as paper
 from evonav.report.run import load_run
+from evonav.statistics import paired_effect
 
 # Tables 1 and 2 of the paper as printed: SR, SPL, SR of relocated and of not relocated targets.
 PRINTED = {
@@ -88,7 +90,7 @@ def test_ours_stand_beside_the_papers(write_run: WriteRun) -> None:
     (pair,) = differences.rows
     assert pair[:2] == ("ftu less fu", "+6.3")
     assert pair[2].startswith("+41.7 [")
-    assert pair[5:] == ("ftu is ahead beyond the interval", "no")
+    assert pair[6:] == ("a tie at this n", "no")
 
 
 def test_agents_that_the_paper_lacks_stand_without_its_figures(tmp_path: Path) -> None:
@@ -118,7 +120,8 @@ def test_the_command_prints_and_writes_the_tables(write_run: WriteRun, tmp_path:
 
 
 def test_power_is_of_the_papers_houses(write_run: WriteRun) -> None:
-    pair = PairedDifference("fu", "ftu", 446, 110, 0.0, (-0.03, 0.03), 0.0, (0.0, 0.0), 1, 1)
+    effect = replace(paired_effect(np.zeros(1), np.zeros(1), ["a"]), num_clusters=110, ci95=(-0.03, 0.03))
+    pair = AgentPair("fu", "ftu", num_tasks=440, num_only_a=1, num_only_b=1, sr=effect, spl=effect)
     (row,) = paper.power_table([pair]).rows
     error = 0.03 / 1.96 * (110 / 90) ** 0.5
     assert row[:2] == ("ftu less fu", "+6.3")

@@ -2,16 +2,20 @@ import csv
 import io
 import shutil
 import subprocess
-from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from made_up_run import WriteRun
+from numpy.typing import NDArray
 from rich.console import Console
 
-from evonav.evaluation.metrics.navigation import PairedDifference, paired_differences, summarise
+from evonav.evaluation.metrics.navigation import agent_pairs, summarise
 from evonav.report.run import load_run
 from evonav.report.tables import table as tables
+from evonav.statistics import paired_effect
+
+F64 = NDArray[np.float64]
 
 
 def test_rates_are_those_of_the_metrics(write_run: WriteRun) -> None:
@@ -25,7 +29,7 @@ def test_rates_are_those_of_the_metrics(write_run: WriteRun) -> None:
     assert row["SR % [95% CI]"] == f"91.7 [{low:.1f}, {high:.1f}]"
     assert (row["n"], row["success"], row["failure"]) == ("12", "11", "1")
     assert row["stages"] == "all 12"
-    pairs = paired_differences(records)
+    pairs = agent_pairs(records)
     assert run.pairs == tuple(pairs)
 
 
@@ -54,13 +58,18 @@ def test_incomplete_runs_say_so_in_words(write_run: WriteRun) -> None:
     assert "Incomplete" not in "".join(tables.headline(load_run(write_run("whole")).summaries).notes)
 
 
-def test_a_verdict_claims_no_more_than_the_interval() -> None:
-    pair = PairedDifference("fu", "ftu", 20, 10, 0.1, (-0.1, 0.3), 0.1, (0.0, 0.2), 2, 4)
-    assert tables.verdict(pair) == "a tie within the interval"
-    assert tables.verdict(replace(pair, sr_ci95=(0.01, 0.3))) == "ftu is ahead beyond the interval"
-    assert tables.verdict(replace(pair, sr_ci95=(-0.3, -0.01))) == "fu is ahead beyond the interval"
-    assert tables.verdict(replace(pair, sr_ci95=(0.2, 0.2), num_tasks=1)) == "too few tasks to tell (1)"
-    assert tables.verdict(replace(pair, num_only_a=0, num_only_b=0)) == "equal on every stage"
+def test_a_verdict_is_that_of_the_effect() -> None:
+    houses = [f"house {i}" for i in range(12)]
+    none, some = np.zeros(12), np.array([1.0, 0.0] * 6)
+
+    def told(a: F64, b: F64, of: list[str] = houses) -> str:
+        return tables.verdict_words("fu", "ftu", paired_effect(a, b, of))
+
+    assert told(none, some) == "ftu is ahead"
+    assert told(some, none) == "fu is ahead"
+    assert told(some, 1 - some) == "a tie at this n"
+    assert told(some, some) == "equal on every stage"
+    assert told(none, some, ["one house"] * 12) == "too few houses to tell (1)"
 
 
 def test_causes_add_up_to_the_stages_without_success(write_run: WriteRun) -> None:
@@ -108,7 +117,7 @@ def test_latex_compiles_and_shrinks_to_the_line(tmp_path: Path) -> None:
 
 
 def test_rates_without_spread_claim_no_interval() -> None:
-    assert tables.percent(1.0, (1.0, 1.0)) == "100.0"
+    assert tables.percent(1.0, None) == "100.0"
     assert tables.percent(0.5, (0.25, 0.75)) == "50.0 [25.0, 75.0]"
     assert tables.percent(None, None) == "–"
 
@@ -119,4 +128,5 @@ def test_paired_differences_name_who_succeeded_alone(write_run: WriteRun) -> Non
     # ftu alone succeeds in six second stages, fu alone in one first stage.
     assert (row["Agents"], row["only first"], row["only second"]) == ("ftu less fu", "6", "1")
     assert row["SR difference [95% CI]"].startswith("+41.7 [")
-    assert row["SR says"] == "ftu is ahead beyond the interval"
+    # The interval leaves 0 out, p does not suffice: six houses against half a house.
+    assert (row["p"], row["SR says"]) == ("0.062", "a tie at this n")

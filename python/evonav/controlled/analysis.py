@@ -9,14 +9,13 @@ import numpy as np
 
 from evonav.controlled.layout import ControlledRecord, read_controlled, run_of
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.navigation import SUCCESS_RADIUS_M
+from evonav.evaluation.metrics.navigation import SUCCESS_RADIUS_M, house_of
 from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.paired import PairedEffect, paired_effect
 from evonav.report.run import PAPER_ORDER
 from evonav.report.tables.table import NONE, Table
-from evonav.significance import Interval
+from evonav.statistics import Interval, PairedEffect, paired_effect
 
 BASELINE = "stage-reset"
 """What forgets everything: against it memory is judged."""
@@ -80,6 +79,10 @@ class Analysis:
         scored = [set(self.outcomes[arm, agent]) for agent in agents for arm in self.arms]
         return sorted(set.intersection(*scored)) if scored else []
 
+    def houses(self, keys: Sequence[Key], agent: str) -> list[str]:
+        """Return the house of each stage, all of which the agent has scored."""
+        return [house_of(self.outcomes[self.arms[0], agent][key].row) for key in keys]
+
     def effect(
         self, a: tuple[str, str], b: tuple[str, str], measure: Measure, keys: Sequence[Key] | None = None
     ) -> PairedEffect | None:
@@ -91,9 +94,8 @@ class Analysis:
         keys = self.keys(a[1], b[1]) if keys is None else keys
         if not keys:
             return None
-        houses = [self.outcomes[a][key].row.house for key in keys]
         values = [np.array([measure(self.outcomes[side][key]) for key in keys]) for side in (a, b)]
-        return paired_effect(values[0], values[1], houses)
+        return paired_effect(values[0], values[1], self.houses(keys, a[1]))
 
     def effect_on_change(self, a: str, b: str, measure: Measure) -> PairedEffect | None:
         """What agent `b` gains from the first arm to the last, less what agent `a` does, pair by pair."""
@@ -107,8 +109,7 @@ class Analysis:
             )
             for name in (a, b)
         ]
-        houses = [self.outcomes[first, a][key].row.house for key in keys]
-        return paired_effect(gains[0], gains[1], houses)
+        return paired_effect(gains[0], gains[1], self.houses(keys, a))
 
 
 def load_analysis(directory: Path) -> Analysis:

@@ -4,9 +4,8 @@ import numpy as np
 
 from evonav.controlled.analysis import MEASURES, Analysis, Measure
 from evonav.controlled.rates import by_rate
-from evonav.paired import cluster_means
 from evonav.report.plots.specs import BarPlot, CurvePlot, Line, Plot, Series
-from evonav.significance import Interval
+from evonav.statistics import ClusterBootstrap, Interval
 
 ARM_NAMES = ("Fixed", "Not Fixed")
 
@@ -25,11 +24,14 @@ def _arm_plot(analysis: Analysis, name: str, measure: Measure) -> BarPlot:
         keys = analysis.keys(agent)
         if keys:
             values = np.array([[measure(analysis.outcomes[arm, agent][key]) for arm in analysis.arms] for key in keys])
-            houses = [analysis.outcomes[analysis.arms[0], agent][key].row.house for key in keys]
             groups.append(f"{agent}\n({len(keys)})")
-            arm_means.append(cluster_means(values, houses))
+            arm_means.append(ClusterBootstrap(analysis.houses(keys, agent)).column_means(values))
     series = tuple(
-        Series(arm, tuple(100 * arms[j][0] for arms in arm_means), tuple(_percent(arms[j][1]) for arms in arm_means))
+        Series(
+            arm,
+            tuple(100 * (found[j].value or 0.0) for found in arm_means),
+            tuple(_percent(found[j].ci95) for found in arm_means),
+        )
         for j, arm in enumerate(ARM_NAMES)
     )
     note = "in parentheses: pairs; whiskers: 95%, bootstrap by house"

@@ -7,11 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, Key, Measure, effect_cells
-from evonav.paired import cluster_means
 from evonav.report.tables.table import Table, percent
-from evonav.significance import Interval
-
-NUM_RESAMPLES = 10_000
+from evonav.statistics import ClusterBootstrap, Interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +18,7 @@ class Crossover:
     rate: float
     """May lie outside of 0 to 1; -inf: the baseline is ahead at every rate, inf: at none."""
     ci95: Interval
-    """Of resampled houses."""
+    """Bootstrap by house; the rate twice where houses agree, or there is but one."""
     share_within: float
     """Of resamples, those in which it lies in 0 to 1."""
 
@@ -53,9 +50,11 @@ def by_rate(analysis: Analysis, agent: str, measure: Measure) -> list[tuple[floa
     if not keys:
         return []
     values = np.array([[measure(analysis.outcomes[arm, agent][key]) for arm in analysis.arms] for key in keys])
-    houses = [analysis.outcomes[analysis.arms[0], agent][key].row.house for key in keys]
-    found = cluster_means(values, houses)
-    return [(arm.evolve_probability, *one) for arm, one in zip(analysis.record.arms, found, strict=True)]
+    found = ClusterBootstrap(analysis.houses(keys, agent)).column_means(values)
+    return [
+        (arm.evolve_probability, mean.value or 0.0, mean.ci95)
+        for arm, mean in zip(analysis.record.arms, found, strict=True)
+    ]
 
 
 def crossover(analysis: Analysis, agent: str, measure: Measure, *, seed: int = 0) -> Crossover | None:
@@ -72,19 +71,14 @@ def crossover(analysis: Analysis, agent: str, measure: Measure, *, seed: int = 0
             for key in keys
         ]
     )
-    houses = [analysis.outcomes[analysis.arms[0], agent][key].row.house for key in keys]
-    names, rows = np.unique(np.asarray(houses), return_inverse=True)
-    sums = np.zeros((len(names), leads.shape[1] + 1))
-    np.add.at(sums, rows, np.column_stack([leads, np.ones(len(leads))]))
     rates = np.array([arm.evolve_probability for arm in analysis.record.arms])
-    generator = np.random.Generator(np.random.PCG64(seed))
-    counts = generator.multinomial(len(names), np.full(len(names), 1 / len(names)), size=NUM_RESAMPLES)
-    drawn = counts @ sums
-    crossed = np.sort([_crossing(rates, row[:-1] / row[-1]) for row in drawn])
-    low, high = (crossed[round(share * (NUM_RESAMPLES - 1))] for share in (0.025, 0.975))
+    bootstrap = ClusterBootstrap(analysis.houses(keys, agent), seed=seed)
+    drawn = bootstrap.resampled_sums(bootstrap.sums(np.column_stack([leads, np.ones(len(leads))])))
+    crossed = np.array([_crossing(rates, row[:-1] / row[-1]) for row in drawn])
+    rate = _crossing(rates, leads.mean(axis=0))
     return Crossover(
-        rate=_crossing(rates, leads.mean(axis=0)),
-        ci95=(float(low), float(high)),
+        rate=rate,
+        ci95=bootstrap.estimate(rate, crossed, len(keys)).ci95 or (rate, rate),
         share_within=float(((crossed >= 0.0) & (crossed <= 1.0)).mean()),
     )
 

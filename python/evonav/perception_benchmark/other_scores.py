@@ -1,13 +1,14 @@
 """Figures of a perception beside its detections: confidence, depth, pose, features, and the memory made from it."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.perception_benchmark.estimates import Estimate, Group, Houses, estimate
 from evonav.perception_benchmark.records import DISTANCE_BINS_M, NUM_COSINE_BINS, MemoryState, TaskRecord
+from evonav.statistics import ClusterBootstrap, Estimate
 
 NUM_CONFIDENCE_BINS = 10
 _STARTS = tuple(f"{low:g}" for low in DISTANCE_BINS_M)
@@ -15,8 +16,16 @@ DISTANCES = (*(f"{a}-{b} m" for a, b in pairwise(_STARTS)), f"over {_STARTS[-1]}
 COSINES = ("same_object", "same_category", "other", "text_own", "text_other")
 
 
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Objects and detections of one kind."""
+
+    name: str
+    measures: Mapping[str, Estimate]
+
+
 def calibration(
-    houses: Houses, confidences: NDArray[np.float64], is_right: NDArray[np.bool_], of: NDArray[np.int64]
+    houses: ClusterBootstrap, confidences: NDArray[np.float64], is_right: NDArray[np.bool_], of: NDArray[np.int64]
 ) -> tuple[dict[str, Estimate], list[tuple[float, Estimate]]]:
     """Expected calibration error, and mean confidence and precision by tenths of confidence.
 
@@ -27,23 +36,24 @@ def calibration(
         of: `(D,)` house of each.
     """
     bins = np.minimum((confidences * NUM_CONFIDENCE_BINS).astype(np.int64), NUM_CONFIDENCE_BINS - 1)
-    tops, sums, counts = np.zeros((3, NUM_CONFIDENCE_BINS, houses.num))
+    tops, sums, counts = np.zeros((3, NUM_CONFIDENCE_BINS, houses.num_clusters))
     rows: list[tuple[float, Estimate]] = []
     for i in range(NUM_CONFIDENCE_BINS):
         mine = bins == i
-        tops[i], sums[i] = houses.sums(of[mine], is_right[mine]), houses.sums(of[mine], confidences[mine])
-        counts[i] = houses.sums(of[mine])
+        tops[i], sums[i] = houses.sums(is_right[mine], of[mine]), houses.sums(confidences[mine], of[mine])
+        counts[i] = houses.sums(np.ones(int(mine.sum())), of[mine])
         if mine.any():
             rows.append((float(confidences[mine].mean()), houses.ratio(tops[i], counts[i], int(mine.sum()))))
     num = len(confidences)
     if num == 0:
-        return {"ece": Estimate(None, None, 0)}, rows
+        return {"ece": Estimate(None, None, 0, houses.num_clusters)}, rows
     value = float(np.abs(tops.sum(axis=1) - sums.sum(axis=1)).sum() / num)
-    drawn = np.abs(houses.draws @ (tops - sums).T).sum(axis=1) / np.maximum(houses.draws @ counts.sum(axis=0), 1.0)
-    return {"ece": estimate(value, drawn, num, houses.num)}, rows
+    errors = np.abs(houses.resampled_sums((tops - sums).T)).sum(axis=1)
+    resampled = errors / np.maximum(houses.resampled_sums(counts.sum(axis=0)), 1.0)
+    return {"ece": houses.estimate(value, resampled, num)}, rows
 
 
-def depth_groups(houses: Houses, records: Sequence[TaskRecord]) -> list[Group]:
+def depth_groups(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> list[Group]:
     """Depth errors over all pixels, then by their true depth."""
     num, lost, relative, square = (
         np.array([getattr(record.depth, name) for record in records], np.float64).reshape(len(records), -1)
@@ -52,7 +62,7 @@ def depth_groups(houses: Houses, records: Sequence[TaskRecord]) -> list[Group]:
 
     def group(name: str, columns: Sequence[int]) -> Group:
         all_px, lost_px, relatives, squares = (
-            houses.task_sums(table[:, columns].sum(axis=1).tolist()) for table in (num, lost, relative, square)
+            houses.sums(table[:, columns].sum(axis=1)) for table in (num, lost, relative, square)
         )
         told = all_px - lost_px
         measures = {
@@ -66,16 +76,18 @@ def depth_groups(houses: Houses, records: Sequence[TaskRecord]) -> list[Group]:
     return [group("all", every), *(group(name, [i]) for i, name in enumerate(DISTANCES))]
 
 
-def pose(houses: Houses, records: Sequence[TaskRecord]) -> dict[str, Estimate]:
+def pose(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> dict[str, Estimate]:
     """Mean errors of the believed pose."""
-    nums = houses.task_sums([len(record.pose.offset_m) for record in records])
-    offsets = houses.task_sums([sum(record.pose.offset_m) for record in records])
-    turns = houses.task_sums([float(np.degrees(sum(record.pose.turn_rad))) for record in records])
+    nums = houses.sums([len(record.pose.offset_m) for record in records])
+    offsets = houses.sums([sum(record.pose.offset_m) for record in records])
+    turns = houses.sums([float(np.degrees(sum(record.pose.turn_rad))) for record in records])
     num = int(nums.sum())
     return {"pose_offset_m": houses.ratio(offsets, nums, num), "pose_turn_deg": houses.ratio(turns, nums, num)}
 
 
-def cosines(houses: Houses, records: Sequence[TaskRecord]) -> tuple[dict[str, list[int]], dict[str, Estimate]]:
+def cosines(
+    houses: ClusterBootstrap, records: Sequence[TaskRecord]
+) -> tuple[dict[str, list[int]], dict[str, Estimate]]:
     """Histograms of cosines, and their means; nothing without features."""
     counts: dict[str, list[int]] = {}
     means: dict[str, Estimate] = {}
@@ -85,17 +97,17 @@ def cosines(houses: Houses, records: Sequence[TaskRecord]) -> tuple[dict[str, li
             table[i] = getattr(record.features, name) or 0
         if table.any():
             counts[name] = table.sum(axis=0).astype(np.int64).tolist()
-            nums = houses.task_sums(table.sum(axis=1).tolist())
-            totals = houses.task_sums([record.features.totals.get(name, 0.0) for record in records])
+            nums = houses.sums(table.sum(axis=1))
+            totals = houses.sums([record.features.totals.get(name, 0.0) for record in records])
             means[f"cosine_{name}"] = houses.ratio(totals, nums, int(nums.sum()))
-    nums = houses.task_sums([record.features.num_texts for record in records])
+    nums = houses.sums([record.features.num_texts for record in records])
     if nums.any():
-        rights = houses.task_sums([record.features.num_right for record in records])
+        rights = houses.sums([record.features.num_right for record in records])
         means["text_right"] = houses.ratio(rights, nums, int(nums.sum()))
     return counts, means
 
 
-def memory(houses: Houses, records: Sequence[TaskRecord]) -> dict[str, Estimate]:
+def memory(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> dict[str, Estimate]:
     """The object map after the first house's tour, and what became of it in the next house."""
     first = [_states(record, 0, 1.0) for record in records]
     begun, toured = ([_states(record, 1, share) for record in records] for share in (0.0, 1.0))
@@ -106,7 +118,7 @@ def memory(houses: Houses, records: Sequence[TaskRecord]) -> dict[str, Estimate]
     }
 
 
-def memory_curve(houses: Houses, records: Sequence[TaskRecord]) -> list[tuple[float, dict[str, Estimate]]]:
+def memory_curve(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> list[tuple[float, dict[str, Estimate]]]:
     """The same by share of the first house's tour, where all tasks were looked at."""
     shares = sorted({state.share for record in records for state in record.memory if state.stage == record.stages[0]})
     found = []
@@ -117,13 +129,13 @@ def memory_curve(houses: Houses, records: Sequence[TaskRecord]) -> list[tuple[fl
     return found
 
 
-def memory_measures(houses: Houses, states: Sequence[MemoryState | None]) -> dict[str, Estimate]:
+def memory_measures(houses: ClusterBootstrap, states: Sequence[MemoryState | None]) -> dict[str, Estimate]:
     """Of the memory at one time, one state a task."""
-    one = houses.task_sums([float(state is not None) for state in states])
+    one = houses.sums([float(state is not None) for state in states])
     num_tasks = int(one.sum())
 
     def per_task(name: str) -> Estimate:
-        return houses.ratio(houses.task_sums([getattr(s, name) if s else 0.0 for s in states]), one, num_tasks)
+        return houses.ratio(houses.sums([getattr(s, name) if s else 0.0 for s in states]), one, num_tasks)
 
     return {
         "entries": per_task("num_entries"),
@@ -138,10 +150,10 @@ def memory_measures(houses: Houses, states: Sequence[MemoryState | None]) -> dic
 
 
 def _share(
-    houses: Houses, states: Sequence[MemoryState | None], name: str, of: Callable[[MemoryState], float]
+    houses: ClusterBootstrap, states: Sequence[MemoryState | None], name: str, of: Callable[[MemoryState], float]
 ) -> Estimate:
-    bottoms = houses.task_sums([of(state) if state else 0.0 for state in states])
-    tops = houses.task_sums([getattr(state, name) if state else 0.0 for state in states])
+    bottoms = houses.sums([of(state) if state else 0.0 for state in states])
+    tops = houses.sums([getattr(state, name) if state else 0.0 for state in states])
     return houses.ratio(tops, bottoms, int(bottoms.sum()))
 
 
@@ -155,4 +167,4 @@ def _states(record: TaskRecord, house: int, share: float) -> MemoryState | None:
 
 def measure_values(measures: Mapping[str, Estimate]) -> dict[str, dict[str, object]]:
     """Estimates as JSON."""
-    return {name: {"value": found.value, "interval": found.interval, "n": found.n} for name, found in measures.items()}
+    return {name: {"value": found.value, "interval": found.ci95, "n": found.n} for name, found in measures.items()}

@@ -7,11 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from evonav.perception_benchmark.average_precision import RECALLS
-from evonav.perception_benchmark.estimates import Estimate
 from evonav.perception_benchmark.records import NUM_COSINE_BINS
 from evonav.perception_benchmark.scores import Scores
 from evonav.report.plots.specs import ConfusionPlot, ConfusionRow, CurvePlot, GroupPlot, Line, Plot, Series
-from evonav.significance import Interval
+from evonav.statistics import Estimate, Interval
 
 MAX_CONFUSED = 12
 _GROUPS = (("distance", "distance"), ("size", "size in the image"))
@@ -38,7 +37,7 @@ def perception_plots(found: Sequence[Scores]) -> list[Plot]:
         Line(
             one.word,
             tuple((confidence, each.value or 0.0) for confidence, each in one.calibration),
-            tuple(each.interval for _, each in one.calibration),
+            tuple(each.ci95 for _, each in one.calibration),
         )
         for one in found
         if one.calibration
@@ -108,7 +107,7 @@ def _memory_plots(found: Sequence[Scores]) -> list[CurvePlot]:
             Line(
                 one.word,
                 tuple((share, measures[name].value or 0.0) for share, measures in one.memory_curve),
-                tuple(measures[name].interval for _, measures in one.memory_curve),
+                tuple(measures[name].ci95 for _, measures in one.memory_curve),
             )
             for one in found
             if one.memory_curve
@@ -145,4 +144,4 @@ def _percent(estimate: Estimate) -> float | None:
 
 
 def _interval(estimate: Estimate) -> Interval | None:
-    return None if estimate.interval is None else (100 * estimate.interval[0], 100 * estimate.interval[1])
+    return None if estimate.ci95 is None else (100 * estimate.ci95[0], 100 * estimate.ci95[1])

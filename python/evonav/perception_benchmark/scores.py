@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from evonav.errors import StoreError
 from evonav.perception_benchmark import other_scores as other
 from evonav.perception_benchmark.average_precision import interpolated, resampled
-from evonav.perception_benchmark.estimates import Estimate, Group, Houses, estimate
 from evonav.perception_benchmark.matching import IGNORED, IOU_LIMIT, NONE
+from evonav.perception_benchmark.other_scores import Group
 from evonav.perception_benchmark.records import DISTANCE_BINS_M, TaskRecord
+from evonav.statistics import ClusterBootstrap, Estimate
 
+NUM_RESAMPLES = 2000
 NUM_AP_RESAMPLES = 300
 SIZE_LIMITS = (32 * 32 / (640 * 480), 96 * 96 / (640 * 480))
 """COCO's small and medium objects end here, as parts of an image: its images are mostly of 640 x 480 pixels."""
@@ -104,7 +106,7 @@ def differences(found: Sequence[Scores]) -> list[Difference]:
             b.word,
             a.word,
             {
-                name: theirs[name].less(ours[name], a.num_houses)
+                name: theirs[name].minus(ours[name])
                 for ours, theirs, names in ((a.overall, b.overall, COMPARED), (a.memory, b.memory, COMPARED_MEMORY))
                 for name in names
                 if name in ours and name in theirs
@@ -120,10 +122,10 @@ class _Scorer:
 
     def __init__(self, word: str, records: Sequence[TaskRecord], seed: int) -> None:
         self.word, self.records = word, records
-        self.houses = Houses(records, seed)
+        self.houses = ClusterBootstrap([r.house for r in records], num_resamples=NUM_RESAMPLES, seed=seed)
         truths, found = [r.truths for r in records], [r.detections for r in records]
-        self.truth_house = np.repeat(self.houses.of_task, [len(t.view) for t in truths])
-        self.house = np.repeat(self.houses.of_task, [len(d.view) for d in found])
+        self.truth_house = np.repeat(self.houses.cluster_of, [len(t.view) for t in truths])
+        self.house = np.repeat(self.houses.cluster_of, [len(d.view) for d in found])
         self.truth_category = np.array([c for t in truths for c in t.category], dtype=object)
         self.is_found = np.array([i >= 0 for t in truths for i in t.found], np.bool_)
         self.is_located = np.array([i >= 0 for t in truths for i in t.located], np.bool_)
@@ -168,7 +170,7 @@ class _Scorer:
         return Scores(
             word=self.word,
             num_tasks=len(records),
-            num_houses=houses.num,
+            num_houses=houses.num_clusters,
             num_views=sum(sum(record.num_views) for record in records),
             overall={**overall, **error, **depth[0].measures, **other.pose(houses, records), **texts},
             groups=groups,
@@ -192,9 +194,9 @@ class _Scorer:
         """
         houses = self.houses
         of = self.truth_house[truths]
-        wanted, right = houses.sums(of), houses.sums(of, self.is_found[truths])
-        located = houses.sums(of, self.is_located[truths])
-        both = houses.sums(of, self.is_found[truths] & self.is_located[truths])
+        wanted, right = houses.sums(np.ones(len(of)), of), houses.sums(self.is_found[truths], of)
+        located = houses.sums(self.is_located[truths], of)
+        both = houses.sums(self.is_found[truths] & self.is_located[truths], of)
         num = int(wanted.sum())
         measures = {
             "recall": houses.ratio(right, wanted, num),
@@ -204,14 +206,14 @@ class _Scorer:
         if found is None:
             return measures
         counted = found & (self.partner != IGNORED)
-        claims = houses.sums(self.house[counted])
-        hits = houses.sums(self.house[counted], self.partner[counted] >= 0)
+        claims = houses.sums(counted, self.house)
+        hits = houses.sums(counted & (self.partner >= 0), self.house)
         placed = found & (self.place >= 0)
-        num_placed = houses.sums(self.house[placed])
+        num_placed = houses.sums(placed, self.house)
         measures["precision"] = houses.ratio(hits, claims, int(claims.sum()))
         # Objects of a kind and detections of a kind need not be partners (a distance may be wrong): each counts half.
         measures["f1"] = houses.ratio(right + hits, wanted + claims, num)
-        ious = houses.sums(self.house[placed], self.place_iou[placed])
+        ious = houses.sums(self.place_iou[placed], self.house[placed])
         measures["iou"] = houses.ratio(ious, num_placed, int(num_placed.sum()))
         return measures
 
@@ -233,22 +235,22 @@ class _Scorer:
         curves, found = [], {}
         for i, name in enumerate(names):
             mine = self.label == name
-            wanted = houses.sums(self.truth_house[self.truth_category == name])
+            wanted = houses.sums(self.truth_category == name, self.truth_house)
             for j, limit in enumerate(AP_LIMITS):
                 curve, drawn[i, j] = self._precision_curve(mine, self.partner, self.iou, wanted, limit, draws)
                 values[i, j] = curve.mean()
                 if j == 0:
                     curves.append(curve)
-            found[name] = {"ap50": estimate(float(values[i, 0]), drawn[i, 0], int(wanted.sum()), houses.num)}
+            found[name] = {"ap50": houses.estimate(float(values[i, 0]), drawn[i, 0], int(wanted.sum()))}
         num, every = len(self.truth_house), np.ones(len(self.house), np.bool_)
-        wanted = houses.sums(self.truth_house)
+        wanted = houses.sums(np.ones(num), self.truth_house)
         curve, of_places = self._precision_curve(every, self.place, self.place_iou, wanted, AP_LIMITS[0], draws)
         # A resample may lack a category; then the mean is over the others.
         means = np.nanmean(drawn, axis=0)
         found[""] = {
-            "ap50": estimate(float(values[:, 0].mean()), means[0], num, houses.num),
-            "ap": estimate(float(values.mean()), means.mean(axis=0), num, houses.num),
-            "ap50_located": estimate(float(curve.mean()), of_places, num, houses.num),
+            "ap50": houses.estimate(float(values[:, 0].mean()), means[0], num),
+            "ap": houses.estimate(float(values.mean()), means.mean(axis=0), num),
+            "ap50_located": houses.estimate(float(curve.mean()), of_places, num),
         }
         return np.mean(curves, axis=0).tolist(), found
 
@@ -274,8 +276,9 @@ class _Scorer:
         found = []
         for (category, label), num in sorted(pairs.items(), key=lambda pair: (-pair[1], pair[0])):
             mine = wrong & (self.place_category == category) & (self.label == label)
-            of = self.truth_house[self.truth_category == category]
-            share = self.houses.ratio(self.houses.sums(self.house, mine), self.houses.sums(of), len(of))
+            there = self.truth_category == category
+            tops, bottoms = self.houses.sums(mine, self.house), self.houses.sums(there, self.truth_house)
+            share = self.houses.ratio(tops, bottoms, int(there.sum()))
             found.append(Confusion(category, label, num, share))
         return found
 

@@ -4,9 +4,10 @@ import csv
 import io
 from collections.abc import Mapping, Sequence
 
-from evonav.perception_benchmark.estimates import Estimate, Group
+from evonav.perception_benchmark.other_scores import Group
 from evonav.perception_benchmark.scores import COMPARED, COMPARED_MEMORY, Scores, differences
 from evonav.report.tables.table import NONE, Table
+from evonav.statistics import Estimate
 
 MAX_CATEGORIES, MAX_CONFUSIONS = 8, 4
 INTERVALS = "[..]: 95% interval, bootstrap by house."
@@ -40,8 +41,8 @@ def percent(estimate: Estimate | None, *, has_n: bool = False) -> str:
     if estimate is None or estimate.value is None:
         return NONE
     told = f"{100 * estimate.value:.1f}"
-    if estimate.interval is not None:
-        told += " [{:.1f}, {:.1f}]".format(*(100 * end for end in estimate.interval))
+    if estimate.ci95 is not None:
+        told += " [{:.1f}, {:.1f}]".format(*(100 * end for end in estimate.ci95))
     return f"{told} ({estimate.n})" if has_n else told
 
 
@@ -50,8 +51,8 @@ def points(estimate: Estimate | None) -> str:
     if estimate is None or estimate.value is None:
         return NONE
     told = f"{100 * estimate.value:+.1f}"
-    if estimate.interval is not None:
-        told += " [{:+.1f}, {:+.1f}]".format(*(100 * end for end in estimate.interval))
+    if estimate.ci95 is not None:
+        told += " [{:+.1f}, {:+.1f}]".format(*(100 * end for end in estimate.ci95))
     return told
 
 
@@ -60,8 +61,8 @@ def number(estimate: Estimate | None, decimals: int = 2) -> str:
     if estimate is None or estimate.value is None:
         return NONE
     told = f"{estimate.value:.{decimals}f}"
-    if estimate.interval is not None:
-        told += f" [{estimate.interval[0]:.{decimals}f}, {estimate.interval[1]:.{decimals}f}]"
+    if estimate.ci95 is not None:
+        told += f" [{estimate.ci95[0]:.{decimals}f}, {estimate.ci95[1]:.{decimals}f}]"
     return told
 
 
@@ -91,7 +92,7 @@ def _differences(found: Sequence[Scores]) -> Table:
         (f"{each.word} less {each.less}", *(points(each.measures.get(name)) for name in (*COMPARED, *COMPARED_MEMORY)))
         for each in differences(found)
     )
-    note = f"In points. {INTERVALS} Of the same views: an interval without 0 in it is a difference."
+    note = f"In points. {INTERVALS} Of the same views; not adjusted for how many are compared."
     return Table("Perceptions against each other", ("perceptions", *heads), rows, (note,))
 
 
@@ -249,7 +250,7 @@ def perception_csv(found: Sequence[Scores]) -> str:
 
     def write(word: str, by: str, group: str, measures: Mapping[str, Estimate]) -> None:
         for name, each in measures.items():
-            low, high = each.interval or ("", "")
+            low, high = each.ci95 or ("", "")
             value = "" if each.value is None else each.value
             writer.writerow((word, by, group, name, value, low, high, each.n, found[0].num_houses))
 

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.navigation import AgentSummary, PairedDifference, paired_differences, summarise
+from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_pairs, summarise
 from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
 from evonav.evaluation.records.store import FailureRow, RunStore
 from evonav.report.maps.stage_map import success_radius_of
@@ -74,7 +74,7 @@ class Run:
     failures: tuple[FailureRow, ...]
     """Attempts that failed, those that were tried again among them; not part of the records."""
     summaries: tuple[AgentSummary, ...]
-    pairs: tuple[PairedDifference, ...]
+    pairs: tuple[AgentPair, ...]
 
     @property
     def success_radius_m(self) -> float:
@@ -172,7 +172,7 @@ def load_run(run_dir: Path) -> Run:
         total_wall_s=sum(wall_s for wall_s, _ in timings.values()),
         wall_s=_mean_wall_s(timings),
         summaries=tuple(summarise(agent, records[agent], total) for agent in agents),
-        pairs=tuple(paired_differences(records)),
+        pairs=tuple(agent_pairs(records)),
     )
 
 

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
-from evonav.evaluation.metrics.navigation import paired_differences, summarise, summary_json
+from evonav.evaluation.metrics.navigation import agent_pairs, summarise, summary_json
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
 
@@ -121,7 +121,7 @@ def packed_summary(records: dict[str, list[StageRecord]], num_stages: int) -> di
         num_stages: That each should have.
     """
     summaries = [summarise(agent, mine, num_stages) for agent, mine in records.items()]
-    summary: dict[str, Any] = json.loads(json.dumps(summary_json(summaries, paired_differences(records))))
+    summary: dict[str, Any] = json.loads(json.dumps(summary_json(summaries, agent_pairs(records))))
     return summary
 
 

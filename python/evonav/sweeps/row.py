@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from evonav.evaluation.records.schema import EndState
-from evonav.significance import Interval
+from evonav.statistics import Interval
 
 AXES = ("simulator", "perception", "decision", "tasks", "seed")
 STATES = ("success", "failure", "errored", "not_run")

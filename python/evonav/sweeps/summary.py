@@ -1,6 +1,6 @@
 """What came of a sweep: a row a cell and agent, and one over the seeds of cells that differ in nothing else.
 
-Rates and intervals are the runs' own; over seeds, stages of one task under several seeds are resampled together.
+Rates and intervals are the runs' own; over seeds, stages of one house under several seeds are resampled together.
 """
 
 import json
@@ -13,7 +13,7 @@ from evonav.evaluation.metrics.navigation import Rates, rates
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.run import SUMMARY_NAME, write_summary
-from evonav.significance import Interval
+from evonav.statistics import Interval
 from evonav.sweeps.row import AXES, STATES, SweepRow
 from evonav.sweeps.run import RUNS_NAME, read_claim
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.parallel.folders import write_atomically
-from evonav.report.tables.table import Table, percent
+from evonav.report.tables.table import INTERVALS, Table, percent
 from evonav.sweeps.row import AXES, STATES, SweepRow
 
 
@@ -79,7 +79,7 @@ def _table(title: str, rows: Sequence[SweepRow], axes: Sequence[str]) -> Table:
         )
         for row in rows
     )
-    notes = ["Intervals: bootstrap over tasks (stages of a task share a memory), 10,000 resamples."]
+    notes = [INTERVALS]
     if any(row.is_incomplete for row in rows):
         notes.append("Incomplete: some stages errored or were not run; their rates are not final.")
     return Table(title, columns, told, tuple(notes))

@@ -1,7 +1,7 @@
 """What explains a rate: means of `StageRow`'s measures for every agent, with intervals over houses.
 
 Every figure is a ratio of sums: of a share, what is counted over what could have been; of a mean, the sum over the
-stages that have a value. Intervals resample houses, which the stages of a task share.
+stages that have a value. Intervals are by house (`evonav.statistics`).
 """
 
 from collections.abc import Callable, Sequence
@@ -10,10 +10,10 @@ from typing import Literal
 
 import numpy as np
 
+from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageRow
-from evonav.significance import Interval
+from evonav.statistics import ClusterBootstrap, Interval
 
-NUM_RESAMPLES = 10_000
 RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 """Of the sweep over success radii."""
 
@@ -42,7 +42,7 @@ class Explained:
     num_houses: int
     value: float | None
     ci95: Interval | None
-    """Percentile bootstrap over houses; `None` with fewer than two."""
+    """Bootstrap by house; `None` of one house, or where all of them agree."""
 
 
 def _mean(name: str) -> Callable[[StageRow], Part]:
@@ -169,25 +169,10 @@ def explain(rows: Sequence[StageRow], measures: Sequence[Measure]) -> dict[str, 
 
 
 def _explained(rows: Sequence[StageRow], measure: Measure) -> Explained:
-    parts = [(row.house or row.task_id, part) for row in rows if (part := measure.part(row)) is not None]
-    houses = sorted({house for house, _ in parts})
+    parts = [(house_of(row), part) for row in rows if (part := measure.part(row)) is not None]
     if not parts:
         return Explained(measure, 0, 0, None, None)
-    index = {house: i for i, house in enumerate(houses)}
-    sums = np.zeros((len(houses), 2))
-    for house, part in parts:
-        sums[index[house]] += part
-    value = float(sums[:, 0].sum() / sums[:, 1].sum())
-    return Explained(measure, len(parts), len(houses), value, _interval(sums) if len(houses) > 1 else None)
-
-
-def _interval(sums: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Interval:
-    generator = np.random.Generator(np.random.PCG64(0))
-    values = np.empty(NUM_RESAMPLES)
-    chunk = max(1, 4_000_000 // len(sums))
-    for start in range(0, NUM_RESAMPLES, chunk):
-        drawn = generator.integers(0, len(sums), size=(min(chunk, NUM_RESAMPLES - start), len(sums)))
-        totals = sums[drawn].sum(axis=1)
-        values[start : start + len(drawn)] = totals[:, 0] / totals[:, 1]
-    low, high = np.quantile(values, [0.025, 0.975])
-    return (float(low), float(high))
+    bootstrap = ClusterBootstrap([house for house, _ in parts])
+    tops, bottoms = bootstrap.sums(np.array([part for _, part in parts])).T
+    found = bootstrap.ratio(tops, bottoms, len(parts))
+    return Explained(measure, found.n, found.num_clusters, found.value, found.ci95)

@@ -1,24 +1,40 @@
 """The paper's measures (Sec. C.2), per stage and over stages, with intervals.
 
-Stages of a task share a memory and a house, so intervals resample *tasks*, not stages.
+Stages of a house are not independent, so intervals and verdicts are by house (`evonav.statistics`).
 """
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from itertools import combinations
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import StoreError
 from evonav.evaluation.records.schema import EndState, StageRecord
-from evonav.significance import Interval, percentile_interval, wilson
+from evonav.statistics import ClusterBootstrap, Interval, PairedEffect, paired_effects, wilson, with_holm
 
 SUCCESS_RADIUS_M = 2.0
-NUM_RESAMPLES = 10_000
-MAX_RESAMPLE_CELLS = 4_000_000
-"""Resampled indices held at a time, to bound memory on full splits."""
+SUMMARY_VERSION = 2
+"""Of `summary.json`. Version 1 resampled tasks instead of houses, and had no p and no verdict."""
+
+
+class _Stage(Protocol):
+    @property
+    def house(self) -> str: ...
+    @property
+    def task_id(self) -> str: ...
+
+
+def house_of(stage: _Stage) -> str:
+    """Return the house that a stage is resampled with; its task where the record does not name a house.
+
+    Args:
+        stage: A record, or a row made of one.
+    """
+    return stage.house or stage.task_id
 
 
 def stage_spl(is_success: bool, path_length_m: float, reference_length_m: float) -> float:
@@ -46,9 +62,9 @@ class Rates:
     sr: float | None
     spl: float | None
     sr_ci95: Interval | None = None
-    """Percentile bootstrap over tasks."""
+    """Bootstrap by house (`ClusterBootstrap`); `None` of one house, or where all of them agree."""
     spl_ci95: Interval | None = None
-    """Percentile bootstrap over tasks."""
+    """Likewise."""
     sr_wilson95: Interval | None = None
     """Wilson's score interval, as if stages were independent: for comparison with tables that give `n` alone."""
 
@@ -80,47 +96,23 @@ class AgentSummary:
 
 
 @dataclass(frozen=True, slots=True)
-class PairedDifference:
-    """Agent `b` less agent `a`, on the stages that both scored; intervals resample tasks."""
+class AgentPair:
+    """Agent `b` against agent `a`, on the stages that both scored."""
 
     a: str
     b: str
-    n: int
     num_tasks: int
-    sr: float
-    sr_ci95: Interval
-    spl: float
-    spl_ci95: Interval
     num_only_a: int
     """Stages where only `a` succeeded."""
     num_only_b: int
+    sr: PairedEffect
+    """Of `b` less `a`, as all effects here. Its verdict allows for the number of pairs, by Holm."""
+    spl: PairedEffect
 
-
-def bootstrap_means(values: NDArray[np.float64], tasks: Sequence[str], *, seed: int = 0) -> NDArray[np.float64]:
-    """95% intervals of column means, resampling tasks with replacement; widened for few (`percentile_interval`).
-
-    Args:
-        values: `(N, D)`, one row a stage.
-        tasks: `N` task ids; rows of one task are drawn together.
-        seed: Of the resampling.
-
-    Returns:
-        `(D, 2)` lower and upper ends.
-    """
-    names = sorted(set(tasks))
-    index = {name: i for i, name in enumerate(names)}
-    rows = np.fromiter((index[task] for task in tasks), dtype=np.int64, count=len(tasks))
-    sums = np.zeros((len(names), values.shape[1]))
-    np.add.at(sums, rows, values)
-    sizes = np.bincount(rows, minlength=len(names)).astype(np.float64)
-    generator = np.random.Generator(np.random.PCG64(seed))
-    means = np.empty((NUM_RESAMPLES, values.shape[1]))
-    chunk = max(1, MAX_RESAMPLE_CELLS // len(names))
-    for start in range(0, NUM_RESAMPLES, chunk):
-        count = min(chunk, NUM_RESAMPLES - start)
-        drawn = generator.integers(0, len(names), size=(count, len(names)))
-        means[start : start + count] = sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1)[:, None]
-    return percentile_interval(means, len(names))
+    @property
+    def n(self) -> int:
+        """Stages that both scored."""
+        return self.sr.n
 
 
 def rates(records: Sequence[StageRecord]) -> Rates:
@@ -129,14 +121,13 @@ def rates(records: Sequence[StageRecord]) -> Rates:
     if not scored:
         return Rates(n=0, sr=None, spl=None)
     values = _success_and_spl(scored)
-    sr, spl = (float(mean) for mean in values.mean(axis=0))
-    ends = bootstrap_means(values, [record.task_id for record in scored])
+    sr, spl = ClusterBootstrap([house_of(record) for record in scored]).column_means(values)
     return Rates(
         n=len(scored),
-        sr=sr,
-        spl=spl,
-        sr_ci95=_interval(ends[0]),
-        spl_ci95=_interval(ends[1]),
+        sr=sr.value,
+        spl=spl.value,
+        sr_ci95=sr.ci95,
+        spl_ci95=spl.ci95,
         sr_wilson95=wilson(int(values[:, 0].sum()), len(scored)),
     )
 
@@ -173,48 +164,65 @@ def summarise(agent: str, records: Sequence[StageRecord], num_stages: int) -> Ag
     )
 
 
-def paired_differences(records_by_agent: dict[str, list[StageRecord]]) -> list[PairedDifference]:
-    """Every pair of agents on the stages that both scored."""
+def agent_pairs(records_by_agent: Mapping[str, Sequence[StageRecord]]) -> list[AgentPair]:
+    """Compare every two agents on the stages that both scored; two without such a stage are left out."""
     scored = {
         agent: {(record.task_id, record.stage): record for record in records if record.is_scored}
         for agent, records in records_by_agent.items()
     }
-    agents = list(scored)
-    differences = []
-    for i, a in enumerate(agents):
-        for b in agents[i + 1 :]:
-            keys = sorted(scored[a].keys() & scored[b].keys())
-            if not keys:
-                continue
-            values_a = _success_and_spl([scored[a][key] for key in keys])
-            values_b = _success_and_spl([scored[b][key] for key in keys])
-            difference = values_b - values_a
-            ends = bootstrap_means(difference, [task_id for task_id, _ in keys])
-            sr, spl = (float(mean) for mean in difference.mean(axis=0))
-            differences.append(
-                PairedDifference(
-                    a=a,
-                    b=b,
-                    n=len(keys),
-                    num_tasks=len({task_id for task_id, _ in keys}),
-                    sr=sr,
-                    sr_ci95=_interval(ends[0]),
-                    spl=spl,
-                    spl_ci95=_interval(ends[1]),
-                    num_only_a=int((difference[:, 0] < 0).sum()),
-                    num_only_b=int((difference[:, 0] > 0).sum()),
-                )
-            )
-    return differences
+    pairs = [
+        _agent_pair(a, b, [(scored[a][key], scored[b][key]) for key in sorted(scored[a].keys() & scored[b].keys())])
+        for a, b in combinations(scored, 2)
+        if scored[a].keys() & scored[b].keys()
+    ]
+    srs, spls = with_holm([pair.sr for pair in pairs]), with_holm([pair.spl for pair in pairs])
+    return [replace(pair, sr=sr, spl=spl) for pair, sr, spl in zip(pairs, srs, spls, strict=True)]
 
 
-def summary_json(summaries: Sequence[AgentSummary], pairs: Sequence[PairedDifference]) -> dict[str, Any]:
-    """The content of `summary.json`."""
+def _agent_pair(a: str, b: str, stages: Sequence[tuple[StageRecord, StageRecord]]) -> AgentPair:
+    values_a, values_b = (_success_and_spl(records) for records in zip(*stages, strict=True))
+    sr, spl = paired_effects(values_a, values_b, [house_of(record) for record, _ in stages])
+    return AgentPair(
+        a=a,
+        b=b,
+        num_tasks=len({record.task_id for record, _ in stages}),
+        num_only_a=int((values_a[:, 0] > values_b[:, 0]).sum()),
+        num_only_b=int((values_b[:, 0] > values_a[:, 0]).sum()),
+        sr=sr,
+        spl=spl,
+    )
+
+
+def summary_json(summaries: Sequence[AgentSummary], pairs: Sequence[AgentPair]) -> dict[str, Any]:
+    """Return the content of `summary.json`."""
     return {
-        "schema_version": 1,
+        "schema_version": SUMMARY_VERSION,
         "is_incomplete": any(summary.is_incomplete for summary in summaries),
         "agents": {summary.agent: asdict(summary) for summary in summaries},
-        "paired_differences": [asdict(pair) for pair in pairs],
+        "paired_differences": [
+            {
+                "a": pair.a,
+                "b": pair.b,
+                "n": pair.n,
+                "num_tasks": pair.num_tasks,
+                "num_houses": pair.sr.num_clusters,
+                **_effect_json("sr", pair.sr),
+                **_effect_json("spl", pair.spl),
+                "num_only_a": pair.num_only_a,
+                "num_only_b": pair.num_only_b,
+            }
+            for pair in pairs
+        ],
+    }
+
+
+def _effect_json(name: str, effect: PairedEffect) -> dict[str, Any]:
+    return {
+        name: effect.difference,
+        f"{name}_ci95": effect.ci95,
+        f"{name}_p": effect.p,
+        f"{name}_holm_p": effect.adjusted_p,
+        f"{name}_verdict": effect.verdict,
     }
 
 
@@ -232,10 +240,6 @@ def _splits(scored: Sequence[StageRecord]) -> dict[str, list[StageRecord]]:
 def _success_and_spl(scored: Sequence[StageRecord]) -> NDArray[np.float64]:
     rows = [(float(record.state is EndState.SUCCESS), record.spl or 0.0) for record in scored]
     return np.array(rows, dtype=np.float64)
-
-
-def _interval(ends: NDArray[np.float64]) -> Interval:
-    return (float(ends[0]), float(ends[1]))
 
 
 def _mean(values: Iterable[float | None]) -> float | None:

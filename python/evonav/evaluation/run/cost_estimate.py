@@ -13,10 +13,8 @@ from typing import Any
 
 from evonav.decision.vlm.ledger import Ledger
 from evonav.evaluation.run.run import Progress, RunConfig, agent_seed, evaluate
+from evonav.statistics import student_quantile
 from evonav.tasks.listing import TaskFile
-
-_T_95 = (math.inf, 12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228)
-"""Student's t for 95%, by degrees of freedom; 1.96 beyond."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,5 +119,4 @@ def ratio_error(tokens: Sequence[tuple[int, int]]) -> float:
         return 0.0
     mean = total / sum(stages for stages, _ in tokens)
     variance = sum((count - mean * stages) ** 2 for stages, count in tokens) / (num - 1)
-    t = _T_95[num - 1] if num - 1 < len(_T_95) else 1.96
-    return t * math.sqrt(variance / num) / (total / num)
+    return student_quantile(num - 1) * math.sqrt(variance / num) / (total / num)

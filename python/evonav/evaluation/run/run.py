@@ -11,7 +11,7 @@ from typing import Any
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
-from evonav.evaluation.metrics.navigation import AgentSummary, paired_differences, summarise, summary_json
+from evonav.evaluation.metrics.navigation import AgentSummary, agent_pairs, summarise, summary_json
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import FILE_NAME, RunStore
@@ -259,7 +259,7 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
         backend = (store.meta("config") or {}).get("backend", {})
         models = store.meta(MODELS_KEY)
     summaries = {agent: summarise(agent, records[agent], num_stages) for agent in agents}
-    content = summary_json(list(summaries.values()), paired_differences(records))
+    content = summary_json(list(summaries.values()), agent_pairs(records))
     if make := backend.get("perception"):
         content["perception"] = word_of(make, backend.get("perception_options", {}))
     if models:

@@ -19,14 +19,7 @@ from evonav.generation.statistics.metrics import (
 )
 from evonav.generation.statistics.room_mix import Reweighting, check_mix, reweight
 from evonav.generation.statistics.task_summary import MODES, RATIO_CLASSES, TaskFacts, read_all_facts
-from evonav.significance import (
-    bootstrap_medians,
-    bootstrap_ratios,
-    chi_square,
-    effective_size,
-    weighted_quantiles,
-    wilson,
-)
+from evonav.statistics import ClusterBootstrap, chi_square, effective_size, weighted_quantiles, wilson
 from evonav.tasks.dataset import DATASET_NAME, read_dataset
 from evonav.tasks.listing import task_roots
 from evonav.tasks.statistics import (
@@ -40,6 +33,7 @@ from evonav.tasks.statistics import (
     Weighting,
 )
 
+NUM_RESAMPLES = 2000
 _RATIOS = tuple(info for info in MEASURES if info.unit != "median share")
 _MEDIANS = tuple(info for info in MEASURES if info.unit == "median share")
 
@@ -193,30 +187,6 @@ def _weighting(weighting: Reweighting) -> Weighting:
     )
 
 
-@dataclass(frozen=True)
-class _Units:
-    """What is resampled: houses, and the kind of each where that is held fixed."""
-
-    of_tasks: NDArray[np.int64]
-    strata: NDArray[np.int64]
-
-    @property
-    def num(self) -> int:
-        return len(self.strata)
-
-    def sums(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rows of tasks added up by house."""
-        summed = np.zeros((self.num, rows.shape[1]))
-        np.add.at(summed, self.of_tasks, rows)
-        return summed
-
-
-def _units(tally: _Tally, weighting: Reweighting | None) -> _Units:
-    _, first, of_tasks = np.unique(np.array(tally.houses), return_index=True, return_inverse=True)
-    strata = np.zeros(len(first), dtype=np.int64) if weighting is None else weighting.task_strata[first]
-    return _Units(of_tasks.astype(np.int64), strata)
-
-
 def _measures(tally: _Tally, weighting: Reweighting | None) -> tuple[Measure, ...]:
     raw = _estimates(tally, None)
     reweighted = {} if weighting is None else _estimates(tally, weighting)
@@ -257,28 +227,22 @@ def _rows(tally: _Tally) -> NDArray[np.float64]:
 
 def _estimates(tally: _Tally, weighting: Reweighting | None) -> dict[str, Estimate]:
     """Values and bootstrap intervals by measure, without those of nothing."""
-    units = _units(tally, weighting)
+    strata = None if weighting is None else weighting.task_strata
+    houses = ClusterBootstrap(tally.houses, strata=strata, num_resamples=NUM_RESAMPLES)
     weights = np.ones(len(tally.houses)) if weighting is None else weighting.weights
     rows = _rows(tally) * weights[:, None, None]
-    numerators, denominators = units.sums(rows[:, :, 0]), units.sums(rows[:, :, 1])
-    above, below = numerators.sum(axis=0), denominators.sum(axis=0)
-    ends = bootstrap_ratios(numerators, denominators, units.strata)
-    found = {
-        info.key: Estimate(value=float(above[i] / below[i]), ci95=_interval(ends[i]))
-        for i, info in enumerate(_RATIOS)
-        if below[i] > 0
-    }
+    found = {}
+    for i, info in enumerate(_RATIOS):
+        numerators, denominators = houses.sums(rows[:, i]).T
+        ratio = houses.ratio(numerators, denominators, len(tally.houses))
+        if ratio.value is not None:
+            found[info.key] = Estimate(value=ratio.value, ci95=ratio.ci95)
     for info in _MEDIANS:
         values, tasks = _values(tally, info.key)
-        median = float(weighted_quantiles(values, weights[tasks], [0.5])[0])
-        low, high = bootstrap_medians(values, weights[tasks], units.of_tasks[tasks], units.strata)
-        found[info.key] = Estimate(value=median, ci95=(low, high))
+        median = houses.weighted_median(values, weights[tasks], houses.cluster_of[tasks])
+        if median.value is not None:
+            found[info.key] = Estimate(value=median.value, ci95=median.ci95)
     return found
-
-
-def _interval(ends: NDArray[np.float64]) -> tuple[float, float] | None:
-    low, high = float(ends[0]), float(ends[1])
-    return None if np.isnan(low) or low == high else (low, high)
 
 
 def _values(tally: _Tally, key: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -7,16 +7,16 @@ from itertools import pairwise
 import numpy as np
 
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageRow
 from evonav.evaluation.records.store import RunStore
-from evonav.paired import cluster_means
 from evonav.report.compare.compare import MODES, STRATA, check_measure
 from evonav.report.compare.selection import Side
 from evonav.report.compare.wording import RATES, measure_name
 from evonav.report.export import csv_text
 from evonav.report.plots.specs import CurvePlot, GroupPlot, Line, Plot, Series
 from evonav.report.tables.table import NONE, Table
-from evonav.significance import Interval
+from evonav.statistics import ClusterBootstrap, Interval
 
 RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 RADIUS = "radius"
@@ -107,12 +107,9 @@ def breakdown(sides: Sequence[Side], by: str, measure: str = "success") -> Break
 
 
 def _cell(rows: Sequence[StageRow], values: Sequence[float]) -> Cell:
-    first_task: dict[str, str] = {}
-    for row in rows:
-        first_task.setdefault(row.house, row.task_id)
-    houses = [first_task[row.house] for row in rows]
-    ((mean, ends),) = cluster_means(np.array(values)[:, None], houses)
-    return Cell(len(rows), len(first_task), mean, ends)
+    bootstrap = ClusterBootstrap([house_of(row) for row in rows])
+    (mean,) = bootstrap.column_means(np.array(values)[:, None])
+    return Cell(mean.n, mean.num_clusters, mean.value, mean.ci95)
 
 
 def _by_radius(sides: Sequence[Side]) -> Breakdown:

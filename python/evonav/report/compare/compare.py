@@ -1,6 +1,6 @@
 """Agents against each other on the same stages: differences with interval and p, in parts, and the stages that flipped.
 
-The statistics are those of `evonav.paired`; what they mean and how they were calibrated is in docs/statistics.md.
+The statistics are those of `evonav.statistics`; what they mean and how they were calibrated is in docs/statistics.md.
 """
 
 import shlex
@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageRow
 from evonav.evaluation.records.schema import EndState
-from evonav.paired import PairedEffect, holm, mcnemar, paired_effects
 from evonav.report.compare.selection import Side, config_differences
 from evonav.report.maps.stage_map import VIEW_DIR, page_name
 from evonav.report.tables.causes import WORDS, Cause
+from evonav.statistics import PairedEffect, mcnemar, paired_effects, with_holm
 
 MEASURES = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_success": "strict SR"}
 """Fields of a row that are compared unless others are asked for."""
@@ -82,14 +83,12 @@ class Comparison:
     a: str
     b: str
     parts: tuple[Part, ...]
-    """`all` first."""
+    """`all` first: its verdicts allow for the number of pairs compared, by Holm. Those of the others do not."""
     dropped: Mapping[str, int]
     """Stages of either that are not compared, by reason."""
     flips: tuple[Flip, ...]
     settings: Mapping[str, tuple[str, str]]
     """What the two runs were told differently."""
-    adjusted: Mapping[str, float]
-    """By measure, p on all stages after Holm's adjustment over all pairs of the report."""
 
     @property
     def all(self) -> Part:
@@ -120,12 +119,15 @@ def compare(
     pairs = _pairs(sides, baseline)
     names = _fields(sides, measures)
     found = [_compare(a, b, names, allow_differences) for a, b in pairs]
-    adjusted: list[dict[str, float]] = [{} for _ in found]
+    adjusted: list[dict[str, PairedEffect]] = [dict(one.all.effects) for one in found]
     for field in names:
-        of_field = [(i, one.all.effects[field].p) for i, one in enumerate(found) if field in one.all.effects]
-        for (i, _), p in zip(of_field, holm([p for _, p in of_field]), strict=True):
-            adjusted[i][field] = p
-    return [replace(one, adjusted=ps) for one, ps in zip(found, adjusted, strict=True)]
+        there = [effects for effects in adjusted if field in effects]
+        for effects, effect in zip(there, with_holm([effects[field] for effects in there]), strict=True):
+            effects[field] = effect
+    return [
+        replace(one, parts=(replace(one.all, effects=effects), *one.parts[1:]))
+        for one, effects in zip(found, adjusted, strict=True)
+    ]
 
 
 def check_measure(name: str) -> None:
@@ -145,7 +147,7 @@ _NUMBERS = ("int", "float", "bool")
 def comparison_json(comparisons: Sequence[Comparison]) -> dict[str, Any]:
     """All figures, unrounded."""
     return {
-        "schema_version": 1,
+        "schema_version": 2,
         "comparisons": [
             {
                 "a": one.a,
@@ -160,7 +162,7 @@ def comparison_json(comparisons: Sequence[Comparison]) -> dict[str, Any]:
                     }
                     for part in one.parts
                 ],
-                "holm_p": dict(one.adjusted),
+                "holm_p": {name: effect.adjusted_p for name, effect in one.all.effects.items()},
                 "dropped": dict(one.dropped),
                 "settings": {key: list(values) for key, values in one.settings.items()},
                 "flips": [asdict(flip) for flip in one.flips],
@@ -225,7 +227,7 @@ def _compare(a: Side, b: Side, fields: Sequence[str], allow_differences: bool) -
     order = {ALL: "all", **STRATA, **MODES}
     parts = tuple(_part(key, order[key], groups[key], fields) for key in order if key in groups)
     flips = tuple(_flip(a, b, pair) for pair in pairs if pair[0].success is not pair[1].success)
-    return Comparison(a.name, b.name, parts, dict(dropped.most_common()), flips, settings, {})
+    return Comparison(a.name, b.name, parts, dict(dropped.most_common()), flips, settings)
 
 
 def _stages(side: Side) -> set[tuple[str, int]]:
@@ -251,10 +253,6 @@ def _reason(a: Side, b: Side, key: tuple[str, int], allow_differences: bool) -> 
 
 
 def _part(key: str, words: str, pairs: Sequence[tuple[StageRow, StageRow]], fields: Sequence[str]) -> Part:
-    # Houses are told apart by their first task, so that resamples are those of the run's own tables.
-    first_task: dict[str, str] = {}
-    for row, _ in pairs:
-        first_task.setdefault(row.house, row.task_id)
     by_missing: dict[tuple[int, ...], list[str]] = {}
     for field in fields:
         there = tuple(i for i, pair in enumerate(pairs) if all(getattr(row, field) is not None for row in pair))
@@ -263,7 +261,7 @@ def _part(key: str, words: str, pairs: Sequence[tuple[StageRow, StageRow]], fiel
     effects: dict[str, PairedEffect] = {}
     for there, names in by_missing.items():
         values = np.array([[[float(getattr(row, name)) for name in names] for row in pairs[i]] for i in there])
-        houses = [first_task[pairs[i][0].house] for i in there]
+        houses = [house_of(pairs[i][0]) for i in there]
         effects.update(zip(names, paired_effects(values[:, 0], values[:, 1], houses), strict=True))
     only_a = sum(bool(x.success) and not y.success for x, y in pairs)
     only_b = sum(bool(y.success) and not x.success for x, y in pairs)

@@ -10,21 +10,17 @@ from evonav.report.pages.template import page_environment, policy, text_of
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.specs import Gap, GapPlot
 from evonav.report.plots.style import plot_css
+from evonav.report.tables.table import p_words
+from evonav.statistics import PairedEffect
 
 
 def comparison_plot(comparisons: Sequence[Comparison]) -> GapPlot:
     """SR differences: of one pair by parts, of several pairs on all stages."""
     if len(comparisons) == 1:
         (one,) = comparisons
-        gaps = tuple(
-            _gap(one, i, part.words, f"n = {part.n}, p = {words.p_words(part.effects['success'].p)}")
-            for i, part in enumerate(one.parts)
-        )
+        gaps = tuple(_gap(part.effects["success"], part.words) for part in one.parts)
         return GapPlot(f"SR of {one.b} less {one.a}, points", gaps, f"{one.a} is better", f"{one.b} is better")
-    gaps = tuple(
-        _gap(one, 0, f"{one.b} less {one.a}", f"n = {one.all.n}, p (Holm) = {words.p_words(one.adjusted['success'])}")
-        for one in comparisons
-    )
+    gaps = tuple(_gap(one.all.effects["success"], f"{one.b} less {one.a}", "p (Holm)") for one in comparisons)
     return GapPlot("SR differences, points", gaps, "the second is better", "the first is better")
 
 
@@ -63,12 +59,10 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
     )
 
 
-def _gap(one: Comparison, index: int, name: str, detail: str) -> Gap:
-    effect = one.parts[index].effects["success"]
+def _gap(effect: PairedEffect, name: str, p_name: str = "p") -> Gap:
     ends = None if effect.ci95 is None else (100 * effect.ci95[0], 100 * effect.ci95[1])
-    # Parts by their own p, the whole after adjustment.
-    is_head = words.says(one).endswith("ahead") if index == 0 else effect.verdict in ("a", "b")
-    return Gap(name, detail.replace("= <", "< "), 100 * effect.difference, ends, is_head)
+    detail = f"n = {effect.n}, {p_name} = {p_words(effect.adjusted_p)}".replace("= <", "< ")
+    return Gap(name, detail, 100 * effect.difference, ends, effect.verdict in ("a", "b"))
 
 
 def _shown(flip: Flip, out_dir: Path | None) -> dict[str, object]:

@@ -2,11 +2,10 @@
 
 from collections.abc import Sequence
 
-from evonav.paired import LEAST_CLUSTERS, LEVEL, PairedEffect
 from evonav.report.compare.compare import MEASURES, STRATA, Comparison, Flip
 from evonav.report.export import csv_text
-from evonav.report.tables.table import NONE, Table
-from evonav.significance import Interval
+from evonav.report.tables.table import INTERVALS, NONE, VERDICTS, Table, p_heading, p_words, verdict_words
+from evonav.statistics import MIN_CLUSTERS, Interval, PairedEffect
 
 RATES = frozenset(
     {
@@ -24,10 +23,7 @@ RATES = frozenset(
 MAX_FLIPS = 5
 """Stages that flipped, each way, in a terminal."""
 
-METHOD = (
-    "Differences are of the same stages. Intervals: 95%, houses resampled (10,000 times). p: two-sided, the agents' "
-    "names exchanged in whole houses. Holm: p adjusted for the number of pairs."
-)
+METHOD = f"Differences are of the same stages. {INTERVALS} {VERDICTS}"
 EXPLORING = "Parts are for reading on, not for claims: their p is not adjusted for the number of parts."
 
 
@@ -39,25 +35,23 @@ def measure_name(field: str) -> str:
 def pair_table(comparisons: Sequence[Comparison]) -> Table:
     """One row a pair, on all stages that both scored."""
     rows = []
-    is_family = len(comparisons) > 1
     for one in comparisons:
         sr, spl = one.all.effects["success"], one.all.effects.get("spl")
-        p = one.adjusted["success"] if is_family else sr.p
         rows.append(
             (
                 f"{one.b} less {one.a}",
                 f"{100 * sr.mean_a:.1f} to {100 * sr.mean_b:.1f}",
                 difference(sr, "success"),
-                p_words(p),
+                p_words(sr.adjusted_p),
                 NONE if spl is None else difference(spl, "spl"),
-                NONE if spl is None else p_words(one.adjusted["spl"] if is_family else spl.p),
+                NONE if spl is None else p_words(spl.adjusted_p),
                 str(one.all.n),
                 f"{one.all.num_only_b} / {one.all.num_only_a}",
                 NONE if sr.detectable is None else f"{100 * sr.detectable:.1f}",
                 says(one),
             )
         )
-    p_name = "p (Holm)" if is_family else "p"
+    p_name = p_heading(len(comparisons))
     columns = (
         "Agents",
         "SR %",
@@ -80,15 +74,14 @@ def pair_table(comparisons: Sequence[Comparison]) -> Table:
 
 def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
     """One measure on all stages, for a terminal: one row a pair."""
-    is_family = len(comparisons) > 1
     rows = []
     for one in comparisons:
         effect = one.all.effects.get(field)
         if effect is not None:
-            p = one.adjusted[field] if is_family else effect.p
+            p = effect.adjusted_p
             shown = [f"{_scale(field) * mean:.1f}" for mean in (effect.mean_a, effect.mean_b)]
             rows.append((f"{one.b} less {one.a}", *shown, difference(effect, field), p_words(p), says(one, field)))
-    columns = ("", "second", "first", "difference [95% CI]", "p (Holm)" if is_family else "p", "")
+    columns = ("", "second", "first", "difference [95% CI]", p_heading(len(comparisons)), "")
     sizes = sorted({one.all.n for one in comparisons})
     return Table(f"{measure_name(field)}, n = {'-'.join(map(str, sizes))}", columns, tuple(rows))
 
@@ -106,7 +99,7 @@ def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
                 str(part.n),
                 *(f"{100 * mean:.1f}" for mean in (sr.mean_a, sr.mean_b)),
                 difference(sr, "success"),
-                p_words(sr.p),
+                p_words(sr.adjusted_p),
             )
             for part, sr in effects
         )
@@ -141,7 +134,7 @@ def part_table(one: Comparison) -> Table:
         cells += [f"{100 * sr.mean_a:.1f}", f"{100 * sr.mean_b:.1f}"]
         for field in fields:
             effect = part.effects.get(field)
-            cells += [NONE, NONE] if effect is None else [difference(effect, field), p_words(effect.p)]
+            cells += [NONE, NONE] if effect is None else [difference(effect, field), p_words(effect.adjusted_p)]
         rows.append(tuple(cells))
     return Table(f"{one.b} less {one.a}", tuple(columns), tuple(rows), (METHOD, EXPLORING))
 
@@ -170,8 +163,7 @@ def findings(comparisons: Sequence[Comparison]) -> list[str]:
         for field in ("success", "spl"):
             effect = one.all.effects.get(field)
             if effect is not None:
-                p = one.adjusted[field] if len(comparisons) > 1 else effect.p
-                lines.append(f"{measure_name(field)}: {sentence(one.a, one.b, effect, field, p, len(comparisons))}")
+                lines.append(f"{measure_name(field)}: {sentence(one.a, one.b, effect, field, len(comparisons))}")
     return lines
 
 
@@ -188,18 +180,17 @@ def warnings(comparisons: Sequence[Comparison]) -> list[str]:
     return lines
 
 
-def sentence(a: str, b: str, effect: PairedEffect, field: str, p: float, num_pairs: int = 1) -> str:
+def sentence(a: str, b: str, effect: PairedEffect, field: str, num_pairs: int = 1) -> str:
     """One difference in words."""
-    measured = f"{difference(effect, field)}{' points' if field in RATES else ''}, p = {p_words(p)}".replace(
-        "= <", "< "
-    )
+    p = f"p = {p_words(effect.adjusted_p)}".replace("= <", "< ")
+    measured = f"{difference(effect, field)}{' points' if field in RATES else ''}, {p}"
     measured += f" (Holm, {num_pairs} pairs)" if num_pairs > 1 else ""
     on = f"on {effect.n} stages of {effect.num_clusters} houses"
-    verdict = effect.verdict if p <= LEVEL or effect.verdict not in ("a", "b") else "tie"
+    verdict = effect.verdict
     if verdict == "equal":
         return f"{a} and {b} are equal on every one of {effect.n} stages."
     if verdict == "few":
-        return f"{b} less {a}: {measured} {on}: fewer than {LEAST_CLUSTERS} houses, or all alike, are too few to tell."
+        return f"{b} less {a}: {measured} {on}: fewer than {MIN_CLUSTERS} houses, or all alike, are too few to tell."
     if verdict == "tie":
         least = "" if effect.detectable is None else f"{amount(effect.detectable, field)} "
         found = f" (a true difference of {least}would be found four times in five)" if least else ""
@@ -214,18 +205,8 @@ def sentence(a: str, b: str, effect: PairedEffect, field: str, p: float, num_pai
 def says(one: Comparison, field: str = "success") -> str:
     """What a measure on all stages allows to say, after adjustment, in a few words."""
     effect = one.all.effects[field]
-    verdict = effect.verdict
-    if verdict in ("a", "b") and one.adjusted.get(field, effect.p) > LEVEL:
-        verdict = "tie"
-    if verdict in ("a", "b") and field not in RATES:
-        return "they differ"
-    return {
-        "equal": "equal on every stage",
-        "few": f"too few houses to tell ({effect.num_clusters})",
-        "tie": "a tie at this n",
-        "a": f"{one.a} is ahead",
-        "b": f"{one.b} is ahead",
-    }[verdict]
+    is_about_rank = field in RATES or effect.verdict not in ("a", "b")
+    return verdict_words(one.a, one.b, effect) if is_about_rank else "they differ"
 
 
 def comparison_csv(comparisons: Sequence[Comparison]) -> str:
@@ -262,7 +243,7 @@ def comparison_csv(comparisons: Sequence[Comparison]) -> str:
                     [
                         *(one.a, one.b, part.key, name, effect.n, effect.num_clusters, effect.mean_a, effect.mean_b),
                         *(effect.difference, *_two(effect.ci95), effect.relative, *_two(effect.relative_ci95)),
-                        *(effect.p, one.adjusted.get(name) if part is one.all else None),
+                        *(effect.p, effect.adjusted_p if part is one.all else None),
                         *(effect.standard_error, effect.detectable, part.num_only_a, part.num_only_b),
                         *(part.mcnemar_p, effect.verdict),
                     ]
@@ -306,11 +287,6 @@ def difference(effect: PairedEffect, field: str) -> str:
 def amount(value: float, field: str) -> str:
     """A size without a sign, with its unit where it is points."""
     return f"{100 * value:.1f} points" if field in RATES else f"{value:.2g}"
-
-
-def p_words(p: float) -> str:
-    """`0.012`; `<0.0001` where it is less."""
-    return "<0.0001" if p < 0.0001 else f"{p:.4f}" if p < 0.01 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"
 
 
 def where(flip: Flip) -> str:

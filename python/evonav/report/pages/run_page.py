@@ -25,7 +25,7 @@ from evonav.report.tables import table as tables
 from evonav.report.tables.causes import WORDS, Cause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
 from evonav.report.tables.run_tables import latex_tables, markdown_tables, run_tables, statements
-from evonav.significance import Interval
+from evonav.statistics import Interval
 
 MAX_OPEN_STAGES = 400
 """Recorded stages up to which maps stand in the page as they are; beyond, each task is packed until it is looked at."""

@@ -9,11 +9,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from evonav.evaluation.metrics.navigation import AgentSummary, PairedDifference, Rates
-from evonav.paired import DETECTABLE_Z, power
+from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates
 from evonav.report.run import PAPER_ORDER, Run
-from evonav.report.tables.table import NONE, Table, percent, points, verdict
-from evonav.significance import wilson
+from evonav.report.tables.table import (
+    INTERVALS,
+    NONE,
+    VERDICTS,
+    Table,
+    p_heading,
+    p_words,
+    percent,
+    points,
+    verdict_words,
+)
+from evonav.statistics import DETECTABLE_Z, Z_95, power, wilson
 
 Perception = Literal["gt", "prediction"]
 
@@ -55,7 +64,7 @@ PAPER: dict[Perception, dict[str, PaperResult]] = {
     },
 }
 _PAPER_NOTE = "Paper: Wilson's 95% interval of its counts, as if its stages were independent."
-_OURS_NOTE = "Ours: bootstrap over houses (one task each), 95%, 10,000 resamples."
+_OURS_NOTE = f"Ours: {INTERVALS}"
 
 
 def paper_tables(run: Run, perception: Perception = "gt") -> list[Table]:
@@ -81,16 +90,16 @@ def paper_markdown(run: Run, perception: Perception = "gt") -> str:
     return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables if table.rows)
 
 
-def power_table(pairs: Sequence[PairedDifference], perception: Perception = "gt") -> Table:
+def power_table(pairs: Sequence[AgentPair], perception: Perception = "gt") -> Table:
     """Whether the paper's differences in SR could be told from none on its houses, if they vary as ours do."""
     paper = PAPER[perception]
     rows = []
     for pair in pairs:
-        width = pair.sr_ci95[1] - pair.sr_ci95[0]
-        if pair.a not in paper or pair.b not in paper or width == 0:
+        if pair.a not in paper or pair.b not in paper or pair.sr.ci95 is None:
             continue
+        width = pair.sr.ci95[1] - pair.sr.ci95[0]
         gap = (paper[pair.b].num_all - paper[pair.a].num_all) / NUM_STAGES
-        error = width / (2 * 1.959963984540054) * math.sqrt(pair.num_tasks / NUM_FIRST)
+        error = width / (2 * Z_95) * math.sqrt(pair.sr.num_clusters / NUM_FIRST)
         chance = power(gap, error)
         least = DETECTABLE_Z * error
         needed = "–" if gap == 0 else f"{math.ceil(NUM_FIRST * (least / gap) ** 2)}"
@@ -207,34 +216,36 @@ def order(values: Mapping[str, float | None]) -> str:
     return words or NONE
 
 
-def _difference_table(pairs: Sequence[PairedDifference], paper: dict[str, PaperResult]) -> Table:
+def _difference_table(pairs: Sequence[AgentPair], paper: dict[str, PaperResult]) -> Table:
     rows = []
     for pair in pairs:
         if pair.a not in paper or pair.b not in paper:
             continue
         theirs = (paper[pair.b].num_all - paper[pair.a].num_all) / NUM_STAGES
-        low, high = pair.sr_ci95
+        ends = pair.sr.ci95
         rows.append(
             (
                 f"{pair.b} less {pair.a}",
                 f"{100 * theirs:+.1f}",
-                points(pair.sr, pair.sr_ci95),
-                points(pair.spl, pair.spl_ci95),
+                points(pair.sr),
+                p_words(pair.sr.adjusted_p),
+                points(pair.spl),
                 str(pair.n),
-                verdict(pair),
-                "yes" if low <= theirs <= high else "no",
+                verdict_words(pair.a, pair.b, pair.sr),
+                NONE if ends is None else "yes" if ends[0] <= theirs <= ends[1] else "no",
             )
         )
     columns = (
         "Agents",
         "SR, paper",
         "SR, ours [95% CI]",
+        p_heading(len(pairs)),
         "SPL, ours [95% CI]",
         "n",
         "ours says",
         "paper's in our interval",
     )
-    note = "Percentage points, on the stages that both scored; intervals resample houses."
+    note = f"Percentage points, on the stages that both scored. {INTERVALS} {VERDICTS}"
     return Table("Differences between agents", columns, tuple(rows), (note,))
 
 

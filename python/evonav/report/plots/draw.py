@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from evonav.report.maps.svg import clean
 from evonav.report.plots.specs import BarPlot, ConfusionPlot, CurvePlot, Gap, GapPlot, GroupPlot, Line, Plot, Series
 from evonav.report.plots.style import BAND, COLOURS, INK, PALE, PAPER, REFERENCE, SOFT
-from evonav.significance import Interval
+from evonav.statistics import Interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

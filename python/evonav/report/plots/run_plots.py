@@ -7,7 +7,6 @@ from evonav.report.compare.breakdown import Breakdown, breakdown, breakdown_plot
 from evonav.report.compare.selection import Side, read_sides
 from evonav.report.plots.specs import Gap, GapPlot, Plot
 from evonav.report.run import Run
-from evonav.report.tables.table import verdict
 
 PLOTTED = ("stratum", "mode", "path-length", "earlier-stages", "radius")
 TABLED = ("path-length", "room-count", "radius")
@@ -48,7 +47,7 @@ def run_plots(run: Run) -> list[RunPlot]:
     """
     plots = []
     if len(run.pairs) > 0:
-        caption = "On the stages that both scored; 95% intervals, bootstrap by task. Blue: beyond the interval."
+        caption = "On the stages that both scored; 95% intervals, bootstrap by house. Blue: ahead, as the table says."
         plots.append(RunPlot(_difference_plot(run), caption))
     for one in run_breakdowns(run, PLOTTED):
         plots.append(RunPlot(breakdown_plot(one), f"{_CAPTIONS[one.by]} 95% intervals, bootstrap by house."))
@@ -66,9 +65,9 @@ def _difference_plot(run: Run) -> GapPlot:
         Gap(
             f"{pair.b} less {pair.a}",
             f"n = {pair.n}",
-            100 * pair.sr,
-            None if pair.sr_ci95[0] == pair.sr_ci95[1] else (100 * pair.sr_ci95[0], 100 * pair.sr_ci95[1]),
-            verdict(pair).endswith("ahead beyond the interval"),
+            100 * pair.sr.difference,
+            None if pair.sr.ci95 is None else (100 * pair.sr.ci95[0], 100 * pair.sr.ci95[1]),
+            pair.sr.verdict in ("a", "b"),
         )
         for pair in run.pairs
     )

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from evonav.significance import Interval
+from evonav.statistics import Interval
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from evonav.report.plots.specs import BarPlot, Series
-from evonav.significance import Interval, wilson
+from evonav.statistics import Interval, wilson
 from evonav.tasks.statistics import Distribution, Estimate, TaskStatistics
 
 OURS, REWEIGHTED = "these tasks", "reweighted"

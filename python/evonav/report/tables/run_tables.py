@@ -8,6 +8,7 @@ from evonav.report.compare.breakdown import breakdown_table
 from evonav.report.plots.run_plots import run_breakdowns
 from evonav.report.run import Run
 from evonav.report.tables import table as tables
+from evonav.statistics import MIN_CLUSTERS
 
 
 def markdown_tables(found: Iterable[tables.Table]) -> str:
@@ -103,12 +104,12 @@ def statements(run: Run) -> list[str]:
         measured = tables.percent(best.sr, best.sr_ci95)
         lines = [f"{best.agent} has the highest success rate, {measured} % of {best.n} stages."]
     pairs = [pair for pair in run.pairs if best.agent in (pair.a, pair.b)]
-    if pairs and all(pair.num_tasks < tables.MIN_TASKS_FOR_VERDICT for pair in pairs):
-        lines.append(f"{pairs[0].num_tasks} tasks are too few to tell agents apart.")
+    if pairs and all(pair.sr.num_clusters < MIN_CLUSTERS for pair in pairs):
+        lines.append(f"{pairs[0].sr.num_clusters} houses are too few to tell agents apart.")
         return lines
     for pair in pairs:
         lines.append(
-            f"{pair.b} less {pair.a}: {tables.points(pair.sr, pair.sr_ci95)} points on the {pair.n} stages that both "
-            f"scored: {tables.verdict(pair)}."
+            f"{pair.b} less {pair.a}: {tables.points(pair.sr)} points on the {pair.n} stages that both scored: "
+            f"{tables.verdict_words(pair.a, pair.b, pair.sr)}."
         )
     return lines

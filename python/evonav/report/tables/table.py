@@ -1,6 +1,6 @@
 """Tables of a run, as Markdown, CSV, LaTeX (booktabs), HTML cells and for a terminal.
 
-Rates are in percent with their 95% bootstrap interval over tasks; a row with errored or not-run stages says
+Rates are in percent with their 95% interval by house; a row with errored or not-run stages says
 *incomplete* in words, since its rates are not final.
 """
 
@@ -15,15 +15,18 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from evonav.evaluation.metrics.navigation import AgentSummary, PairedDifference, Rates, rates
+from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, rates
 from evonav.evaluation.records.schema import StageRecord
 from evonav.report.tables.causes import WORDS, Cause, cause_of
-from evonav.significance import Interval
+from evonav.statistics import LEVEL, NUM_RESAMPLES, Interval, PairedEffect
 
 NONE = "–"
 """What a cell without a value says."""
-MIN_TASKS_FOR_VERDICT = 5
-"""Tasks from which on a bootstrap interval is taken at its word."""
+INTERVALS = f"Intervals: 95%, houses resampled ({NUM_RESAMPLES:,} times)."
+VERDICTS = (
+    "p: two-sided, the agents' names exchanged in whole houses. Holm: p adjusted for the number of pairs. Ahead: p is "
+    f"at most {LEVEL:g} and the interval leaves 0 out."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,10 +105,7 @@ def headline(summaries: Sequence[AgentSummary]) -> Table:
         )
         for summary in summaries
     )
-    notes = [
-        "Intervals: bootstrap over tasks (stages of a task share a memory), 10,000 resamples. "
-        "Rates are over stages that ended in success or failure."
-    ]
+    notes = [f"{INTERVALS} Rates are over stages that ended in success or failure."]
     incomplete = [summary.agent for summary in summaries if summary.is_incomplete]
     if incomplete:
         notes.append(f"Incomplete: {', '.join(incomplete)}. Some stages errored or were not run; rates are not final.")
@@ -165,12 +165,15 @@ def cause_count_table(counts: Mapping[str, Mapping[Cause | None, int]]) -> Table
     return Table("Why stages failed", ("Cause", *counts), rows, (note,))
 
 
-def paired_table(pairs: Sequence[PairedDifference]) -> Table:
+def paired_table(pairs: Sequence[AgentPair]) -> Table:
     """Differences between agents on the stages that both scored, with a verdict in words."""
+    p_name = p_heading(len(pairs))
     columns = (
         "Agents",
         "SR difference [95% CI]",
+        p_name,
         "SPL difference [95% CI]",
+        p_name,
         "n",
         "only first",
         "only second",
@@ -179,34 +182,43 @@ def paired_table(pairs: Sequence[PairedDifference]) -> Table:
     rows = tuple(
         (
             f"{pair.b} less {pair.a}",
-            points(pair.sr, pair.sr_ci95),
-            points(pair.spl, pair.spl_ci95),
+            points(pair.sr),
+            p_words(pair.sr.adjusted_p),
+            points(pair.spl),
+            p_words(pair.spl.adjusted_p),
             str(pair.n),
             str(pair.num_only_b),
             str(pair.num_only_a),
-            verdict(pair),
+            verdict_words(pair.a, pair.b, pair.sr),
         )
         for pair in pairs
     )
-    note = (
-        "Percentage points, on the same stages; intervals resample tasks. Only first: stages where only the "
-        "first-named agent succeeded."
+    notes = (
+        f"Percentage points, on the same stages. {INTERVALS} {VERDICTS}",
+        "Only first: stages where only the first-named agent succeeded.",
     )
-    return Table("Paired differences", columns, rows, (note,))
+    return Table("Paired differences", columns, rows, notes)
 
 
-def verdict(pair: PairedDifference) -> str:
-    """What an interval allows to say about SR."""
-    low, high = pair.sr_ci95
-    if pair.num_only_a == 0 and pair.num_only_b == 0:
-        return "equal on every stage"
-    if pair.num_tasks < MIN_TASKS_FOR_VERDICT:
-        return f"too few tasks to tell ({pair.num_tasks})"
-    if low > 0:
-        return f"{pair.b} is ahead beyond the interval"
-    if high < 0:
-        return f"{pair.a} is ahead beyond the interval"
-    return "a tie within the interval"
+def verdict_words(a: str, b: str, effect: PairedEffect) -> str:
+    """The verdict on `b` less `a` in a few words."""
+    return {
+        "equal": "equal on every stage",
+        "few": f"too few houses to tell ({effect.num_clusters})",
+        "tie": "a tie at this n",
+        "a": f"{a} is ahead",
+        "b": f"{b} is ahead",
+    }[effect.verdict]
+
+
+def p_heading(num_pairs: int) -> str:
+    """The head of a column of p, which is adjusted where there are several pairs."""
+    return "p (Holm)" if num_pairs > 1 else "p"
+
+
+def p_words(p: float) -> str:
+    """`0.012`; `<0.0001` where it is less."""
+    return "<0.0001" if p < 0.0001 else f"{p:.4f}" if p < 0.01 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"
 
 
 _CSV_COLUMNS = (
@@ -251,19 +263,18 @@ def summary_csv(summaries: Sequence[AgentSummary]) -> str:
 def percent(value: float | None, interval: Interval | None) -> str:
     """`61.1 [54.0, 68.2]`, from rates of 0 to 1.
 
-    No interval where resampling cannot tell one: a single task, or tasks that all agree.
+    No interval where resampling cannot tell one: a single house, or houses that all agree.
     """
     if value is None:
         return NONE
-    ends = (
-        "" if interval is None or interval[0] == interval[1] else f" [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
-    )
+    ends = "" if interval is None else f" [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
     return f"{100 * value:.1f}{ends}"
 
 
-def points(value: float, interval: Interval) -> str:
-    """`+6.3 [-1.2, +13.9]`, from differences of -1 to 1."""
-    return f"{100 * value:+.1f} [{100 * interval[0]:+.1f}, {100 * interval[1]:+.1f}]"
+def points(effect: PairedEffect) -> str:
+    """`+6.3 [-1.2, +13.9]`, in percentage points."""
+    ends = "" if effect.ci95 is None else f" [{100 * effect.ci95[0]:+.1f}, {100 * effect.ci95[1]:+.1f}]"
+    return f"{100 * effect.difference:+.1f}{ends}"
 
 
 def _split_table(title: str, summaries: Sequence[AgentSummary], names: Sequence[str], notes: tuple[str, ...]) -> Table:

@@ -1,33 +1,10 @@
-import math
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from evonav.significance import (
-    bootstrap_medians,
-    bootstrap_ratios,
-    chi_square,
-    chi_square_tail,
-    effective_size,
-    resampled_counts,
-    weighted_quantiles,
-    wilson,
-)
-
-
-@given(st.floats(0, 200), st.integers(1, 30))
-def test_the_tail_is_scipys(statistic: float, num_degrees: int) -> None:
-    assert chi_square_tail(statistic, num_degrees) == pytest.approx(
-        stats.chi2.sf(statistic, num_degrees), rel=1e-9, abs=1e-12
-    )
-
-
-@pytest.mark.parametrize(("statistic", "num_degrees"), [(3.841459, 1), (5.991465, 2), (7.814728, 3), (9.487729, 4)])
-def test_the_tail_at_the_printed_five_percent_points(statistic: float, num_degrees: int) -> None:
-    assert chi_square_tail(statistic, num_degrees) == pytest.approx(0.05, abs=1e-6)
+from evonav.statistics import chi_square, effective_size, mcnemar, weighted_quantiles
 
 
 @given(st.lists(st.tuples(st.integers(0, 400), st.floats(0.5, 3)), min_size=2, max_size=8))
@@ -86,42 +63,12 @@ def test_weighted_quantiles_are_those_of_repeated_values(values: list[tuple[floa
     assert found == pytest.approx(np.quantile(repeated, share, method="averaged_inverted_cdf"), abs=1e-12)
 
 
-def test_resamples_keep_the_size_of_every_stratum() -> None:
-    strata = np.array([0, 1, 1, 1, 0, 2])
-    counts = np.concatenate(list(resampled_counts(strata, num_resamples=50, seed=1)))
-    assert counts.shape == (50, 6)
-    for stratum, size in ((0, 2), (1, 3), (2, 1)):
-        assert (counts[:, strata == stratum].sum(axis=1) == size).all()
-    assert len({tuple(row) for row in counts}) > 10
-
-
-def test_the_bootstrap_agrees_with_wilson_and_leaves_out_what_is_not_there() -> None:
-    num, successes = 400, 120
-    numerators = np.zeros((num, 2))
-    numerators[:successes, 0] = 1
-    denominators = np.stack([np.ones(num), np.zeros(num)], axis=1)
-    ends = bootstrap_ratios(numerators, denominators, np.zeros(num, dtype=np.int64))
-    told = wilson(successes, num)
-    assert told is not None
-    assert ends[0] == pytest.approx(told, abs=0.006)
-    assert np.isnan(ends[1]).all()
-
-
-def test_the_bootstrap_of_a_median_covers_it_about_as_often_as_it_says() -> None:
-    generator = np.random.Generator(np.random.PCG64(3))
-    num_covered = 0
-    for seed in range(200):
-        values = generator.exponential(size=60)
-        units = np.arange(60)
-        low, high = bootstrap_medians(
-            values, np.ones(60), units, np.zeros(60, dtype=np.int64), num_resamples=300, seed=seed
-        )
-        num_covered += low <= math.log(2) <= high
-    assert 0.88 <= num_covered / 200 <= 1.0
-
-
 def test_effective_size_of_equal_and_of_unequal_weights() -> None:
     assert effective_size(np.full(7, 0.3)) == pytest.approx(7)
     assert effective_size(np.array([1.0, 1.0, 0.0])) == pytest.approx(2)
     assert effective_size(np.array([3.0, 1.0])) == pytest.approx(1.6)
     assert effective_size(np.zeros(3)) == 0
+
+
+def test_mcnemar_of_thousands_of_stages() -> None:
+    assert mcnemar(980, 1100) == pytest.approx(stats.binomtest(980, 2080).pvalue, rel=1e-9)

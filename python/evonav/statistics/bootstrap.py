@@ -1,0 +1,203 @@
+"""Resample houses: the one bootstrap behind every interval over stages, tasks or views.
+
+Stages of a house share its floor plan, those of a task also a memory, and views of a house its objects. They are not
+independent, so every resample takes a house whole.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from evonav.statistics.interval import Interval, percentile_interval
+from evonav.statistics.weighted import weighted_quantiles
+
+NUM_RESAMPLES = 10_000
+MAX_RESAMPLE_CELLS = 4_000_000
+"""Resampled counts drawn at a time, to bound memory."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A number with its interval."""
+
+    value: float | None
+    """`None` where there is nothing to take it of."""
+    ci95: Interval | None
+    """Percentile bootstrap by cluster; `None` of fewer than two clusters, or where all of them agree."""
+    n: int
+    """Number of things that it is a mean over."""
+    num_clusters: int
+    """Clusters that were resampled."""
+    resampled: NDArray[np.float64] | None = field(default=None, repr=False, compare=False)
+    """`(R,)` its value in every resample, where it was resampled."""
+
+    def minus(self, other: "Estimate") -> "Estimate":
+        """Return the difference to another estimate that was resampled with the same bootstrap.
+
+        Its interval is of the differences within resamples, and its `n` is the smaller one.
+
+        Args:
+            other: The same number of something else, over the same clusters.
+        """
+        n = min(self.n, other.n)
+        if self.value is None or other.value is None:
+            return Estimate(None, None, n, self.num_clusters)
+        value = self.value - other.value
+        if self.resampled is None or other.resampled is None:
+            return Estimate(value, None, n, self.num_clusters)
+        resampled = self.resampled - other.resampled
+        return Estimate(value, percentile_interval(resampled, self.num_clusters), n, self.num_clusters, resampled)
+
+
+class ClusterBootstrap:
+    """Resamples of clusters (houses), the same for everything that is estimated with them.
+
+    Attributes:
+        num_clusters: C, the different clusters. Their order is that of their sorted names.
+        cluster_of: `(N,)` index of each row's cluster.
+    """
+
+    def __init__(
+        self,
+        clusters: Sequence[str],
+        *,
+        strata: Sequence[str] | NDArray[np.int64] | None = None,
+        num_resamples: int = NUM_RESAMPLES,
+        seed: int = 0,
+    ) -> None:
+        """Prepare the resamples of some rows' clusters.
+
+        Args:
+            clusters: `N` names of houses, one a row; rows of one house are drawn together.
+            strata: `N` names or numbers, the same for all rows of a house; houses are resampled within them. For rows
+                pooled from sets whose sizes were chosen, such as a thousand small houses and seventy large ones.
+            num_resamples: R, more make steadier ends.
+            seed: Seed of the draws.
+
+        Raises:
+            ValueError: A house lies in two strata.
+        """
+        names, cluster_of = np.unique(np.asarray(clusters), return_inverse=True)
+        self.num_clusters = len(names)
+        self.cluster_of = cluster_of.astype(np.int64)
+        self._strata = np.zeros(self.num_clusters, np.int64)
+        if strata is not None:
+            _, stratum_of = np.unique(np.asarray(strata), return_inverse=True)
+            self._strata[self.cluster_of] = stratum_of
+            if not np.array_equal(self._strata[self.cluster_of], stratum_of):
+                raise ValueError("a house lies in two strata")
+        self._num_resamples = num_resamples
+        self._seed = seed
+
+    @property
+    def draws(self) -> NDArray[np.float64]:
+        """`(R, C)` how often each cluster is drawn in each resample."""
+        return np.concatenate(self._blocks()).astype(np.float64)
+
+    def sums(self, values: ArrayLike, cluster_of: NDArray[np.int64] | None = None) -> NDArray[np.float64]:
+        """Add up rows by cluster.
+
+        Args:
+            values: `(N,)` or `(N, M)`.
+            cluster_of: `(N,)` index of each row's cluster; default: those of the rows that the bootstrap is of.
+
+        Returns:
+            `(C,)` or `(C, M)`.
+        """
+        rows = np.asarray(values, np.float64)
+        summed = np.zeros((self.num_clusters, *rows.shape[1:]))
+        np.add.at(summed, self.cluster_of if cluster_of is None else cluster_of, rows)
+        return summed
+
+    def resampled_sums(self, sums: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the totals of every resample, `(R, ...)`, from sums by cluster, `(C, ...)`."""
+        return np.concatenate([counts.astype(np.float64) @ sums for counts in self._blocks()])
+
+    def column_means(self, values: NDArray[np.float64]) -> list[Estimate]:
+        """Estimate the mean of each of M columns over all rows.
+
+        Args:
+            values: `(N, M)`, a row as the bootstrap's.
+        """
+        sums = self.sums(np.column_stack([values, np.ones(len(values))]))
+        totals = self.resampled_sums(sums)
+        resampled = totals[:, :-1] / totals[:, -1:]
+        return [
+            Estimate(float(mean), percentile_interval(column, self.num_clusters), len(values), self.num_clusters)
+            for mean, column in zip(values.mean(axis=0), resampled.T, strict=True)
+        ]
+
+    def ratio(
+        self,
+        numerators: NDArray[np.float64],
+        denominators: NDArray[np.float64],
+        n: int,
+        transform: Callable[[NDArray[np.float64]], NDArray[np.float64]] = lambda ratios: ratios,
+    ) -> Estimate:
+        """Estimate a ratio of sums over clusters.
+
+        Args:
+            numerators: `(C,)`.
+            denominators: `(C,)`.
+            n: Number of things that the estimate is a mean over.
+            transform: Applied to the ratio, such as a root.
+        """
+        total = float(denominators.sum())
+        if total <= 0:
+            return Estimate(None, None, n, self.num_clusters)
+        value = float(transform(np.array([numerators.sum() / total]))[0])
+        above, below = self.resampled_sums(np.column_stack([numerators, denominators])).T
+        ratios = np.divide(above, below, out=np.full_like(below, np.nan), where=below > 0)
+        return self.estimate(value, transform(ratios), n)
+
+    def estimate(self, value: float, resampled: NDArray[np.float64], n: int) -> Estimate:
+        """Return an estimate of which the value in each resample, `(R,)`, is known; NaN where there is none."""
+        return Estimate(value, percentile_interval(resampled, self.num_clusters), n, self.num_clusters, resampled)
+
+    def weighted_median(
+        self, values: NDArray[np.float64], weights: NDArray[np.float64], cluster_of: NDArray[np.int64]
+    ) -> Estimate:
+        """Estimate a weighted median.
+
+        Args:
+            values: `(V,)`.
+            weights: `(V,)`.
+            cluster_of: `(V,)` index of each value's cluster.
+        """
+        order = np.argsort(values, kind="stable")
+        ordered, its_weights, its_clusters = values[order], weights[order], cluster_of[order]
+        medians = []
+        for counts in self._blocks():
+            for row in counts:
+                cumulated = np.cumsum(row[its_clusters] * its_weights)
+                is_drawn = cumulated[-1] > 0
+                medians.append(ordered[np.searchsorted(cumulated, cumulated[-1] / 2)] if is_drawn else np.nan)
+        return self.estimate(float(weighted_quantiles(values, weights, [0.5])[0]), np.array(medians), len(values))
+
+    def _blocks(self) -> tuple[NDArray[np.uint16], ...]:
+        return _counts(self._strata.tobytes(), self._num_resamples, self._seed)
+
+
+# The same houses are resampled for every agent and every measure: drawing takes ten times as long as summing.
+@lru_cache(maxsize=8)
+def _counts(strata: bytes, num_resamples: int, seed: int) -> tuple[NDArray[np.uint16], ...]:
+    """Draw how often each cluster is in each resample, with replacement and each stratum by itself.
+
+    Returns:
+        `(r, C)` blocks, R rows in all.
+    """
+    stratum_of = np.frombuffer(strata, dtype=np.int64)
+    generator = np.random.Generator(np.random.PCG64(seed))
+    members = [np.flatnonzero(stratum_of == stratum) for stratum in np.unique(stratum_of)]
+    block = max(1, MAX_RESAMPLE_CELLS // max(1, len(stratum_of)))
+    blocks = []
+    for start in range(0, num_resamples, block):
+        counts = np.zeros((min(block, num_resamples - start), len(stratum_of)), np.uint16)
+        for indices in members:
+            shares = np.full(len(indices), 1 / len(indices))
+            counts[:, indices] = generator.multinomial(len(indices), shares, size=len(counts))
+        blocks.append(counts)
+    return tuple(blocks)

@@ -1,0 +1,68 @@
+"""95% intervals: Wilson's for a rate of counts, and percentiles of resamples, widened where there are few clusters."""
+
+import math
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Interval = tuple[float, float]
+
+Z_95 = 1.959963984540054
+"""Standard normal quantile that is exceeded one time in forty."""
+
+
+def wilson(num_successes: float, n: float) -> Interval | None:
+    """Return Wilson's 95% score interval of a rate, `None` without trials."""
+    if n == 0:
+        return None
+    p = num_successes / n
+    centre = (p + Z_95 * Z_95 / (2 * n)) / (1 + Z_95 * Z_95 / n)
+    half = Z_95 / (1 + Z_95 * Z_95 / n) * math.sqrt(p * (1 - p) / n + Z_95 * Z_95 / (4 * n * n))
+    return (max(0.0, centre - half), min(1.0, centre + half))
+
+
+def percentile_interval(resampled: NDArray[np.float64], num_clusters: int) -> Interval | None:
+    """Return the 95% interval of a statistic from its values in resamples.
+
+    Args:
+        resampled: `(R,)` values; NaN where a resample has none. Infinite values are allowed.
+        num_clusters: Clusters that were resampled. Few of them widen the interval (`widened_tail`).
+
+    Returns:
+        `None` where resampling cannot tell: fewer than two clusters, no value, or the same value in every resample.
+    """
+    values = resampled[~np.isnan(resampled)]
+    if num_clusters < 2 or values.size == 0 or not values.max() > values.min() + 1e-12:
+        return None
+    tail = widened_tail(num_clusters)
+    # Nothing lies between a finite value and an infinite one.
+    method: Literal["linear", "nearest"] = "linear" if np.isfinite(values).all() else "nearest"
+    low, high = np.quantile(values, [tail, 1 - tail], method=method)
+    return (float(low), float(high))
+
+
+@cache
+def widened_tail(num_clusters: int) -> float:
+    """Return the share of resamples to leave out at either end.
+
+    Resamples of N clusters vary by (N - 1) / N of what the mean of N clusters does, and their quantiles are a normal's
+    where Student's are due: of 10 clusters the plain percentiles cover the truth 89 times in 100 instead of 95. For 100
+    clusters the two are 2% apart. Hesterberg, "What Teachers Should Know About the Bootstrap", The American
+    Statistician 2015.
+
+    Args:
+        num_clusters: Clusters that are resampled, at least 2.
+    """
+    from scipy.special import ndtr
+
+    widening = math.sqrt(num_clusters / (num_clusters - 1))
+    return float(ndtr(-widening * student_quantile(num_clusters - 1)))
+
+
+def student_quantile(num_degrees: int) -> float:
+    """Return the quantile of Student's t with `num_degrees` that is exceeded one time in forty."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(num_degrees, 0.975))
