@@ -86,7 +86,7 @@ def test_the_shell_gets_its_answers():
 
 def test_completion_does_not_slow_the_start():
     """Neither defining completions nor examples loads what they are about."""
-    heavy = ("evonav.agents", "evonav.decision", "rich.live", "yaml")
+    heavy = ("evonav.agents", "evonav.decision", "rich.live", "tomllib", "tomli")
     code = f"import sys, evonav.cli; print([m for m in sys.modules if m.startswith({heavy})])"
     printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert printed.strip() == "[]"

@@ -142,8 +142,8 @@ def write_files_of(page: Path, place: Path) -> None:
     for language, text in blocks(page):
         if language == "python" and (found := re.match(r"# (\w+\.py)\b", text)):
             texts[found[1]] = texts.get(found[1], "") + text
-        if language == "json":
-            texts["theta.json"] = text
+        if language == "toml":
+            texts["theta.toml"] = text
     for name, text in texts.items():
         (place / name).write_text(text)
 

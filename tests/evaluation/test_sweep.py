@@ -245,7 +245,7 @@ def test_examples(tmp_path, monkeypatch):
     assert plan.exit_code == 0, plan.output
     monkeypatch.chdir(EXAMPLES.parents[1])
     two = ("--set", "tasks.test-90=bundled:2", "--only", "*rules*")
-    plan = run("sweep", "examples/sweeps/paper-gt.yaml", *two, "--dry-run")
+    plan = run("sweep", "examples/sweeps/paper-gt.toml", *two, "--dry-run")
     assert plan.exit_code == 0, plan.output
     assert "gt__rules__test-90__s0" in plan.stdout
     assert "42 stages" in plan.stdout

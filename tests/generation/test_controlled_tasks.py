@@ -185,8 +185,8 @@ def test_the_command_says_what_it_made_and_what_is_missing(tmp_path):
     runner = CliRunner()
     houses = tmp_path / "houses.jsonl"
     houses.write_text(next(bundled_houses(1)).to_json() + "\n", encoding="utf-8")
-    config = tmp_path / "small.json"
-    config.write_text(json.dumps({"reference_image_px": 64, "reference_min_visible_px": 10}))
+    config = tmp_path / "small.toml"
+    config.write_text("reference_image_px = 64\nreference_min_visible_px = 10\n")
     out = tmp_path / "out"
     command = ["controlled", "generate", str(houses), "--out", str(out), "--config", str(config), "--workers", "0"]
     made = runner.invoke(app, command, catch_exceptions=False)

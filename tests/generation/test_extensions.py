@@ -57,9 +57,9 @@ def test_without_extensions_nothing_of_them_is_recorded(house: House) -> None:
 
 
 def test_the_command_takes_parameters_from_a_file_and_options(tmp_path: Path, house: House) -> None:
-    houses, config, out = tmp_path / "houses.json", tmp_path / "theta.json", tmp_path / "tasks"
+    houses, config, out = tmp_path / "houses.json", tmp_path / "theta.toml", tmp_path / "tasks"
     houses.write_text(house.to_json())
-    config.write_text(json.dumps({"evolve_probability": 0.25, "extensions": {"removal": OFTEN}}))
+    config.write_text("evolve_probability = 0.25\nextensions.removal = {probability = 1.0, max_count = 3}\n")
     arguments = ["generate", "--houses", str(houses), "--config", str(config), "--workers", "0"]
     done = CliRunner().invoke(app, [*arguments, "--num-stages", "6", "--out", str(out)])
     assert done.exit_code == 0, done.output

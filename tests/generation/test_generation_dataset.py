@@ -286,8 +286,8 @@ def test_a_folder_of_houses(houses, clean, tmp_path):
 
 
 def command(houses, out, *more):
-    config = houses.parent / "theta.json"
-    config.write_text(json.dumps({"reference_image_px": 64, "reference_min_visible_px": 4}))
+    config = houses.parent / "theta.toml"
+    config.write_text("reference_image_px = 64\nreference_min_visible_px = 4\n")
     arguments = ("generate", "--houses", houses, "--out", out, "--config", config, *more)
     return [sys.executable, "-m", "evonav", *map(str, arguments)]
 

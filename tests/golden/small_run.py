@@ -25,18 +25,17 @@ from PIL import Image
 
 DIGESTS = Path(__file__).with_name("digests.json")
 SIX_AGENTS = "unigoal,3d-mem,msgnav,fu,stage-reset,ftu"
-EXTENSIONS = {
-    "num_stages": [3, 4],
-    "evolve_probability": 0.8,
-    "extensions": {
-        "insertion": {"probability": 0.5, "max_count": 3},
-        "removal": {"probability": 0.5, "max_count": 3},
-        "doors": {"probability": 0.5, "max_count": 2},
-        "openables": {"probability": 0.5, "max_count": 3},
-        "switches": {"probability": 0.5, "max_count": 2},
-        "schedule": {"num_persons": 3, "minutes_between_stages": 180, "tidiness": 0.8},
-    },
-}
+EXTENSIONS = """
+num_stages = [3, 4]
+evolve_probability = 0.8
+[extensions]
+insertion = {probability = 0.5, max_count = 3}
+removal = {probability = 0.5, max_count = 3}
+doors = {probability = 0.5, max_count = 2}
+openables = {probability = 0.5, max_count = 3}
+switches = {probability = 0.5, max_count = 2}
+schedule = {num_persons = 3, minutes_between_stages = 180, tidiness = 0.8}
+"""
 SWEEP = """
 name = "golden"
 agents = ["fu", "ftu"]
@@ -85,11 +84,11 @@ def _imperfect(out: Path) -> Iterator[tuple[str, str]]:
 def _generation(out: Path) -> Iterator[tuple[str, str]]:
     houses = Path(__file__).parents[2] / "python/evonav/data/houses.jsonl.gz"
     _evonav("generate", "--houses", houses, "--limit", 3, "--seed", 1, "--workers", 2, "--out", out / "paper")
-    config = out / "extensions.json"
-    config.write_text(json.dumps(EXTENSIONS), encoding="utf-8")
+    config = out / "extensions.toml"
+    config.write_text(EXTENSIONS, encoding="utf-8")
     _evonav("generate", "--houses", houses, "--limit", 3, "--config", config, "--workers", 1, "--out", out / "more")
     for path in sorted(out.rglob("*")):
-        if path.suffix in _READERS and path != config:
+        if path.suffix in _READERS:
             yield str(path.relative_to(out)), _READERS[path.suffix](path.read_bytes())
 
 

@@ -30,7 +30,7 @@ from evonav.tasks.bundled import bundled_tasks
         ({"persistence_scope": "run"}, "persistence_scope = 'run': expected stage or episode"),
         ({"mis_rate": 0.1}, "no parameter 'mis_rate'; did you mean miss_rate?"),
         ({"preset": "bad"}, "no preset 'bad'; there are perfect, good, yolo-world-like, poor"),
-        ({"confusion": "nowhere.yaml"}, "nowhere.yaml: cannot be read"),
+        ({"confusion": "nowhere.toml"}, "nowhere.toml: cannot be read"),
     ],
 )
 def test_bad_parameters_are_named(options: dict[str, object], said: str) -> None:
@@ -49,16 +49,16 @@ def test_presets_are_what_the_file_says_with_options_over_them() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("- a", "expected frequencies, groups and pairs"),
-        ("frequencies: {}", "frequencies: expected at least one category"),
-        ("frequencies: {Mug: -1}", "frequencies.Mug = -1: expected a weight"),
-        ("frequencies: {Mug: 1}\ngroups: {a: Mug}", "groups: expected lists"),
-        ("frequencies: {Mug: 1}\npairs: {Mug: 3}", "pairs.Mug: expected a table"),
-        ("frequencies: [", "cannot be read"),
+        ("a = 1", "expected frequencies, groups and pairs"),
+        ("frequencies = {}", "frequencies: expected at least one category"),
+        ("frequencies = {Mug = -1}", "frequencies.Mug = -1: expected a weight"),
+        ('frequencies = {Mug = 1}\ngroups = {a = "Mug"}', "groups: expected lists"),
+        ("frequencies = {Mug = 1}\npairs = {Mug = 3}", "pairs.Mug: expected a table"),
+        ("frequencies = [", "not TOML"),
     ],
 )
 def test_bad_confusion_files_are_named(tmp_path: Path, text: str, said: str) -> None:
-    path = tmp_path / "own.yaml"
+    path = tmp_path / "own.toml"
     path.write_text(text)
     with pytest.raises(InvalidArgumentError) as error:
         read_confusion(str(path))
@@ -67,8 +67,10 @@ def test_bad_confusion_files_are_named(tmp_path: Path, text: str, said: str) -> 
 
 
 def test_ones_own_confusion_is_used(tmp_path: Path) -> None:
-    path = tmp_path / "own.yaml"
-    path.write_text("frequencies: {Mug: 1, Cup: 3, Bed: 0}\ngroups: {a: [Mug, Cup, Bed]}\npairs: {Mug: {Cup: 3}}\n")
+    path = tmp_path / "own.toml"
+    path.write_text(
+        'frequencies = {Mug = 1, Cup = 3, Bed = 0}\ngroups.a = ["Mug", "Cup", "Bed"]\npairs.Mug = {Cup = 3}\n'
+    )
     confusion = read_confusion(str(path))
     shares = np.linspace(0.0, 0.999, 1000)
     assert np.mean([confusion.another("Mug", True, s) == "Cup" for s in shares]) == pytest.approx(0.75, abs=0.002)

@@ -50,7 +50,7 @@ def generate(
     per_house: Annotated[int, typer.Option(min=1, help="Tasks a house, of the seeds from SEED on.")] = 1,
     seed: Seed = 0,
     config: Annotated[
-        Path | None, typer.Option(help="JSON or TOML with any of the generator's parameters (docs/extensions.md).")
+        Path | None, typer.Option(help="TOML with any of the generator's parameters (docs/extensions.md).")
     ] = None,
     workers: Workers = None,
     allow_unknown_assets: AnyAsset = False,

@@ -16,7 +16,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "sweep": (
         "evonav sweep examples/sweeps/noise.toml",
         "evonav sweep examples/sweeps/noise.toml --dry-run",
-        "evonav sweep sweep.yaml --set 'seeds=[0,1,2]' --only '*__s0' --workers 8",
+        "evonav sweep sweep.toml --set 'seeds=[0,1,2]' --only '*__s0' --workers 8",
     ),
     "demo": ("evonav demo", "evonav demo --limit 4 --out out/short"),
     "failures": ("evonav failures out/run", "evonav failures out/run --agent fu --brief"),

@@ -31,7 +31,7 @@ def generate(
     subset: Subset = None,
     seed: Seed = 0,
     config: Annotated[
-        Path | None, typer.Option(help="JSON or TOML with any of the generator's parameters (docs/extensions.md).")
+        Path | None, typer.Option(help="TOML with any of the generator's parameters (docs/extensions.md).")
     ] = None,
     evolve_probability: Annotated[
         float | None, typer.Option(help="Chance that a transition changes the house; the paper's: 0.5.")

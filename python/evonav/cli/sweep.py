@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 
 
 def sweep(
-    file: Annotated[
-        Path | None, typer.Argument(help="TOML, YAML or JSON (docs/sweeps.md).", show_default=False)
-    ] = None,
+    file: Annotated[Path | None, typer.Argument(help="A TOML file (docs/sweeps.md).", show_default=False)] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the sweep; default: the file's `out`, else out/NAME of the file.")
     ] = None,

@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from evonav.errors import InvalidArgumentError, TaskError
+from evonav.errors import InvalidArgumentError
 from evonav.tasks.manifest import GenerationParameters
-from evonav.tasks.records import parse_record, read_file
-from evonav.toml import tomllib
+from evonav.tasks.records import parse_record
+from evonav.toml import read_toml
 
 
 def read_parameters(
@@ -16,15 +16,18 @@ def read_parameters(
     """Θ: the paper's, what a file says otherwise, and options over both.
 
     Args:
-        path: JSON, or TOML where its name ends in `.toml`: any of the fields of `GenerationParameters`.
+        path: TOML with any of the fields of `GenerationParameters`.
         evolve_probability: Chance that a transition evolves the house.
         num_stages: Numbers of stages to draw from, such as `6,8`.
 
     Raises:
-        TaskError: The file cannot be read or is no such record; it names the field.
-        InvalidArgumentError: An option is outside its domain.
+        TaskError: The file is no such record; it names the field.
+        InvalidArgumentError: An option is outside its domain, or the file cannot be read as TOML.
     """
-    parameters = GenerationParameters() if path is None else parse_record(GenerationParameters, _json_of(path), path)
+    parameters = GenerationParameters()
+    if path is not None:
+        content = json.dumps(read_toml(path), default=str)  # a date is no value of any field
+        parameters = parse_record(GenerationParameters, content.encode(), path)
     changes: dict[str, Any] = {}
     if evolve_probability is not None:
         if not 0.0 <= evolve_probability <= 1.0:
@@ -39,13 +42,3 @@ def read_parameters(
             raise InvalidArgumentError(f"num_stages is {num_stages!r}, expected counts of 1..=64 such as 3,4,5")
         changes["num_stages"] = counts
     return parameters.model_copy(update=changes)
-
-
-def _json_of(path: Path) -> bytes:
-    data = read_file(path)
-    if path.suffix.lower() != ".toml":
-        return data
-    try:
-        return json.dumps(tomllib.loads(data.decode())).encode()
-    except ValueError as error:
-        raise TaskError(f"{path}: no TOML: {error}") from None

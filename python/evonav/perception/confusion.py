@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
+from evonav.toml import read_toml
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ def _pick(labels: Sequence[str], weights: NDArray[np.float64], share: float) -> 
 
 @cache
 def read_confusion(path: str = "") -> Confusion:
-    """Reads a file of frequencies, groups and pairs (`confusion.yaml` tells its form).
+    """Reads a file of frequencies, groups and pairs (`confusion.toml` shows the form).
 
     Args:
         path: Empty: that file.
@@ -60,15 +60,9 @@ def read_confusion(path: str = "") -> Confusion:
     Raises:
         InvalidArgumentError: It cannot be read, or a part of it is malformed.
     """
-    import yaml
-
-    place = files("evonav.perception") / "confusion.yaml" if not path else Path(path)
-    name = path or "confusion.yaml"
-    try:
-        raw = yaml.safe_load(place.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InvalidArgumentError(f"{name}: cannot be read: {' '.join(str(error).split())}") from None
-    if not isinstance(raw, dict) or set(raw) - {"frequencies", "groups", "pairs"}:
+    name = path or "confusion.toml"
+    raw = read_toml(Path(path) if path else Path(__file__).with_name(name))
+    if set(raw) - {"frequencies", "groups", "pairs"}:
         raise InvalidArgumentError(f"{name}: expected frequencies, groups and pairs, and nothing else")
     groups = raw.get("groups", {})
     if not isinstance(groups, dict) or not all(
@@ -85,7 +79,7 @@ def read_confusion(path: str = "") -> Confusion:
             for other in group:
                 if other != label:
                     row[other] = row.get(other, 0.0) + 1.0
-    pairs = raw.get("pairs") or {}
+    pairs = raw.get("pairs", {})
     if not isinstance(pairs, dict):
         raise InvalidArgumentError(f"{name}: pairs: expected a table of weights by category")
     for label, others in pairs.items():

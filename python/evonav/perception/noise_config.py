@@ -1,14 +1,15 @@
-"""How simulated perception errs: every parameter in one place, and the presets (`noise_presets.yaml`)."""
+"""How simulated perception errs: every parameter in one place, and the presets (`noise_presets.toml`)."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from difflib import get_close_matches
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 from evonav.errors import InvalidArgumentError
+from evonav.toml import read_toml
 
 Scope = Literal["stage", "episode"]
 
@@ -48,7 +49,7 @@ class NoiseConfig:
     confusion_similar: float = 0.85
     """0..1: of those, labels taken from the confusion matrix; the others by how frequent categories are."""
     confusion: str = ""
-    """Path of a file like `confusion.yaml`; empty: that one."""
+    """Path of a file like `confusion.toml`; empty: that one."""
 
     false_positives_per_view: float = 0.0
     """0..50: expected detections of nothing, on surfaces in view."""
@@ -138,10 +139,8 @@ class NoiseConfig:
 @cache
 def noise_presets() -> Mapping[str, NoiseConfig]:
     """The presets by name, the best first."""
-    import yaml
-
-    text = (files("evonav.perception") / "noise_presets.yaml").read_text(encoding="utf-8")
-    return {name: NoiseConfig(**values) for name, values in yaml.safe_load(text).items()}
+    presets = read_toml(Path(__file__).with_name("noise_presets.toml"))
+    return {name: NoiseConfig(**values) for name, values in presets.items()}
 
 
 def _check(name: str, value: Any) -> None:  # noqa: ANN401 - as given

@@ -1,4 +1,4 @@
-"""Sweep files: TOML, YAML or JSON that names what is to be run (docs/sweeps.md).
+"""Sweep files: TOML that names what is to be run (docs/sweeps.md).
 
 Short forms (`tasks = ["bundled:2"]`) are spelled out first, so that there is one record and one way to read it.
 Whatever is wrong is one sentence with the file, the key and the value.
@@ -23,8 +23,9 @@ from evonav.evaluation.run.settings import (
     SimulatorSettings,
 )
 from evonav.parallel.pool import EngineName
-from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed, loaded
+from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed
 from evonav.tasks.subsets import SubsetError, parse_subset
+from evonav.toml import read_toml
 
 BUNDLED = "bundled"
 """Stands for the folder of the tasks that come with evonav."""
@@ -128,13 +129,13 @@ def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
     """Reads a sweep file.
 
     Args:
-        path: `.toml`, `.yaml`, `.yml` or `.json`.
+        path: A file of TOML.
         changes: `KEY=VALUE` over what the file says; keys with dots reach into tables, values are JSON or plain words.
 
     Raises:
         InvalidArgumentError: With file, key and value.
     """
-    raw = loaded(path)
+    raw = read_toml(path)
     for change in changes:
         apply(raw, change, path)
     for axis, spell in SHORT_FORMS.items():

@@ -8,64 +8,8 @@ from typing import Any
 
 from evonav.errors import InvalidArgumentError
 from evonav.tasks.subsets import SubsetError, parse_subset
-from evonav.toml import tomllib
 
 MAX_NAME_CHARACTERS = 64
-
-
-def loaded(path: Path) -> dict[str, Any]:
-    """A file as plain values.
-
-    Args:
-        path: `.toml`, `.yaml`, `.yml` or `.json`.
-
-    Raises:
-        InvalidArgumentError: It cannot be read; it says where.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise InvalidArgumentError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError as error:
-        raise InvalidArgumentError(f"{path}: not UTF-8: {error}") from None
-    kind = path.suffix.lower()
-    try:
-        if kind == ".toml":
-            raw = tomllib.loads(text)
-        elif kind in (".yaml", ".yml"):
-            raw = _yaml(text)
-        elif kind == ".json":
-            raw = json.loads(text)
-        else:
-            raise InvalidArgumentError(f"{path}: expected a name that ends in .toml, .yaml, .yml or .json")
-    except ValueError as error:
-        said = " ".join(str(error).split())
-        raise InvalidArgumentError(f"{path}: no {kind[1:].upper()}: {said}") from None
-    if not isinstance(raw, dict):
-        raise InvalidArgumentError(f"{path}: expected keys and values, got {type(raw).__name__}: see docs/sweeps.md")
-    return raw
-
-
-def _yaml(text: str) -> Any:  # noqa: ANN401 - YAML
-    """Plain YAML, in which a key said twice is an error.
-
-    Raises:
-        ValueError: It is none.
-    """
-    import yaml
-
-    class Loader(yaml.SafeLoader):
-        def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:  # noqa: ANN401
-            keys = [self.construct_object(key, deep=True) for key, _ in node.value]
-            twice = next((key for i, key in enumerate(keys) if key in keys[:i]), None)
-            if twice is not None:
-                raise ValueError(f"key {twice!r} is there twice (line {node.start_mark.line + 1})")
-            return super().construct_mapping(node, deep=deep)
-
-    try:
-        return yaml.load(text, Loader)  # noqa: S506 - a safe loader
-    except yaml.YAMLError as error:
-        raise ValueError(str(error)) from None
 
 
 def apply(raw: dict[str, Any], change: str, path: Path) -> None:
