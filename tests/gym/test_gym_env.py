@@ -48,7 +48,7 @@ def test_gymnasiums_checker_finds_nothing(settings):
         check_env(gymnasium.make(ENV_ID, **SMALL, **settings).unwrapped)
 
 
-def test_the_id_is_known_by_naming_the_package():
+def test_importing_the_package_registers_the_id():
     code = (
         "import gymnasium; env = gymnasium.make('evonav:evonav/LifelongNav-v0', width_px=8, height_px=8);"
         "env.reset(seed=0); print(type(env.unwrapped).__name__)"
@@ -88,7 +88,7 @@ def _as_told(env: LifelongNavEnv, action) -> AgentAction:
 
 
 @pytest.mark.parametrize("mode", ["actions", "waypoints"])
-def test_the_same_actions_get_the_evaluators_measures(mode):
+def test_the_same_actions_give_the_evaluators_metrics(mode):
     """Five tasks walked at random, some stages to their budget's end, by environment and evaluator."""
     budget = 40 if mode == "actions" else 8
     config = NavConfig(action_mode=mode, max_steps=budget, observations=("pose",), **SMALL)
@@ -173,7 +173,7 @@ def test_an_episode_is_a_task_whose_stages_begin_where_the_last_ended():
         env.step(0)
 
 
-def test_progress_rewards_sum_to_the_way_made_good():
+def test_progress_rewards_sum_to_the_reduced_distance():
     env = LifelongNavEnv(observations=("pose",), oracle_info=True, max_steps=100)
     _, info = env.reset(seed=2)
     start_m = info["oracle"]["geodesic_distance_m"]
@@ -189,7 +189,7 @@ def test_progress_rewards_sum_to_the_way_made_good():
     assert total == pytest.approx(expected)
 
 
-def test_observations_hold_nothing_of_the_oracle():
+def test_observations_contain_no_oracle_data():
     env = LifelongNavEnv(observations=OBSERVATIONS, **SMALL)
     seen, info = env.reset(seed=0)
     assert set(info) == {"task_id", "stage", "num_stages"}
@@ -235,7 +235,7 @@ def test_waypoints_are_in_their_frame(frame, action, expected):
     assert np.isfinite(waypoint_m(config, np.float32([np.nan, np.inf, -np.inf]), pose, origin)).all()
 
 
-def test_wrong_settings_are_told(tmp_path):
+def test_wrong_settings_are_reported(tmp_path):
     for settings in (
         {"action_mode": "flying"},
         {"observations": ("depth", "target")},

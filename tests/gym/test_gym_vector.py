@@ -62,7 +62,7 @@ def test_a_batch_is_as_many_environments_alone(settings):
     ours.close()
 
 
-def test_it_is_what_gymnasium_says_a_vector_environment_is():
+def test_it_is_a_gymnasium_vector_environment():
     envs = _make(None, 4)
     assert isinstance(envs, VectorEnv)
     seen, infos = envs.reset(seed=[1, None, 3, 4])
@@ -76,7 +76,7 @@ def test_it_is_what_gymnasium_says_a_vector_environment_is():
     envs.close()
 
 
-def test_arrays_are_ones_own_unless_shared_on_purpose():
+def test_arrays_are_copies_unless_sharing_is_requested():
     own, shared = _make(None, 2, observations=("depth",)), _make(None, 2, observations=("depth",), copy=False)
     for envs, is_shared in ((own, False), (shared, True)):
         first, _ = envs.reset(seed=0)
@@ -114,7 +114,7 @@ def test_python_runs_while_a_batch_is_drawn():
     envs.close()
 
 
-def test_the_kernel_refuses_what_does_not_fit():
+def test_the_kernel_refuses_arrays_of_the_wrong_shape():
     envs = VectorEnv(num_envs=2, **SMALL, observations=("depth",))
     with pytest.raises(ResetNeeded):
         envs.step(np.zeros(2, np.int64))

@@ -29,7 +29,7 @@ def houses() -> list[House]:
     return list(bundled_houses(3))
 
 
-def test_bundled_houses_are_multi_room_and_whole() -> None:
+def test_bundled_houses_have_several_rooms_and_are_complete() -> None:
     bundled = list(bundled_houses())
     assert len(bundled) >= 24
     assert all(2 <= len(house.rooms) <= 10 for house in bundled)
@@ -38,7 +38,7 @@ def test_bundled_houses_are_multi_room_and_whole() -> None:
 
 
 @pytest.mark.parametrize("suffix", [".json", ".json.gz", ".jsonl", ".jsonl.gz"])
-def test_each_kind_of_file_gives_the_same_houses(tmp_path: Path, houses: list[House], suffix: str) -> None:
+def test_all_file_formats_give_the_same_houses(tmp_path: Path, houses: list[House], suffix: str) -> None:
     documents = [house.to_json() for house in houses]
     text = "\n\n".join(documents) if "jsonl" in suffix else f" [{documents[0]},\n {documents[1]}\n, {documents[2]}]\n"
     path = tmp_path / f"houses{suffix}"
@@ -168,7 +168,7 @@ def test_a_house_without_the_wall_of_a_door_is_refused(tmp_path: Path, houses: l
 
 
 @needs_data("zhiyuan-gao-procthor-houses/partial_houses")
-def test_partial_houses_are_read_or_refused() -> None:
+def test_incomplete_houses_are_read_or_refused() -> None:
     """One house saved after each generator step: before its outer walls exist, its outer door has no wall."""
     without_outer_walls = {"1_DOORS.json", "2_LIGHTS.json", "3_SKYBOX.json"}
     for path in sorted(data_path("zhiyuan-gao-procthor-houses/partial_houses").iterdir()):

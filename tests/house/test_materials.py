@@ -39,7 +39,7 @@ def test_the_first_two_materials_count_each_once() -> None:
     assert materials_named(named) == ["wood", "metal"]
 
 
-def test_assets_are_made_of_what_their_kind_is_made_of() -> None:
+def test_assets_have_the_materials_of_their_category() -> None:
     first = Counter(
         (row["category"], (row.get("made_of") or [None])[0]) for row in json.loads(ASSETS.read_text())["assets"]
     )

@@ -88,7 +88,7 @@ def _published(url: str) -> Remote:
     return Remote(url, pages, files, texts)
 
 
-def test_fetch_keeps_the_published_bytes_and_a_second_call_only_looks(remote) -> None:
+def test_fetch_stores_the_published_bytes_and_a_second_call_only_verifies(remote) -> None:
     fetched = fetch_procthor10k(COMMIT)
     assert fetched.new == SPLITS
     assert fetched.folder == dataset_folder(COMMIT)
@@ -169,7 +169,7 @@ def test_the_pinned_revision_is_held_to_the_published_checksums(remote) -> None:
     }
 
 
-def test_a_download_cut_short_leaves_nothing_and_is_done_again(remote) -> None:
+def test_an_interrupted_download_leaves_nothing_and_is_repeated(remote) -> None:
     name, data = f"/files/{COMMIT}/val.jsonl.gz", remote.files["val"]
     remote.pages[name] = data[: len(data) // 2]
     with pytest.raises(DatasetCorruptError, match=r"val\.jsonl\.gz"):
@@ -195,7 +195,7 @@ def test_unknown_revisions(remote, revision) -> None:
     assert not dataset_folder("x").parent.exists()
 
 
-def test_files_that_prior_has_need_no_network(remote, tmp_path, monkeypatch) -> None:
+def test_files_of_prior_need_no_network(remote, tmp_path, monkeypatch) -> None:
     stored = tmp_path / "home/.prior/datasets/allenai/procthor-10k" / REVISION / "val.jsonl.gz"
     stored.parent.mkdir(parents=True)
     stored.write_bytes(remote.files["val"])
@@ -218,7 +218,7 @@ def test_files_that_prior_has_need_no_network(remote, tmp_path, monkeypatch) -> 
         (502, DatasetNetworkError),
     ],
 )
-def test_refusals_are_told_apart(remote, status, kind) -> None:
+def test_causes_of_a_refusal_are_distinguished(remote, status, kind) -> None:
     remote.status = status
     remote.pages.clear()
     for revision in ("main", COMMIT, REVISION):

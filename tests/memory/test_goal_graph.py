@@ -60,7 +60,7 @@ def test_score_is_the_mean_of_node_and_edge_similarity():
     assert apart.score == pytest.approx(((2 / 3 + 0.0) / 2 + 0.0) / 2)
 
 
-def test_of_many_chairs_the_one_by_the_table_is_meant():
+def test_the_goal_among_many_chairs_is_the_one_by_the_table():
     nodes = [node(1, "chair", 5.0), node(2, "table"), node(3, "chair", 0.5)]
     edges = [SceneEdge(1, 2, "away from"), SceneEdge(3, 1, "away from"), SceneEdge(3, 2, "next to")]
     assert match(CHAIR_BY_TABLE, nodes, edges).anchors["chair"] == 3
@@ -159,7 +159,7 @@ def test_corrections_rename_until_detections_change_and_delete_until_detected_ag
     assert [n.name for n in graph.nodes] == ["sofa_2", "chair_3"]
 
 
-def test_groups_are_what_hangs_together_by_half_metres():
+def test_groups_are_connected_within_half_a_metre():
     graph = ObjectGraph()
     places = {1: (0.0, 0.0), 2: (0.45, 0.0), 3: (0.9, 0.0), 4: (2.0, 0.0)}
     graph._nodes = {i: node(i, "chair", x, z) for i, (x, z) in places.items()}
@@ -194,7 +194,7 @@ def test_unmapped_types_are_invisible():
     assert relabelled(replace(found, labels=("Mug",) * 3), LABEL_OF_TYPE).labels == ()
 
 
-def test_tables_name_types_that_there_are():
+def test_tables_name_existing_types():
     from evonav.decision.text.language import _NOUNS
 
     for kind in {*CATEGORY_OF_TYPE, *LABEL_OF_TYPE} - {"SinkBasin", "Cabinet", "Mirror", "Curtains", "Cup"}:

@@ -40,7 +40,7 @@ def block(col: int = 20, depth_m: float = 2.0) -> tuple[NDArray[np.float32], NDA
     return depth, masks
 
 
-def test_conflicts_tell_both_ways_and_the_last_observation_wins() -> None:
+def test_conflicts_go_both_ways_and_the_last_observation_counts() -> None:
     memory = OccupancyMap(FRAME)
     assert len(memory.integrate(seen(cells((3, 4), (3, 5)), cells((3, 6))), (-0.6, 2.3))) == 0
     again = seen(cells((3, 6)), cells((3, 5), (9, 9)))
@@ -56,7 +56,7 @@ def test_conflicts_tell_both_ways_and_the_last_observation_wins() -> None:
     assert not memory.explored.any()
 
 
-def test_what_is_only_assumed_contradicts_nothing() -> None:
+def test_assumed_cells_cause_no_conflict() -> None:
     memory = OccupancyMap(FRAME)
     memory.assume_free((0.0, 3.0), 0.3)
     assert memory.cells[10, 10] == 1
@@ -104,7 +104,7 @@ def test_a_wall_hides_what_lies_behind_it_and_the_view_ends_with_range_and_angle
     assert east.free[:, 1].max() == 30 + 10
 
 
-def test_a_stale_entry_is_told_from_one_still_there() -> None:
+def test_a_stale_entry_is_distinguished_from_a_valid_one() -> None:
     entries = ObjectMap()
     here, moved = a_view(*block(), "Mug"), a_view(*block(35, 2.6), "Mug")
     assert entries.update(here).entry_ids == (1,)

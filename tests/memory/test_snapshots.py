@@ -33,7 +33,7 @@ def test_views_without_an_entry_are_no_frames():
     assert (found(memory), memory.num_frames) == ({2: {1, 2}}, 1)
 
 
-def test_a_later_view_of_more_takes_over_what_is_near():
+def test_a_later_view_of_more_entries_takes_over_near_ones():
     views, memory = ViewStore(), SnapshotMemory()
     look(views, 1)
     memory.update(views, entries(1, 2), (0.0, 0.0))
@@ -42,7 +42,7 @@ def test_a_later_view_of_more_takes_over_what_is_near():
     assert found(memory) == {1: {1, 2}}
 
 
-def test_what_is_far_away_keeps_its_snapshot():
+def test_far_entries_stay_in_their_snapshot():
     views, memory = ViewStore(), SnapshotMemory()
     look(views, 1)
     memory.update(views, entries(1), (0.0, 0.0))

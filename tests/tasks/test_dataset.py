@@ -64,7 +64,7 @@ def folder(task: Task, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_record_reads_back_and_its_tasks_are_those_there(folder: Path, task: Task) -> None:
+def test_a_dataset_record_reads_back_and_matches_its_folder(folder: Path, task: Task) -> None:
     record = read_dataset(folder)
     assert record_of(record.tasks) == record
     assert record.num_rejected == {"too_few_rooms": 1}
@@ -74,7 +74,7 @@ def test_a_record_reads_back_and_its_tasks_are_those_there(folder: Path, task: T
     assert not list(folder.glob("*.partial"))
 
 
-def test_tasks_that_are_gone_changed_or_new_are_named(folder: Path, task: Task) -> None:
+def test_missing_changed_and_new_tasks_are_named(folder: Path, task: Task) -> None:
     record = read_dataset(folder)
     header = folder / "another" / "task.json"
     header.write_text(header.read_text(encoding="utf-8").replace('"seed": 4', '"seed": 5'), encoding="utf-8")
@@ -144,7 +144,7 @@ def test_smaller_subsets_are_part_of_larger_ones() -> None:
     assert all(fewer < more for fewer, more in pairwise(chosen))
 
 
-def test_a_house_that_is_there_twice_counts_once() -> None:
+def test_a_duplicate_house_counts_once() -> None:
     one, two = entries_of(2)
     record = record_of((one, two, one.model_copy(update={"task_id": "t9"})))
     assert subset_of(record, "test-2") == (one, two)
@@ -162,7 +162,7 @@ def test_a_house_that_is_there_twice_counts_once() -> None:
         ("test-10", {"limit": 90}, "the first 90 of their split"),
     ],
 )
-def test_a_subset_that_cannot_be_had_says_why(name: str, changes: dict[str, Any], message: str) -> None:
+def test_the_error_for_an_impossible_subset_gives_the_reason(name: str, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(SubsetError, match=message):
         subset_of(record_of(entries_of(90), **changes), name)
 

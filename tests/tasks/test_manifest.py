@@ -69,7 +69,7 @@ def strings_in(value: Any) -> Iterator[str]:
         yield str(value)
 
 
-def test_public_files_hold_nothing_of_the_oracle(task: Task, root: Path) -> None:
+def test_public_files_contain_no_oracle_data(task: Task, root: Path) -> None:
     house = json.loads(task.house_json(1))
     ids = {entry["id"] for entry in house["objects"]} | {room["id"] for room in house["rooms"]}
     for parent in house["objects"]:
@@ -168,7 +168,7 @@ def test_hundreds_of_mutated_files_are_each_refused_by_name(task: Task, root: Pa
     assert num_refused > 400
 
 
-def test_mutated_oracles_with_matching_checksums_are_refused_or_whole(root: Path, tmp_path: Path) -> None:
+def test_mutated_oracles_with_matching_checksums_are_refused_or_consistent(root: Path, tmp_path: Path) -> None:
     name = "oracle/stage_2.json"
     document = json.loads((root / name).read_text(encoding="utf-8"))
     cases = list(mutations(document))
@@ -231,7 +231,7 @@ def test_damaged_images_are_refused(root: Path, seed: int) -> None:
         assert checksums_of(task) == task.header.checksums
 
 
-def test_an_image_of_another_size_is_not_even_unpacked(root: Path) -> None:
+def test_an_image_of_another_size_is_not_decoded(root: Path) -> None:
     path = root / "public/stage_1.png"
     data = bytearray(path.read_bytes())
     data[16:24] = (60_000).to_bytes(4, "big") * 2
@@ -239,7 +239,7 @@ def test_an_image_of_another_size_is_not_even_unpacked(root: Path) -> None:
     refused(root, r"stage_1\.png.*IHDR.*300x300")
 
 
-def test_a_house_that_unpacks_without_end_is_refused(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_house_that_unpacks_beyond_the_limit_is_refused(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = root / "houses/stage_1.json.gz"
     path.write_bytes(gzip.compress(b" " * 3_000_000))
     monkeypatch.setattr("evonav.tasks.records.MAX_FILE_BYTES", 2_000_000)
@@ -247,7 +247,7 @@ def test_a_house_that_unpacks_without_end_is_refused(root: Path, monkeypatch: py
 
 
 @pytest.mark.parametrize("stage", [1, 3])
-def test_a_changed_house_does_not_pass_for_the_one_the_oracle_was_made_in(root: Path, stage: int) -> None:
+def test_a_house_other_than_the_oracles_is_refused(root: Path, stage: int) -> None:
     path = root / f"houses/stage_{stage}.json.gz"
     house = json.loads(read_gzip(path))
     house["objects"][0]["position"]["x"] += 0.25

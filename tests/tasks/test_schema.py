@@ -73,7 +73,7 @@ def test_the_schema_refuses_what_the_records_refuse(root: Path, name: str) -> No
     assert verdicts == {True, False}
 
 
-def test_strangers_are_refused_at_every_depth(task: Task) -> None:
+def test_unknown_keys_are_refused_at_every_depth(task: Task) -> None:
     def objects_of(value: Any) -> int:
         if isinstance(value, dict):
             closed = value.get("type") != "object" or "additionalProperties" in value

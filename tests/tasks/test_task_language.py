@@ -2,7 +2,7 @@ from evonav.house import bundled_houses
 from evonav.tasks.language import listed, noun_of, plural_of, with_article
 
 
-def test_nouns_are_words_that_people_use() -> None:
+def test_nouns_are_common_words() -> None:
     nouns = {
         "DiningTable": "dining table",
         "TVStand": "TV stand",

@@ -30,14 +30,14 @@ def houses(tmp_path) -> Path:
     return path
 
 
-def test_it_knows_nothing_of_evonav() -> None:
+def test_the_guard_imports_nothing_of_evonav() -> None:
     tree = ast.parse(SCRIPT.read_text())
     imported = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     imported |= {str(node.module) for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     assert {name.partition(".")[0] for name in imported} - set(sys.stdlib_module_names) == {"ai2thor", "numpy"}
 
 
-def test_the_expert_finds_what_it_looks_for(houses, tmp_path) -> None:
+def test_the_expert_finds_its_object(houses, tmp_path) -> None:
     *episodes, summary = run(houses, tmp_path, "--episodes", "3")
     assert len(episodes) == summary["episodes"] == 3
     for episode in episodes:
@@ -55,7 +55,7 @@ def test_the_expert_finds_what_it_looks_for(houses, tmp_path) -> None:
     assert summary["spl"] == pytest.approx(sum(episode["spl"] for episode in episodes) / 3)
 
 
-def test_the_shortest_path_is_walked_as_it_was_told(houses, tmp_path) -> None:
+def test_the_shortest_path_can_be_followed_as_returned(houses, tmp_path) -> None:
     *episodes, summary = run(houses, tmp_path, "--agent", "path", "--episodes", "3", "--seed", "1")
     assert len(episodes) == 3
     for episode in episodes:

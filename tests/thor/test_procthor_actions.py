@@ -56,7 +56,7 @@ def table(house: Json) -> str:
     return str(found)
 
 
-def test_a_house_without_metadata_is_made(house: Json) -> None:
+def test_a_house_without_metadata_is_loaded(house: Json) -> None:
     bare = {key: value for key, value in house.items() if key != "metadata"}
     assert engine_with(bare).scene.simulator.objects == engine_with(house).scene.simulator.objects
 
@@ -75,7 +75,7 @@ def test_an_asset_is_spawned_into_an_empty_scene_with_its_box_about_the_position
     assert box["size"] == pytest.approx({"x": size["z"], "y": size["y"], "z": size["x"]}, abs=1e-6)
 
 
-def test_what_cannot_be_spawned_is_refused_and_leaves_the_scene(house: Json) -> None:
+def test_an_impossible_spawn_is_refused_and_leaves_the_scene(house: Json) -> None:
     engine = engine_with(house)
     before = [r["objectId"] for r in objects.static_records(engine.scene)]
     taken = house["rooms"][0]["id"]
@@ -101,7 +101,7 @@ def test_the_geometry_is_the_surface_of_the_object_in_the_world() -> None:
     assert "nothing" in refused(engine, "GetInSceneAssetGeometry", objectId="nothing")
 
 
-def test_spawned_things_rest_on_the_receptacle_and_apart(house: Json, table: str) -> None:
+def test_spawned_objects_rest_on_the_receptacle_without_overlap(house: Json, table: str) -> None:
     engine = engine_with(house)
     names = []
     for index in range(6):
@@ -159,7 +159,7 @@ def test_furniture_and_excluded_objects_stay(house: Json) -> None:
     assert all(before[key]["pickupable"] for key in moved)
 
 
-def test_copies_are_made_until_there_are_so_many(house: Json) -> None:
+def test_objects_are_copied_up_to_the_requested_count(house: Json) -> None:
     engine = engine_with(house)
     kinds = [r["objectType"] for r in objects.static_records(engine.scene) if r["pickupable"]]
     kind = kinds[0]

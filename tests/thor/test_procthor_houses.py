@@ -70,7 +70,7 @@ def test_every_room_is_walked_into_and_every_asset_is_known(houses: list[House])
         assert all(in_room[room.id] >= 5 for room in house.rooms), in_room
 
 
-def test_small_things_stand_on_what_they_were_put_on_and_apart(houses: list[House]) -> None:
+def test_small_objects_stand_on_their_receptacles_without_overlap(houses: list[House]) -> None:
     num_small = 0
     for house in houses:
         simulator = EmbeddedSimulator()
@@ -98,7 +98,7 @@ def test_small_things_stand_on_what_they_were_put_on_and_apart(houses: list[Hous
     assert num_small > 30
 
 
-def test_tasks_are_made_of_them(houses: list[House]) -> None:
+def test_tasks_are_generated_from_fetched_houses(houses: list[House]) -> None:
     num_tasks = 0
     for house in houses:
         with contextlib.suppress(TaskRejectedError):

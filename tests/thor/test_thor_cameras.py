@@ -110,7 +110,7 @@ def test_the_map_view_holds_the_house_and_nothing_hides_its_large_objects(contro
     assert num_whole >= 5
 
 
-def test_the_skybox_is_where_nothing_is(controller) -> None:
+def test_the_skybox_fills_the_background(controller) -> None:
     camera = from_above(controller)
     event = controller.step("AddThirdPartyCamera", **camera, skyboxColor="#0f08", raise_for_failure=True)
     nothing = (event.third_party_instance_segmentation_frames[0] == 0).all(axis=-1)
@@ -175,7 +175,7 @@ def test_angles_come_back_as_unity_gives_them(controller) -> None:
     assert (one == other).all(axis=-1).mean() > 0.99
 
 
-def test_a_camera_where_the_agents_is_sees_the_same(controller) -> None:
+def test_a_camera_at_the_agents_camera_gives_the_same_images(controller) -> None:
     event = controller.step("RotateRight")
     agent = event.metadata["agent"]
     event = controller.step(
@@ -190,7 +190,7 @@ def test_a_camera_where_the_agents_is_sees_the_same(controller) -> None:
     np.testing.assert_array_equal(event.third_party_instance_segmentation_frames[0], event.instance_segmentation_frame)
 
 
-def test_the_agents_camera_can_be_lent_to_the_map_view(controller, house) -> None:
+def test_the_map_view_replaces_the_agents_camera(controller, house) -> None:
     camera = map_view(controller)
     before = controller.step("AddThirdPartyCamera", **camera, raise_for_failure=True)
     assert before.metadata["cameraOrthSize"] == -1
@@ -222,7 +222,7 @@ def test_the_agents_camera_can_be_lent_to_the_map_view(controller, house) -> Non
         ({"position": vector(1e300, 0, 0)}, "position and rotation must be within"),
     ],
 )
-def test_what_cannot_be_drawn_is_a_failed_action(controller, options, message) -> None:
+def test_a_view_that_cannot_be_rendered_fails_the_action(controller, options, message) -> None:
     given = {"position": vector(1, 2, 3), "rotation": vector(0, 0, 0)} | options
     event = controller.step("AddThirdPartyCamera", **given)
     assert not event.metadata["lastActionSuccess"]

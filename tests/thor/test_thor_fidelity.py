@@ -87,7 +87,7 @@ def test_recorded_object_records() -> None:
 
 
 @needs_recordings
-def test_asset_boxes_are_those_of_a_procthor_10k_house() -> None:
+def test_asset_boxes_equal_those_of_a_procthor_10k_house() -> None:
     ((num_all, error_m),) = measured("asset_boxes").values()
     assert num_all == 201
     assert error_m < 0.01
@@ -146,7 +146,7 @@ def house() -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("requests", "code", "message"), quoted_failures())
-def test_failures_are_as_the_document_quotes_them(
+def test_failures_match_the_documented_messages(
     house: dict[str, Any], requests: list[str], code: str, message: str
 ) -> None:
     engine = Engine()

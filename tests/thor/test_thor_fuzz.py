@@ -145,7 +145,7 @@ def _changed(data: st.DataObject, house: JsonObject) -> JsonObject:
 
 @settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.data())
-def test_any_house_is_taken_whole_or_refused(house: JsonObject, data: st.DataObject) -> None:
+def test_any_house_is_loaded_completely_or_refused(house: JsonObject, data: st.DataObject) -> None:
     engine, emitter = _fresh(house)
     changed = _changed(data, house)
     version, agent = engine.scene.version, engine.agent.pose

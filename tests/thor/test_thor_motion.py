@@ -57,7 +57,7 @@ def refused(engine: Engine, action: str, **arguments: object) -> str:
     turn_deg=st.sampled_from([15.0, 30.0, 45.0, 90.0, 7.5, 36.7]),
     steps=st.lists(st.sampled_from([*STEPS, Action.MOVE_FORWARD, Action.MOVE_FORWARD]), max_size=60),
 )
-def test_poses_are_the_embedded_simulators_to_the_bit(house: Json, turn_deg: float, steps: list[Action]) -> None:
+def test_poses_equal_the_embedded_simulators_bit_by_bit(house: Json, turn_deg: float, steps: list[Action]) -> None:
     engine = engine_in(house, snapToGrid=False, rotateStepDegrees=turn_deg)
     simulator = EmbeddedSimulator(SimulatorConfig(turn_deg=turn_deg))
     simulator.reset(json.dumps(house))
@@ -108,7 +108,7 @@ def test_moves_in_all_directions_undo_each_other() -> None:
     assert num_moved > 8
 
 
-def test_steps_end_on_the_grid_unless_told() -> None:
+def test_steps_end_on_the_grid_by_default() -> None:
     engine = engine_in(HOUSES[1])
     done(engine, "Teleport", rotation={"y": 37})
     if run(engine, "MoveAhead").is_success:
@@ -123,7 +123,7 @@ def test_steps_end_on_the_grid_unless_told() -> None:
     assert "moveMagnitude must be > 0" in refused(free, "MoveAhead", moveMagnitude=0)
 
 
-def test_a_blocked_move_names_what_blocks() -> None:
+def test_a_blocked_move_names_the_blocking_object() -> None:
     engine = engine_in(HOUSES[0])
     for _ in range(200):
         before = engine.agent.point_m
@@ -138,7 +138,7 @@ def test_a_blocked_move_names_what_blocks() -> None:
     assert gap_m < 0.2
 
 
-def test_objects_hold_the_agent_on_a_leash() -> None:
+def test_max_distance_to_object_limits_the_agent() -> None:
     engine = engine_in(HOUSES[1])
     body = next(body for body in engine.scene.simulator.objects if body.kind == "object")
     message = refused(engine, "MoveBack", objectId=body.id, maxAgentsDistance=0.01)
@@ -168,7 +168,7 @@ def test_turns() -> None:
     assert engine.agent.yaw_deg == 0.0
 
 
-def test_looks_stop_at_their_limits() -> None:
+def test_the_camera_stops_at_its_limits() -> None:
     engine = engine_in(HOUSES[0])
     done(engine, "Teleport", horizon=0)
     done(engine, "LookDown")
@@ -347,7 +347,7 @@ def test_initialize_refuses_what_ai2thor_does(wrong: Json, said: str) -> None:
     assert run(engine, "Initialize").is_success
 
 
-def test_a_house_may_say_where_the_agent_starts() -> None:
+def test_a_house_may_define_the_agents_start() -> None:
     pose = HOUSES[0]["metadata"]["agent"] | {"standing": False, "horizon": 15}
     engine = Engine()
     done(engine, "CreateHouse", house=HOUSES[0])
@@ -370,7 +370,7 @@ def test_a_house_with_a_broken_start_is_refused() -> None:
     assert engine.scene.house is None
 
 
-def test_actions_that_do_nothing() -> None:
+def test_some_actions_do_nothing() -> None:
     engine = engine_in(HOUSES[0])
     before = engine.agent.pose
     for name in ("Pass", "Done", "NoOp", "Stop"):

@@ -24,7 +24,7 @@ def rows(path: Path) -> list[Json]:
     return [json.loads(line) for line in gzip.decompress(path.read_bytes()).splitlines()]
 
 
-def test_a_walk(controller: Any, house: Json) -> None:
+def test_a_short_episode_with_both_engines(controller: Any, house: Json) -> None:
     agent = controller.last_event.metadata["agent"]
     assert agent["position"] == house["metadata"]["agent"]["position"] | {"y": 0.9009992}
     assert (agent["rotation"], agent["isStanding"]) == (house["metadata"]["agent"]["rotation"], True)

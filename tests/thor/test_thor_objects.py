@@ -114,7 +114,7 @@ def records_in(node: Any) -> list[Json]:
     return [record for child in children for record in records_in(child)]
 
 
-def test_what_lies_in_a_fridge_is_cold() -> None:
+def test_an_object_in_a_fridge_is_cold() -> None:
     house = json.loads(list(bundled_houses(3))[2].to_json())
     records = {record["objectId"]: record for record in objects.static_records(engine_of(house).scene)}
     fridge = next(record for record in records.values() if record["objectType"] == "Fridge")
@@ -140,7 +140,7 @@ def test_boxes_list_their_corners_as_recorded_ones() -> None:
 
 
 @needs_recorded
-def test_things_belong_to_the_receptacles_that_recorded_cubes_belong_to() -> None:
+def test_objects_have_the_same_receptacles_as_recorded_cubes() -> None:
     """The receptacle under a thing, and `Floor` for all that begins lower than its trigger box ends."""
     houses = rows(RECORDED / "val.jsonl.gz")
     agreed = total = 0

@@ -52,7 +52,7 @@ def points_of(positions: list[Json]) -> list[tuple[float, float]]:
 
 @pytest.mark.parametrize("house", HOUSES)
 @pytest.mark.parametrize("grid_m", [0.25, 0.1, 0.4])
-def test_reachable_positions_are_the_embedded_simulators(house: Json, grid_m: float) -> None:
+def test_reachable_positions_equal_the_embedded_simulators(house: Json, grid_m: float) -> None:
     engine = engine_in(house)
     positions = run(engine, "GetReachablePositions", **({} if grid_m == 0.25 else {"gridSize": grid_m}))
     points = points_of(positions)
@@ -103,7 +103,7 @@ def test_a_stuck_agent_reaches_its_own_position_only() -> None:
 
 
 @pytest.mark.parametrize("grid_m", [1e-9, -0.25])
-def test_grids_of_no_use_are_refused(grid_m: float) -> None:
+def test_useless_grids_are_refused(grid_m: float) -> None:
     assert "gridSize" in refused(engine_in(HOUSES[0]), "GetReachablePositions", gridSize=grid_m)
 
 
@@ -127,7 +127,7 @@ def test_a_grid_of_too_many_positions_is_refused(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize("name", ["position", "rotation", "horizon"])
-def test_a_forced_pose_of_more_than_single_precision_is_refused(name: str) -> None:
+def test_a_forced_pose_beyond_single_precision_is_refused(name: str) -> None:
     engine = engine_in(HOUSES[0])
     before = engine.state
     pose = {name: 1e300 if name == "horizon" else {"x": 0.0, "y": 1e300, "z": 0.0}}
@@ -137,7 +137,7 @@ def test_a_forced_pose_of_more_than_single_precision_is_refused(name: str) -> No
 
 @settings(max_examples=30, deadline=None)
 @given(data=st.data(), house=st.sampled_from(HOUSES))
-def test_corners_are_the_embedded_simulators(data: st.DataObject, house: Json) -> None:
+def test_path_corners_equal_the_embedded_simulators(data: st.DataObject, house: Json) -> None:
     engine = engine_in(house)
     simulator = embedded(engine, house)
     reachable_m = simulator.reachable_positions().tolist()
@@ -239,7 +239,7 @@ def test_the_expert_walks_to_objects() -> None:
 
 
 @pytest.mark.parametrize(("horizon", "look"), [(-30, "LookDown"), (60, "LookUp")])
-def test_the_expert_looks_for_what_it_stands_before(horizon: float, look: str) -> None:
+def test_the_expert_looks_for_an_object_in_front_of_it(horizon: float, look: str) -> None:
     engine = engine_in(HOUSES[1])
     looks = set()
     for thing in HOUSES[1]["objects"]:

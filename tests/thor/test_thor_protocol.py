@@ -75,7 +75,7 @@ def test_metadata_has_all_fields(controller: Any) -> None:
             assert abs(box["center"][axis] - bounds["center"][axis]) <= 0.5 * bounds["size"][axis] + 1e-6
 
 
-def test_images_are_the_embedded_simulators(controller: Any, house: dict[str, Any]) -> None:
+def test_images_equal_the_embedded_simulators(controller: Any, house: dict[str, Any]) -> None:
     event = controller.last_event
     simulator, frame = _embedded(controller, house)
     assert np.array_equal(event.frame, frame.rgb)
@@ -166,12 +166,12 @@ def test_settings_change_on_reset(start_controller: Any, house: dict[str, Any]) 
         ({"renderNormalsImage": True}, "renderNormalsImage is not supported"),
     ],
 )
-def test_settings_that_cannot_be(start_controller: Any, settings: dict[str, Any], problem: str) -> None:
+def test_impossible_settings_are_refused(start_controller: Any, settings: dict[str, Any], problem: str) -> None:
     with pytest.raises(RuntimeError, match=problem):
         start_controller(scene="Procedural", **settings)
 
 
-def test_settings_that_cannot_be_drawn_leave_the_scene(controller: Any) -> None:
+def test_settings_that_cannot_be_rendered_leave_the_scene(controller: Any) -> None:
     before = controller.last_event
     for degrees in (1e-6, 179.999):
         event = controller.step("Initialize", fieldOfView=degrees)
@@ -185,7 +185,7 @@ def test_settings_of_a_wrong_type(start_controller: Any) -> None:
         start_controller(scene="Procedural", gridSize="wide")
 
 
-def test_mistakes_get_the_documented_errors(controller: Any) -> None:
+def test_wrong_arguments_get_the_documented_errors(controller: Any) -> None:
     with pytest.raises(ValueError, match="Invalid action: FlyAway"):
         controller.step("FlyAway")
     with pytest.raises(ValueError, match="\"GetSceneBounds\" called with invalid argument: 'speeed'"):
@@ -255,7 +255,7 @@ def test_patches_only_on_request() -> None:
     assert kinds == [FieldType.METADATA] * 4 + [FieldType.METADATA_PATCH] * 2
 
 
-def test_returns_that_cannot_be_sent_fail_the_action() -> None:
+def test_an_unsendable_return_value_fails_the_action() -> None:
     engine = Engine()
     for odd in (object(), 2**70, {"x": {1, 2}}):
         engine.last.is_success, engine.last.action_return = True, odd
@@ -264,7 +264,7 @@ def test_returns_that_cannot_be_sent_fail_the_action() -> None:
         assert "cannot be sent" in engine.last.error_message
 
 
-def test_no_executable_is_explained(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
+def test_a_missing_executable_is_explained(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     assert evonav.thor.executable().endswith("evonav-thor")
     monkeypatch.setattr("sys.executable", str(tmp_path / "python"))
     monkeypatch.setattr("sysconfig.get_path", lambda name: str(tmp_path))

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from test_thor_object_actions import engine_of
+from test_thor_object_placement import engine_of
 
 from evonav.thor import objects
 from evonav.world.simulator import Frame
@@ -31,7 +31,7 @@ def pixels_of(frame: Frame, agent_m: tuple[float, float], rotation: np.ndarray) 
 
 
 @pytest.mark.parametrize("number", [1, 2, 5])
-def test_visible_is_what_is_near_and_in_the_picture(number: int) -> None:
+def test_objects_near_and_in_the_image_are_visible(number: int) -> None:
     """What is visible shows in the picture, so never through a wall; what shows, large and near, is visible.
 
     Both but for slivers: AI2-THOR looks at some points of an object, a picture at some others.
@@ -60,7 +60,7 @@ def test_visible_is_what_is_near_and_in_the_picture(number: int) -> None:
     assert missed <= 0.03 * near
 
 
-def test_nothing_is_visible_beyond_the_distance_that_is_asked_for() -> None:
+def test_nothing_is_visible_beyond_the_requested_distance() -> None:
     engine = engine_of(2)
     agent = engine.agent
     agent.yaw_deg = 180.0

@@ -128,7 +128,7 @@ def test_episodes_are_the_same_by_both_routes(tmp_path: Path) -> None:
             assert sum(1 for record in store.records() if record.path_length_m) >= 9
 
 
-def test_a_requested_pose_that_is_taken_is_moved_as_the_embedded_simulator_moves_it(
+def test_an_occupied_pose_is_moved_as_in_the_embedded_simulator(
     simulator: Ai2ThorSimulator,
 ) -> None:
     embedded = EmbeddedSimulator()
@@ -139,7 +139,7 @@ def test_a_requested_pose_that_is_taken_is_moved_as_the_embedded_simulator_moves
         assert simulator.reset(HOUSE, asked) == embedded.reset(HOUSE, asked)
 
 
-def test_what_is_not_finite_is_refused(simulator: Ai2ThorSimulator) -> None:
+def test_non_finite_numbers_are_refused(simulator: Ai2ThorSimulator) -> None:
     start = simulator.reset(HOUSE)
     assert not simulator.teleport(replace(start, yaw_rad=math.nan))
     assert not simulator.is_free((math.inf, 0.0, 0.0))
@@ -174,7 +174,7 @@ def test_a_house_that_is_refused_leaves_a_simulator_that_works(simulator: Ai2Tho
         lambda simulator: simulator.shortest_path((1.0, 0.0, 1.0), (2.0, 0.0, 2.0)),
     ],
 )
-def test_a_process_that_is_lost_is_told_and_replaced(number: int, how: str, ask: Callable[[Any], object]) -> None:
+def test_a_lost_process_is_reported_and_replaced(number: int, how: str, ask: Callable[[Any], object]) -> None:
     simulator = Ai2ThorSimulator(SimulatorConfig(width_px=64, height_px=64), replace(OURS, timeout_s=3.0))
     try:
         start = simulator.reset(HOUSE)
@@ -210,7 +210,7 @@ def test_nothing_is_left_after_closing(tmp_path: Path, monkeypatch: pytest.Monke
     assert len(list(Path("/proc/self/fd").iterdir())) <= before
 
 
-def test_an_evaluation_outlives_its_simulators_process(tmp_path: Path) -> None:
+def test_an_evaluation_survives_the_loss_of_its_simulators_process(tmp_path: Path) -> None:
     """A simulator that is killed in the middle: the records are those of a run in which nothing happened."""
     options = {"executable": "evonav"}
     whole = RunConfig(
@@ -308,7 +308,7 @@ def killed_once(executable: str, folder: str) -> KilledOnce:
 class TestAsUnityReports:
     """What Unity does that our engine does not: single precision, other depths, things that are no objects."""
 
-    def test_poses_in_single_precision_are_those_asked_for(self, simulator: Ai2ThorSimulator) -> None:
+    def test_poses_in_single_precision_count_as_the_requested_ones(self, simulator: Ai2ThorSimulator) -> None:
         asked = Pose(1.2345678912, 0.9, 7.1, 1.0, 0.2).canonical()
         event = _event(np.float32(asked.x_m), np.float32(asked.z_m), np.float32(asked.yaw_deg), asked.horizon_deg)
         assert simulator._adopted(asked, event) == asked
@@ -316,14 +316,14 @@ class TestAsUnityReports:
         assert simulator._adopted(asked, turned) == asked
 
     @pytest.mark.parametrize("off", [(0.01, 0.0, 0.0, 0.0), (0.0, 0.01, 0.0, 0.0), (0, 0, 1.0, 0), (0, 0, 0, 1.0)])
-    def test_poses_that_are_others_are_believed(
+    def test_different_reported_poses_are_accepted(
         self, simulator: Ai2ThorSimulator, off: tuple[float, float, float, float]
     ) -> None:
         asked = Pose(1.0, 0.9, 7.0, 0.0, 0.0)
         reported = simulator._adopted(asked, _event(1.0 + off[0], 7.0 + off[1], off[2], off[3]))
         assert reported == Pose.of_degrees(1.0 + off[0], 0.9, 7.0 + off[1], off[2], off[3])
 
-    def test_the_far_plane_is_nothing(self) -> None:
+    def test_the_far_plane_is_background(self) -> None:
         depth_m = np.array([[0.5, 19.9, np.nextafter(np.float32(20.0), np.float32(0.0)), 20.0, 25.0]], np.float32)
         got = depth_of(SimpleNamespace(depth_frame=depth_m[::1]), 20.0)
         np.testing.assert_array_equal(np.isinf(got), [[False, False, True, True, True]])
@@ -352,7 +352,7 @@ class TestAsUnityReports:
         assert is_ceiling[decoded[is_ceiling[frame.instances]]].mean() > 0.98
         np.testing.assert_array_equal(decoded == 0, np.isinf(frame.depth_m))
 
-    def test_an_object_that_is_missing_is_told(self) -> None:
+    def test_a_missing_object_is_reported(self) -> None:
         embedded = EmbeddedSimulator()
         embedded.reset(HOUSE)
         box = {"center": {"x": 1, "y": 2, "z": 3}, "size": {"x": 4, "y": 5, "z": 6}}

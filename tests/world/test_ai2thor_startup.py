@@ -74,7 +74,7 @@ def build(home: Path, platform: str, commit: str = "abc") -> None:
     program.chmod(0o755)
 
 
-def test_a_process_that_ends_at_once_is_told_with_its_log(script: Script) -> None:
+def test_the_error_for_a_process_that_ends_at_once_has_its_log(script: Script) -> None:
     began_s = time.monotonic()
     with pytest.raises(SimulatorLostError, match=r"(?s)ended with exit code 7 while starting.*cannot find the moon"):
         Ai2ThorSimulator(options=Ai2ThorOptions(script("echo cannot find the moon >&2; exit 7"))).start()
@@ -86,11 +86,11 @@ def test_a_process_that_ends_at_once_is_told_with_its_log(script: Script) -> Non
     ("printed", "advice"),
     [("Failed to create Vulkan instance", "vulkaninfo"), ("Unable to open DISPLAY", "--thor-display")],
 )
-def test_what_the_log_says_is_turned_into_advice(script: Script, printed: str, advice: str) -> None:
+def test_errors_in_the_log_become_advice(script: Script, printed: str, advice: str) -> None:
     assert advice in failure(Ai2ThorOptions(script(f"echo {printed}; exit 1")))
 
 
-def test_a_process_that_stays_silent_is_ended(script: Script, tmp_path: Path) -> None:
+def test_a_process_that_does_not_answer_is_ended(script: Script, tmp_path: Path) -> None:
     pid_file = tmp_path / "pid"
     message = failure(Ai2ThorOptions(script(f"echo $$ > '{pid_file}'; echo loading; sleep 600"), timeout_s=0.3))
     assert "did not come up" in message
@@ -107,20 +107,20 @@ def test_a_process_that_stays_silent_is_ended(script: Script, tmp_path: Path) ->
         (lambda path: path.write_text("#!/bin/sh\n"), "chmod"),
     ],
 )
-def test_an_executable_that_is_none(tmp_path: Path, make: Callable[[Path], object], words: str) -> None:
+def test_a_wrong_executable_is_reported(tmp_path: Path, make: Callable[[Path], object], words: str) -> None:
     path = tmp_path / "thor"
     make(path)
     assert words in failure(Ai2ThorOptions(str(path)))
 
 
-def test_a_file_that_the_system_cannot_run(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_executed_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "thor"
     path.write_bytes(b"\x7fELF not really")
     path.chmod(path.stat().st_mode | stat.S_IXUSR)
     assert "Exec format error" in failure(Ai2ThorOptions(str(path)))
 
 
-def test_a_display_is_asked_for_where_one_is_needed(script: Script) -> None:
+def test_a_display_is_required_only_where_it_is_needed(script: Script) -> None:
     assert "no X display" in failure(Ai2ThorOptions(platform="x11"))
     assert "no X display" in failure(Ai2ThorOptions(script("exit 0"), platform="x11"))
     # A build given by path may draw without one, so it is started.
@@ -128,7 +128,7 @@ def test_a_display_is_asked_for_where_one_is_needed(script: Script) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:unclosed <socket:ResourceWarning")
-def test_a_display_that_is_not_there(tmp_path: Path) -> None:
+def test_a_missing_display_is_reported(tmp_path: Path) -> None:
     build(tmp_path / "home", "Linux64")
     message = failure(Ai2ThorOptions(commit_id="abc", platform="x11", x_display=":97"))
     assert "no usable X display" in message
@@ -150,7 +150,7 @@ def test_no_vulkan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "vulkaninfo" in message
 
 
-def test_unity_that_ends_for_want_of_a_gpu(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unity_without_a_gpu_ends_with_advice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     build(tmp_path / "home", "CloudRendering")
     monkeypatch.setattr("ctypes.util.find_library", lambda name: "libvulkan.so.1")
     message = failure(Ai2ThorOptions(platform="cloud", commit_id="abc"))
@@ -159,7 +159,7 @@ def test_unity_that_ends_for_want_of_a_gpu(tmp_path: Path, monkeypatch: pytest.M
     assert "vulkaninfo" in message
 
 
-def test_gpus_are_looked_for(script: Script, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gpus_are_found_before_starting(script: Script, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tools = tmp_path / "tools"
     tools.mkdir()
     monkeypatch.setenv("PATH", str(tools))
@@ -171,7 +171,7 @@ def test_gpus_are_looked_for(script: Script, tmp_path: Path, monkeypatch: pytest
     assert "no such GPU" in failure(options)
 
 
-def test_the_client_is_named_where_it_is_missing() -> None:
+def test_a_missing_client_package_is_named() -> None:
     """In an interpreter that cannot import it."""
     program = (
         "import sys; sys.modules['ai2thor'] = None\n"
@@ -185,7 +185,7 @@ def test_the_client_is_named_where_it_is_missing() -> None:
 
 
 @pytest.mark.parametrize("field", ["camera_height_m", "agent_radius_m", "agent_height_m"])
-def test_a_body_that_ai2thor_has_not_is_refused(field: str) -> None:
+def test_a_body_unlike_ai2thors_is_refused(field: str) -> None:
     with pytest.raises(InvalidArgumentError, match=f"{field} = 1"):
         Ai2ThorSimulator(SimulatorConfig(**{field: 1.0}))
 
@@ -218,7 +218,7 @@ def test_nothing_is_left_of_starts_that_failed(script: Script, tmp_path: Path, m
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_the_process_ends_with_evonav_whatever_ends_that(script: Script, tmp_path: Path, number: int) -> None:
+def test_the_process_ends_with_evonav_however_that_ends(script: Script, tmp_path: Path, number: int) -> None:
     """A process that, unlike our engine, does not look whether anybody is left."""
     pid_file = tmp_path / "pid"
     program = (

@@ -71,7 +71,7 @@ def test_an_orthographic_map_from_above_shows_floors_and_objects_where_they_are(
     assert floor_share > 0.3
 
 
-def test_nothing_is_seen_beyond_the_clip_planes() -> None:
+def test_nothing_is_rendered_beyond_the_clip_planes() -> None:
     near = EmbeddedSimulator(SimulatorConfig(width_px=80, height_px=60, near_m=1.0, far_m=2.0))
     start = near.reset(HOUSE_JSON)
     usual = EmbeddedSimulator(SimulatorConfig(width_px=80, height_px=60))

@@ -90,7 +90,7 @@ class TeleportsAnywhere(EmbeddedSimulator):
         (TeleportsAnywhere, "teleport 100 m outside succeeded"),
     ],
 )
-def test_checker_notices(broken: type[EmbeddedSimulator], message: str) -> None:
+def test_the_checker_finds_broken_contracts(broken: type[EmbeddedSimulator], message: str) -> None:
     with pytest.raises(SimulationError, match=message):
         check_simulator(broken(SMALL), HOUSES[0])
 
@@ -180,7 +180,7 @@ def test_sight_is_blocked_by_walls_and_not_by_the_object_looked_at() -> None:
 
 
 @pytest.mark.parametrize("house_json", HOUSES)
-def test_occupancy_is_what_a_client_that_knows_teleport_and_reachable_positions_finds(house_json: str) -> None:
+def test_occupancy_needs_only_teleport_and_reachable_positions(house_json: str) -> None:
     cell_m = SMALL.occupancy_cell_m
     simulator = EmbeddedSimulator(replace(SMALL, grid_m=cell_m))
     start = simulator.reset(house_json)

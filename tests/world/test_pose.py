@@ -16,7 +16,7 @@ ANGLES = st.floats(-100.0, 100.0)
 
 
 @given(ANGLES, ANGLES)
-def test_canonical_angles_survive_the_way_over_degrees(yaw_rad: float, horizon_rad: float) -> None:
+def test_canonical_angles_survive_conversion_to_degrees(yaw_rad: float, horizon_rad: float) -> None:
     pose = Pose(0.0, 0.0, 0.0, yaw_rad, horizon_rad).canonical()
     assert pose.canonical() == pose
     assert 0.0 <= pose.yaw_deg < 360.0

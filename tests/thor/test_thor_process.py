@@ -162,7 +162,7 @@ def test_both_processes_of_the_engine_killed(clients: Any) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_both_killed(clients: Any, seed: int) -> None:
+def test_the_worker_and_supervisor_are_both_killed(clients: Any, seed: int) -> None:
     client = clients()
     engine = int(client.line("started"))
     time.sleep(random.Random(seed).uniform(0.0, 0.2))
@@ -216,7 +216,7 @@ def test_a_fork_of_the_client_does_not_keep_the_engine(
     assert client.pids(), "the fork was to live on"
 
 
-def test_without_a_client_it_says_how_it_is_started() -> None:
+def test_without_a_client_it_prints_its_usage() -> None:
     environment = {key: value for key, value in os.environ.items() if not key.startswith("AI2THOR_")}
     run = subprocess.run(
         [evonav.thor.executable()], env=environment, capture_output=True, text=True, timeout=WITHIN_S, check=False

@@ -159,7 +159,7 @@ NO_ACTIONS = [
 ]
 
 
-def test_messages_that_are_no_actions_fail(engine: "subprocess.Popen[str]", pipes: Pipes) -> None:
+def test_messages_without_an_action_fail(engine: "subprocess.Popen[str]", pipes: Pipes) -> None:
     for body in NO_ACTIONS:
         pipes.write(framed(body))
         agent = pipes.agent()
@@ -221,7 +221,7 @@ def test_large_bodies_pass_in_portions(tmp_path: Path) -> None:
     pipes.close()
 
 
-def test_a_message_broken_off_anywhere_makes_the_client_raise() -> None:
+def test_a_message_interrupted_anywhere_makes_the_client_raise() -> None:
     """AI2-THOR's own reader, which waits for its timeout at the end of a pipe; never is a torn picture an event."""
     fifo_server = pytest.importorskip("ai2thor.fifo_server")
     metadata = {"agents": [{"name": "agent"}], "activeAgentId": 0}

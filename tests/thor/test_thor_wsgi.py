@@ -98,7 +98,7 @@ def test_any_text_arrives(server, connect) -> None:
     server.send({})
 
 
-def test_third_party_images_keep_their_order(server, connect) -> None:
+def test_third_party_images_are_in_order(server, connect) -> None:
     transport = connect()
     pairs = []
     cameras = [_images(1), _images(2)]
@@ -127,7 +127,7 @@ def test_another_engines_token_is_refused(server, connect) -> None:
         transport.receive()
 
 
-def test_stop_is_told_from_an_action(server, connect) -> None:
+def test_stop_is_distinguished_from_an_action(server, connect) -> None:
     transport = connect()
     transport.send([(FieldType.METADATA, _metadata(0))])
     server.receive()
@@ -150,7 +150,7 @@ def test_waiting_ends_with_the_parent(server, connect) -> None:
     server.send({})
 
 
-def test_nobody_there() -> None:
+def test_a_missing_reader_is_an_error() -> None:
     with pytest.raises(ClientGone, match="takes no event"):
         Wsgi("127.0.0.1", 9, "t", lambda: False).send([(FieldType.METADATA, _metadata(0))])
 
@@ -163,7 +163,7 @@ def test_other_machines_are_refused(host) -> None:
         Wsgi(host, 80, "t", lambda: False)
 
 
-def test_this_machine() -> None:
+def test_addresses_of_this_machine_are_accepted() -> None:
     assert all(is_loopback(host) for host in ("127.0.0.1", "127.3.2.1", "::1", "localhost"))
 
 

@@ -61,7 +61,7 @@ def corners_m(record: Json) -> Any:
 
 
 @pytest.mark.parametrize("is_stationary", [True, False])
-def test_poses_that_are_set_to_what_they_are_change_nothing(engine: Engine, is_stationary: bool) -> None:
+def test_setting_the_present_poses_changes_nothing(engine: Engine, is_stationary: bool) -> None:
     before = records(engine)
     do(engine, "SetObjectPoses", objectPoses=poses(movable(engine)), placeStationary=is_stationary)
     after = records(engine)
@@ -74,7 +74,7 @@ def test_poses_that_are_set_to_what_they_are_change_nothing(engine: Engine, is_s
     assert len(lost) <= 2
 
 
-def test_what_can_be_moved_and_is_not_named_goes(engine: Engine) -> None:
+def test_movable_objects_that_are_not_named_are_removed(engine: Engine) -> None:
     kept, *others = movable(engine)
     do(engine, "SetObjectPoses", objectPoses=poses([kept]))
     left = records(engine)
@@ -95,14 +95,14 @@ def test_a_pose_is_that_of_the_pivot_and_copies_get_names_of_their_own(engine: E
     assert records(engine)[lamp["objectId"]]["position"] == pytest.approx(lamp["position"])
 
 
-def test_a_name_that_is_not_there_fails_and_the_rest_is_done(engine: Engine) -> None:
+def test_an_unknown_name_fails_and_the_other_objects_are_placed(engine: Engine) -> None:
     chosen = poses(movable(engine)[:1])
     message = fail(engine, "SetObjectPoses", objectPoses=[*chosen, {"objectName": "Ghost"}])
     assert message == "No Pickupable or Moveable object of name Ghost found in scene."
     assert len(movable(engine)) == 1
 
 
-def test_a_thing_is_put_on_the_surface_under_a_point(engine: Engine) -> None:
+def test_an_object_is_placed_on_the_surface_below_a_point(engine: Engine) -> None:
     table = next(r for r in records(engine).values() if r["objectType"] == "Dresser" and r["receptacleObjectIds"])
     small = table["receptacleObjectIds"][0]
     do(engine, "RemoveFromScene", objectIds=table["receptacleObjectIds"][1:])
@@ -118,7 +118,7 @@ def test_a_thing_is_put_on_the_surface_under_a_point(engine: Engine) -> None:
     assert corners_m(records(engine)[small])[:, 1].min() == pytest.approx(top_m + 0.005, abs=1e-6)
 
 
-def test_a_thing_is_not_put_where_another_is(engine: Engine) -> None:
+def test_an_object_is_not_placed_where_another_is(engine: Engine) -> None:
     lamp = next(record for record in movable(engine) if record["objectType"] == "FloorLamp")
     dresser = next(record for record in records(engine).values() if record["objectType"] == "Dresser")
     point = {**dresser["axisAlignedBoundingBox"]["center"]}
@@ -129,7 +129,7 @@ def test_a_thing_is_not_put_where_another_is(engine: Engine) -> None:
     assert records(engine) == before
 
 
-def test_an_object_is_teleported_where_nothing_is_and_falls(engine: Engine) -> None:
+def test_a_teleported_object_falls_unless_it_collides(engine: Engine) -> None:
     lamp = next(record for record in movable(engine) if record["objectType"] == "FloorLamp")
     x_m, _, z_m = engine.scene.simulator.pose.position_m
     aloft = {"x": x_m, "y": lamp["position"]["y"] + 0.4, "z": z_m}
@@ -146,7 +146,7 @@ def test_an_object_is_teleported_where_nothing_is_and_falls(engine: Engine) -> N
     do(engine, "TeleportObject", objectId=lamp["objectId"], position={**inside, "y": 1.0}, forceAction=True)
 
 
-def test_furniture_takes_along_what_stands_on_it(engine: Engine) -> None:
+def test_furniture_carries_the_objects_on_it(engine: Engine) -> None:
     before = records(engine)
     table = next(r for r in before.values() if r["objectType"] == "Dresser" and r["receptacleObjectIds"])
     target = {**table["position"], "x": table["position"]["x"] + 3.0}
@@ -173,7 +173,7 @@ def test_points_off_the_scene_are_named(engine: Engine) -> None:
     assert "Position coordinate ((99.0, 1.0, 0.0)) is not within scene bounds" in message
 
 
-def test_what_stood_on_what_goes_falls_and_comes_back_with_nothing_on_it(engine: Engine) -> None:
+def test_objects_on_a_removed_object_fall_and_it_returns_empty(engine: Engine) -> None:
     before = records(engine)
     table = next(r for r in before.values() if r["objectType"] == "Dresser" and r["receptacleObjectIds"])
     do(engine, "DisableObject", objectId=table["objectId"])
@@ -200,7 +200,7 @@ def test_unknown_ids_are_named(engine: Engine, action: str) -> None:
     )
 
 
-def test_unknown_ids_where_ai2thor_has_other_words(engine: Engine) -> None:
+def test_unknown_ids_where_ai2thor_has_another_message(engine: Engine) -> None:
     assert fail(engine, "DisableObject", objectId="Ghost") == ""
     assert fail(engine, "EnableObject", objectId="Ghost") == ""
     at = {"x": 1.0, "y": 1.0, "z": 1.0}
@@ -235,7 +235,7 @@ def test_the_object_at_a_pixel_is_the_one_of_the_instance_image(number: int) -> 
     assert agreed == total
 
 
-def test_points_of_the_picture_and_of_the_world_are_each_others(engine: Engine) -> None:
+def test_image_points_and_world_points_convert_both_ways(engine: Engine) -> None:
     engine.agent.yaw_deg, engine.agent.horizon_deg = 33.0, 12.0
     point = do(engine, "GetCoordinateFromRaycast", x=0.3, y=0.8)
     back = do(engine, "WorldToViewportPoint", position=point)
@@ -262,7 +262,7 @@ def test_states_show_in_records(engine: Engine) -> None:
     assert records(engine)[lamp["objectId"]] == lamp
 
 
-def test_states_of_many_are_set_at_once(engine: Engine) -> None:
+def test_one_action_sets_the_state_of_many_objects(engine: Engine) -> None:
     def those(flag: str) -> list[Json]:
         return [record for record in records(engine).values() if record[flag]]
 
@@ -276,7 +276,7 @@ def test_states_of_many_are_set_at_once(engine: Engine) -> None:
     assert "stateChange" in fail(engine, "SetObjectStates", SetObjectStates={"stateChange": "sliceable"})
 
 
-def test_states_that_an_object_has_not_are_refused(engine: Engine) -> None:
+def test_states_that_an_object_lacks_are_refused(engine: Engine) -> None:
     dresser = next(record for record in records(engine).values() if record["objectType"] == "Dresser")["objectId"]
     assert fail(engine, "OpenObject", objectId=dresser, forceAction=True) == f"{dresser} is not an Openable object"
     assert fail(engine, "ToggleObjectOn", objectId=dresser, forceAction=True) == f"{dresser} is not toggleable"
@@ -284,7 +284,7 @@ def test_states_that_an_object_has_not_are_refused(engine: Engine) -> None:
     assert far == "NullReferenceException: Target object not found within the specified visibility."
 
 
-def test_a_house_file_says_what_is_open_on_and_dirty() -> None:
+def test_open_on_and_dirty_states_come_from_the_house_file() -> None:
     engine = engine_of(2)
     house = engine.scene.house
     assert house is not None
@@ -297,7 +297,7 @@ def test_a_house_file_says_what_is_open_on_and_dirty() -> None:
     assert not records(engine)[lamp]["isToggled"]
 
 
-def test_what_a_house_file_says_null_of_is_as_the_asset_comes(engine: Engine) -> None:
+def test_null_in_a_house_file_means_the_assets_default(engine: Engine) -> None:
     house = engine.scene.house
     assert house is not None
     entries = [entry for entry, _ in objects.placed_objects(house)]
@@ -313,7 +313,7 @@ def test_what_a_house_file_says_null_of_is_as_the_asset_comes(engine: Engine) ->
     assert records(engine) == before
 
 
-def test_what_is_taken_out_of_a_fridge_is_cold_no_more(engine: Engine) -> None:
+def test_an_object_outside_a_fridge_is_not_cold(engine: Engine) -> None:
     fridge = next(record for record in records(engine).values() if record["objectType"] == "Fridge")
     food = fridge["receptacleObjectIds"][0]
     assert records(engine)[food]["temperature"] == "Cold"
@@ -365,7 +365,7 @@ def test_poses_of_an_absurd_grid_are_refused(engine: Engine) -> None:
     assert "gridSize 0.25 m gives 4002 positions" in message
 
 
-def test_things_can_be_put_at_spawn_coordinates(engine: Engine) -> None:
+def test_objects_can_be_placed_at_spawn_coordinates(engine: Engine) -> None:
     table = next(r for r in records(engine).values() if r["objectType"] == "Dresser" and r["receptacleObjectIds"])
     small, *rest = table["receptacleObjectIds"]
     points = do(engine, "GetSpawnCoordinatesAboveReceptacle", objectId=table["objectId"], anywhere=True)
@@ -376,7 +376,7 @@ def test_things_can_be_put_at_spawn_coordinates(engine: Engine) -> None:
     assert "not found within" in fail(engine, "GetSpawnCoordinatesAboveReceptacle", objectId=table["objectId"])
 
 
-def test_events_list_what_the_filter_lets_through_after_every_edit(engine: Engine) -> None:
+def test_events_list_filtered_objects_after_every_edit(engine: Engine) -> None:
     """Whatever was packed before, an event is that of an encoder that has packed nothing yet."""
     kept = MetadataEncoder()
     first, second, *_ = movable(engine)
