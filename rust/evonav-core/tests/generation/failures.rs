@@ -2,9 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
-mod evolved;
-
-use evolved::always;
+use crate::evolved::always;
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     generation::{
@@ -15,7 +13,7 @@ use evonav_core::{
 };
 use serde_json::Value;
 
-const HOUSE: &str = include_str!("data/house_100_objects.json");
+const HOUSE: &str = include_str!("../data/house_100_objects.json");
 
 fn task_of(house: &House, seed: u64, parameters: &Parameters) -> GeneratedTask {
     let (catalogue, unknown) = (Catalogue::bundled(), UnknownAssets::Error);

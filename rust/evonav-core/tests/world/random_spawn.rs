@@ -1,9 +1,8 @@
 //! Where `random_spawn` and `settled` put things, judged point by point from the definition of the shapes.
 
-mod solids;
-
 use std::f64::consts::PI;
 
+use crate::solids::holds;
 use evonav_core::{
     assets::{
         Catalogue, UnknownAssets,
@@ -18,9 +17,8 @@ use evonav_core::{
 };
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use solids::holds;
 
-const HOUSE: &str = include_str!("data/house_100_objects.json");
+const HOUSE: &str = include_str!("../data/house_100_objects.json");
 
 fn house_with(extra: Vec<Value>) -> House {
     let mut document: Value = serde_json::from_str(HOUSE).expect("JSON");

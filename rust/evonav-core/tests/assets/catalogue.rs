@@ -1,19 +1,16 @@
 //! The asset catalogue: what it holds, against the published database and recorded boxes.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod recorded;
-
 use std::path::PathBuf;
 
+use crate::recorded::data_set;
 use evonav_core::{
     Error,
     assets::{Catalogue, UnknownAssets, placement_rule::Place},
     house::House,
 };
-use recorded::data_set;
 use serde_json::Value;
 
-const HOUSE: &str = include_str!("data/house_100_objects.json");
+const HOUSE: &str = include_str!("../data/house_100_objects.json");
 
 fn read(path: PathBuf) -> Value {
     let text = std::fs::read_to_string(path).expect("readable");

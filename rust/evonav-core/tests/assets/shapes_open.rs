@@ -15,8 +15,6 @@ use proptest::prelude::*;
 
 use crate::solids::holds;
 
-mod solids;
-
 fn at(asset: &Asset, openness: f64) -> Vec<Part> {
     shape_in(asset, Condition { openness: Some(openness), is_on: None })
 }

@@ -3,8 +3,8 @@
 use evonav_core::{Error, house::House};
 use serde_json::{Value, json};
 
-const SMALL: &str = include_str!("data/house_39_objects.json");
-const LARGE: &str = include_str!("data/house_100_objects.json");
+const SMALL: &str = include_str!("../data/house_39_objects.json");
+const LARGE: &str = include_str!("../data/house_100_objects.json");
 
 /// The document with the value at `pointer` replaced.
 fn changed(pointer: &str, value: Value) -> String {

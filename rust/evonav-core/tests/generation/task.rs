@@ -3,12 +3,10 @@
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
-mod evolved;
-mod points;
-
 use std::collections::{BTreeMap, BTreeSet};
 
-use evolved::always;
+use crate::evolved::always;
+use crate::points::{contains, interpenetrate, object, parts_of, points_in};
 use evonav_core::{
     assets::{Catalogue, UnknownAssets, part::Part, placement_rule::Place},
     generation::{
@@ -27,13 +25,14 @@ use evonav_core::{
         scene::Scene,
     },
 };
-use points::{contains, interpenetrate, object, parts_of, points_in};
 
 const UNKNOWN: UnknownAssets = UnknownAssets::Error;
 
 fn houses() -> Vec<House> {
-    let texts =
-        [include_str!("data/house_39_objects.json"), include_str!("data/house_100_objects.json")];
+    let texts = [
+        include_str!("../data/house_39_objects.json"),
+        include_str!("../data/house_100_objects.json"),
+    ];
     texts.iter().map(|text| House::from_json("test house", text).unwrap()).collect()
 }
 

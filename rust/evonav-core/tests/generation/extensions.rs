@@ -22,14 +22,14 @@ use serde_json::Value;
 
 use crate::solids::holds;
 
-mod solids;
-
 const UNKNOWN: UnknownAssets = UnknownAssets::Error;
 const OFTEN: Option<Occurrence> = Some(Occurrence { probability: 1.0, max_count: 6 });
 
 fn houses() -> Vec<House> {
-    let texts =
-        [include_str!("data/house_39_objects.json"), include_str!("data/house_100_objects.json")];
+    let texts = [
+        include_str!("../data/house_39_objects.json"),
+        include_str!("../data/house_100_objects.json"),
+    ];
     texts.iter().map(|text| House::from_json("test house", text).unwrap()).collect()
 }
 
@@ -283,7 +283,7 @@ fn one_extension_leaves_the_draws_of_the_others_alone() {
 
 #[test]
 fn people_carry_things_where_they_use_them() {
-    let table: Value = serde_json::from_str(include_str!("../data/activities.json")).unwrap();
+    let table: Value = serde_json::from_str(include_str!("../../data/activities.json")).unwrap();
     let known = |name: &str| {
         table["activities"].as_array().unwrap().iter().find(|one| one["name"] == name).cloned()
     };

@@ -15,7 +15,7 @@ use proptest::{collection::vec, prelude::*, sample::Index};
 use serde_json::{Value, json};
 
 const HOUSES: [&str; 2] =
-    [include_str!("data/house_39_objects.json"), include_str!("data/house_100_objects.json")];
+    [include_str!("../data/house_39_objects.json"), include_str!("../data/house_100_objects.json")];
 
 /// JSON pointers of everything in the document.
 fn pointers(value: &Value, here: &str, all: &mut Vec<String>) {

@@ -23,7 +23,7 @@ use evonav_core::{
 use proptest::{collection::vec, prelude::*};
 
 const HOUSES: [&str; 2] =
-    [include_str!("data/house_100_objects.json"), include_str!("data/house_39_objects.json")];
+    [include_str!("../data/house_100_objects.json"), include_str!("../data/house_39_objects.json")];
 const IMAGE_PX: [usize; 2] = [24, 16];
 const STRIDES: Strides = Strides { move_m: 0.25, turn_rad: std::f64::consts::FRAC_PI_6 };
 const FILTER: MaskFilter = MaskFilter { min_area_px: 3, max_box_fraction: 1.0 };

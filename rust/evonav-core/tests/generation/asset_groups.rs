@@ -2,17 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod recorded;
-
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::recorded::{house_lines, house_of};
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     generation::asset_groups,
     house::House,
 };
-use recorded::{house_lines, house_of};
 use serde_json::Value;
 
 const UNKNOWN: UnknownAssets = UnknownAssets::CategoryDefault;

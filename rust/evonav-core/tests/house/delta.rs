@@ -9,7 +9,7 @@ use evonav_core::{
 use proptest::{collection::vec, option, prelude::*, sample::Index};
 use serde_json::{Value, json};
 
-const HOUSE: &str = include_str!("data/house_39_objects.json");
+const HOUSE: &str = include_str!("../data/house_39_objects.json");
 
 /// Takes the object out of the tree; with it, the id of what held it.
 fn take(

@@ -5,18 +5,15 @@
 //! The twin knows nothing of corners or tangents: Dijkstra over a 0.05 m lattice whose points
 //! are joined in every direction up to half a metre, by moves that the swept capsule allows.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod recorded;
-
 use std::{cmp::Reverse, collections::BinaryHeap};
 
+use crate::recorded::{house_lines, house_of, navigation_of, scene_of};
 use evonav_core::{
     geometry::{Vec2, distance_2d_m},
     grid::GridSpec,
     rng::Stream,
     world::navigation::{AgentBody, Navigation, path_length_m},
 };
-use recorded::{house_lines, house_of, navigation_of, scene_of};
 
 const PITCH_M: f64 = 0.05;
 const REACH: i64 = 10;

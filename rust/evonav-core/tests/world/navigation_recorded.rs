@@ -1,12 +1,9 @@
 //! Navigation in real ProcTHOR houses, against positions recorded from AI2-THOR itself.
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod recorded;
-
 use std::collections::BTreeMap;
 
+use crate::recorded::{bundled_lines, data_set, house_of, lines, navigation_of, scene_of};
 use evonav_core::{geometry::Vec2, world::navigation::AgentBody};
-use recorded::{bundled_lines, data_set, house_of, lines, navigation_of, scene_of};
 use serde_json::Value;
 
 /// `[x, z]` of a JSON position, an object or an array.

@@ -12,8 +12,6 @@ use proptest::prelude::*;
 
 use crate::solids::holds;
 
-mod solids;
-
 fn asset(id: &str) -> Asset {
     Catalogue::bundled().get(id).expect("an asset of the catalogue").clone()
 }

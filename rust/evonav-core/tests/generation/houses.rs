@@ -3,15 +3,11 @@
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
 
-mod evolved;
-#[allow(dead_code, reason = "other tests use the rest")]
-mod points;
-#[allow(dead_code, reason = "other tests use the rest")]
-mod recorded;
-
 use std::collections::{BTreeMap, BTreeSet};
 
-use evolved::always;
+use crate::evolved::always;
+use crate::points::{interpenetrate, object, points_in};
+use crate::recorded::{house_lines, house_of};
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     generation::{
@@ -25,8 +21,6 @@ use evonav_core::{
         scene::Scene,
     },
 };
-use points::{interpenetrate, object, points_in};
-use recorded::{house_lines, house_of};
 
 const UNKNOWN: UnknownAssets = UnknownAssets::CategoryDefault;
 const FILES: [(&str, usize); 4] = [
@@ -39,7 +33,7 @@ const FILES: [(&str, usize); 4] = [
 const NUM_BUNDLED: usize = 60;
 
 fn task_of(house: &House, mode: Mode) -> Option<GeneratedTask> {
-    // Others than the fixed one on demand: `EVONAV_SEED=7 cargo test --test evolution_houses`.
+    // Others than the fixed one on demand: `EVONAV_SEED=7 cargo test --test generation houses`.
     let seed = std::env::var("EVONAV_SEED").map_or(3, |seed| seed.parse().unwrap());
     let made =
         generate_task(house, Catalogue::bundled(), UNKNOWN, seed, &house.name, &always(mode, 3));

@@ -134,7 +134,8 @@ proptest! {
 const TOLERANCES: Tolerances = Tolerances { touch_m: 0.0025, rest_m: 0.02 };
 
 fn recorded() -> House {
-    House::from_json("house", include_str!("data/house_100_objects.json")).expect("a valid house")
+    House::from_json("house", include_str!("../data/house_100_objects.json"))
+        .expect("a valid house")
 }
 
 fn findings(source: &House, stage: &House) -> Vec<Finding> {

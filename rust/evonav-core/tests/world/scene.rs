@@ -16,10 +16,6 @@ use crate::{
     solids::holds,
 };
 
-#[allow(dead_code, reason = "other tests use the rest")]
-mod recorded;
-mod solids;
-
 const UNKNOWN: UnknownAssets = UnknownAssets::CategoryDefault;
 
 /// Two rooms of 4 x 4 m side by side, a doorway between them, a window, an L counter and a table

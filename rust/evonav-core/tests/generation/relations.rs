@@ -137,8 +137,10 @@ fn fits(all: &[Thing], house: &House, index: usize, said: &Relations, slack_m: f
 
 #[test]
 fn what_is_said_is_true_and_of_no_more_objects_than_is_recorded() {
-    let texts =
-        [include_str!("data/house_39_objects.json"), include_str!("data/house_100_objects.json")];
+    let texts = [
+        include_str!("../data/house_39_objects.json"),
+        include_str!("../data/house_100_objects.json"),
+    ];
     let (mut num_anchors, mut num_unique, mut num_ambiguous) = (0, 0, 0);
     for (text, seed) in texts.iter().flat_map(|text| (0..12).map(move |seed| (text, seed))) {
         let house = House::from_json("test house", text).unwrap();

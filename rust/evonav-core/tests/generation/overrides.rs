@@ -14,8 +14,10 @@ use evonav_core::{
 use proptest::prelude::*;
 
 fn houses() -> Vec<House> {
-    let texts =
-        [include_str!("data/house_39_objects.json"), include_str!("data/house_100_objects.json")];
+    let texts = [
+        include_str!("../data/house_39_objects.json"),
+        include_str!("../data/house_100_objects.json"),
+    ];
     texts.iter().map(|text| House::from_json("test house", text).unwrap()).collect()
 }
 

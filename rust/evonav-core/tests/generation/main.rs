@@ -1,0 +1,24 @@
+//! Task generation.
+
+#[allow(dead_code, reason = "other test crates use the rest")]
+#[path = "../common/evolved.rs"]
+mod evolved;
+#[allow(dead_code, reason = "other test crates use the rest")]
+#[path = "../common/points.rs"]
+mod points;
+#[allow(dead_code, reason = "other test crates use the rest")]
+#[path = "../common/recorded.rs"]
+mod recorded;
+#[allow(dead_code, reason = "other test crates use the rest")]
+#[path = "../common/solids.rs"]
+mod solids;
+
+mod asset_groups;
+mod extensions;
+mod failures;
+mod houses;
+mod overrides;
+mod relations;
+mod sampling;
+mod start;
+mod task;

@@ -1,0 +1,3 @@
+//! Batches of simulated agents.
+
+mod batch;
