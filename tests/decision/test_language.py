@@ -5,8 +5,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from evonav.decision.text.language import Goal, Relation, canonical, parse_goal, similarity
-from evonav.generation.instructions.appearance import Appearance, Detail, Tint, looks_of
-from evonav.generation.instructions.describe import Anchor, Relations, unified_instruction
+from evonav.generation.instructions.appearance import adjectives_of
+from evonav.generation.instructions.describe import unified_instruction
+from evonav.generation.result import Anchor, Appearance, Detail, Relations, Tint
 from evonav.tasks.language import MATERIALS, STRUCTURES
 
 TYPES = [
@@ -117,7 +118,6 @@ RELATIONS = st.builds(
 )
 APPEARANCES = st.builds(
     Appearance,
-    size_m=st.tuples(*[st.floats(0.05, 2.0)] * 3),
     tints=st.lists(
         st.builds(Tint, colour=st.tuples(*[st.integers(0, 255)] * 3), share=st.floats(0.0, 1.0)), max_size=3
     ).map(tuple),
@@ -127,11 +127,12 @@ APPEARANCES = st.builds(
     ).map(tuple),
     made_of=st.lists(st.sampled_from((*MATERIALS, "food")), max_size=2).map(tuple),
 )
+SIZES_M = st.tuples(*[st.floats(0.05, 2.0)] * 3)
 
 
-@given(target=st.sampled_from(TYPES), relations=RELATIONS, appearance=APPEARANCES)
-def test_reads_back_the_grammar(target, relations, appearance):
-    """What `evonav.tasks.language` lets the describer say is understood in full."""
+@given(target=st.sampled_from(TYPES), size_m=SIZES_M, relations=RELATIONS, appearance=APPEARANCES)
+def test_reads_back_the_grammar(target, size_m, relations, appearance):
+    """Every sentence of the grammar in `evonav.tasks.language` is understood in full."""
     things = [relations.support, *relations.neighbours, relations.wall_object]
     said = [target, *(thing.category for thing in things if thing)]
     assume(len({canonical(noun) for noun in said}) == len(said))  # the describer never names a thing twice
@@ -146,10 +147,10 @@ def test_reads_back_the_grammar(target, relations, appearance):
     if relations.wall_object:
         expected.append(relation("near", canonical(relations.wall_object.category)))
     for category in (None, target):
-        goal = parse_goal(unified_instruction(target, relations, appearance), category)
+        goal = parse_goal(unified_instruction(target, size_m, relations, appearance), category)
         assert goal.noun == canonical(target)
         assert list(goal.relations) == expected
-        words = {word for phrase in looks_of(target, appearance) for word in phrase.split(" and ")}
+        words = {word for phrase in adjectives_of(target, size_m, appearance) for word in phrase.split(" and ")}
         assert set(goal.adjectives) == words
 
 

@@ -210,7 +210,7 @@ def test_runs_with_walks_are_handed_in_and_verified(tmp_path):
     from evonav.house import bundled_houses
     from evonav.tasks import write_task
     from evonav.tasks.listing import task_files
-    from evonav.tasks.manifest import GenerationParameters
+    from evonav.tasks.parameters import GenerationParameters
 
     options = ControlledOptions(parameters=GenerationParameters(reference_image_px=64, reference_min_visible_px=10))
     house = min(bundled_houses(), key=lambda one: len(one.rooms) if len(one.rooms) > 1 else 99)

@@ -6,8 +6,7 @@ import pytest
 
 from evonav.errors import InvalidArgumentError, TaskError
 from evonav.generation.config import read_parameters
-from evonav.tasks.extensions import Extensions, Occurrence, Schedule
-from evonav.tasks.manifest import GenerationParameters
+from evonav.tasks.parameters import Extensions, GenerationParameters, Occurrence, Schedule
 
 THETA = """
 evolve_probability = 0.25

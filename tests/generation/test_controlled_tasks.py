@@ -18,7 +18,7 @@ from evonav.generation.validation import validate_files, validate_task
 from evonav.house import bundled_houses
 from evonav.tasks import load_task, write_task
 from evonav.tasks.listing import task_roots
-from evonav.tasks.manifest import GenerationParameters
+from evonav.tasks.parameters import GenerationParameters
 
 SMALL = GenerationParameters(reference_image_px=64, reference_min_visible_px=10)
 PAIRS = ControlledOptions(parameters=SMALL)

@@ -1,16 +1,11 @@
-"""The describer's sentences, word by word."""
+"""Rule-based instructions, word by word."""
 
 import pytest
 
 from evonav._core import assets
-from evonav.generation.instructions.appearance import Appearance, Detail, Tint, colour_word, size_word
-from evonav.generation.instructions.describe import (
-    Anchor,
-    Relations,
-    appearance_instruction,
-    basic_instruction,
-    unified_instruction,
-)
+from evonav.generation.instructions.appearance import colour_word, size_word
+from evonav.generation.instructions.describe import appearance_instruction, basic_instruction, unified_instruction
+from evonav.generation.result import Anchor, Appearance, Detail, Relations, Tint
 
 SIZES_M = {category: tuple(size_m) for _, category, size_m in assets()}
 
@@ -19,8 +14,8 @@ def the(category: str, determiner: str = "the") -> Anchor:
     return Anchor.model_validate({"category": category, "determiner": determiner})
 
 
-def where(**said: object) -> Relations:
-    return Relations.model_validate({"room_type": "Kitchen", "is_category_unique": True, **said})
+def where(**fields: object) -> Relations:
+    return Relations.model_validate({"room_type": "Kitchen", "is_category_unique": True, **fields})
 
 
 @pytest.mark.parametrize(
@@ -48,41 +43,49 @@ def test_places(relations: Relations, sentence: str) -> None:
     assert basic_instruction("Mug", relations) == f"Please navigate to {sentence}"
 
 
-def looks(category: str, colours: tuple[tuple[int, int, int, float], ...] = (), **facts: object) -> str:
+def described(
+    category: str,
+    colours: tuple[tuple[int, int, int, float], ...] = (),
+    size_m: tuple[float, float, float] | None = None,
+    **fields: object,
+) -> str:
+    size_m = size_m or SIZES_M[category]
     tints = tuple(Tint(colour=(red, green, blue), share=share) for red, green, blue, share in colours)
-    appearance = Appearance.model_validate({"size_m": SIZES_M[category], "tints": tints, **facts})
-    sentence = appearance_instruction(category, appearance)
+    appearance = Appearance.model_validate({"tints": tints, **fields})
+    sentence = appearance_instruction(category, size_m, appearance)
     relations = where(support=the("Desk"))
     place = " on the desk."
-    assert unified_instruction(category, relations, appearance) == sentence.removesuffix(".") + place
+    assert unified_instruction(category, size_m, relations, appearance) == sentence.removesuffix(".") + place
     return sentence.removeprefix("Please navigate to the ")
 
 
-def test_looks() -> None:
+def test_appearance_instructions() -> None:
     white, brown, steel = (240, 240, 240), (120, 78, 48), (60, 60, 64)
     drawers = (Detail(noun="drawer", count=6), Detail(noun="door", count=2), Detail(noun="leg", count=4))
     typical = tuple(sorted(size[i] for _, name, size in assets() if name == "Mug")[2] for i in range(3))
-    mug = looks("Mug", ((*white, 0.7), (*brown, 0.3)), made_of=("ceramic",), size_m=typical)
+    mug = described("Mug", ((*white, 0.7), (*brown, 0.3)), made_of=("ceramic",), size_m=typical)
     assert mug == "white and brown ceramic mug."
-    assert looks("Mug", ((*white, 0.8), (*brown, 0.2)), size_m=typical) == "white mug."
+    assert described("Mug", ((*white, 0.8), (*brown, 0.2)), size_m=typical) == "white mug."
     # Two materials of one colour are one colour.
-    assert looks("Mug", ((*brown, 0.3), (*white, 0.4), (130, 80, 50, 0.3)), size_m=typical) == "brown and white mug."
-    assert looks("Mug", made_of=("food",), size_m=typical) == "mug."
+    assert (
+        described("Mug", ((*brown, 0.3), (*white, 0.4), (130, 80, 50, 0.3)), size_m=typical) == "brown and white mug."
+    )
+    assert described("Mug", made_of=("food",), size_m=typical) == "mug."
     sofa = {"size_m": (2.0, 0.9, 0.9), "details": (Detail(noun="armrest", count=2), Detail(noun="open lid", count=1))}
-    assert looks("Sofa", made_of=("wood", "fabric"), **sofa) == "fabric sofa with armrests and an open lid."
-    assert looks("Sofa", made_of=("metal",), **sofa) == "sofa with armrests and an open lid."
-    assert "with six drawers and two doors." in looks("Dresser", ((*steel, 1.0),), details=drawers)
-    assert looks("HousePlant", made_of=("ceramic", "organic")).endswith("house plant with a ceramic pot.")
-    assert "cardboard box" in looks("Box", made_of=("paper",))
-    assert "round" in looks("DiningTable", form="round")
-    assert "square" in looks("DiningTable", size_m=(1.0, 0.7, 0.95))
-    assert "rectangular" in looks("DiningTable", size_m=(1.6, 0.7, 0.9))
-    assert "long" in looks("DiningTable", size_m=(2.4, 0.7, 0.9))
-    assert "wide" in looks("Dresser", size_m=(2.0, 0.5, 0.5))
-    assert "tall" in looks("Dresser", size_m=(0.6, 2.0, 0.5))
+    assert described("Sofa", made_of=("wood", "fabric"), **sofa) == "fabric sofa with armrests and an open lid."
+    assert described("Sofa", made_of=("metal",), **sofa) == "sofa with armrests and an open lid."
+    assert "with six drawers and two doors." in described("Dresser", ((*steel, 1.0),), details=drawers)
+    assert described("HousePlant", made_of=("ceramic", "organic")).endswith("house plant with a ceramic pot.")
+    assert "cardboard box" in described("Box", made_of=("paper",))
+    assert "round" in described("DiningTable", form="round")
+    assert "square" in described("DiningTable", size_m=(1.0, 0.7, 0.95))
+    assert "rectangular" in described("DiningTable", size_m=(1.6, 0.7, 0.9))
+    assert "long" in described("DiningTable", size_m=(2.4, 0.7, 0.9))
+    assert "wide" in described("Dresser", size_m=(2.0, 0.5, 0.5))
+    assert "tall" in described("Dresser", size_m=(0.6, 2.0, 0.5))
 
 
-def test_sizes_are_for_their_kind() -> None:
+def test_sizes_are_relative_to_the_category() -> None:
     """A small sofa is larger than a large mug."""
     assert size_word("Mug", (0.3, 0.3, 0.3)) == "large"
     assert size_word("Sofa", (0.8, 0.5, 0.5)) == "small"

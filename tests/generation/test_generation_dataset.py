@@ -23,7 +23,7 @@ from evonav.generation.worker import GenerationOptions
 from evonav.house import House
 from evonav.tasks import load_task
 from evonav.tasks.dataset import check_dataset, read_dataset
-from evonav.tasks.manifest import GenerationParameters
+from evonav.tasks.parameters import GenerationParameters
 
 OPTIONS = GenerationOptions(parameters=GenerationParameters(reference_image_px=64, reference_min_visible_px=4))
 FAULTY = "faulty_generation_worker:make_worker"

@@ -13,7 +13,7 @@ from evonav.generation.dataset import Workforce, generate_dataset
 from evonav.generation.worker import GenerationOptions
 from evonav.house import bundled_houses
 from evonav.tasks.dataset import read_dataset
-from evonav.tasks.manifest import GenerationParameters
+from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.subsets import SubsetError, subset_of, subset_roots
 
 OPTIONS = GenerationOptions(

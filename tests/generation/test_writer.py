@@ -1,6 +1,7 @@
 """A model's texts in place of the describer's: what is asked, what may stand, and what an interrupted pass leaves."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -95,7 +96,7 @@ def test_texts_and_checksums_change_and_nothing_else(stub: Stub, folder: Path) -
     writing = write_texts(folder, client_of(stub))
     after = list(load_tasks(folder))  # checks the checksums
     assert writing.num_written == num_stages(before) == len(stub.requests) / 2
-    assert (writing.num_kept, writing.failures, writing.num_done) == (0, {}, 3)
+    assert (writing.num_written_before, writing.failures, writing.num_done) == (0, {}, 3)
     for old, new in zip(before, after, strict=True):
         assert new.oracle_stages == old.oracle_stages
         for k, (was, now) in enumerate(zip(old.public_stages, new.public_stages, strict=True)):
@@ -150,7 +151,7 @@ def test_a_replay_writes_the_same_bytes_without_a_server(stub: Stub, folder: Pat
     num_asked = len(stub.requests)
     config = VlmConfig("gpt-4o", base_url="http://127.0.0.1:9/v1", max_concurrency=1)
     replay = VlmClient(config, store=store, mode="replay")
-    assert estimate_texts(copy, replay).num_kept == num_asked / 2  # the second question holds the first answer
+    assert estimate_texts(copy, replay).num_cached == num_asked / 2  # the second question holds the first answer
     assert write_texts(copy, replay).num_written == num_asked / 2
     (folder / "dataset.json").unlink()
     assert bytes_of(copy) == bytes_of(folder)
@@ -162,7 +163,7 @@ def test_a_second_pass_asks_nothing(stub: Stub, folder: Path) -> None:
     num_asked = len(stub.requests)
     before = bytes_of(folder)
     again = write_texts(folder, client_of(stub), limit=2)
-    assert (again.num_written, again.num_kept) == (0, first.num_written)
+    assert (again.num_written, again.num_written_before) == (0, first.num_written)
     assert len(stub.requests) == num_asked
     assert bytes_of(folder) == before
     assert write_texts(folder, client_of(stub)).num_written > 0
@@ -281,11 +282,15 @@ def test_the_command(stub: Stub, folder: Path, tmp_path: Path) -> None:
 
     def run(*more: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "evonav", "tasks", "write", str(folder), *options, *more]
-        return subprocess.run(command, capture_output=True, text=True, env={"OPENAI_API_KEY": KEY}, check=False)
+        return subprocess.run(
+            command, capture_output=True, text=True, env={**os.environ, "OPENAI_API_KEY": KEY}, check=False
+        )
 
     stages = num_stages(list(load_tasks(folder)))
     dry = run("--dry-run")
-    assert re.search(rf"^{2 * stages} questions, 0 of them kept.*\n.*\$0\.", dry.stdout), dry.stdout + dry.stderr
+    assert re.search(rf"^{2 * stages} questions, 0 answered by the cache.*\n.*\$0\.", dry.stdout), (
+        dry.stdout + dry.stderr
+    )
     assert not stub.requests
     poor = run("--max-cost", "0.02")
     assert poor.returncode == 3

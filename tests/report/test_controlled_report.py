@@ -20,7 +20,7 @@ from evonav.evaluation.records.schema import EndState, TransitionRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.statistics import mcnemar
 from evonav.tasks.dataset import SourceFile
-from evonav.tasks.manifest import GenerationParameters
+from evonav.tasks.parameters import GenerationParameters
 
 S, F = EndState.SUCCESS, EndState.FAILURE
 TASKS = tuple(f"task-{i}" for i in range(6))

@@ -5,7 +5,7 @@ import pytest
 from evonav.generation import generate_task
 from evonav.house import bundled_houses
 from evonav.tasks import Task, write_task
-from evonav.tasks.manifest import GenerationParameters
+from evonav.tasks.parameters import GenerationParameters
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ from evonav.tasks.dataset import (
     read_dataset,
     write_dataset,
 )
-from evonav.tasks.manifest import GenerationParameters
+from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.subsets import SubsetError, subset_of
 
 

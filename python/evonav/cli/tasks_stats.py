@@ -10,7 +10,7 @@ from evonav.cli.options import Workers, count_of
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from evonav.tasks.statistics import Estimate, Measure, TaskStatistics, Test
+    from evonav.tasks.statistics import Estimate, Metric, TaskStatistics, Test
 
 NUM_NAMES = 6
 """Of a distribution in one line."""
@@ -64,12 +64,12 @@ def print_statistics(found: "TaskStatistics") -> None:
             f"reweighted to {weighting.mix} by {weighting.by}: worth {weighting.effective_num_tasks:.0f} tasks, "
             f"covers {100 * weighting.covered_share:.0f}% of the mix, leaves out {weighting.num_left_out} tasks"
         )
-    console.print(_measures(found))
+    console.print(_metrics(found))
     for test in found.tests:
         console.print(_test_words(test), soft_wrap=False)
-    for measure in found.measures:
-        if measure.accepted is not None:
-            console.print(_verdict(measure))
+    for metric in found.measures:
+        if metric.accepted is not None:
+            console.print(_verdict(metric))
     console.print()
     for one in found.distributions:
         total = sum(one.counts)
@@ -85,7 +85,7 @@ def print_statistics(found: "TaskStatistics") -> None:
     )
 
 
-def _measures(found: "TaskStatistics") -> "Table":
+def _metrics(found: "TaskStatistics") -> "Table":
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 1, 0, 0), title="Metrics in %, unless they say otherwise", title_justify="left")
@@ -96,37 +96,37 @@ def _measures(found: "TaskStatistics") -> "Table":
     for heading in headings:
         table.add_column(heading, justify="right", no_wrap=True)
     group = ""
-    for measure in found.measures:
-        if measure.raw is None:
+    for metric in found.measures:
+        if metric.raw is None:
             continue
-        if measure.group != group:
-            group = measure.group
+        if metric.group != group:
+            group = metric.group
             table.add_row(f"[bold]{group}[/bold]")
-        mark = "w" if measure.interval == "wilson" else ""
-        row = [f" {measure.label}", _paper(measure), *_shown(measure, measure.raw, mark), str(measure.n)]
+        mark = "w" if metric.interval == "wilson" else ""
+        row = [f" {metric.label}", _paper(metric), *_shown(metric, metric.raw, mark), str(metric.n)]
         if found.weighting is not None:
-            row += ["-", ""] if measure.reweighted is None else _shown(measure, measure.reweighted)
+            row += ["-", ""] if metric.reweighted is None else _shown(metric, metric.reweighted)
         table.add_row(*row)
     return table
 
 
-def _scaled(measure: "Measure", value: float) -> str:
-    return f"{100 * value:.1f}" if "share" in measure.unit else f"{value:.2f}"
+def _scaled(metric: "Metric", value: float) -> str:
+    return f"{100 * value:.1f}" if "share" in metric.unit else f"{value:.2f}"
 
 
-def _paper(measure: "Measure") -> str:
-    if measure.paper is not None:
-        return _scaled(measure, measure.paper)
-    if measure.accepted is not None and measure.unit == "median share":
-        return "{:.0f}-{:.0f}".format(*(100 * end for end in measure.accepted))
-    return "" if measure.expected is None else f"({_scaled(measure, measure.expected)})"
+def _paper(metric: "Metric") -> str:
+    if metric.paper is not None:
+        return _scaled(metric, metric.paper)
+    if metric.accepted is not None and metric.unit == "median share":
+        return "{:.0f}-{:.0f}".format(*(100 * end for end in metric.accepted))
+    return "" if metric.expected is None else f"({_scaled(metric, metric.expected)})"
 
 
-def _shown(measure: "Measure", estimate: "Estimate", mark: str = "") -> list[str]:
+def _shown(metric: "Metric", estimate: "Estimate", mark: str = "") -> list[str]:
     if estimate.ci95 is None:
-        return [_scaled(measure, estimate.value), ""]
+        return [_scaled(metric, estimate.value), ""]
     low, high = estimate.ci95
-    return [_scaled(measure, estimate.value), f"{_scaled(measure, low)}-{_scaled(measure, high)}{mark}"]
+    return [_scaled(metric, estimate.value), f"{_scaled(metric, low)}-{_scaled(metric, high)}{mark}"]
 
 
 def _test_words(test: "Test") -> str:
@@ -137,14 +137,14 @@ def _test_words(test: "Test") -> str:
     return f"{test.label}: {observed}, expected {expected}: chi-square {test.statistic:.2f}, p {test.p:.3f}{again}"
 
 
-def _verdict(measure: "Measure") -> str:
-    low, high = measure.accepted or (0.0, 1.0)
+def _verdict(metric: "Metric") -> str:
+    low, high = metric.accepted or (0.0, 1.0)
     parts = []
-    for name, estimate in (("here", measure.raw), ("reweighted", measure.reweighted)):
+    for name, estimate in (("here", metric.raw), ("reweighted", metric.reweighted)):
         if estimate is not None:
             verdict = "inside" if low <= estimate.value <= high else "OUTSIDE"
-            parts.append(f"{name} {_scaled(measure, estimate.value)}% {verdict}")
-    return f"{measure.label}, to lie in {100 * low:.0f}-{100 * high:.0f}%: {', '.join(parts)}"
+            parts.append(f"{name} {_scaled(metric, estimate.value)}% {verdict}")
+    return f"{metric.label}, to lie in {100 * low:.0f}-{100 * high:.0f}%: {', '.join(parts)}"
 
 
 def _quantities(found: "TaskStatistics") -> "Table":

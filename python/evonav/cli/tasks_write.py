@@ -66,8 +66,9 @@ def write(
     if dry_run:
         estimate = estimate_texts(folder, client, limit=limit)
         cost = "" if account.price is None else f", ${account.price.of(estimate.usage):.2f}"
-        asked = estimate.num_questions - estimate.num_kept
-        typer.echo(f"{estimate.num_questions} questions, {estimate.num_kept} of them kept; {asked} to ask:")
+        num_left = estimate.num_questions - estimate.num_cached
+        counts = f"{estimate.num_cached} answered by the cache; {num_left} to ask"
+        typer.echo(f"{estimate.num_questions} questions, {counts}:")
         typer.echo(f"at most {estimate.usage.input_tokens} tokens in, {estimate.usage.output_tokens} out{cost}")
         return
     with _bar() as on_task:
@@ -95,7 +96,7 @@ def _bar() -> "Iterator[Callable[[Writing], None]]":
 
 def _tell(writing: "Writing") -> None:
     typer.echo(
-        f"{writing.num_written} stages written, {writing.num_kept} were before, "
+        f"{writing.num_written} stages written, {writing.num_written_before} were before, "
         f"{writing.failures.total()} keep the describer's texts ({writing.num_done} of {writing.num_tasks} tasks)"
     )
     for kind, count in sorted(writing.failures.items()):

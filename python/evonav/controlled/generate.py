@@ -18,11 +18,12 @@ from typing import Any
 
 from evonav.controlled.layout import Arm, Kind
 from evonav.errors import InvalidArgumentError
-from evonav.generation.pipeline import GivenStage, TaskRejectedError, generate_task
+from evonav.generation.pipeline import TaskRejectedError, generate_task
+from evonav.generation.result import GivenStage
 from evonav.house import House
 from evonav.tasks.dataset import RejectReason
-from evonav.tasks.files import checksums_of
-from evonav.tasks.manifest import Control, GenerationParameters, Task
+from evonav.tasks.manifest import Control, Task
+from evonav.tasks.parameters import GenerationParameters
 
 NUM_ATTEMPTS = 8
 """Draws of goals and changes before a house is given up."""
@@ -114,14 +115,14 @@ def _draw_goals(house: House, options: ControlledOptions, seed: int, attempt: in
 def _arm(house: House, options: ControlledOptions, seed: int, attempt: int, arm: Arm, goals: Sequence[str]) -> Task:
     is_pair = options.kind == "pairs"
     parameters = options.parameters.model_copy(update={"evolve_probability": arm.evolve_probability})
-    given = [GivenStage(goal) for goal in goals]
+    given = [GivenStage(goal_id=goal) for goal in goals]
     shown = tuple(range(1, len(goals) + 1))
     forced: tuple[int, ...] = ()
     if is_pair:
         given = [
-            GivenStage(goals[0]),
-            GivenStage(goals[1], is_evolved=False),
-            GivenStage(goals[0], is_evolved=arm.evolve_probability == 1.0),
+            GivenStage(goal_id=goals[0]),
+            GivenStage(goal_id=goals[1], is_evolved=False),
+            GivenStage(goal_id=goals[0], is_evolved=arm.evolve_probability == 1.0),
         ]
         shown, forced = (1, 2, 1), (1, 2)
     task = _task(house, options, seed, attempt, parameters, given)
@@ -137,7 +138,7 @@ def _arm(house: House, options: ControlledOptions, seed: int, attempt: int, arm:
         ),
         reference_images=tuple(task.reference_images[other - 1] for other in shown),
     )
-    return dataclasses.replace(task, header=task.header.model_copy(update={"checksums": checksums_of(task)}))
+    return task.with_checksums()
 
 
 def _task(

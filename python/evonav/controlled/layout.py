@@ -12,7 +12,8 @@ from pydantic import Field, NonNegativeInt, PositiveInt
 from evonav.errors import TaskError
 from evonav.parallel.folders import write_atomically
 from evonav.tasks.dataset import HouseRejection, SourceFile
-from evonav.tasks.manifest import GenerationParameters, TaskId
+from evonav.tasks.manifest import TaskId
+from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.records import Id, Probability, Record, parse_record, read_file, record_bytes
 
 FILE_NAME = "controlled.json"

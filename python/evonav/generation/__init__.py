@@ -2,7 +2,7 @@
 
 from evonav.generation.pipeline import Rejections, TaskRejectedError, generate_task, generate_tasks
 from evonav.tasks import write_task
-from evonav.tasks.manifest import GenerationParameters
+from evonav.tasks.parameters import GenerationParameters
 
 __all__ = [
     "GenerationParameters",

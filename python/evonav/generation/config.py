@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import InvalidArgumentError
-from evonav.tasks.manifest import GenerationParameters
+from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.records import parse_record
 from evonav.toml import read_toml
 

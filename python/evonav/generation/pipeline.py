@@ -1,48 +1,32 @@
-"""Tasks from houses: the core does Algorithm 1 of the paper, this gives the result its words and its form."""
+"""Generate tasks from houses: the core runs Algorithm 1 of the paper, this module writes its result as a task."""
 
-import dataclasses
-import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.errors import TaskError
-from evonav.generation.instructions.appearance import parse_appearance
 from evonav.generation.instructions.describe import (
     WRITER,
     appearance_instruction,
     basic_instruction,
-    parse_relations,
     unified_instruction,
 )
+from evonav.generation.result import GeneratedStage, GenerationResult, Given, GivenStage
 from evonav.house import House
 from evonav.tasks.dataset import RejectReason
-from evonav.tasks.files import checksums_of
-from evonav.tasks.manifest import GenerationParameters, HouseSource, PublicStage, Task, TaskHeader
-from evonav.tasks.oracle import OracleStage
+from evonav.tasks.manifest import HouseSource, PublicStage, Task, TaskHeader
+from evonav.tasks.oracle import OracleFields, OracleStage
+from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.records import sha256_of
-
-_ORACLE_KEYS = frozenset(OracleStage.model_fields) - {"schema_version", "stage", "house_sha256"}
-
-
-@dataclass(frozen=True, slots=True)
-class GivenStage:
-    """What of a stage is given instead of drawn."""
-
-    goal_id: str | None = None
-    """Object that is the goal."""
-    is_evolved: bool | None = None
-    """Whether the transition before the stage evolves the house."""
 
 
 class TaskRejectedError(TaskError):
-    """No task can be made of a house."""
+    """A house gives no task."""
 
     def __init__(self, house: str, reason: RejectReason, stage: int, detail: str) -> None:
         super().__init__(f"house {house}: {reason} at stage {stage}: {detail}")
@@ -61,24 +45,24 @@ def generate_task(
     given: Sequence[GivenStage] = (),
     attempt: int = 0,
 ) -> Task:
-    """Makes a task of a house (paper, Algorithm 1).
+    """Generate a task from a house (paper, Algorithm 1).
 
-    What is drawn depends on the seed, the attempt and the house's contents only, each draw by itself: tasks that differ
-    in what is given, or in the probability of evolution, share what they can.
+    All draws depend only on the seed, the attempt and the house's contents, and each has a random stream of its own:
+    tasks that differ in what is given, or in the probability of evolution, share all other draws where possible.
 
     Args:
-        house: Two rooms or more.
-        seed: Of all draws, 0 to 2^64 - 1.
-        config: Θ; default the paper's.
-        dataset: Recorded in the header.
-        split: Recorded in the header.
-        allow_unknown_assets: Give assets that the catalogue lacks the size and shape of their category.
-        given: What is not drawn, of each stage from the first; as many stages as the task then has.
-        attempt: Another one draws anew.
+        house: House with at least two rooms.
+        seed: Seed of all draws, 0 to 2^64 - 1.
+        config: Generation parameters; default the paper's.
+        dataset: Name of the data set, recorded in the header.
+        split: Name of the split, recorded in the header.
+        allow_unknown_assets: Give assets that the catalogue does not contain the size and shape of their category.
+        given: Given parts of each stage from the first, instead of drawn ones; their number is the number of stages.
+        attempt: Number of the attempt; each has its own draws.
 
     Raises:
-        TaskRejectedError: The house does not allow a task; it says why.
-        HouseError: An asset is unknown, unless allowed.
+        TaskRejectedError: The house gives no task; says why.
+        HouseError: An asset is unknown and `allow_unknown_assets` is false.
         InvalidArgumentError: A parameter is outside its domain.
     """
     config = GenerationParameters() if config is None else config
@@ -89,15 +73,13 @@ def generate_task(
         label=house_sha256 if attempt == 0 else f"{house_sha256} attempt {attempt}",
         parameters_json=config.model_dump_json(),
         allow_unknown_assets=allow_unknown_assets,
-        given_json=json.dumps({"stages": [dataclasses.asdict(stage) for stage in given]}),
+        given_json=Given(stages=tuple(given)).model_dump_json(),
     )
-    made = json.loads(text)
-    if "rejected" in made:
-        rejected = made["rejected"]
-        raise TaskRejectedError(house.name, rejected["reason"], rejected["stage"], rejected["detail"])
+    result = GenerationResult.model_validate_json(text)
+    if result.rejected is not None:
+        raise TaskRejectedError(house.name, result.rejected.reason, result.rejected.stage, result.rejected.detail)
+    stages = () if result.task is None else result.task.stages
     source = house_source(house, house_sha256)
-    stages = made["task"]["stages"]
-    oracle = tuple(_oracle_stage(k, stage, houses[k - 1]) for k, stage in enumerate(stages, start=1))
     header = TaskHeader(
         task_id=f"{_slug(source.name)}-{source.sha256[:6]}-s{seed}",
         dataset=dataset,
@@ -106,32 +88,35 @@ def generate_task(
         seed=seed,
         num_stages=len(stages),
         house=source,
-        start_pose=oracle[0].start_pose,
+        start_pose=stages[0].start_pose,
         parameters=config,
         checksums={},
     )
     task = Task(
         header=header,
-        public_stages=tuple(_public_stage(k, stage) for k, stage in enumerate(stages, start=1)),
+        public_stages=tuple(_public_stage(number, stage) for number, stage in enumerate(stages, start=1)),
         reference_images=tuple(_image(data, config.reference_image_px) for data in images),
-        oracle_stages=oracle,
+        oracle_stages=tuple(
+            _oracle_stage(number, stage, house_json)
+            for number, (stage, house_json) in enumerate(zip(stages, houses, strict=True), start=1)
+        ),
         houses_json=tuple(houses),
     )
-    return dataclasses.replace(task, header=header.model_copy(update={"checksums": checksums_of(task)}))
+    return task.with_checksums()
 
 
 @dataclass
 class Rejections:
-    """Houses that gave no task."""
+    """Counts of houses without a task."""
 
     num_houses: int = 0
-    """Houses looked at."""
+    """Number of houses tried."""
     reasons: Counter[str] = field(default_factory=Counter)
     messages: list[str] = field(default_factory=list)
 
     @property
     def num_rejected(self) -> int:
-        """Houses without a task."""
+        """Number of houses without a task."""
         return sum(self.reasons.values())
 
 
@@ -145,16 +130,16 @@ def generate_tasks(
     split: str = "none",
     allow_unknown_assets: bool = False,
 ) -> Iterator[Task]:
-    """One task a house, leaving out houses that allow none.
+    """Generate one task from each house, and skip houses that give none.
 
     Args:
-        houses: Any number.
-        seed: As for `generate_task`, the same for all houses.
-        config: Θ.
-        rejections: Filled as houses are left out.
-        dataset: Recorded in the headers.
-        split: Recorded in the headers.
-        allow_unknown_assets: As for `generate_task`.
+        houses: Houses to try.
+        seed: Seed as for `generate_task`, the same for all houses.
+        config: Generation parameters; default the paper's.
+        rejections: Counts of skipped houses, updated for each of them.
+        dataset: Name of the data set, recorded in the headers.
+        split: Name of the split, recorded in the headers.
+        allow_unknown_assets: Accept unknown assets, see `generate_task`.
     """
     rejections = Rejections() if rejections is None else rejections
     for house in houses:
@@ -179,7 +164,7 @@ def generate_tasks(
 
 
 def house_source(house: House, sha256: str) -> HouseSource:
-    """What a header says of a house, whose JSON has this checksum."""
+    """Return a header's record of a house whose JSON has this checksum."""
     name = short_name(house.name)
     place = re.search(r":([1-9]\d*)(?:\[(\d+)\])?$", name)
     index = None if place is None else int(place[2]) if place[2] else int(place[1]) - 1
@@ -192,40 +177,35 @@ def house_source(house: House, sha256: str) -> HouseSource:
     )
 
 
-def _oracle_stage(number: int, stage: dict[str, Any], house_json: str) -> OracleStage:
-    """The core's record of a stage, checked."""
-    record = {key: stage[key] for key in _ORACLE_KEYS}
-    record |= {"stage": number, "house_sha256": sha256_of(house_json.encode())}
-    return OracleStage.model_validate_json(json.dumps(record))
+def _oracle_stage(number: int, stage: GeneratedStage, house_json: str) -> OracleStage:
+    fields = {name: getattr(stage, name) for name in OracleFields.model_fields}
+    return OracleStage(stage=number, house_sha256=sha256_of(house_json.encode()), **fields)
 
 
-def _public_stage(number: int, stage: dict[str, Any]) -> PublicStage:
-    target = stage["target"]
-    category = cast("str", target["category"])
-    relations = parse_relations(stage["relations"])
-    appearance = parse_appearance(stage["appearance"], target["size_m"])
+def _public_stage(number: int, stage: GeneratedStage) -> PublicStage:
+    target, relations, appearance = stage.target, stage.relations, stage.appearance
     return PublicStage(
         stage=number,
-        category=category,
-        basic_instruction=basic_instruction(category, relations),
-        appearance_instruction=appearance_instruction(category, appearance),
-        unified_instruction=unified_instruction(category, relations, appearance),
+        category=target.category,
+        basic_instruction=basic_instruction(target.category, relations),
+        appearance_instruction=appearance_instruction(target.category, target.size_m, appearance),
+        unified_instruction=unified_instruction(target.category, target.size_m, relations, appearance),
         writer=WRITER,
     )
 
 
 def _image(data: bytes, side_px: int) -> NDArray[np.uint8]:
-    """RGB bytes as a read-only image."""
+    """Return RGB bytes as a read-only image."""
     return np.frombuffer(data, dtype=np.uint8).reshape(side_px, side_px, 3)
 
 
 def short_name(name: str) -> str:
-    """A house's name without the folder of its file."""
+    """Return a house's name without the folder of its file."""
     return name.replace("\\", "/").rsplit("/", 1)[-1]
 
 
 def _slug(name: str) -> str:
-    """A file name's or caller's name in a task id, numbers padded so that ids sort as houses do."""
+    """Return a house's name as a part of a task id, with padded numbers so that ids sort as houses do."""
     stem = re.sub(r"\.(jsonl|json)(\.gz)?", "", name)
-    words = re.sub(r"[^A-Za-z0-9]+", "-", stem).strip("-")[:80] or "house"
-    return re.sub(r"\d+", lambda digits: digits.group().zfill(4), words)
+    slug = re.sub(r"[^A-Za-z0-9]+", "-", stem).strip("-")[:80] or "house"
+    return re.sub(r"\d+", lambda digits: digits.group().zfill(4), slug)

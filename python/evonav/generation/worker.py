@@ -17,7 +17,8 @@ from evonav.parallel.folders import put_folder, sha256_of_file
 from evonav.parallel.pool import Answer
 from evonav.tasks import write_task
 from evonav.tasks.dataset import RejectReason
-from evonav.tasks.manifest import GenerationParameters, Task
+from evonav.tasks.manifest import Task
+from evonav.tasks.parameters import GenerationParameters
 
 WORK = "evonav.generation.worker:make_worker"
 PARTIAL_NAME = ".partial"

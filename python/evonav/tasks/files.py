@@ -13,7 +13,7 @@ from PIL import Image
 
 from evonav.errors import TaskError
 from evonav.tasks.listing import task_roots
-from evonav.tasks.manifest import PublicStage, Task, TaskHeader
+from evonav.tasks.manifest import PublicStage, Task, TaskHeader, contents_of
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.records import (
     field_error,
@@ -55,35 +55,9 @@ def decode_png(path: Path, size_px: int) -> NDArray[np.uint8]:
     return pixels
 
 
-def contents_of(task: Task) -> dict[str, bytes]:
-    """Return the uncompressed contents of a task's files except `task.json`, by relative path, for checksums."""
-    contents: dict[str, bytes] = {}
-    for number in range(1, task.num_stages + 1):
-        contents[f"houses/stage_{number}.json.gz"] = task.houses_json[number - 1].encode()
-        contents[f"oracle/stage_{number}.json"] = record_bytes(task.oracle_stages[number - 1])
-        contents[f"public/stage_{number}.json"] = record_bytes(task.public_stages[number - 1])
-        contents[f"public/stage_{number}.png"] = task.reference_images[number - 1].tobytes()
-    return dict(sorted(contents.items()))
-
-
 def checksums_of(task: Task) -> dict[str, str]:
     """Return the checksums for the header."""
     return {name: sha256_of(data) for name, data in contents_of(task).items()}
-
-
-def packed_of(task: Task) -> dict[str, bytes]:
-    """Return the bytes of a task's files, by relative path."""
-    files = {"task.json": record_bytes(task.header)}
-    packed: dict[str, bytes] = {}
-    for number in range(1, task.num_stages + 1):
-        house = task.houses_json[number - 1]
-        if house not in packed:  # half of the stages have the house of the previous stage
-            packed = {house: write_gzip(house.encode())}
-        files[f"houses/stage_{number}.json.gz"] = packed[house]
-        files[f"oracle/stage_{number}.json"] = record_bytes(task.oracle_stages[number - 1])
-        files[f"public/stage_{number}.json"] = record_bytes(task.public_stages[number - 1])
-        files[f"public/stage_{number}.png"] = encode_png(task.reference_images[number - 1])
-    return files
 
 
 def write_task(task: Task, directory: Path | str) -> Path:
@@ -99,11 +73,27 @@ def write_task(task: Task, directory: Path | str) -> Path:
     try:
         for folder in (root, *(root / name for name in ("houses", "oracle", "public"))):
             folder.mkdir(parents=True, exist_ok=True)
-        for name, data in packed_of(task).items():
+        (root / "task.json").write_bytes(record_bytes(task.header))
+        for name, data in _encoded_files(task):
             (root / name).write_bytes(data)
     except OSError as error:
         raise TaskError(f"{root}: cannot be written: {error.strerror or error}") from error
     return root
+
+
+def _encoded_files(task: Task) -> Iterator[tuple[str, bytes]]:
+    """Yield the path and bytes of each file of a task except `task.json`."""
+    house, compressed = b"", b""
+    for name, data in task.contents.items():
+        if name.startswith("houses/"):
+            if data != house:  # half of the stages have the house of the previous stage
+                house, compressed = data, write_gzip(data)
+            yield name, compressed
+        elif name.endswith(".png"):
+            number = int(name.removeprefix("public/stage_").removesuffix(".png"))
+            yield name, encode_png(task.reference_images[number - 1])
+        else:
+            yield name, data
 
 
 def load_task(root: Path | str) -> Task:

@@ -1,67 +1,27 @@
 """Define a task: header, public stages, oracle stages, stage houses. `evonav.tasks.files` reads and writes it."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
     Field,
-    NonNegativeFloat,
     NonNegativeInt,
-    PositiveFloat,
     PositiveInt,
     SerializerFunctionWrapHandler,
     model_serializer,
 )
 
-from evonav.tasks.extensions import Extensions
 from evonav.tasks.oracle import OracleStage
+from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.public import StageInput
-from evonav.tasks.records import Id, PoseRecord, Probability, Record, Sha256
+from evonav.tasks.records import Id, PoseRecord, Record, Sha256, record_bytes, sha256_of
 from evonav.world.pose import Pose
 
 TaskId = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,127}$")]
-
-
-class GenerationParameters(Record):
-    """The fixed hyperparameters Θ (paper, Sec. A.2), and those that the paper leaves open."""
-
-    num_stages: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (3, 4, 5)
-    """Possible numbers of stages K, drawn uniformly (the paper gives the range only)."""
-    evolve_probability: Probability = 0.5
-    visited_factor: NonNegativeFloat = 3.0
-    recently_changed_factor: NonNegativeFloat = 0.5
-    changed_room_window: PositiveInt = 1
-    """Number of transitions back in which a change counts as recent (the paper's k-2, counted by first stage)."""
-    salient_object_probability: Probability = 0.5
-    retain_group_probability: Probability = 0.4
-    full_shuffle_probability: Probability = 0.1
-    changed_room_multiplier: NonNegativeFloat = 9.0
-    previous_goal_room_multiplier: NonNegativeFloat = 0.2
-    moved_object_multiplier: NonNegativeFloat = 9.0
-    moved_children_multiplier: NonNegativeFloat = 9.0
-    """Multiplier for objects that stood on the salient object and moved with it.
-
-    The paper gives 9 to "the moved object". With 1 here, too few goals are relocated (docs/dataset.md).
-    """
-    goals_on_walls: bool = False
-    """Whether objects on walls, which no modification moves, may be goals.
-
-    The paper uses them as anchors of instructions. Without them as goals, the share of relocated goals (Sec. 3.2) is
-    the published one.
-    """
-    reference_min_m: PositiveFloat = 1.0
-    reference_max_m: PositiveFloat = 1.5
-    reference_image_px: Annotated[int, Field(ge=16, le=4096)] = 300
-    reference_min_visible_px: PositiveInt = 50
-    """Smallest number of pixels of a visible target (the paper says "visible")."""
-    relocated_min_m: NonNegativeFloat = 0.1
-    placement_tries: PositiveInt = 100
-    """Number of places tried for an object before it stays where it is."""
-    modification_tries: Annotated[int, Field(ge=1, le=1000)] = 3
-    """Number of attempts at a room's modification, with new places, before it is abandoned."""
-    extensions: Extensions = Extensions()
 
 
 class HouseSource(Record):
@@ -163,6 +123,18 @@ class Task:
         """The agent's start pose in stage 1."""
         return self.header.start_pose.pose()
 
+    @cached_property
+    def contents(self) -> Mapping[str, bytes]:
+        """Uncompressed contents of the task's files, serialised once; see `contents_of`."""
+        return contents_of(self)
+
+    def with_checksums(self) -> "Task":
+        """Return the task with the checksums of its files in its header."""
+        checksums = {name: sha256_of(data) for name, data in self.contents.items()}
+        task = replace(self, header=self.header.model_copy(update={"checksums": checksums}))
+        vars(task)["contents"] = self.contents  # they do not depend on the header
+        return task
+
     def public(self, stage: int) -> StageInput:
         """Return the agent's input of a stage.
 
@@ -199,3 +171,17 @@ class Task:
         if not 1 <= stage <= self.num_stages:
             raise IndexError(f"task {self.task_id}: stage {stage} of {self.num_stages}")
         return stage - 1
+
+
+def contents_of(task: Task) -> dict[str, bytes]:
+    """Return the uncompressed contents of a task's files except `task.json`, by relative path.
+
+    Checksums are computed from these: JSON as it is, images as their RGB values row by row.
+    """
+    contents: dict[str, bytes] = {}
+    for number in range(1, task.num_stages + 1):
+        contents[f"houses/stage_{number}.json.gz"] = task.houses_json[number - 1].encode()
+        contents[f"oracle/stage_{number}.json"] = record_bytes(task.oracle_stages[number - 1])
+        contents[f"public/stage_{number}.json"] = record_bytes(task.public_stages[number - 1])
+        contents[f"public/stage_{number}.png"] = task.reference_images[number - 1].tobytes()
+    return dict(sorted(contents.items()))

@@ -159,13 +159,9 @@ class Target(Record):
     """Whether any change since stage 1 relocated it."""
 
 
-class OracleStage(Record):
-    """The part of a stage that the agent must not know."""
+class OracleFields(Record):
+    """The fields of an oracle stage that Algorithm 1 determines."""
 
-    schema_version: Literal[2] = 2
-    stage: Annotated[int, Field(ge=1)]
-    house_sha256: Sha256
-    """SHA-256 of `Task.house_json(stage)` in UTF-8."""
     evolution: Evolution
     state: GenerationState
     start_pose: PoseRecord
@@ -181,3 +177,17 @@ class OracleStage(Record):
     reference_path_length_m: NonNegativeFloat
     ever_relocated_ids: tuple[Id, ...]
     """Ids of the objects relocated by any change up to this stage, sorted."""
+
+
+class _OracleFileFields(Record):
+    """The fields that identify the file of an oracle stage."""
+
+    schema_version: Literal[2] = 2
+    stage: Annotated[int, Field(ge=1)]
+    house_sha256: Sha256
+    """SHA-256 of `Task.house_json(stage)` in UTF-8."""
+
+
+# Pydantic orders fields from the last base to the first: those of `_OracleFileFields` come first in the file.
+class OracleStage(OracleFields, _OracleFileFields):
+    """The part of a stage that the agent must not know."""

@@ -44,7 +44,7 @@ def schema_of(name: str) -> dict[str, Any]:
     schema = model.model_json_schema(mode="validation")
     records = {record.__name__: record for record in _all_records(Record)}
     for title, part in [(model.__name__, schema), *schema.get("$defs", {}).items()]:
-        for field, text in _described(records[title]):
+        for field, text in _documentation(records[title]):
             part["properties"][field]["description"] = text
     version = model.model_fields["schema_version"].default
     return {"$schema": DIALECT, "$id": f"urn:evonav:schema:{version}:{name}", **schema}
@@ -78,8 +78,11 @@ def _all_records(record: type[Record]) -> Iterator[type[Record]]:
         yield from _all_records(one)
 
 
-def _described(record: type[Record]) -> Iterator[tuple[str, str]]:
-    """Yield fields with the documentation below them in the source."""
+def _documentation(record: type[Record]) -> Iterator[tuple[str, str]]:
+    """Yield the fields of a record with the documentation below them in the source."""
+    for base in record.__bases__:
+        if issubclass(base, Record):
+            yield from _documentation(base)
     (definition,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
     for field, below in pairwise(definition.body if isinstance(definition, ast.ClassDef) else []):
         if not isinstance(field, ast.AnnAssign) or not isinstance(field.target, ast.Name):

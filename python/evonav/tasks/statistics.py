@@ -17,7 +17,7 @@ class Estimate(Record):
     """The 95% confidence interval; `None` where all values are equal."""
 
 
-class Measure(Record):
+class Metric(Record):
     """A share, a mean or a median."""
 
     key: str
@@ -39,7 +39,7 @@ class Measure(Record):
     expected: float | None = None
     """The value that the published process gives, if it can be computed.
 
-    For other measures, the value of our reading in a trial without images and rejections.
+    For other metrics, the value of our reading in a trial without images and rejections.
     """
     accepted: Range | None = None
     """The accepted range."""
@@ -120,13 +120,13 @@ class TaskStatistics(Record):
     parameters: tuple[str, ...]
     """Generation parameters as JSON, each distinct set once."""
     weighting: Weighting | None
-    measures: tuple[Measure, ...]
+    measures: tuple[Metric, ...]
     tests: tuple[Test, ...]
     distributions: tuple[Distribution, ...]
     quantities: tuple[Quantity, ...]
 
-    def measure(self, key: str) -> Measure:
-        """Return a measure by its key."""
+    def metric(self, key: str) -> Metric:
+        """Return a metric by its key."""
         return next(one for one in self.measures if one.key == key)
 
     def test(self, key: str) -> Test | None:

@@ -1,29 +1,29 @@
-"""Words for what a target looks like: size for its kind, form, colours, material, parts.
+"""Choose words for a target's appearance: relative size, form, colours, material and parts.
 
-Everything said is in the renderer's shape of the target, in its reference image, or in ProcTHOR's databases.
+They come from the renderer's shape of the target, its reference image and ProcTHOR's databases.
 """
 
 import colorsys
 from collections import Counter, defaultdict
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from evonav import _core
+from evonav.generation.result import Appearance, Tint
 from evonav.tasks.language import MATERIALS, NUMBERS, plural_of, with_article
-from evonav.tasks.records import Record
+from evonav.tasks.records import Point3
 
 SECOND_COLOUR_SHARE = 0.25
-"""Least share of the target's visible pixels of a second colour that is named."""
+"""Smallest share of the target's visible pixels at which a second colour is named."""
 SMALL_RATIO, LARGE_RATIO = 0.8, 1.25
-"""Size relative to the category's median below and above which a thing is small or large for its kind."""
+"""Sizes relative to the category's median below and above which an object is called small or large."""
 SQUARE_RATIO, LONG_RATIO = 0.92, 0.45
-"""Shorter over longer side of a top: square above, long below."""
+"""Ratios of a top's shorter to its longer side: it is square above the first, long below the second."""
 
 _TOPS = {"CoffeeTable", "DiningTable", "Footstool", "Ottoman", "SideTable", "Stool"}
-"""Furniture that people tell apart by the form of its top."""
+"""Furniture that people distinguish by the form of its top."""
 _UPRIGHT = {
     "Bottle",
     "Cabinet",
@@ -39,70 +39,38 @@ _UPRIGHT = {
     "TVStand",
     "Vase",
 }
-"""Things that people tell apart by how tall or wide they are."""
+"""Objects that people distinguish by their height or width."""
 _BROAD = {"Cabinet", "Dresser", "ShelvingUnit", "TVStand"}
-"""Of these, what is called wide."""
+"""Upright objects that may be called wide."""
 _SOFT = {"ArmChair", "Bed", "DogBed", "Footstool", "Ottoman", "Sofa"}
-"""Upholstered things, whose frames hardly show."""
-_UNSAID: dict[str, set[str]] = {
+"""Upholstered furniture, whose frame is hardly visible."""
+_IMPLIED_MATERIALS: dict[str, set[str]] = {
     "fabric": {"Bed", "Cloth", "HandTowel", "Pillow", "ShowerCurtain", "Towel"},
     "paper": {"Book", "Newspaper", "PaperTowelRoll", "TissueBox", "ToiletPaper"},
     "rubber": {"BasketBall"},
     "wax": {"Candle"},
-    # The pot's, not the plant's.
+    # This is the pot's material, not the plant's.
     "ceramic": {"HousePlant"},
     "glass": {"Window"},
 }
-"""Materials that go without saying, by category."""
+"""Categories whose names already imply a material, by material."""
 _UNCOUNTED_PARTS = {"armrest", "pillow"}
-"""Parts that come in pairs: nobody counts them."""
+"""Parts that come in pairs and are not counted."""
 
 
-class Tint(Record):
-    """A material's colour in the reference image."""
-
-    colour: tuple[int, int, int]
-    share: float
-
-
-class Detail(Record):
-    """A part of a shape."""
-
-    noun: str
-    count: int
-
-
-class Appearance(Record):
-    """What the core knows of a target's looks (its `Appearance`), and its size."""
-
-    size_m: tuple[float, float, float]
-    tints: tuple[Tint, ...] = ()
-    form: str | None = None
-    details: tuple[Detail, ...] = ()
-    made_of: tuple[str, ...] = ()
-
-
-def parse_appearance(record: Any, size_m: Any) -> Appearance:  # noqa: ANN401
-    """Appearance from the core's records."""
-    return Appearance(
-        size_m=tuple(size_m),
-        tints=tuple(Tint(colour=tuple(tint["colour"]), share=tint["share"]) for tint in record["tints"]),
-        form=record["form"],
-        details=tuple(Detail(**detail) for detail in record["details"]),
-        made_of=tuple(record["made_of"]),
+def adjectives_of(category: str, size_m: Point3, appearance: Appearance) -> list[str]:
+    """Return the adjectives before the noun, in the grammar's order."""
+    adjectives = (
+        size_word(category, size_m),
+        shape_word(category, size_m, appearance.form),
+        " and ".join(colour_words(appearance.tints)),
+        material_word(category, appearance.made_of),
     )
+    return [adjective for adjective in adjectives if adjective]
 
 
-def looks_of(category: str, appearance: Appearance) -> list[str]:
-    """Adjectives before the noun, in the grammar's order."""
-    words = [size_word(category, appearance.size_m), shape_word(category, appearance)]
-    words.append(" and ".join(colour_words(appearance.tints)))
-    words.append(material_word(category, appearance.made_of))
-    return [word for word in words if word]
-
-
-def size_word(category: str, size_m: tuple[float, float, float]) -> str | None:
-    """Small or large for its kind: among the catalogue's assets of its category."""
+def size_word(category: str, size_m: Point3) -> str | None:
+    """Return `small` or `large`, relative to the catalogue's assets of the category; `None` in between."""
     edges_m = _edges_m().get(category, [])
     if len(edges_m) < 3:
         return None
@@ -110,17 +78,17 @@ def size_word(category: str, size_m: tuple[float, float, float]) -> str | None:
     return "small" if ratio < SMALL_RATIO else "large" if ratio > LARGE_RATIO else None
 
 
-def shape_word(category: str, appearance: Appearance) -> str | None:
-    """Its form, or its proportions where people go by them."""
-    if appearance.form is not None:
-        return appearance.form
-    width_m, height_m, depth_m = appearance.size_m
+def shape_word(category: str, size_m: Point3, form: str | None) -> str | None:
+    """Return an object's form, or a word for its proportions where people use one."""
+    if form is not None:
+        return form
+    width_m, height_m, depth_m = size_m
     short_m, long_m = sorted((width_m, depth_m))
     if category in _TOPS:
         ratio = short_m / long_m
         return "square" if ratio > SQUARE_RATIO else "long" if ratio < LONG_RATIO else "rectangular"
     if category in _UPRIGHT and (heights := _height_ratios().get(category)):
-        # Said only of what is so both by itself and among its kind.
+        # Both the object itself and its ratio to its category must be extreme.
         ratio, usual = height_m / long_m, float(np.median(heights))
         if ratio > 1.3 and ratio > 1.3 * usual:
             return "tall"
@@ -130,7 +98,7 @@ def shape_word(category: str, appearance: Appearance) -> str | None:
 
 
 def colour_words(tints: Iterable[Tint]) -> list[str]:
-    """The colour that shows most, and a second one if it shows much."""
+    """Return the colour with the largest share, and a second one if its share is large enough."""
     shares: Counter[str] = Counter()
     for tint in tints:
         shares[colour_word(tint.colour)] += tint.share  # type: ignore[assignment]
@@ -139,32 +107,32 @@ def colour_words(tints: Iterable[Tint]) -> list[str]:
 
 
 def material_word(category: str, made_of: Iterable[str]) -> str | None:
-    """What it is mainly made of, unless that goes without saying."""
+    """Return the adjective of the main material, unless the category implies it."""
     materials = list(made_of)
     covers = [material for material in materials if material in ("fabric", "leather")]
     first = next(iter(covers if category in _SOFT else materials), None)
-    if first not in MATERIALS or category in _UNSAID.get(first, ()):
+    if first not in MATERIALS or category in _IMPLIED_MATERIALS.get(first, ()):
         return None
     return "cardboard" if (category, first) == ("Box", "paper") else MATERIALS[first]
 
 
 def details_of(category: str, appearance: Appearance) -> list[str]:
-    """Up to two parts by which it can be told, with their number."""
-    words: list[str] = []
+    """Return up to two parts that distinguish an object, with their number."""
+    phrases: list[str] = []
     for detail in appearance.details[:2]:
         if detail.count == 1:
-            words.append(with_article(detail.noun))
+            phrases.append(with_article(detail.noun))
         elif detail.noun in _UNCOUNTED_PARTS or detail.count >= len(NUMBERS):
-            words.append(plural_of(detail.noun))
+            phrases.append(plural_of(detail.noun))
         else:
-            words.append(f"{NUMBERS[detail.count]} {plural_of(detail.noun)}")
+            phrases.append(f"{NUMBERS[detail.count]} {plural_of(detail.noun)}")
     if category == "HousePlant" and "ceramic" in appearance.made_of:
         return ["a ceramic pot"]
-    return words
+    return phrases
 
 
 def colour_word(colour: tuple[int, int, int]) -> str:
-    """The nearest of `evonav.tasks.language.COLOURS`, by hue where there is one."""
+    """Return the nearest of `evonav.tasks.language.COLOURS`, by hue unless the colour is a grey."""
     hue, lightness, saturation = colorsys.rgb_to_hls(*(channel / 255.0 for channel in colour))
     hue_deg = 360.0 * hue
     chroma = saturation * (1.0 - abs(2.0 * lightness - 1.0))
@@ -188,13 +156,14 @@ def colour_word(colour: tuple[int, int, int]) -> str:
     return "purple" if hue_deg < 305.0 else "pink"
 
 
-def _edge_m(size_m: tuple[float, float, float]) -> float:
-    """Edge of the cube of the same volume: how large a thing looks, whatever its form."""
+def _edge_m(size_m: Point3) -> float:
+    """Return the edge of the cube with the same volume: a size that does not depend on the form."""
     return float(np.cbrt(np.prod(size_m)))
 
 
 @lru_cache(maxsize=1)
 def _edges_m() -> dict[str, list[float]]:
+    """Return the sizes of the catalogue's assets by category."""
     edges_m: dict[str, list[float]] = defaultdict(list)
     for _, category, size_m in _core.assets():
         edges_m[category].append(_edge_m(size_m))
@@ -203,7 +172,7 @@ def _edges_m() -> dict[str, list[float]]:
 
 @lru_cache(maxsize=1)
 def _height_ratios() -> dict[str, list[float]]:
-    """Height over the longer side of each asset, by category."""
+    """Return the ratio of height to longer side of each asset, by category."""
     ratios: dict[str, list[float]] = defaultdict(list)
     for _, category, (width_m, height_m, depth_m) in _core.assets():
         ratios[category].append(height_m / max(width_m, depth_m))

@@ -1,4 +1,4 @@
-"""What a model is asked to write of a target (paper, Sec. A.4), and what of its answers may stand in a task."""
+"""Write the prompts for instructions (paper, Sec. A.4), and check a model's answers."""
 
 import re
 
@@ -14,13 +14,13 @@ APPEARANCE_PROMPT = (
     "size, or distinctive parts when helpful.\n"
     "Do not mention coordinates, object IDs, simulator terms, or invisible attributes."
 )
-"""As the paper prints it."""
+"""The paper's prompt for appearance instructions."""
 UNIFIED_PROMPT = (
     "Given the basic instruction, the appearance instruction, and the reference image, write one concise navigation "
     "instruction that combines spatial relations with visual appearance.\n"
     "Keep relations such as on, next to, near, or below only when they are supported by the image."
 )
-"""As the paper prints it."""
+"""The paper's prompt for unified instructions."""
 
 MAX_CHARACTERS = 2000
 MAX_SENTENCES = 2
@@ -38,11 +38,11 @@ _FAULTS: tuple[tuple[str, str], ...] = (
 
 
 def appearance_question(category: str, basic: str, image: NDArray[np.uint8]) -> Prompt:
-    """Asks for the appearance instruction.
+    """Return the prompt that asks for an appearance instruction.
 
     Args:
-        category: Of the target, as ProcTHOR spells it.
-        basic: Its basic instruction.
+        category: The target's category, as ProcTHOR spells it.
+        basic: The target's basic instruction.
         image: `(H, W, 3)` RGB reference image.
     """
     inputs = f"Target category: {noun_of(category)}\nBasic instruction: {basic}\nReference image:"
@@ -50,11 +50,11 @@ def appearance_question(category: str, basic: str, image: NDArray[np.uint8]) -> 
 
 
 def unified_question(basic: str, appearance: str, image: NDArray[np.uint8]) -> Prompt:
-    """Asks for the unified instruction.
+    """Return the prompt that asks for a unified instruction.
 
     Args:
-        basic: Of the target.
-        appearance: Of the target.
+        basic: The target's basic instruction.
+        appearance: The target's appearance instruction.
         image: `(H, W, 3)` RGB reference image.
     """
     inputs = f"Basic instruction: {basic}\nAppearance instruction: {appearance}\nReference image:"
@@ -62,12 +62,12 @@ def unified_question(basic: str, appearance: str, image: NDArray[np.uint8]) -> P
 
 
 def repair_request(fault: str) -> str:
-    """What is said to an answer that cannot stand."""
+    """Return the request to correct an unusable answer."""
     return f"This {fault}. Write it again as one or two plain sentences, and nothing else."
 
 
 def cleaned(answer: str) -> str:
-    """An answer on one line, without the quotes, labels and marks that models put around it."""
+    """Return an answer as one line, without the quotes, labels and formatting that models add around it."""
     line = " ".join(answer.split()).strip()
     line = re.sub(r"^(?:\*\*|__)?[A-Za-z ]{0,30}instruction(?:\*\*|__)?\s*:\s*(?:\*\*|__)?\s*", "", line, flags=re.I)
     line = line.strip("*` ")
@@ -77,7 +77,7 @@ def cleaned(answer: str) -> str:
 
 
 def fault_of(text: str) -> str | None:
-    """What keeps a text from being an instruction; `None` if nothing does."""
+    """Return the reason why a text is no usable instruction, or `None` if it is usable."""
     if not re.search(r"[A-Za-z]{2}", text):
         return "has no words"
     if len(text) > MAX_CHARACTERS:

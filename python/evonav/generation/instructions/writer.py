@@ -1,16 +1,15 @@
-"""Has a model write the appearance and unified instructions of tasks that are there (paper, Sec. A.4).
+"""Have a model write the appearance and unified instructions of existing tasks (paper, Sec. A.4).
 
-A pass of its own after generation, which it keeps fast and free of networks: it can be stopped and gone on with, and a
-task is either wholly as before or wholly rewritten. A stage whose texts the model does not get right keeps those of
-the describer, and says so in `writer`.
+This is a separate pass after generation, so that generation stays fast and needs no network. It is safe to interrupt
+and to run again: each task's files are replaced atomically. A stage for which the model gives no usable text keeps the
+rule-based instructions; its `writer` field says so.
 """
 
-import contextlib
 import dataclasses
 import shutil
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,43 +31,43 @@ from evonav.generation.instructions.prompts import (
 )
 from evonav.parallel.folders import put_folder
 from evonav.tasks.dataset import DATASET_NAME, TaskEntry, entry_of, read_dataset, write_dataset
-from evonav.tasks.files import checksums_of, load_task, write_task
+from evonav.tasks.files import load_task, write_task
 from evonav.tasks.listing import task_roots
 from evonav.tasks.manifest import PublicStage, Task
 
 
 @dataclass
 class Writing:
-    """How far a pass has come."""
+    """Progress of a pass over tasks."""
 
     num_tasks: int = 0
     num_done: int = 0
-    """Tasks looked at, those included that were written before."""
+    """Number of processed tasks, including those written before."""
     num_written: int = 0
-    """Stages that now have the model's texts."""
-    num_kept: int = 0
-    """Stages that had them before."""
+    """Number of stages written by this pass."""
+    num_written_before: int = 0
+    """Number of stages that had the model's texts before."""
     failures: Counter[str] = field(default_factory=Counter)
-    """Stages that keep the describer's texts, by failure."""
+    """Number of stages that keep the rule-based texts, by failure."""
     messages: list[str] = field(default_factory=list)
     stopped: VlmError | None = None
-    """What ended the pass early."""
+    """The error that ended the pass early."""
 
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """What a pass would cost."""
+    """Estimated cost of a pass."""
 
     num_questions: int
-    """At least: a repair is one more."""
-    num_kept: int
-    """Of those, answered by the exchanges."""
+    """Smallest number of questions; each correction of an answer is one more."""
+    num_cached: int
+    """Number of questions with a cached answer."""
     usage: Usage
-    """Of the others, rather too much than too little."""
+    """Estimated usage of the remaining questions (upper bound)."""
 
 
 def writer_of(client: VlmClient) -> str:
-    """What `PublicStage.writer` says of a model's texts."""
+    """Return the value of `PublicStage.writer` for a model's texts."""
     return f"vlm:{client.config.model}"
 
 
@@ -79,20 +78,18 @@ def write_texts(
     limit: int | None = None,
     on_task: Callable[[Writing], None] | None = None,
 ) -> Writing:
-    """Rewrites the public texts of a folder's tasks, their checksums, and those of its `dataset.json`.
-
-    As many tasks are under way as the client asks questions at a time.
+    """Rewrite the instructions of a folder's tasks, and all checksums that depend on them.
 
     Args:
-        directory: Holds one directory a task.
-        client: Of the model.
-        limit: Most tasks; default all.
+        directory: Folder with one folder a task.
+        client: Client of the model; its limit on concurrent questions also limits the concurrent tasks.
+        limit: Number of tasks, from the first; default all.
         on_task: Called after each task.
 
     Raises:
-        TaskError: A task cannot be read or written; what was written before stays.
-        StoreError: The exchanges cannot be read or written.
-        DecisionError: The package `openai` or a key is missing.
+        TaskError: A task cannot be read or written; tasks written before stay rewritten.
+        StoreError: The response cache cannot be read or written.
+        DecisionError: The package `openai` or an API key is missing.
     """
     directory = Path(directory)
     roots = _roots(directory, limit)
@@ -126,34 +123,34 @@ def write_texts(
 
 
 def estimate_texts(directory: Path | str, client: VlmClient, *, limit: int | None = None) -> Estimate:
-    """What `write_texts` would ask; nothing is asked.
+    """Estimate the cost of `write_texts` without asking any question.
 
     Raises:
         TaskError: A task cannot be read.
     """
-    num_questions, num_kept, usage = 0, 0, Usage()
+    num_questions, num_cached, usage = 0, 0, Usage()
     for root in _roots(Path(directory), limit):
         task = load_task(root)
         for public, image in zip(task.public_stages, task.reference_images, strict=True):
             if public.writer == writer_of(client):
                 continue
-            # The appearance text that the second question will have is not known yet.
+            # The second question will contain the model's appearance text, which is not known yet.
             for question in (
                 appearance_question(public.category, public.basic_instruction, image),
                 unified_question(public.basic_instruction, public.appearance_instruction, image),
             ):
-                is_kept = client.is_cached(question)
+                is_cached = client.is_cached(question)
                 num_questions += 1
-                num_kept += is_kept
-                usage += Usage() if is_kept else client.estimate(question)
-    return Estimate(num_questions, num_kept, usage)
+                num_cached += is_cached
+                usage += Usage() if is_cached else client.estimate(question)
+    return Estimate(num_questions, num_cached, usage)
 
 
 def write_stage(public: PublicStage, image: NDArray[np.uint8], client: VlmClient) -> PublicStage:
-    """A stage's public part with the model's texts.
+    """Return a stage's public part with the model's texts.
 
     Raises:
-        VlmError: The model does not write them so that they can stand.
+        VlmError: The model gives no usable text.
     """
     basic = public.basic_instruction
     appearance = _text(client, appearance_question(public.category, basic, image))
@@ -163,7 +160,7 @@ def write_stage(public: PublicStage, image: NDArray[np.uint8], client: VlmClient
 
 
 def _text(client: VlmClient, question: Prompt) -> str:
-    """An instruction, asked for once more if the first cannot stand."""
+    """Ask for an instruction, once more if the first answer is unusable."""
     answer = client.ask(question).text
     text = cleaned(answer)
     fault = fault_of(text)
@@ -176,13 +173,13 @@ def _text(client: VlmClient, question: Prompt) -> str:
 
 
 def _write_task(root: Path, client: VlmClient, stop: threading.Event) -> tuple[Task, Writing]:
-    """Rewrites one task, unless something ends the pass before it is whole."""
+    """Rewrite one task, or leave it as it was if the pass ends first."""
     task = load_task(root)
     part = Writing(num_done=1)
     stages: list[PublicStage] = []
     for public, image in zip(task.public_stages, task.reference_images, strict=True):
         if public.writer == writer_of(client):
-            part.num_kept += 1
+            part.num_written_before += 1
             stages.append(public)
             continue
         if stop.is_set():
@@ -197,18 +194,16 @@ def _write_task(root: Path, client: VlmClient, stop: threading.Event) -> tuple[T
             part.messages.append(f"{task.task_id} stage {public.stage}: {error}")
             stages.append(public)
     if part.num_written:
-        changed = dataclasses.replace(task, public_stages=tuple(stages))
-        header = task.header.model_copy(update={"checksums": checksums_of(changed)})
-        task = dataclasses.replace(changed, header=header)
+        task = dataclasses.replace(task, public_stages=tuple(stages)).with_checksums()
         _swap(task, root)
     return task, part
 
 
 def _swap(task: Task, root: Path) -> None:
-    """Puts a task's files in place of the old ones, all or none.
+    """Replace a task's folder atomically.
 
     Raises:
-        TaskError: They cannot be written.
+        TaskError: The files cannot be written.
     """
     old, new = root.with_name(f".{root.name}.old"), root.with_name(f".{root.name}.new")
     try:
@@ -220,12 +215,12 @@ def _swap(task: Task, root: Path) -> None:
 
 
 def _roots(directory: Path, limit: int | None) -> list[Path]:
-    """The tasks' directories, in order; those that an interrupted pass had set aside are put back.
+    """List the tasks' folders in order, after restoring those that an interrupted pass had moved aside.
 
     Raises:
-        TaskError: There is none, or one cannot be put back.
+        TaskError: The folder holds no task, or a task cannot be restored.
     """
-    with _told(directory):
+    try:
         for old in directory.glob(".*.old"):
             root = old.with_name(old.name.removeprefix(".").removesuffix(".old"))
             if root.exists():
@@ -234,19 +229,13 @@ def _roots(directory: Path, limit: int | None) -> list[Path]:
                 old.rename(root)
         for new in directory.glob(".*.new"):
             shutil.rmtree(new)
+    except OSError as error:
+        raise TaskError(f"{directory}: {error.strerror or error}") from error
     return task_roots(directory)[:limit]
 
 
-@contextlib.contextmanager
-def _told(directory: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise TaskError(f"{directory}: {error.strerror or error}") from error
-
-
 def _update_dataset(directory: Path, entries: dict[str, TaskEntry]) -> None:
-    """Writes the tasks' new checksums into `dataset.json`, if there is one."""
+    """Write the tasks' new checksums into `dataset.json`, if it exists."""
     if not entries or not (directory / DATASET_NAME).exists():
         return
     record = read_dataset(directory)
@@ -258,7 +247,7 @@ def _update_dataset(directory: Path, entries: dict[str, TaskEntry]) -> None:
 def _add(writing: Writing, part: Writing) -> None:
     writing.num_done += part.num_done
     writing.num_written += part.num_written
-    writing.num_kept += part.num_kept
+    writing.num_written_before += part.num_written_before
     writing.failures += part.failures
     writing.messages += part.messages
     writing.stopped = writing.stopped or part.stopped

@@ -25,7 +25,7 @@ from evonav.tasks.listing import task_roots
 from evonav.tasks.statistics import (
     Distribution,
     Estimate,
-    Measure,
+    Metric,
     Quantity,
     Stratum,
     TaskStatistics,
@@ -187,7 +187,7 @@ def _weighting(weighting: Reweighting) -> Weighting:
     )
 
 
-def _measures(tally: _Tally, weighting: Reweighting | None) -> tuple[Measure, ...]:
+def _measures(tally: _Tally, weighting: Reweighting | None) -> tuple[Metric, ...]:
     raw = _estimates(tally, None)
     reweighted = {} if weighting is None else _estimates(tally, weighting)
     sums = _rows(tally).sum(axis=0)
@@ -203,7 +203,7 @@ def _measures(tally: _Tally, weighting: Reweighting | None) -> tuple[Measure, ..
         if estimate is not None and is_wilson:
             estimate = Estimate(value=estimate.value, ci95=wilson(estimate.value * n, n))
         measures.append(
-            Measure(
+            Metric(
                 key=info.key,
                 label=info.label,
                 group=info.group,

@@ -67,7 +67,7 @@ def _evolutions(found: TaskStatistics) -> BarPlot | None:
     test = found.test("num_evolutions")
     papers = {} if test is None or test.paper_shares is None else dict(zip(test.cells, test.paper_shares, strict=True))
     notes = [
-        f"{name}: {_percent(found.measure(key).raw)}, paper {100 * (found.measure(key).paper or 0):.1f}%"
+        f"{name}: {_percent(found.metric(key).raw)}, paper {100 * (found.metric(key).paper or 0):.1f}%"
         for name, key in (("one or more", "evolved_once"), ("two or more", "evolved_twice"))
     ]
     notes += [] if test is None else [f"chi-square p = {test.p:.3f}"]
@@ -76,7 +76,7 @@ def _evolutions(found: TaskStatistics) -> BarPlot | None:
 
 
 def _goals(found: TaskStatistics) -> BarPlot | None:
-    goals = found.measure("goal_relocated")
+    goals = found.metric("goal_relocated")
     if goals.raw is None:
         return None
     value, paper, ends = goals.raw.value, goals.paper or 0.0, goals.raw.ci95
@@ -100,7 +100,7 @@ def _ratio(found: TaskStatistics) -> BarPlot | None:
     one = found.distribution("relocated_ratio")
     if one is None:
         return None
-    median = found.measure("relocated_ratio")
+    median = found.metric("relocated_ratio")
     notes = [f"median: {_percent(median.raw)}, paper 10-20%"]
     if median.reweighted is not None:
         notes.append(f"reweighted: {_percent(median.reweighted)}")

@@ -9,7 +9,7 @@ from evonav.report.plots.render import has_renderer, plot_elements, write_plots
 from evonav.report.plots.statistics_plots import other_plots, paper_plots
 from evonav.report.plots.style import plot_css
 from evonav.tasks.records import record_bytes
-from evonav.tasks.statistics import Estimate, Measure, TaskStatistics
+from evonav.tasks.statistics import Estimate, Metric, TaskStatistics
 
 PAGE_NAME = "statistics.html"
 DATA_NAME = "statistics.json"
@@ -59,9 +59,9 @@ def write_statistics_plot(found: TaskStatistics, path: Path) -> Path:
 
 def _context(found: TaskStatistics) -> dict[str, Any]:
     groups: dict[str, list[list[str]]] = {}
-    for measure in found.measures:
-        if measure.raw is not None:
-            groups.setdefault(measure.group, []).append(_row(measure))
+    for metric in found.measures:
+        if metric.raw is not None:
+            groups.setdefault(metric.group, []).append(_row(metric))
     return {
         "found": found,
         "policy": policy(None),
@@ -72,29 +72,29 @@ def _context(found: TaskStatistics) -> dict[str, Any]:
     }
 
 
-def _row(measure: Measure) -> list[str]:
-    paper = "" if measure.paper is None else _scaled(measure, measure.paper)
-    expected = "" if measure.expected is None else _scaled(measure, measure.expected)
-    accepted = "" if measure.accepted is None else "{}–{}".format(*(_scaled(measure, end) for end in measure.accepted))
-    raw = _shown(measure, measure.raw)
-    raw[1] += " (Wilson)" if measure.interval == "wilson" else ""
+def _row(metric: Metric) -> list[str]:
+    paper = "" if metric.paper is None else _scaled(metric, metric.paper)
+    expected = "" if metric.expected is None else _scaled(metric, metric.expected)
+    accepted = "" if metric.accepted is None else "{}–{}".format(*(_scaled(metric, end) for end in metric.accepted))
+    raw = _shown(metric, metric.raw)
+    raw[1] += " (Wilson)" if metric.interval == "wilson" else ""
     return [
-        measure.label.strip(),
+        metric.label.strip(),
         paper,
         expected,
         accepted,
         *raw,
-        str(measure.n),
-        *_shown(measure, measure.reweighted),
+        str(metric.n),
+        *_shown(metric, metric.reweighted),
     ]
 
 
-def _shown(measure: Measure, estimate: Estimate | None) -> list[str]:
+def _shown(metric: Metric, estimate: Estimate | None) -> list[str]:
     if estimate is None:
         return ["", ""]
-    ends = "" if estimate.ci95 is None else "–".join(_scaled(measure, end) for end in estimate.ci95)
-    return [_scaled(measure, estimate.value), ends]
+    ends = "" if estimate.ci95 is None else "–".join(_scaled(metric, end) for end in estimate.ci95)
+    return [_scaled(metric, estimate.value), ends]
 
 
-def _scaled(measure: Measure, value: float) -> str:
-    return f"{100 * value:.1f}%" if "share" in measure.unit else f"{value:.2f}"
+def _scaled(metric: Metric, value: float) -> str:
+    return f"{100 * value:.1f}%" if "share" in metric.unit else f"{value:.2f}"
