@@ -216,6 +216,12 @@ def test_python_of_a_page_runs(page: Path, place: Path, monkeypatch: pytest.Monk
                 value.stop()
 
 
+def test_no_script_of_a_page_guards_against_being_imported_by_workers() -> None:
+    """Workers do not import the script: tests/evaluation/test_nothing_lost.py runs one without a guard."""
+    guarded = [str(page) for page in pages() for text in python_texts(page) if "__main__" in text]
+    assert guarded == []
+
+
 def test_the_doubting_agent_of_the_tutorial_forgets_an_object_that_is_gone() -> None:
     namespace: dict[str, Any] = {}
     for text in python_texts(Path("docs/tutorial-agent.md")):
