@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.run.components import Backend
+from evonav.perception.words import GROUND_TRUTH
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
 from evonav.perception_benchmark.page import write_perception_report
 from evonav.perception_benchmark.records import read_record, read_records, record_path
@@ -25,7 +26,7 @@ from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 
 SPECS = [
-    PerceptionSpec("gt", "evonav.evaluation.run.components:ground_truth"),
+    PerceptionSpec("gt", GROUND_TRUTH),
     *(PerceptionSpec(name, f"erring_perceptions:{name}") for name in ("missing_a_third", "confusing", "deep")),
 ]
 CONFIG = TourConfig(views_per_room=6, num_houses=2)

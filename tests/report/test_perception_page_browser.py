@@ -7,6 +7,7 @@ import pytest
 from browser import Chromium, needs_browser
 
 from evonav.perception.ground_truth import GroundTruthPerception
+from evonav.perception.words import GROUND_TRUTH
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
 from evonav.perception_benchmark.page import write_perception_report
 from evonav.tasks.bundled import bundled_tasks
@@ -36,7 +37,7 @@ def smuggling():
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("perceptions")
     specs = [
-        PerceptionSpec("gt", "evonav.evaluation.run.components:ground_truth"),
+        PerceptionSpec("gt", GROUND_TRUTH),
         PerceptionSpec(f"mine:{SMUGGLED}", f"{__name__}:smuggling"),
     ]
     with bundled_tasks() as folder:

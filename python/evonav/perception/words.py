@@ -14,7 +14,7 @@ from typing import Any
 
 from evonav.errors import InvalidArgumentError
 
-GROUND_TRUTH = "evonav.evaluation.run.components:ground_truth"
+GROUND_TRUTH = "evonav.perception.ground_truth:GroundTruthPerception"
 NOISY = "evonav.perception.simulated:noisy_perception"
 PREDICTED = "evonav.perception.predicted:predicted_perception"
 STACKS = ("auto", "3d-mem", "unigoal", "transformers", "mini")

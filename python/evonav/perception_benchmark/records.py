@@ -15,6 +15,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from evonav.errors import StoreError
+from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.parallel.folders import write_atomically
 
 HEADER_NAME = "perception.json"
@@ -230,8 +231,8 @@ def read_header(folder: Path) -> Header | None:
     if not path.exists():
         return None
     try:
-        return Header.model_validate_json(path.read_bytes())
-    except (OSError, ValidationError) as error:
+        return Header.model_validate(with_current_paths(json.loads(path.read_bytes())))
+    except (OSError, ValueError) as error:
         raise StoreError(f"{path}: no header of `evonav perception` ({str(error).splitlines()[0]})") from error
 
 

@@ -16,6 +16,7 @@ from pydantic import ValidationError
 from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
 from evonav.evaluation.metrics.navigation import stage_soft_spl, stage_spl
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.parallel.pool import Job, answers, open_pool
@@ -249,7 +250,7 @@ def _reenact(
     num_workers: int,
     on_progress: Callable[[int, int], None],
 ) -> Iterator[str]:
-    backend = header.config.get("backend")
+    backend = with_current_paths(header.config.get("backend"))
     simulator = str(backend.get("simulator")) if isinstance(backend, dict) else ""
     module, _, name = simulator.partition(":")
     if module != Backend.__module__ or name not in _OUR_SIMULATORS:

@@ -21,6 +21,7 @@ from evonav._core import __version__
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
 from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import NUM_RETRIES, Progress, RunConfig, RunRequest, evaluate_all, run_identity
@@ -230,7 +231,7 @@ def read_claim(out: Path) -> dict[str, Any]:
     """
     path = out / SWEEP_NAME
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = with_current_paths(json.loads(path.read_text(encoding="utf-8")))
     except OSError as error:
         raise StoreError(f"{out}: no sweep here ({SWEEP_NAME}: {error.strerror or error})") from None
     except ValueError as error:

@@ -22,6 +22,7 @@ from pydantic import ValidationError
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.stage_metrics import MEASURES_VERSION, kept_measures
 from evonav.evaluation.records.costs import StageCosts
+from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, StageFailure, StageMap, StageRecord
 from evonav.parallel.folders import is_on_network, sync_folder
 
@@ -145,9 +146,9 @@ class RunStore:
         self._db.close()
 
     def meta(self, key: str) -> Any:  # noqa: ANN401 - JSON
-        """A JSON value of the run's header, or `None`."""
+        """Return a JSON value of the run's header with current import paths, or `None`."""
         rows = self._query("SELECT value FROM meta WHERE key = ?", (key,))
-        return json.loads(rows[0][0]) if rows else None
+        return with_current_paths(json.loads(rows[0][0])) if rows else None
 
     def set_meta(self, key: str, value: Any) -> None:  # noqa: ANN401 - JSON
         """Sets a JSON value of the run's header."""

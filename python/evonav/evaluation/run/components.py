@@ -15,6 +15,7 @@ from evonav.evaluation.episode.oracle_baselines import YARDSTICKS, yardstick
 from evonav.evaluation.hosting.process import DecisionSpec, check_importable
 from evonav.evaluation.protocol import EpisodeCase
 from evonav.perception import Perception
+from evonav.perception.words import GROUND_TRUTH
 from evonav.world.simulator import Simulator
 
 
@@ -44,7 +45,7 @@ class Backend:
     """Takes a task's directory, returns an `EpisodeCase`."""
     simulator: str = "evonav.evaluation.run.components:embedded_simulator"
     """Makes a `Simulator`."""
-    perception: str = "evonav.evaluation.run.components:ground_truth"
+    perception: str = GROUND_TRUTH
     """Makes a `Perception`."""
     perception_options: Mapping[str, Any] = field(default_factory=dict)
     """Keywords for `perception`, as JSON."""
@@ -184,13 +185,6 @@ def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - of `Ai2Tho
     from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator
 
     return Ai2ThorSimulator(options=Ai2ThorOptions(**options))
-
-
-def ground_truth() -> Perception:
-    """The simulator's masks and labels."""
-    from evonav.perception.ground_truth import GroundTruthPerception
-
-    return GroundTruthPerception()
 
 
 def _imported(path: str) -> Callable[..., Any]:
