@@ -40,16 +40,20 @@ MAX_TRACEBACK = 20_000
 NUM_FRAMES = 3
 """Of a traceback, the innermost ones."""
 
-_OURS = ("evonav.evaluation.", "evonav.agents.wire", "evonav.agents.serving")
+_OURS = ("evonav.agents.wire", "evonav.agents.serving")
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")
 _CONTAINERS = (dict, list, tuple)
 _SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
 
 
-def describe(error: BaseException) -> str:
-    """An agent's exception in a line or few: type, message, and where it came from, the innermost place last.
+def describe(error: BaseException, *, caller: str | None = None) -> str:
+    """Describe an agent's exception in a line or few: type, message and places, the innermost place last.
 
-    The same in whatever process and at whatever address it was raised.
+    The text is the same in whatever process and at whatever address the exception was raised.
+
+    Args:
+        error: The exception.
+        caller: Package that called the agent in this process; its own places are left out.
     """
     try:
         text = str(error)
@@ -57,7 +61,7 @@ def describe(error: BaseException) -> str:
         text = "(its message cannot be read)"
     text = _ADDRESS.sub("0x...", f"{type(error).__name__}: {text}")
     text = clean(text if len(text) <= MAX_MESSAGE else text[:MAX_MESSAGE] + " ...")
-    places = _places(error.__traceback__)
+    places = _places(error.__traceback__, _OURS if caller is None else (*_OURS, f"{caller}."))
     return f"{text} [{' > '.join(places)}]" if places else text
 
 
@@ -69,11 +73,11 @@ def traceback_of(error: BaseException) -> str:
         return f"{type(error).__name__}"
 
 
-def _places(trace: TracebackType | None) -> list[str]:
+def _places(trace: TracebackType | None, outside: tuple[str, ...]) -> list[str]:
     places: list[str] = []
     while trace is not None:
         module = str(trace.tb_frame.f_globals.get("__name__", "?"))
-        if places or not module.startswith(_OURS):
+        if places or not module.startswith(outside):
             places.append(clean(f"{module}:{trace.tb_lineno} in {trace.tb_frame.f_code.co_name}"))
         trace = trace.tb_next
     return places[-NUM_FRAMES:]

@@ -26,6 +26,7 @@ PROTOCOL = ProtocolConfig(max_rounds=10, max_actions=40)
 """Shorter than an evaluation's."""
 SLOW_ROUND_S = 1.0
 LARGE_MEMORY_MB = 2000.0
+_PACKAGE = "evonav.evaluation"
 
 Verdict = Literal["pass", "warn", "fail", "skip"]
 
@@ -134,7 +135,11 @@ class _Examination:
             factory = self._factory or agent_factory(self._name)
             first = self._here(factory, [case])
         except BaseException as error:  # SystemExit too: it is a stranger's code
-            self._say("made", "fail", f"making it raises {wire.describe(error)}; it must do without arguments")
+            self._say(
+                "made",
+                "fail",
+                f"making it raises {wire.describe(error, caller=_PACKAGE)}; it must do without arguments",
+            )
             return
         self._look(first)
         if first.failures:
@@ -191,7 +196,7 @@ class _Examination:
         ):
             error = probe.errors.get(name)
             if error is not None:
-                self._say(name, "fail", f"raises {wire.describe(error)}")
+                self._say(name, "fail", f"raises {wire.describe(error, caller=_PACKAGE)}")
             elif probe.calls[name]:
                 self._say(name, "pass", f"called {probe.calls[name]} times: {what}")
             else:
@@ -249,7 +254,7 @@ class _Examination:
         if not probe.explains:
             self._say("diagnostics", "warn", "no `diagnostics()` and `entries()`: reports cannot show what it believes")
         elif (error := probe.errors.get("diagnostics")) is not None:
-            self._say("diagnostics", "fail", f"{wire.describe(error)}; see `RoundDiagnostics`")
+            self._say("diagnostics", "fail", f"{wire.describe(error, caller=_PACKAGE)}; see `RoundDiagnostics`")
         else:
             self._say("diagnostics", "pass", f"JSON-ready, {probe.largest_diagnostics} bytes a round at most")
 
@@ -257,7 +262,7 @@ class _Examination:
         if not probe.explains:
             return
         if (error := probe.errors.get("entries")) is not None:
-            self._say("entries", "fail", f"{wire.describe(error)}; see `EntryBelief`")
+            self._say("entries", "fail", f"{wire.describe(error, caller=_PACKAGE)}; see `EntryBelief`")
         elif probe.outside:
             self._say("entries", "fail", f"{probe.outside[0]}; centres are (x, y, z) in metres, in the world's frame")
         else:

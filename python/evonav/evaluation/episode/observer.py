@@ -75,7 +75,7 @@ def blame(kind: ErrorKind) -> Iterator[None]:
         raise StageFailedError(ErrorKind.DECISION, wire.clean(str(error))) from error
     except Exception as error:
         if kind is ErrorKind.AGENT:
-            raise StageFailedError(kind, wire.describe(error)) from error
+            raise StageFailedError(kind, wire.describe(error, caller="evonav.evaluation")) from error
         if isinstance(error, SimulationError):
             is_lost = isinstance(error, SimulatorLostError)
             kind = ErrorKind.SIMULATOR_LOST if is_lost else ErrorKind.SIMULATION
