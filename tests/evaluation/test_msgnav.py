@@ -9,7 +9,7 @@ from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 from evonav.agents.msgnav.agent import MsgNav, MsgNavConfig
 from evonav.agents.msgnav.questions import GraphQuestion
 from evonav.agents.msgnav.scene_graph import SceneGraph
-from evonav.agents.visible_viewpoint import visible_viewpoint
+from evonav.agents.msgnav.viewpoint import visible_viewpoint
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
@@ -228,7 +228,7 @@ def test_the_place_to_stand_is_chosen_once_or_again_while_it_is_off_the_circle()
     run(kept, stage_case(1, "Bed|1"), start=start)
     assert kept.noted[0].found == "snapped"
     assert len(set(kept.noted[:-1])) == 1
-    again = Noting(MsgNavConfig(is_viewpoint_kept=False))
+    again = Noting(MsgNavConfig(has_fixed_viewpoint=False))
     run(again, stage_case(1, "Bed|1"), start=start)
     assert again.noted[0] == kept.noted[0]
     assert again.noted[-2] != again.noted[0]

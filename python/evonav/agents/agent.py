@@ -1,4 +1,4 @@
-"""The agent contract: what evonav evaluates, and all that an agent may answer."""
+"""The agent contract: what evonav evaluates, and every answer that an agent may give."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ AgentAction = Move | NavigateTo | Stop
 
 @dataclass(frozen=True, slots=True)
 class ViewSchedule:
-    """Views a round: `count` cameras, `spacing_deg` apart, centred on the heading; the heading view comes last."""
+    """Views of a round: `count` cameras, `spacing_deg` apart, centred on the heading; the heading view comes last."""
 
     count: int
     spacing_deg: float
@@ -51,79 +51,82 @@ class ViewSchedule:
 
 @dataclass(frozen=True, slots=True)
 class Sensing:
-    """What an agent asks of its sensors (3D-Mem's schedule by default). The protocol caps it; see `ProtocolConfig`."""
+    """The sensors that an agent needs (default: 3D-Mem's schedule), within the limits of `ProtocolConfig`."""
 
     first_round: ViewSchedule = ViewSchedule(7, 40.0)
     later_rounds: ViewSchedule = ViewSchedule(3, 60.0)
     needs_rgb: bool = False
     motion: Literal["waypoints", "actions"] = "waypoints"
-    """What the stage's budget counts: 50 decision rounds, or 500 discrete actions (UniGoal; paper, Sec. C.3)."""
+    """The unit of the stage's budget: 50 decision rounds, or 500 discrete actions (UniGoal; paper, Sec. C.3)."""
     max_travel_m: float = 1.0
-    """Path length a `NavigateTo` covers in one round."""
+    """Path length that a `NavigateTo` covers in one round."""
     occupancy_range_m: float = 3.0
 
 
 class Agent(Protocol):
-    """What evonav evaluates."""
+    """An agent as evonav evaluates it."""
 
     sensing: Sensing
 
     def begin_task(self, task: TaskInfo) -> None:
-        """A new house; forget everything."""
+        """Start in a new house and forget everything."""
         ...
 
     def begin_stage(self, stage: StageInput) -> None:
-        """A new goal in the same house, which may have changed."""
+        """Start the search for a new goal in the same house, which may have changed."""
         ...
 
     def act(self, observation: Observation) -> AgentAction:
-        """One decision round."""
+        """Decide what to do in one decision round."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class EntryBelief:
-    """An object entry as remembered."""
+    """An object entry as the agent remembers it."""
 
     entry_id: int
     label: str
     centre_m: tuple[float, float, float]
     size_m: tuple[float, float, float]
-    """Of the axis-aligned box."""
+    """Edge lengths of the axis-aligned box."""
     num_detections: int
 
 
 @dataclass(frozen=True, slots=True)
 class RoundDiagnostics:
-    """A round in the agent's own words."""
+    """A round as the agent describes it."""
 
     choice: str = ""
-    """For example `object 12`, `frontier 3`, `none`."""
+    """The agent's choice, for example `object 12`, `frontier 3`, `none`."""
     chosen_entry: EntryBelief | None = None
     num_entries: int = 0
     num_frontiers: int = 0
     counters: dict[str, int] = field(default_factory=dict)
-    """Cumulative, such as `conflicts`, `cells_cleared`, `rejected_entries`."""
+    """Cumulative counts, such as `conflicts`, `cells_cleared`, `rejected_entries`."""
     details: dict[str, Any] = field(default_factory=dict)
-    """JSON-ready extras."""
+    """Further JSON-ready values."""
 
 
 @runtime_checkable
 class ExplainingAgent(Protocol):
-    """An agent that can be asked what it believes; for records and pictures, never for scoring."""
+    """An agent that can report its beliefs; for records and pictures, never for scoring."""
 
     def diagnostics(self) -> RoundDiagnostics:
-        """What the agent chose in the last round, and its counters."""
+        """Return what the agent chose in the last round, and its counters."""
         ...
 
     def entries(self) -> Sequence[EntryBelief]:
-        """The object memory; asked as a stage begins and ends, and between rounds when something has come to light."""
+        """Return the object memory.
+
+        It is called when a stage begins, when it ends, and between rounds when an observed change may have changed it.
+        """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class FrontierBelief:
-    """A frontier as the agent knows it."""
+    """A frontier in the agent's map."""
 
     frontier_id: int
     position_m: tuple[float, float]
@@ -132,26 +135,26 @@ class FrontierBelief:
 
 @dataclass(frozen=True, slots=True)
 class Belief:
-    """All that an agent holds true in a round."""
+    """Everything that an agent believes in a round."""
 
     entries: Sequence[EntryBelief]
     candidate_ids: tuple[int, ...]
-    """Entries that the last question offered."""
+    """Ids of the entries that the last question offered."""
     frontiers: Sequence[FrontierBelief]
     cells: NDArray[np.uint8]
     """`(R, C)`: 0 unknown, 1 free, 2 blocked."""
     map_frame: MapFrame
-    """Of `cells`; need not be the task's own."""
+    """Frame of `cells`; it may differ from the task's own."""
     queries: tuple[QueryLogEntry, ...]
     """The questions of the round with their answers."""
     explored: NDArray[np.bool_] | None = None
-    """`(R, C)`: cells that were seen from close by, where the agent tells them apart."""
+    """`(R, C)`: cells that were seen from close by, if the agent distinguishes them."""
 
 
 @runtime_checkable
 class InspectableAgent(Protocol):
-    """An agent whose rounds can be looked at (`evonav view`); never asked in an evaluation."""
+    """An agent whose rounds can be inspected (`evonav view`); never used in an evaluation."""
 
     def belief(self) -> Belief:
-        """What it holds true after `act`."""
+        """Return what the agent believes after `act`."""
         ...

@@ -1,4 +1,4 @@
-"""Mapping and exploration, as all agents but UniGoal share it."""
+"""Mapping and exploration, shared by all agents but UniGoal."""
 
 import math
 from dataclasses import dataclass, field
@@ -15,23 +15,24 @@ Point2 = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class ExplorerConfig:
-    """3D-Mem's constants, and what the paper leaves open."""
+    """3D-Mem's constants, and values that the paper leaves open."""
 
     explored_range_m: float = 1.7
     """Seen cells nearer than this are explored."""
     near_radius_m: float = 0.7
-    """Free cells this near the agent are explored wherever it looks."""
+    """Free cells this near the agent are explored in any viewing direction."""
     start_radius_m: float = 0.6
-    """Cells this near the first pose are taken for free: no camera sees them."""
+    """Cells this near the first pose are assumed to be free, since no camera sees them."""
     min_conflict_cells: int | None = 1
-    """Contradicting cells from which on the map is outdated (1: the paper's oracle occupancy has no noise).
+    """Number of contradicting cells that makes the map outdated (1: the paper's oracle occupancy has no noise).
 
-    `None`: it never is, and the last observation of a cell wins (3D-Mem and MSGNav; paper, Sec. C.3)."""
+    `None`: the map is never outdated, and the last observation of a cell wins (3D-Mem and MSGNav; paper, Sec. C.3)."""
     conflict_margin_cells: int = 0
-    """A contradicting cell counts only if all cells this near it, rows and columns, contradict the map too: against
-    the noise of predicted occupancy, whose edges waver."""
+    """A contradicting cell counts only if all cells within this many rows and columns contradict the map too.
+
+    This absorbs the noise of predicted occupancy, whose edges waver."""
     reached_m: float = 0.3
-    """A frontier this near that is still there after a look is given up."""
+    """A frontier this near the agent that is still there after a look is abandoned."""
     frontiers: FrontierConfig = field(default_factory=FrontierConfig)
 
 
@@ -54,14 +55,14 @@ class Explorer:
         return OccupancyMap(self._map_frame, config.frontiers, explored_range_m=config.explored_range_m)
 
     def clear(self) -> None:
-        """Forgets cells, frontiers with their ids, and what was given up."""
+        """Forget cells, frontiers with their ids, and abandoned frontiers."""
         self.map = self._new_map()
         self._is_blank = True
         self._given_up.clear()
         self._last = None
 
     def observe(self, observation: Observation) -> bool:
-        """Takes over a round's views. All of them are compared with the map before any is integrated.
+        """Integrate a round's views; all of them are compared with the map before any is integrated.
 
         Returns:
             Whether they contradicted the map, which then holds this round's views alone.
@@ -97,7 +98,10 @@ class Explorer:
         return num_conflicting >= self.config.min_conflict_cells
 
     def _give_up_unseeable(self, observation: Observation, here: Point2) -> None:
-        """A frontier that was reached, or could not be, and that is still there, would be chosen for ever."""
+        """Abandon the chosen frontier if it is still there although it was reached, or could not be.
+
+        It would be chosen for ever.
+        """
         last = self._last
         if last is None:
             return
@@ -108,11 +112,11 @@ class Explorer:
 
     @property
     def frontiers(self) -> list[Frontier]:
-        """Those left to explore, by ascending id."""
+        """The frontiers that are left to explore, by ascending id."""
         return [frontier for frontier in self.map.frontiers if frontier.id not in self._given_up]
 
     def go_to(self, frontier: Frontier) -> tuple[Point2, Point2]:
-        """Remembers that the agent goes there.
+        """Remember that the agent goes to a frontier.
 
         Returns:
             Where to stand, and a point to face.
@@ -123,11 +127,11 @@ class Explorer:
         return frontier.position_m, ahead
 
     def stop_exploring(self) -> None:
-        """The agent goes elsewhere: arriving there says nothing about a frontier."""
+        """Note that the agent goes elsewhere: its arrival says nothing about a frontier."""
         self._last = None
 
     def is_free(self, point_m: Point2) -> bool:
-        """Whether the map knows the cell of a point to be free."""
+        """Return whether the map knows the cell of a point to be free."""
         frame = self.map.map_frame
         row = math.floor((point_m[1] - frame.corner_m[1]) / frame.cell_m)
         col = math.floor((point_m[0] - frame.corner_m[0]) / frame.cell_m)
@@ -135,15 +139,15 @@ class Explorer:
 
 
 def _eroded(cells: NDArray[np.bool_], margin_cells: int) -> NDArray[np.bool_]:
-    """Cells all of whose neighbours up to `margin_cells` rows and columns away are set, too."""
+    """Return the cells whose neighbours up to `margin_cells` rows and columns away are all set, too."""
     for _ in range(margin_cells):
         padded = np.pad(cells, 1)
-        sides = range(3)
+        shifts = range(3)
         rows, cols = cells.shape
-        cells = np.logical_and.reduce([padded[r : r + rows, c : c + cols] for r in sides for c in sides])
+        cells = np.logical_and.reduce([padded[r : r + rows, c : c + cols] for r in shifts for c in shifts])
     return cells
 
 
 def nearest_frontier(frontiers: list[Frontier], point_m: Point2) -> Frontier | None:
-    """The frontier whose position is nearest to a point; the older one of two as near."""
+    """Return the frontier whose position is nearest to a point; of two as near, the older one."""
     return min(frontiers, key=lambda f: (math.dist(f.position_m, point_m), f.id), default=None)

@@ -1,4 +1,4 @@
-"""What all agents but UniGoal share: a map with frontiers, object entries, kept views, and one committed target.
+"""The part that all agents but UniGoal share: a map with frontiers, object entries, stored views, one committed target.
 
 Specification: the common substrate of the paper's Sec. C.3 and C.4, with 3D-Mem's parameters.
 """
@@ -27,16 +27,16 @@ Point2 = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class NavigatorConfig:
-    """3D-Mem's constants, and what the paper leaves open."""
+    """3D-Mem's constants, and values that the paper leaves open."""
 
     explorer: ExplorerConfig = field(default_factory=ExplorerConfig)
     objects: ObjectMapConfig = field(default_factory=ObjectMapConfig)
     observation_distance_m: float = 1.5
-    """Where to stand to look at an object."""
+    """Distance from which to look at an object."""
     aim_again_m: float = 0.25
     """The place to stand is chosen again when the middle of the entry has shifted by more than this."""
     image_px: int = 360
-    """Longer edge of an image in a prompt, at most."""
+    """Longest edge of an image in a prompt."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,12 +45,12 @@ class Target:
 
     entry_id: int
     goal_m: Point2
-    """Where to stand."""
+    """The place to stand."""
     centre_m: Point2
 
 
 class Navigator:
-    """Takes in observations, and turns choices into places to go."""
+    """Integrates observations, and turns choices into places to go."""
 
     def __init__(self, map_frame: MapFrame, config: NavigatorConfig) -> None:
         self.config = config
@@ -59,21 +59,21 @@ class Navigator:
         self.views = ViewStore()
         self.target: Target | None = None
         self.round_views: list[StoredView] = []
-        """Of the last round, the heading view last."""
+        """Views of the last round, the heading view last."""
         self._first_map_view = 0
-        """Id of the first view that the map, as it is now, was made of."""
+        """Id of the first view in the present map."""
         self.stage = 1
         self.round = -1
 
     def begin_stage(self, stage: int) -> None:
-        """A new goal: the target is dropped, all else stays, the count of views to the next clean-up starts over."""
+        """Drop the target and start counting views to the next clean-up; everything else stays."""
         self.target = None
         self.stage = stage
         self.round = -1
         self.objects.begin_stage(stage)
 
     def observe(self, observation: Observation) -> bool:
-        """Takes over a round's views: entries first, then cells and frontiers.
+        """Integrate a round's views: entries first, then cells and frontiers.
 
         Returns:
             Whether the views contradicted the map, which then holds this round's views alone; the target is dropped.
@@ -92,7 +92,7 @@ class Navigator:
         return is_outdated
 
     def _follow(self, removed: Sequence[int]) -> None:
-        """Keeps the commitment when its entry was merged into another; drops it when the entry is gone."""
+        """Follow the target's entry if it was merged into another; drop the target if the entry was removed."""
         target = self.target
         if target is None:
             return
@@ -100,19 +100,19 @@ class Navigator:
         self.target = None if entry_id in removed else replace(target, entry_id=entry_id)
 
     def reached(self, observation: Observation) -> Target | None:
-        """The committed target, if its place was reached, or cannot be any nearer."""
+        """Return the committed target if its place was reached, or cannot be approached any further."""
         is_done = observation.has_arrived or not observation.is_action_success
         return self.target if is_done else None
 
     def observation_point(self, centre_m: Point2) -> Point2 | None:
-        """Where to stand to look at a place; `None` where the map knows no free floor around it."""
+        """Return where to stand to look at a place; `None` if the map knows no free floor around it."""
         occupancy = self.explorer.map
         return observation_point(
             occupancy.cells == FREE, occupancy.map_frame, centre_m, self.config.observation_distance_m
         )
 
     def aim(self) -> None:
-        """Brings the target's place up to date: the first glimpse of a table may be its corner."""
+        """Update the target's place: the first view of a table may have shown only its corner."""
         target = self.target
         entry = None if target is None else self.objects.entry(target.entry_id)
         if target is None or entry is None:
@@ -123,47 +123,44 @@ class Navigator:
             self.target = Target(entry.id, goal_m, centre_m)
 
     def approach(self, target: Target) -> NavigateTo:
-        """Commits to a target and goes on towards it."""
+        """Commit to a target and continue towards it."""
         self.target = target
         self.explorer.stop_exploring()
         return NavigateTo(target.goal_m, face_m=target.centre_m)
 
     def go_to_frontier(self, frontier: Frontier) -> NavigateTo:
-        """Goes on towards a frontier; no commitment."""
+        """Continue towards a frontier, without a commitment."""
         position_m, face_m = self.explorer.go_to(frontier)
         return NavigateTo(position_m, face_m=face_m)
 
     def heading_view(self) -> Pixels | None:
-        """The heading view of the last round, for a prompt."""
+        """Return the heading view of the last round, for a prompt."""
         return pixels_of(self.round_views[-1], self.config.image_px) if self.round_views else None
 
-    def candidate(self, entry: ObjectEntry, *, with_images: bool = False) -> ObjectCandidate:
-        """An entry as questions show it.
+    def candidate(self, entry: ObjectEntry) -> ObjectCandidate:
+        """Return an entry of the object memory as questions describe it, without images."""
+        return ObjectCandidate(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)
 
-        Args:
-            entry: Of the object memory.
-            with_images: Cut its best crop out, and find the view that it was last seen in.
-        """
-        crop: Pixels | None = None
-        view: Pixels | None = None
-        if with_images:
-            if (best := self.views.best(entry.id)) is not None:
-                crop = crop_of(best[0], best[1].box_px)
-            if (latest := self.views.latest(entry.id)) is not None:
-                view = pixels_of(latest, self.config.image_px)
-        return ObjectCandidate(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections, crop, view)
+    def with_images(self, candidate: ObjectCandidate) -> ObjectCandidate:
+        """Return a candidate with the best crop of its entry, and the view in which the entry was last seen."""
+        best, latest = self.views.best(candidate.entry_id), self.views.latest(candidate.entry_id)
+        return replace(
+            candidate,
+            crop=None if best is None else crop_of(best[0], best[1].box_px),
+            view=None if latest is None else pixels_of(latest, self.config.image_px),
+        )
 
     def frontier_candidate(self, frontier: Frontier, here: Point2, *, with_images: bool = False) -> FrontierCandidate:
-        """A frontier as questions show it."""
+        """Return a frontier as questions describe it."""
         x_m, z_m = frontier.position_m
         image = self.frontier_image(frontier) if with_images else None
         return FrontierCandidate(frontier.id, (x_m, z_m), math.dist((x_m, z_m), here), image)
 
     def frontier_image(self, frontier: Frontier) -> Pixels | None:
-        """A frontier as the agent saw it: the kept view whose axis points most nearly at it.
+        """Return a frontier as the agent saw it: the stored view whose axis points most nearly at it.
 
-        3D-Mem renders a fresh view for each new frontier; here one of those that showed it has to do, since no agent
-        may look around without spending a round. Views from before the map was rebuilt show what is no longer so.
+        3D-Mem renders a fresh view for each new frontier. Here one of the stored views must do, since no agent may look
+        around without spending a round. Views from before the map was rebuilt are not used: they are outdated.
         """
         best: tuple[float, StoredView] | None = None
         for view in reversed(self.views.views[self._first_map_view :]):
@@ -177,16 +174,16 @@ class Navigator:
                 best = (cost, view)
         return None if best is None else pixels_of(best[1], self.config.image_px)
 
-    def told(
+    def describe_round(
         self, choice: str, entry_id: int | None, counters: Mapping[str, int], details: Mapping[str, Any]
     ) -> RoundDiagnostics:
-        """A round for `diagnostics`.
+        """Return a round's diagnostics.
 
         Args:
-            choice: In the agent's words.
-            entry_id: The chosen entry, if the choice was one.
-            counters: Cumulative.
-            details: JSON-ready extras.
+            choice: The agent's choice, in its own terms.
+            entry_id: The chosen entry, if the agent chose one.
+            counters: Cumulative counts.
+            details: Further JSON-ready values.
         """
         entry = None if entry_id is None else self.objects.entry(entry_id)
         return RoundDiagnostics(
@@ -199,15 +196,15 @@ class Navigator:
         )
 
     def beliefs(self) -> list[EntryBelief]:
-        """The object memory."""
+        """Return the object memory."""
         return [belief_of(entry) for entry in self.objects.entries]
 
     def belief(self, queries: Sequence[QueryLogEntry], candidate_ids: Sequence[int] = ()) -> Belief:
-        """All of it, for pictures.
+        """Return everything that the agent believes, for pictures.
 
         Args:
             queries: The questions of the round with their answers.
-            candidate_ids: Entries that the last question offered.
+            candidate_ids: Ids of the entries that the last question offered.
         """
         cells: NDArray[np.uint8] = self.explorer.map.cells
         return Belief(
@@ -222,5 +219,5 @@ class Navigator:
 
 
 def belief_of(entry: ObjectEntry) -> EntryBelief:
-    """An entry for records."""
+    """Return an entry as records state it."""
     return EntryBelief(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)

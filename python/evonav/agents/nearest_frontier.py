@@ -1,4 +1,4 @@
-"""Exploration alone: always the nearest frontier."""
+"""Exploration alone: the agent always goes to the nearest frontier."""
 
 from evonav.agents.agent import AgentAction, EntryBelief, NavigateTo, RoundDiagnostics, Sensing, Stop
 from evonav.agents.explorer import Explorer, nearest_frontier
@@ -7,7 +7,7 @@ from evonav.tasks.public import StageInput, TaskInfo
 
 
 class NearestFrontier:
-    """Explores, nearest frontier first, and recognises nothing: the search half of a yardstick.
+    """Explores the nearest frontier first and recognises nothing: the search half of an oracle baseline.
 
     Each stage starts with a blank map: what was seen on the way to another goal was not looked at for this one.
     """
@@ -18,16 +18,16 @@ class NearestFrontier:
         self._choice = ""
 
     def begin_task(self, task: TaskInfo) -> None:
-        """A blank map."""
+        """Start with a blank map."""
         self._explorer = Explorer(task.map_frame)
 
     def begin_stage(self, stage: StageInput) -> None:
-        """A blank map."""
+        """Start with a blank map."""
         if self._explorer is not None:
             self._explorer.clear()
 
     def act(self, observation: Observation) -> AgentAction:
-        """Towards the nearest frontier."""
+        """Go towards the nearest frontier."""
         explorer = self._explorer
         assert explorer is not None, "begin_task comes first"
         explorer.observe(observation)
@@ -41,7 +41,7 @@ class NearestFrontier:
         return NavigateTo(position_m, face_m)
 
     def diagnostics(self) -> RoundDiagnostics:
-        """Choice and counters of the last round."""
+        """Return the choice and the counters of the last round."""
         explorer = self._explorer
         if explorer is None:
             return RoundDiagnostics()
@@ -52,5 +52,5 @@ class NearestFrontier:
         )
 
     def entries(self) -> tuple[EntryBelief, ...]:
-        """It remembers no objects."""
+        """Return no entries: the agent remembers no objects."""
         return ()

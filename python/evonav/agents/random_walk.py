@@ -1,4 +1,4 @@
-"""A floor for every measure: walks in random directions and never recognises anything."""
+"""A lower bound for every metric: walk in random directions and recognise nothing."""
 
 import math
 import random
@@ -9,7 +9,7 @@ from evonav.tasks.public import StageInput, TaskInfo
 
 
 class RandomWalk:
-    """Each round straight on, or in a new direction now and then and whenever the way was blocked."""
+    """Goes straight on, or in a new direction now and then and whenever the way was blocked."""
 
     sensing = Sensing(first_round=ViewSchedule(1, 0.0), later_rounds=ViewSchedule(1, 0.0))
 
@@ -19,15 +19,15 @@ class RandomWalk:
         self._heading_rad = 0.0
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Starts the task's own random stream."""
+        """Start the task's own random stream."""
         self._random = random.Random(f"random-walk {task.seed}")  # noqa: S311
         self._heading_rad = self._random.uniform(-math.pi, math.pi)
 
     def begin_stage(self, stage: StageInput) -> None:
-        """Goals make no difference."""
+        """Ignore the goal."""
 
     def act(self, observation: Observation) -> AgentAction:
-        """One metre on."""
+        """Go one metre further."""
         if not observation.is_action_success or self._random.random() < self._turn_probability:
             self._heading_rad = self._random.uniform(-math.pi, math.pi)
         pose = observation.pose

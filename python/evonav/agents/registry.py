@@ -43,11 +43,11 @@ BUILT_IN: dict[str, tuple[str, str]] = {
     "stay-still": ("evonav.agents.stay_still:StayStill", "yardstick: stops at once; its successes are free"),
     "random-walk": ("evonav.agents.random_walk:RandomWalk", "yardstick: walks in random directions"),
 }
-"""Import path and description by name."""
+"""Import path and description of each built-in agent, by name."""
 
 
 def agent_factory(name: str) -> Callable[..., Agent]:
-    """What makes an agent.
+    """Return the class or function that makes an agent.
 
     Args:
         name: A built-in name, an entry point of the group `evonav.agents`, `package.module:Class`, or
@@ -72,7 +72,7 @@ def agent_factory(name: str) -> Callable[..., Agent]:
 
 
 def new_agent(factory: Callable[..., Agent], decision: DecisionModel | None = None) -> Agent:
-    """An agent; one whose factory has a parameter `decision` is given the model of the run."""
+    """Make an agent; a factory with a parameter `decision` is given the run's model."""
     try:
         takes_decision = "decision" in inspect.signature(factory).parameters
     except (TypeError, ValueError):  # builtins and some extension types tell nothing
@@ -82,17 +82,17 @@ def new_agent(factory: Callable[..., Agent], decision: DecisionModel | None = No
 
 
 def agent_descriptions() -> dict[str, str]:
-    """Names and what they are: built-in agents and those of installed packages."""
+    """Return the names and descriptions of built-in agents and of those of installed packages."""
     installed = {entry.name: f"plug-in: {entry.value}" for entry in entry_points(group=ENTRY_POINT_GROUP)}
     return {**installed, **{name: description for name, (_, description) in BUILT_IN.items()}}
 
 
 def imported(path: str, what: str = "agent") -> Callable[..., Any]:
-    """The callable at `package.module:name`, or at `path/to/file.py:name`.
+    """Return the callable at `package.module:name`, or at `path/to/file.py:name`.
 
     Args:
-        path: Where.
-        what: To call it in errors.
+        path: Import path or file, with a name.
+        what: The noun for it in error messages.
 
     Raises:
         InvalidArgumentError: It cannot be imported, or is not callable.
@@ -108,7 +108,7 @@ def imported(path: str, what: str = "agent") -> Callable[..., Any]:
 
 
 def _file_module(path: str) -> ModuleType:
-    """A Python file as a module by its own name, which may import its neighbours; loaded once."""
+    """Load a Python file as a module by its own name, once; the module may import its neighbours."""
     file = Path(path).resolve()
     there = sys.modules.get(file.stem)
     if there is not None and getattr(there, "__file__", None) == str(file):

@@ -1,4 +1,4 @@
-"""Where to stand to look at a remembered object (3D-Mem's observation point)."""
+"""Find where to stand to look at a remembered object (3D-Mem's observation point)."""
 
 import math
 
@@ -14,19 +14,19 @@ _NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1))
 def observation_point(
     is_free: NDArray[np.bool_], frame: MapFrame, object_m: Point2, distance_m: float = 1.5
 ) -> Point2 | None:
-    """A free place `distance_m` from an object, on the side where most free floor is.
+    """Return a free place `distance_m` from an object, on the side where most free floor is.
 
-    Of the free cells within `distance_m` of the object the largest 4-connected group is taken; the point lies in the
-    direction of its mean, at `distance_m` exactly, moved to the nearest free cell.
+    The free cells within `distance_m` of the object fall into 4-connected groups. The point lies in the direction of
+    the largest group's mean, at `distance_m` exactly, moved to the nearest free cell.
 
     Args:
         is_free: `(R, C)`, cells known to be free.
-        frame: Of the map.
+        frame: Frame of the map.
         object_m: `(x, z)` of the object's middle.
-        distance_m: How far to stand.
+        distance_m: Distance from the object.
 
     Returns:
-        `(x, z)` of a cell's middle, or `None` when no cell within `distance_m` is known to be free.
+        `(x, z)` of a cell's middle, or `None` if no cell within `distance_m` is known to be free.
     """
     window, offset = _window(is_free, frame, object_m, distance_m + 2 * frame.cell_m)
     rows, cols = np.nonzero(window)
@@ -55,7 +55,7 @@ def observation_point(
 def _window(
     is_free: NDArray[np.bool_], frame: MapFrame, centre_m: Point2, reach_m: float
 ) -> tuple[NDArray[np.bool_], tuple[int, int]]:
-    """The part of the map around a point, and the row and column where it begins."""
+    """Return the part of the map around a point, and the row and column where it begins."""
     ends = []
     for centre, corner, size in (
         (centre_m[1], frame.corner_m[1], frame.rows),
@@ -69,7 +69,7 @@ def _window(
 
 
 def _largest_group(cells: NDArray[np.bool_]) -> NDArray[np.int64] | None:
-    """`(N, 2)` cells of the largest 4-connected group, the first one of those as large; `None` without cells."""
+    """Return the `(N, 2)` cells of the largest 4-connected group, the first of equals; `None` without cells."""
     unseen = {(int(row), int(col)) for row, col in zip(*np.nonzero(cells), strict=True)}
     largest: list[tuple[int, int]] = []
     for start in sorted(unseen):
@@ -91,17 +91,17 @@ def _largest_group(cells: NDArray[np.bool_]) -> NDArray[np.int64] | None:
 def widest_direction_rad(
     is_free: NDArray[np.bool_], frame: MapFrame, here_m: Point2, reach_m: float, num_directions: int = 72
 ) -> float | None:
-    """The middle of the widest run of directions in which the floor is known to be free.
+    """Return the middle of the widest run of directions in which the floor is known to be free.
 
     Args:
         is_free: `(R, C)`, cells known to be free.
-        frame: Of the map.
-        here_m: `(x, z)` to go from.
-        reach_m: How far it has to be free.
-        num_directions: Directions tried, evenly spaced from +z clockwise.
+        frame: Frame of the map.
+        here_m: `(x, z)` of the agent.
+        reach_m: Distance over which the floor has to be free.
+        num_directions: Number of directions to try, evenly spaced from +z clockwise.
 
     Returns:
-        Radians clockwise from +z, of the first run of those as wide; `None` when it is free in none.
+        Radians clockwise from +z; of runs as wide, the first one's. `None` if no direction is free.
     """
     bearings_rad = np.arange(num_directions) * (math.tau / num_directions)
     steps_m = np.arange(1, math.ceil(reach_m / frame.cell_m) + 1) * frame.cell_m

@@ -24,19 +24,19 @@ from evonav.tasks.public import StageInput, TaskInfo
 
 @dataclass(frozen=True, slots=True)
 class FrontierUpdateConfig:
-    """What the paper says, and what it leaves open."""
+    """The paper's constants, and values that the paper leaves open."""
 
     navigator: NavigatorConfig = field(default_factory=NavigatorConfig)
     num_candidates: int = 5
-    """Object entries that the decision model is shown."""
+    """Number of object entries that the decision model is shown."""
     num_tries: int = 3
-    """Questions asked before an invalid answer is given up on."""
+    """Number of tries before a question without a valid answer counts as failed."""
     on_failed_decision: Literal["nearest_frontier", "abort"] = "nearest_frontier"
-    """Without a valid answer: explore on (the paper leaves it open), or end the stage as 3D-Mem does."""
+    """The action without a valid answer: explore on (the paper leaves it open), or end the stage as 3D-Mem does."""
     explore_towards: Literal["object", "agent"] = "object"
-    """An object that the map does not reach leads to the frontier nearest to it, or to the agent."""
+    """An object that the map does not reach leads to the frontier nearest to the object, or nearest to the agent."""
     ranking: Literal["words", "text"] = "words"
-    """Without image features, entries go by the instruction's words or by their meaning (extra `evonav[text]`)."""
+    """Rank entries by the instruction's words or by its meaning (extra `evonav[text]`), if images have no features."""
 
 
 class FrontierUpdate:
@@ -45,7 +45,7 @@ class FrontierUpdate:
     def __init__(self, config: FrontierUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or FrontierUpdateConfig()
         if self.config.ranking == "text":
-            encoder()  # a missing extra is told before the episode
+            encoder()  # reports a missing extra before the episode
         model: DecisionModel = decision or TextMatch()
         self.sensing = Sensing(needs_rgb=model.needs_images)
         self._queries = QuerySession(model, num_tries=self.config.num_tries)
@@ -57,7 +57,7 @@ class FrontierUpdate:
         self._diagnostics = RoundDiagnostics()
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Forgets everything."""
+        """Forget everything."""
         self._task = task
         self._counters.clear()
         self._details = {}
@@ -65,12 +65,12 @@ class FrontierUpdate:
         self._navigator = Navigator(task.map_frame, self.config.navigator)
 
     def begin_stage(self, stage: StageInput) -> None:
-        """A new goal; entries, map and frontiers stay."""
+        """Take a new goal; entries, map and frontiers stay."""
         self._goal = stage
         self._navigator.begin_stage(stage.stage)
 
     def act(self, observation: Observation) -> AgentAction:
-        """Stops at the object it was committed to; else looks, decides and goes on."""
+        """Stop at the committed object if it was reached; else look, decide and move on."""
         self._queries.begin_round()
         self._candidates = ()
         navigator = self._navigator
@@ -90,30 +90,23 @@ class FrontierUpdate:
         return self._decide(observation)
 
     def _stops_at_sight_of_place(self) -> bool:
-        """Whether arriving at an entry's place ends the stage without another look."""
+        """Return whether arriving at an entry's place ends the stage without another look."""
         return True
 
     def _is_confirmed(self, entry_id: int, observation: Observation) -> bool:
-        """Whether the object of an entry whose place was reached is there."""
+        """Return whether the object of an entry whose place was reached is there."""
         return True
 
     def _reject(self, entry_id: int) -> None:
-        """Revises an entry that was not confirmed."""
+        """Revise an entry that was not confirmed."""
 
     def _decide(self, observation: Observation) -> AgentAction:
-        """Asks where to go: to one of the best entries, or to a frontier."""
+        """Ask where to go: to one of the best entries, or to a frontier."""
         navigator = self._navigator
         here = (observation.pose.x_m, observation.pose.z_m)
         entries = navigator.objects.entries
         remembered = [navigator.candidate(entry) for entry in entries]
-        goal_feature = observation.goal_feature
-        if goal_feature is None and self.config.ranking == "text":
-            order = rank_by_text(self._goal, remembered, here)
-        elif goal_feature is None:
-            order = rank_entries(self._matcher, self._goal, remembered, here)
-        else:
-            order = rank_by_feature(goal_feature, [entry.feature for entry in entries], [entry.id for entry in entries])
-        ranked = [index for index in order if self._is_offered(entries[index])][: self.config.num_candidates]
+        ranked = self._ranked(entries, remembered, observation)[: self.config.num_candidates]
         frontiers = navigator.explorer.frontiers
         if not ranked and not frontiers:
             return self._without_candidates(observation)
@@ -121,7 +114,7 @@ class FrontierUpdate:
         question = ChooseQuestion(
             goal=self._goal,
             position_m=here,
-            objects=[navigator.candidate(entries[index], with_images=with_images) for index in ranked],
+            objects=[navigator.with_images(entry) for entry in ranked] if with_images else ranked,
             frontiers=[navigator.frontier_candidate(f, here, with_images=with_images) for f in frontiers],
             surroundings=remembered,
             num_rounds_left=observation.num_rounds_left,
@@ -138,16 +131,30 @@ class FrontierUpdate:
             return self._go_to_frontier(nearest, "no valid answer")
         return self._stop("no valid answer", None)
 
+    def _ranked(
+        self, entries: Sequence[ObjectEntry], remembered: Sequence[ObjectCandidate], observation: Observation
+    ) -> list[ObjectCandidate]:
+        """Return the entries that may be candidates, the best first: by image features, by words or by meaning."""
+        here = (observation.pose.x_m, observation.pose.z_m)
+        feature = observation.goal_feature
+        if feature is not None:
+            order = rank_by_feature(feature, [entry.feature for entry in entries], [entry.id for entry in entries])
+        elif self.config.ranking == "text":
+            order = rank_by_text(self._goal, remembered, here)
+        else:
+            order = rank_entries(self._matcher, self._goal, remembered, here)
+        return [remembered[index] for index in order if self._is_offered(entries[index])]
+
     def _is_offered(self, entry: ObjectEntry) -> bool:
-        """Whether an entry may be a candidate."""
+        """Return whether an entry may be a candidate."""
         return True
 
     def _without_candidates(self, observation: Observation) -> AgentAction:
-        """There is nothing to ask about: neither entries nor frontiers."""
+        """Act when there is nothing to ask about: neither entries nor frontiers."""
         return self._stop("nothing to go to", None)
 
     def _go_to_object(self, chosen: ObjectCandidate, frontiers: list[Frontier], here: Point2) -> AgentAction:
-        """Commits to an entry whose surroundings the map knows; else explores towards it."""
+        """Commit to an entry whose surroundings the map knows; else explore towards it."""
         goal_m = self._navigator.observation_point(chosen.ground_m)
         if goal_m is None:
             self._counters["unsupported_choices"] += 1
@@ -171,7 +178,7 @@ class FrontierUpdate:
         return Stop(reason)
 
     def _tell(self, choice: str, reason: str, entry_id: int | None = None) -> None:
-        """Notes a round for `diagnostics`."""
+        """Store a round for `diagnostics`."""
         explorer = self._navigator.explorer
         counters = {
             **self._queries.counters,
@@ -182,16 +189,16 @@ class FrontierUpdate:
             **self._counters,
         }
         details = {**({"reason": reason} if reason else {}), **self._details}
-        self._diagnostics = self._navigator.told(choice, entry_id, counters, details)
+        self._diagnostics = self._navigator.describe_round(choice, entry_id, counters, details)
 
     def diagnostics(self) -> RoundDiagnostics:
-        """Choice and counters of the last round."""
+        """Return the choice and the counters of the last round."""
         return self._diagnostics
 
     def entries(self) -> Sequence[EntryBelief]:
-        """The object memory."""
+        """Return the object memory."""
         return self._navigator.beliefs()
 
     def belief(self) -> Belief:
-        """Entries, map, frontiers, and what was asked."""
+        """Return entries, map, frontiers, and the questions of the last round."""
         return self._navigator.belief(self._queries.log, self._candidates)

@@ -1,4 +1,4 @@
-"""Fail-then-Update (paper, Sec. C.4): Frontier-Update that looks whether its target is there before it stops."""
+"""Fail-then-Update (paper, Sec. C.4): Frontier-Update that checks on arrival whether its target is there."""
 
 import math
 from dataclasses import dataclass
@@ -14,24 +14,24 @@ from evonav.sensors.observation import Observation, View
 from evonav.tasks.public import StageInput, TaskInfo
 
 SAME_PLACE_M = 0.5
-"""An entry whose middle is this near that of a rejected one of its label is the same again."""
+"""An entry whose middle is this near that of a rejected one with its label counts as the same."""
 
 
 @dataclass(frozen=True, slots=True)
 class FailThenUpdateConfig(FrontierUpdateConfig):
-    """What the paper leaves open about the look on arrival."""
+    """Values that the paper leaves open about the look on arrival."""
 
     verify_views: Literal["facing", "all"] = "facing"
-    """Show the view towards the entry, or all of the round."""
+    """Views in the question: the one towards the entry, or all of the round."""
     unanswered_means: Literal["yes", "no"] = "yes"
-    """What no valid answer is taken for; `yes` ends the stage, `no` deletes the entry."""
+    """The answer assumed if there is no valid one; `yes` ends the stage, `no` deletes the entry."""
     hide_after_rejections: int | None = None
-    """A safety: an entry that has come up again at the same place, and was rejected so often in a stage, is no
-    candidate for the rest of it. `None`: it is offered again."""
+    """A safeguard: an entry that was rejected this often at one place in a stage is no candidate for the rest of it.
+    `None`: it is offered again."""
 
 
 class FailThenUpdate(FrontierUpdate):
-    """On arrival it asks whether the present view supports the entry; if not, the entry goes and the search goes on."""
+    """Asks on arrival whether the present view supports the entry; if not, it deletes the entry and searches on."""
 
     def __init__(self, config: FailThenUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
         self._verification = config or FailThenUpdateConfig()
@@ -39,12 +39,12 @@ class FailThenUpdate(FrontierUpdate):
         self._rejected: list[tuple[int, str, Point3]] = []
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Forgets everything."""
+        """Forget everything."""
         super().begin_task(task)
         self._counters.update(verifications=0, rejected_entries=0)
 
     def begin_stage(self, stage: StageInput) -> None:
-        """A new goal; what was rejected for the last one is gone from memory anyway."""
+        """Take a new goal; entries rejected in the last stage are no longer in memory."""
         super().begin_stage(stage)
         self._rejected.clear()
         self._details = {}
@@ -57,13 +57,14 @@ class FailThenUpdate(FrontierUpdate):
         entry = navigator.objects.entry(entry_id)
         if entry is None:
             return False
+        remembered = navigator.candidate(entry)
         first = 0 if self._verification.verify_views == "all" else -1
         images = [pixels_of(view, navigator.config.image_px) for view in navigator.round_views[first:]]
         self._counters["verifications"] += 1
         is_present = self._queries.ask(
             VerifyQuestion(
                 goal=self._goal,
-                entry=navigator.candidate(entry, with_images=self.sensing.needs_rgb),
+                entry=navigator.with_images(remembered) if self.sensing.needs_rgb else remembered,
                 seen=[sighting for view in observation.views[first:] for sighting in self._sightings(entry_id, view)],
                 image_share=image_share(observation.views[-1], entry.centre_m, entry.size_m),
                 views=[image for image in images if image is not None],
@@ -101,7 +102,7 @@ class FailThenUpdate(FrontierUpdate):
 
 
 def image_share(view: View, centre_m: tuple[float, float, float], size_m: tuple[float, float, float]) -> float:
-    """About how much of an image an object fills: its box's largest face seen from the camera's distance, 0..1."""
+    """Return about how much of an image an object fills: its largest face at the camera's distance, 0..1."""
     pose, intrinsics = view.pose, view.intrinsics
     distance_m = max(math.dist(pose.position_m, centre_m), 0.1)
     edges_px = sorted((edge_m / distance_m * intrinsics.focal_px for edge_m in size_m), reverse=True)

@@ -1,4 +1,4 @@
-"""What Frontier-Update and its kin ask (paper, Sec. C.4): where to go, and whether the target is still there."""
+"""Questions of Frontier-Update and its variants (paper, Sec. C.4): the next place, and whether the target is there."""
 
 import re
 from collections.abc import Sequence
@@ -17,14 +17,14 @@ _CHOICE = re.compile(r"(object|frontier)\s+(\d+)\b[.:]?", re.IGNORECASE)
 
 @dataclass(frozen=True, slots=True)
 class ChooseQuestion(ClosedQuestion[Choice]):
-    """Where to go next: to one of the objects, or to one of the frontiers?"""
+    """Ask where to go next: to one of the objects, or to one of the frontiers."""
 
     kind: ClassVar[str] = "choose"
     goal: StageInput
     position_m: Point2
-    """Of the agent."""
+    """`(x, z)` of the agent."""
     objects: Sequence[ObjectCandidate]
-    """Best first, by `rank_entries`."""
+    """Candidates, the best first by `rank_entries`."""
     frontiers: Sequence[FrontierCandidate]
     surroundings: Sequence[ObjectCandidate]
     """Everything remembered: what the candidates' images would show around them. Not part of the prompt."""
@@ -32,7 +32,7 @@ class ChooseQuestion(ClosedQuestion[Choice]):
     heading_view: Pixels | None = field(default=None, compare=False, repr=False)
 
     def prompt(self) -> Prompt:
-        """The heading view, each object with its crop and last view, each frontier with its image."""
+        """Show the heading view, each object with its crop and last view, each frontier with its image."""
         parts = [
             *goal_parts(self.goal),
             Text(
@@ -56,7 +56,7 @@ class ChooseQuestion(ClosedQuestion[Choice]):
         return Prompt.of(*merged(parts))
 
     def parse(self, text: str) -> Choice:
-        """`Object i` or `Frontier i`, whatever the case, with an index that there is."""
+        """Read `Object i` or `Frontier i`, in any case, with an index of the list."""
         line = first_line(text)
         match = _CHOICE.fullmatch(line)
         if match is None:
@@ -67,11 +67,11 @@ class ChooseQuestion(ClosedQuestion[Choice]):
         return choice
 
     def answer_text(self, answer: Choice) -> str:
-        """`Object i` or `Frontier i`."""
+        """Return `Object i` or `Frontier i`."""
         return f"{answer.kind.capitalize()} {answer.index}"
 
     def choices(self) -> Sequence[Choice]:
-        """Objects, then frontiers."""
+        """Return objects, then frontiers."""
         return [
             *(Choice("object", index) for index in range(len(self.objects))),
             *(Choice("frontier", index) for index in range(len(self.frontiers))),
@@ -88,27 +88,27 @@ class Sighting:
 
     label: str
     overlap: float
-    """Share of its points that lie by the remembered object's."""
+    """Share of its points that lie by the remembered object's points."""
     distance_m: float
-    """From its centroid to the middle of the remembered object's box; `inf` if it cannot be told."""
+    """Distance from its centroid to the middle of the remembered object's box; `inf` if it is unknown."""
 
 
 @dataclass(frozen=True, slots=True)
 class VerifyQuestion(YesNoQuestion):
-    """Does the present observation support that the remembered object is still here?"""
+    """Ask whether the present observation supports that the remembered object is still here."""
 
     kind: ClassVar[str] = "verify"
     goal: StageInput
     entry: ObjectCandidate
     seen: Sequence[Sighting]
-    """What the present views show, for models that do not look at them. Not part of the prompt."""
+    """Objects in the present views, for models that do not look at images. Not part of the prompt."""
     image_share: float
     """Share of the present view that the remembered object's box would cover if nothing hid it."""
     views: Sequence[Pixels] = field(default=(), compare=False, repr=False)
-    """Present ones, the facing view last."""
+    """Present views, the facing view last."""
 
     def prompt(self) -> Prompt:
-        """The stored crop, and what the robot sees where it was."""
+        """Show the stored crop, and what the robot sees where it was."""
         parts = [
             *goal_parts(self.goal),
             *titled(f"The robot remembers this object: {self.entry.label}", self.entry.crop),

@@ -16,10 +16,10 @@ from evonav.tasks.public import StageInput
 
 @dataclass(frozen=True, slots=True)
 class StageResetConfig(FrontierUpdateConfig):
-    """What a search from scratch leaves open."""
+    """Values that the paper leaves open about a search from scratch."""
 
     on_nothing_found: Literal["widest_direction", "end"] = "widest_direction"
-    """When a stage's first look finds neither objects nor frontiers: go where most floor is free, or end the stage."""
+    """The action if a stage's first look finds neither objects nor frontiers: go where most floor is free, or end."""
 
 
 class StageReset(FrontierUpdate):
@@ -31,7 +31,7 @@ class StageReset(FrontierUpdate):
         self._on_nothing_found = config.on_nothing_found
 
     def begin_stage(self, stage: StageInput) -> None:
-        """Forgets entries, map, frontiers, views and ids; keeps the pose. Counters count over the task."""
+        """Forget entries, map, frontiers, views and ids; counters count over the whole task."""
         before = self._navigator.explorer
         self._navigator = Navigator(self._task.map_frame, self.config.navigator)
         explorer = self._navigator.explorer
@@ -41,7 +41,7 @@ class StageReset(FrontierUpdate):
         super().begin_stage(stage)
 
     def _without_candidates(self, observation: Observation) -> AgentAction:
-        """The first look may be into a corner."""
+        """Go where most floor is free if the stage's first look found nothing, as one into a corner does."""
         navigator = self._navigator
         if navigator.round == 0 and self._on_nothing_found == "widest_direction":
             here, travel_m = (observation.pose.x_m, observation.pose.z_m), self.sensing.max_travel_m

@@ -27,8 +27,8 @@ from evonav.agents.msgnav.candidates import GraphObject, PastChoice
 from evonav.agents.msgnav.memory import GraphMemory
 from evonav.agents.msgnav.questions import ArrivalQuestion, FrontierImagesQuestion, GraphQuestion, SubgraphQuestion
 from evonav.agents.msgnav.scene_graph import Subgraph
+from evonav.agents.msgnav.viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
 from evonav.agents.navigator import Navigator, NavigatorConfig
-from evonav.agents.visible_viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
 from evonav.decision.candidates import ObjectCandidate, Point2
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
@@ -49,46 +49,47 @@ class MsgNavConfig:
     )
     """The map is never cleared; images of 512 px at most."""
     max_edge_m: float = 3.5
-    """Entries seen together farther apart than this have no edge."""
+    """Entries seen together have an edge up to this distance."""
     max_selected: int = 20
-    """Objects that key subgraph selection keeps."""
+    """Largest number of objects in a key subgraph selection."""
     viewpoint: ViewpointConfig = field(default_factory=ViewpointConfig)
-    is_viewpoint_kept: bool = True
-    """Whether the place to stand stays what it was when the target was chosen, as in the original. `False`: a place off
-    the circle, as that of a far target on floor that is not mapped yet, is looked for again in every round."""
+    has_fixed_viewpoint: bool = True
+    """The place to stand stays as it was when the target was chosen, as in the original.
+
+    `False`: a place off the circle, such as that of a far target on unmapped floor, is chosen again in every round."""
     arrival_rounds: int = 5
-    """Rounds whose views are looked at on arrival..."""
+    """Number of last rounds whose views are shown on arrival..."""
     arrival_views: int = 35
-    """...and how many of these at most."""
+    """...and the largest number of these views."""
     num_tries: int = 3
-    """Questions asked before an invalid answer is given up on."""
+    """Number of tries before a question without a valid answer counts as failed."""
 
 
 @dataclass(frozen=True, slots=True)
 class MsgNavTarget:
-    """What the agent is committed to until it arrives."""
+    """The place or object that the agent is committed to until it arrives."""
 
     candidate: ObjectCandidate
-    """The entry when it was chosen; or what an image shows, with the id -1."""
+    """The entry as it was when it was chosen; or the object in an image, with the id -1."""
     viewpoint: Viewpoint
-    """Where to stand."""
+    """The place to stand."""
     view_id: int | None = None
-    """The image that it was found in."""
+    """Id of the image that shows it, unless it is an entry."""
     points_m: NDArray[np.float32] = field(
         default_factory=lambda: np.empty((0, 3), np.float32), compare=False, repr=False
     )
-    """`(N, 3)` when it was chosen."""
+    """`(N, 3)` points when it was chosen."""
 
     @property
     def name(self) -> str:
-        """For diagnostics."""
+        """The target's name in diagnostics."""
         if self.view_id is None:
             return f"object {self.candidate.entry_id}"
         return f"image {self.view_id}, {self.candidate.label}"
 
 
 class MsgNav:
-    """Chooses from a graph, goes to where the choice can be seen, asks whether it is the goal, and remembers a no."""
+    """Chooses from a graph, goes where the choice can be seen, asks if it is the goal, and remembers rejections."""
 
     def __init__(self, config: MsgNavConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or MsgNavConfig()
@@ -100,14 +101,14 @@ class MsgNav:
         self._diagnostics = RoundDiagnostics()
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Forgets everything."""
+        """Forget everything."""
         self._task = task
         self._counters.clear()
         self._queries.counters.clear()
         self._memory = GraphMemory(Navigator(task.map_frame, self.config.navigator), max_edge_m=self.config.max_edge_m)
 
     def begin_stage(self, stage: StageInput) -> None:
-        """A new goal; graph, images and map stay, target and history do not."""
+        """Take a new goal; graph, images and map stay, target and history do not."""
         self._goal = stage
         self._target: MsgNavTarget | None = None
         self._history: list[PastChoice] = []
@@ -115,7 +116,7 @@ class MsgNav:
         self._memory.navigator.begin_stage(stage.stage)
 
     def act(self, observation: Observation) -> AgentAction:
-        """Looks; goes on to what it is committed to; there it asks whether that is the goal; else it decides."""
+        """Look; go on to the committed target; on arrival, ask whether it is the goal; without a target, decide."""
         self._queries.begin_round()
         self._candidates = ()
         self._memory.observe(observation)
@@ -131,7 +132,7 @@ class MsgNav:
         return self._decide(observation)
 
     def _followed(self) -> MsgNavTarget | None:
-        """The target; an entry that was merged into another goes by that one's id."""
+        """Return the target; if its entry was merged into another, by the other's id."""
         target = self._target
         if target is None or target.view_id is not None:
             return target
@@ -140,14 +141,14 @@ class MsgNav:
         return self._target
 
     def _aimed(self, target: MsgNavTarget, observation: Observation) -> MsgNavTarget:
-        """The target with the place to stand that the map now allows, if it may change."""
-        if self.config.is_viewpoint_kept or target.viewpoint.found == "circle":
+        """Return the target with the place to stand that the map now allows, if it may change."""
+        if self.config.has_fixed_viewpoint or target.viewpoint.found == "circle":
             return target
         here = (observation.pose.x_m, observation.pose.z_m)
         return replace(target, viewpoint=self._viewpoint(target.points_m, here))
 
     def _is_found(self, target: MsgNavTarget, observation: Observation) -> bool:
-        """Asks about all views of the last rounds; without a valid answer it is not."""
+        """Ask about all views of the last rounds; no valid answer counts as no."""
         memory, config = self._memory, self.config
         navigator = memory.navigator
         views = memory.recent_views(config.arrival_rounds, config.arrival_views)
@@ -168,7 +169,7 @@ class MsgNav:
         return is_found is True
 
     def _reject(self, target: MsgNavTarget) -> None:
-        """Remembers the no until the stage ends; the entry stays as it is."""
+        """Remember a rejected target until the stage ends; the entry stays as it is."""
         self._counters["rejected_choices"] += 1
         self._history.append(
             PastChoice(
@@ -181,7 +182,7 @@ class MsgNav:
         )
 
     def _decide(self, observation: Observation) -> AgentAction:
-        """Key subgraph, then the choice: an object of it, something in an image, or exploring on."""
+        """Select the key subgraph, then choose: an object of it, something in an image, or exploration."""
         memory, navigator = self._memory, self._memory.navigator
         pose = observation.pose
         here = (pose.x_m, pose.z_m)
@@ -198,7 +199,7 @@ class MsgNav:
         if choice is None:
             return self._random_frontier()
         if choice.kind == "explore":
-            return self._explore(here)
+            return self._explore(here, [node.candidate for node in nodes])
         if choice.kind == "object":
             points_m = navigator.objects.points_m(choice.id)
             candidate = next((node.candidate for node in question.objects if node.entry_id == choice.id), None)
@@ -219,7 +220,7 @@ class MsgNav:
     def _graph_question(
         self, nodes: Sequence[GraphObject], subgraph: Subgraph, observation: Observation
     ) -> GraphQuestion:
-        """The main question, with as few images as show every edge."""
+        """Return the main question, with as few images as show every edge."""
         memory, config = self._memory, self.config
         images = memory.images(subgraph.view_ids, config.navigator.image_px if self.sensing.needs_rgb else None)
         number_of = {image.view_id: number for number, image in enumerate(images)}
@@ -241,7 +242,7 @@ class MsgNav:
         )
 
     def _viewpoint(self, points_m: NDArray[np.float32], here: Point2) -> Viewpoint:
-        """The place from which most of a target can be seen."""
+        """Return the place from which most of a target can be seen."""
         navigator = self._memory.navigator
         occupancy = navigator.explorer.map
         return visible_viewpoint(
@@ -249,14 +250,14 @@ class MsgNav:
         )
 
     def _approach(self, target: MsgNavTarget, reason: str) -> AgentAction:
-        """Commits to a target and goes on towards it; the heading on arrival is the direction of travel."""
+        """Commit to a target and continue towards it; the heading on arrival is the direction of travel."""
         self._target = target
         self._memory.navigator.explorer.stop_exploring()
         self._tell(target.name, reason, target)
         return NavigateTo(target.viewpoint.position_m)
 
-    def _explore(self, here: Point2) -> AgentAction:
-        """The only frontier, or the one that the model chooses by its image."""
+    def _explore(self, here: Point2, remembered: Sequence[ObjectCandidate]) -> AgentAction:
+        """Go to the only frontier, or to the one that the model chooses by its image."""
         navigator = self._memory.navigator
         frontiers = navigator.explorer.frontiers
         if len(frontiers) < 2:
@@ -266,15 +267,15 @@ class MsgNav:
             FrontierImagesQuestion(
                 goal=self._goal,
                 frontiers=[navigator.frontier_candidate(f, here, with_images=with_images) for f in frontiers],
-                surroundings=[navigator.candidate(entry) for entry in navigator.objects.entries],
+                surroundings=remembered,
             )
         )
-        return (
-            self._random_frontier() if index is None else self._go_to_frontier(frontiers[index], self._queries.reason)
-        )
+        if index is None:
+            return self._random_frontier()
+        return self._go_to_frontier(frontiers[index], self._queries.reason)
 
     def _random_frontier(self) -> AgentAction:
-        """What follows every invalid answer; drawn from the task's seed, the stage and the round alone."""
+        """Go to a frontier drawn from the task's seed, the stage and the round alone, after any invalid answer."""
         navigator = self._memory.navigator
         frontiers = navigator.explorer.frontiers
         if not frontiers:
@@ -293,27 +294,27 @@ class MsgNav:
         return Stop("nothing to explore")
 
     def _tell(self, choice: str, reason: str, target: MsgNavTarget | None = None) -> None:
-        """Notes a round for `diagnostics`."""
+        """Store a round for `diagnostics`."""
         entry_id = target.candidate.entry_id if target is not None and target.view_id is None else None
         counters = {**self._queries.counters, **self._counters, "edges": len(self._memory.graph)}
         details = {"reason": reason} if reason else {}
-        self._diagnostics = self._memory.navigator.told(choice, entry_id, counters, details)
+        self._diagnostics = self._memory.navigator.describe_round(choice, entry_id, counters, details)
 
     def diagnostics(self) -> RoundDiagnostics:
-        """Choice and counters of the last round."""
+        """Return the choice and the counters of the last round."""
         return self._diagnostics
 
     def entries(self) -> Sequence[EntryBelief]:
-        """The object memory."""
+        """Return the object memory."""
         return self._memory.navigator.beliefs()
 
     def belief(self) -> Belief:
-        """Entries, map, frontiers, and what was asked."""
+        """Return entries, map, frontiers, and the questions of the last round."""
         return self._memory.navigator.belief(self._queries.log, self._candidates)
 
 
 def _candidate_of(label: str, points_m: NDArray[np.float32]) -> ObjectCandidate:
-    """Something that is no entry, by its points."""
+    """Return an object that is no entry, by its points."""
     low, high = points_m.min(axis=0).astype(np.float64), points_m.max(axis=0).astype(np.float64)
     x_m, y_m, z_m = ((low + high) / 2.0).tolist()
     width_m, height_m, depth_m = (high - low).tolist()

@@ -1,4 +1,4 @@
-"""What MSGNav remembers beyond the shared memory, and its questions made of it."""
+"""MSGNav's memory beyond the shared one, and the parts of questions made from it."""
 
 from collections.abc import Sequence
 
@@ -16,13 +16,13 @@ from evonav.memory.views import StoredView, pixels_of
 from evonav.sensors.observation import Observation
 
 _MIN_SIMILARITY = 0.4
-"""From which on a word may be for a label, as for `Matcher.label_score`."""
+"""Smallest similarity at which a word may name a label, as for `Matcher.label_score`."""
 OTHER_ROOM = "others"
-"""The room of entries around which nothing speaks for one; so the original's classifier calls it."""
+"""The room of entries whose surroundings point to no type of room, named as by the original's classifier."""
 
 
 class GraphMemory:
-    """Entries, kept views and their points, and the scene graph over them."""
+    """Entries, stored views and their points, and the scene graph over them."""
 
     def __init__(self, navigator: Navigator, *, max_edge_m: float) -> None:
         self.navigator = navigator
@@ -32,7 +32,7 @@ class GraphMemory:
         self._entry_ids: frozenset[int] = frozenset()
 
     def observe(self, observation: Observation) -> None:
-        """Takes over a round's views: entries, map and frontiers, then the graph."""
+        """Integrate a round's views: entries, map and frontiers, then the graph."""
         navigator, graph = self.navigator, self.graph
         navigator.observe(observation)
         became = {entry_id: navigator.views.resolve(entry_id) for entry_id in graph.entry_ids}
@@ -46,10 +46,10 @@ class GraphMemory:
             graph.add_view(stored.id, {entry_id: centres_m[entry_id] for entry_id in found if entry_id in centres_m})
 
     def nodes(self) -> list[GraphObject]:
-        """Every entry with its room and its neighbours.
+        """Return every entry with its room and its neighbours.
 
-        MSGNav asks CLIP which kind of room the whole image shows. There is no CLIP here: a room is what the things
-        around an entry speak for (`Matcher.room_around`), as for all other agents.
+        MSGNav asks CLIP which kind of room the whole image shows. There is no CLIP here: as for all other agents, the
+        room follows from the objects around an entry (`Matcher.room_around`).
         """
         neighbours = self.graph.neighbours()
         candidates = [self.navigator.candidate(entry) for entry in self.navigator.objects.entries]
@@ -64,11 +64,11 @@ class GraphMemory:
         ]
 
     def images(self, view_ids: Sequence[int], image_px: int | None) -> list[GraphImage]:
-        """Kept views as questions show them, then those of this round.
+        """Return stored views as questions show them, then those of this round.
 
         Args:
-            view_ids: That cover the graph. One of this round is shown once, among the first.
-            image_px: Longer edge of the images at most; `None` for none.
+            view_ids: Views that cover the graph. A view of this round is shown once, among the first.
+            image_px: Longest edge of the images; `None` for no images.
         """
         views = self.navigator.views.views
         now = [view.id for view in self.navigator.round_views]
@@ -84,16 +84,18 @@ class GraphMemory:
         return GraphImage(view.id, is_egocentric, tuple(seen), pixels)
 
     def _alive(self, entry_id: int | None) -> int | None:
-        """The entry that an entry has become, if it is still there."""
+        """Return the entry that an entry was merged into, if it still exists."""
         entry_id = None if entry_id is None else self.navigator.views.resolve(entry_id)
         return entry_id if entry_id in self._entry_ids else None
 
     def recent_views(self, num_rounds: int, max_views: int) -> list[StoredView]:
-        """Views of the last rounds of this stage, the most recent first: in an earlier one the house may have differed.
+        """Return the views of the last rounds of this stage, the most recent first.
+
+        Views of earlier stages are left out, since the house may have differed.
 
         Args:
-            num_rounds: This one included.
-            max_views: At most so many.
+            num_rounds: Number of rounds, this one included.
+            max_views: Largest number of views.
         """
         navigator = self.navigator
         recent: list[StoredView] = []
@@ -105,7 +107,7 @@ class GraphMemory:
         return recent
 
     def detections(self, views: Sequence[StoredView]) -> list[ObjectCandidate]:
-        """What was detected in some views, each detection by its own points; those of no entry have negative ids."""
+        """Return the detections in some views, each by its own points; those of no entry have negative ids."""
         found: list[ObjectCandidate] = []
         for view in views:
             for one, box_m in zip(view.seen, self._clouds[view.id].boxes_m, strict=True):
@@ -116,10 +118,11 @@ class GraphMemory:
         return found
 
     def largest_detection(self, view_id: int, category: str) -> tuple[str, NDArray[np.float32]] | None:
-        """Label and `(N, 3)` points of the largest thing of a category in a kept view (adaptive vocabulary update).
+        """Return label and `(N, 3)` points of the largest object of a category in a stored view.
 
-        MSGNav runs its detector on the image once more, with the category as its only word. Under ground truth the
-        recorded masks answer: those whose label names it best, a dining table where a table is asked for.
+        This is the adaptive vocabulary update: MSGNav runs its detector on the image once more, with the category as
+        its only word. Under ground truth the recorded masks answer: the one whose label names the category best, such
+        as a dining table for a table.
         """
         noun = canonical(category)
         seen = self.navigator.views.views[view_id].seen

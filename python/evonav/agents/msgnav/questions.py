@@ -33,18 +33,18 @@ _FRONTIER = re.compile(r"frontier\s+(\d+)[.]?", re.IGNORECASE)
 
 @dataclass(frozen=True, slots=True)
 class SubgraphQuestion(Question[tuple[int, ...]]):
-    """Which objects help to find the goal? Key subgraph selection."""
+    """Ask which objects help to find the goal (key subgraph selection)."""
 
     kind: ClassVar[str] = "subgraph"
     goal: StageInput
     objects: Sequence[GraphObject]
     """The whole graph."""
     position_m: Point2
-    """Of the agent. Not part of the prompt."""
+    """`(x, z)` of the agent. Not part of the prompt."""
     max_ids: int = 20
 
     def prompt(self) -> Prompt:
-        """The whole graph as text, one line an object."""
+        """Show the whole graph as text, one line an object."""
         lines = [
             f"{node.entry_id}: {node.candidate.label}, {node.room}, "
             f"beside {', '.join(map(str, node.neighbour_ids)) or 'nothing'}"
@@ -60,7 +60,7 @@ class SubgraphQuestion(Question[tuple[int, ...]]):
         return Prompt.of(*merged([*goal_parts(self.goal), Text(text)]))
 
     def parse(self, text: str) -> tuple[int, ...]:
-        """Ids one a line; lines that name no object of the graph are left out, as is what comes after `max_ids`."""
+        """Read one id a line; lines that name no object of the graph are left out, and so are ids after `max_ids`."""
         known = {node.entry_id for node in self.objects}
         ids: list[int] = []
         for line in lines_of(text):
@@ -72,16 +72,16 @@ class SubgraphQuestion(Question[tuple[int, ...]]):
         return tuple(ids[: self.max_ids])
 
     def answer_text(self, answer: tuple[int, ...]) -> str:
-        """One id a line."""
+        """Return one id a line."""
         return "\n".join(map(str, answer))
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """An array of ids."""
+        """Return the schema of an array of ids."""
         ids = [str(node.entry_id) for node in self.objects]
         return {"type": "array", "items": {"type": "string", "enum": ids}, "maxItems": self.max_ids}
 
     def alternatives(self, answer: tuple[int, ...]) -> Sequence[tuple[int, ...]]:
-        """Any other object alone."""
+        """Return each other object alone."""
         return [(node.entry_id,) for node in self.objects if (node.entry_id,) != answer]
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[int, ...], str]:
@@ -91,26 +91,26 @@ class SubgraphQuestion(Question[tuple[int, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class GraphQuestion(Question[GraphChoice]):
-    """Where to go? To an object of the graph, to something that an image shows, or on exploring."""
+    """Ask where to go: to an object of the graph, to something that an image shows, or on exploring."""
 
     kind: ClassVar[str] = "graph"
     goal: StageInput
     objects: Sequence[GraphObject]
-    """Selected ones and their neighbours."""
+    """Selected objects and their neighbours."""
     edges: Sequence[tuple[int, int, tuple[int, ...]]]
     """Ids of two objects, and numbers of images that show both."""
     images: Sequence[GraphImage]
-    """Those that cover the edges, then those of this round."""
+    """Images that cover the edges, then those of this round."""
     history: Sequence[PastChoice]
-    """Of this stage, oldest first."""
+    """Earlier choices of this stage, oldest first."""
     round: int
-    """From 0."""
+    """The round, from 0."""
     max_rounds: int
     num_frontiers: int
-    """Not part of the prompt."""
+    """Number of frontiers. Not part of the prompt."""
 
     def prompt(self) -> Prompt:
-        """Objects and edges as text, images with numbers, and what was tried before."""
+        """Show objects and edges as text, images with numbers, and earlier choices."""
         objects = [_object_line(node) for node in self.objects]
         edges = [f"{a}, {b}, [{', '.join(map(str, numbers))}]" for a, b, numbers in self.edges]
         parts = [
@@ -140,7 +140,7 @@ class GraphQuestion(Question[GraphChoice]):
         return Prompt.of(*merged(parts))
 
     def parse(self, text: str) -> GraphChoice:
-        """`Object id`, `Image i, category` or `Continue Exploration`, of an object or an image that there is."""
+        """Read `Object id`, `Image i, category` or `Continue Exploration`, of an object or image of the question."""
         line = first_line(text)
         if (match := _OBJECT.fullmatch(line)) is not None:
             if int(match[1]) not in {node.entry_id for node in self.objects}:
@@ -156,17 +156,17 @@ class GraphQuestion(Question[GraphChoice]):
         raise AnswerError("invalid", f"{expected}: {line[:80]!r}", text)
 
     def answer_text(self, answer: GraphChoice) -> str:
-        """As the grammar has it."""
+        """Return the answer in the form that `parse` reads."""
         if answer.kind == "object":
             return f"Object {answer.id}"
         return f"Image {answer.id}, {answer.category}" if answer.kind == "image" else "Continue Exploration"
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """One of three forms."""
+        """Return the schema of the three forms."""
         return {"type": "string", "pattern": r"^(Object \d+|Image \d+, [A-Za-z][A-Za-z ]*|Continue Exploration)$"}
 
     def alternatives(self, answer: GraphChoice) -> Sequence[GraphChoice]:
-        """Every other object, and exploring."""
+        """Return every other object, and exploration."""
         choices = [*(GraphChoice("object", node.entry_id) for node in self.objects), GraphChoice("explore")]
         return [choice for choice in choices if choice != answer]
 
@@ -191,7 +191,7 @@ def _object_line(node: GraphObject) -> str:
 
 @dataclass(frozen=True, slots=True)
 class FrontierImagesQuestion(ClosedQuestion[int]):
-    """Behind which frontier may the goal be? The answer is its place in the list."""
+    """Ask behind which frontier the goal may be; the answer is its place in the list."""
 
     kind: ClassVar[str] = "frontier"
     goal: StageInput
@@ -200,7 +200,7 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
     """Everything remembered: what the images would show. Not part of the prompt."""
 
     def prompt(self) -> Prompt:
-        """Each frontier with its image."""
+        """Show each frontier with its image."""
         parts = [*goal_parts(self.goal), Text("The robot searches a home. It may explore one of these frontiers next.")]
         for index, frontier in enumerate(self.frontiers):
             parts += titled(f"Frontier {index}:", frontier.image)
@@ -213,7 +213,7 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
         return Prompt.of(*merged(parts))
 
     def parse(self, text: str) -> int:
-        """`Frontier i`, with a frontier that there is."""
+        """Read `Frontier i`, with a frontier of the list."""
         line = first_line(text)
         match = _FRONTIER.fullmatch(line)
         if match is None or int(match[1]) >= len(self.frontiers):
@@ -221,11 +221,11 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
         return int(match[1])
 
     def answer_text(self, answer: int) -> str:
-        """`Frontier i`."""
+        """Return `Frontier i`."""
         return f"Frontier {answer}"
 
     def choices(self) -> Sequence[int]:
-        """Places in the list."""
+        """Return the places in the list."""
         return range(len(self.frontiers))
 
     def by_rule(self, matcher: Matcher) -> tuple[int, str]:
@@ -235,25 +235,25 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
 
 @dataclass(frozen=True, slots=True)
 class ArrivalQuestion(YesNoQuestion):
-    """Is the goal here? Asked at an object that was chosen, with all that was seen on the last stretch to it."""
+    """Ask whether the goal is here: at a chosen object, with all that was seen on the last stretch to it."""
 
     kind: ClassVar[str] = "arrival"
     goal: StageInput
     target: ObjectCandidate
-    """What the agent went to. Not part of the prompt."""
+    """The object that the agent went to. Not part of the prompt."""
     seen: Sequence[ObjectCandidate]
     """Detections of these rounds, each by the points of that view alone. Not part of the prompt."""
     num_views: int
-    """Of the last rounds; as many images where the model looks at them."""
+    """Number of views of the last rounds, and of images if the model looks at them."""
     num_frontiers: int
-    """Not part of the prompt."""
+    """Number of frontiers. Not part of the prompt."""
     num_rounds_left: int
-    """Not part of the prompt."""
+    """Number of rounds that are left. Not part of the prompt."""
     views: Sequence[Pixels] = field(default=(), compare=False, repr=False)
-    """Most recent first."""
+    """Views, the most recent first."""
 
     def prompt(self) -> Prompt:
-        """The views."""
+        """Show the views."""
         parts = [*goal_parts(self.goal), Text("The robot may have arrived. What it saw, the most recent view first:")]
         for index, view in enumerate(self.views):
             parts += titled(f"View {index}:", view)

@@ -1,7 +1,7 @@
 """Rules for what MSGNav asks: the same knowledge of words, geometry and rooms as all other rules.
 
-They look at no image. What an image shows they know by the labels that were recorded with it, and what the arrived
-agent sees by the points of the last rounds' detections; size, form and colour are never judged.
+They look at no image. They know an image by the labels that were recorded with it, and the surroundings of an agent
+that has arrived by the points of the last rounds' detections; size, shape and colour are never judged.
 """
 
 import math
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def select(matcher: Matcher, question: "SubgraphQuestion") -> tuple[tuple[int, ...], str]:
-    """Entries whose label the instruction speaks of; then others, one a label, none beside one that is chosen.
+    """Select the entries that the instruction mentions; then others, one a label, none beside a selected one.
 
     Raises:
         AnswerError: The graph is empty.
@@ -50,10 +50,10 @@ def select(matcher: Matcher, question: "SubgraphQuestion") -> tuple[tuple[int, .
 
 
 def choose(matcher: Matcher, question: "GraphQuestion") -> tuple[GraphChoice, str]:
-    """An object that the instruction fits and that was not wrong before; else what only an image shows; else explore.
+    """Choose a fitting object that was not rejected; else one that only an image shows; else explore.
 
-    With no frontier or hardly a round left anything of the right category will do, and then what the goal should be
-    on or near.
+    With no frontier or hardly a round left, any object of the right category is chosen, or else one that the goal
+    should be on or near.
     """
     goal, config = matcher.parsed(question.goal), matcher.config
     around = [node.candidate for node in question.objects]
@@ -85,7 +85,7 @@ def choose(matcher: Matcher, question: "GraphQuestion") -> tuple[GraphChoice, st
 def _unmapped(
     matcher: Matcher, goal: Goal, question: "GraphQuestion", around: Sequence[ObjectCandidate]
 ) -> GraphChoice | None:
-    """The largest detection of the goal's category that is of no entry, and by no place that is known already."""
+    """Choose the largest detection of the goal's category that belongs to no entry and lies at no known place."""
     known_m = [candidate.ground_m for candidate in around if matcher.names_goal(goal, candidate)]
     known_m += [past.place_m for past in question.history if past.place_m is not None]
 
@@ -108,7 +108,7 @@ def _unmapped(
 
 
 def explore(matcher: Matcher, question: "FrontierImagesQuestion") -> tuple[int, str]:
-    """The cheapest frontier."""
+    """Choose the cheapest frontier."""
     goal = matcher.parsed(question.goal)
     costs_m = [matcher.frontier_cost_m(goal, frontier, question.surroundings) for frontier in question.frontiers]
     index = min(range(len(costs_m)), key=lambda i: (costs_m[i], i))
@@ -116,7 +116,7 @@ def explore(matcher: Matcher, question: "FrontierImagesQuestion") -> tuple[int, 
 
 
 def arrive(matcher: Matcher, question: "ArrivalQuestion") -> tuple[bool, str]:
-    """Found if the goal's category was seen at the place, and what is said of it holds among what was seen.
+    """Answer yes if the goal's category was seen at the place, and its relations hold among the objects seen.
 
     With no frontier or hardly a round left the category is enough.
     """
@@ -128,6 +128,6 @@ def arrive(matcher: Matcher, question: "ArrivalQuestion") -> tuple[bool, str]:
     ]
     if not here:
         return False, f"no {goal.noun} seen here"
-    held = max(matcher.relation_share(goal, seen, question.seen) for seen in here)
+    share = max(matcher.relation_share(goal, seen, question.seen) for seen in here)
     is_last_chance = question.num_frontiers == 0 or question.num_rounds_left <= config.hurry_rounds
-    return held >= config.min_relations or is_last_chance, f"{goal.noun} seen here, {held:.0%} of what is said fits"
+    return share >= config.min_relations or is_last_chance, f"{goal.noun} seen here, {share:.0%} of what is said fits"

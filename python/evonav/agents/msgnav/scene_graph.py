@@ -1,7 +1,7 @@
-"""MSGNav's multi-modal scene graph: which entries were seen together, and in which kept views.
+"""MSGNav's multi-modal scene graph: the entries that were seen together, and the stored views that show them.
 
-Entries are those of the object map, images those of the view store; this holds the edges between them. An edge has no
-text: it is the list of the views that show both of its ends.
+Entries are those of the object map, images those of the view store; this module has the edges between them. An edge has
+no text: it is the list of the views that show both of its ends.
 """
 
 import heapq
@@ -10,40 +10,39 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 Pair = tuple[int, int]
-"""Two entries, the smaller id first; twice the same one for an entry by itself."""
+"""Ids of two entries, the smaller first; twice the same one for an entry's edge to itself."""
 
 
 @dataclass(slots=True)
 class _Edge:
     bit: int
-    """Its place in the views' masks."""
+    """The edge's bit in the views' masks."""
     view_ids: list[int] = field(default_factory=list)
-    """Ascending."""
+    """Ids of the views that show both ends, ascending."""
 
 
 class SceneGraph:
     """Edges between entries that one view shows at most `max_edge_m` apart, an entry's edge to itself included."""
 
     def __init__(self, *, max_edge_m: float = 3.5) -> None:
-        """A graph without edges.
+        """Create a graph without edges.
 
         Args:
             max_edge_m: Largest distance on the ground plane between the middles of two ends.
         """
         self.max_edge_m = max_edge_m
         self._edges: dict[Pair, _Edge] = {}
-        self._masks: dict[
-            int, int
-        ] = {}  # view id -> its edges as bits: a view is compared with all that is left at once
+        self._masks: dict[int, int] = {}
+        """Edges of each view as bits, by its id, so that a view is compared with all remaining edges at once."""
         self._next_bit = 0
 
     def __len__(self) -> int:
-        """Number of edges."""
+        """Return the number of edges."""
         return len(self._edges)
 
     @property
     def entry_ids(self) -> list[int]:
-        """Entries with an edge, ascending."""
+        """Ids of the entries with an edge, ascending."""
         return sorted({end for pair in self._edges for end in pair})
 
     @property
@@ -52,17 +51,17 @@ class SceneGraph:
         return sorted(self._edges)
 
     def views_of(self, pair: Pair) -> Sequence[int]:
-        """Views that show both ends, ascending; empty without such an edge."""
+        """Return the views that show both ends, ascending; empty without such an edge."""
         edge = self._edges.get(pair)
         return [] if edge is None else list(edge.view_ids)
 
     def edges_of(self, view_id: int) -> list[Pair]:
-        """Ends of the edges that a view shows, ascending."""
+        """Return the ends of the edges that a view shows, ascending."""
         mask = self._masks.get(view_id, 0)
         return sorted(pair for pair, edge in self._edges.items() if mask >> edge.bit & 1)
 
     def neighbours(self) -> dict[int, set[int]]:
-        """Entries one edge away, by entry; an entry is not its own neighbour."""
+        """Return the entries one edge away, by entry; an entry is not its own neighbour."""
         found: dict[int, set[int]] = {}
         for a, b in self._edges:
             ends = found.setdefault(a, set()), found.setdefault(b, set())
@@ -72,10 +71,10 @@ class SceneGraph:
         return found
 
     def add_view(self, view_id: int, centres_m: Mapping[int, tuple[float, float]]) -> None:
-        """Joins the entries that a view shows.
+        """Join the entries that a view shows.
 
         Args:
-            view_id: Larger than those before.
+            view_id: Id of the view, larger than those before.
             centres_m: `(x, z)` of each entry that a detection of the view joined.
         """
         seen = sorted(centres_m.items())
@@ -89,7 +88,7 @@ class SceneGraph:
         self._masks[view_id] = mask
 
     def follow(self, merged: Mapping[int, int] | Iterable[tuple[int, int]]) -> None:
-        """Hands the edges of entries that became others to those; pairs as `ObjectUpdate.merged` has them."""
+        """Move the edges of merged entries to the entries that they became; pairs as in `ObjectUpdate.merged`."""
         for old, new in dict(merged).items():
             for pair in [pair for pair in self._edges if old in pair]:
                 gone = self._drop(pair)
@@ -100,26 +99,26 @@ class SceneGraph:
                     self._masks[view_id] |= 1 << edge.bit
 
     def prune(self, alive: Iterable[int]) -> None:
-        """Drops the edges that have lost an end."""
+        """Drop the edges that have lost an end."""
         ids = set(alive)
         for pair in [pair for pair in self._edges if not ids.issuperset(pair)]:
             self._drop(pair)
 
     def subgraph(self, selected: Iterable[int]) -> "Subgraph":
-        """The edges from selected entries to selected or adjacent ones.
+        """Return the edges from selected entries to selected or adjacent ones.
 
         Args:
-            selected: Entries; those without an edge have been seen in no view and are left out.
+            selected: Ids of entries; those without an edge were seen in no view and are left out.
         """
         chosen = set(selected)
-        kept = [pair for pair in self.pairs if pair[0] in chosen or pair[1] in chosen]
-        return Subgraph(tuple(sorted({end for pair in kept for end in pair})), tuple(kept), self.cover(kept))
+        pairs = [pair for pair in self.pairs if pair[0] in chosen or pair[1] in chosen]
+        return Subgraph(tuple(sorted({end for pair in pairs for end in pair})), tuple(pairs), self.cover(pairs))
 
     def cover(self, pairs: Sequence[Pair]) -> tuple[int, ...]:
-        """Few views that show all these edges: always the one that shows most of those left, the older of two as good.
+        """Return few views that show all these edges: always the one that shows most of the rest, the oldest of equals.
 
-        A heap holds the number of edges that each view had left when last counted. That number only falls, so a view
-        that is still first after a recount is the best.
+        A heap has the number of uncovered edges that each view had when it was last counted. The number only falls,
+        so a view that is still first after a recount is the best.
         """
         left = 0
         for pair in pairs:

@@ -1,7 +1,7 @@
-"""3D-Mem (paper, Sec. C.3): snapshots and frontiers, chosen from by a decision model; what it remembers it believes."""
+"""3D-Mem (paper, Sec. C.3): choose from snapshots and frontiers by a decision model, and trust the memory."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -16,15 +16,14 @@ from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
 from evonav.decision.text.decision import TextMatch
 from evonav.memory import Frontier
-from evonav.memory.objects import ObjectEntry
 from evonav.memory.views import crop_of, pixels_of
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
 
 NO_ANSWER = "aborted: no valid answer"
-"""Reason of a stop: the decision model could not be understood."""
+"""The reason of a stop when the decision model gave no valid answer."""
 NOTHING_LEFT = "aborted: no snapshot and no frontier left"
-"""Reason of a stop: there was nothing to ask about."""
+"""The reason of a stop when there was nothing to ask about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,15 +35,15 @@ class ThreeDMemConfig:
         default_factory=lambda: NavigatorConfig(explorer=ExplorerConfig(min_conflict_cells=None))
     )
     max_classes: int = 10
-    """Classes that the prefilter keeps."""
+    """Largest number of classes that pass the prefilter."""
     recluster_reach_m: float = RECLUSTER_REACH_M
     """Entries nearer than this are clustered anew in each round."""
     num_tries: int = 3
-    """Questions asked before an invalid answer is given up on."""
+    """Number of tries before a question without a valid answer counts as failed."""
 
 
 class ThreeDMem:
-    """Walks to what a snapshot shows and stops there, whether or not it is still there."""
+    """Walks to an object in a snapshot and stops there, whether or not it is still there."""
 
     def __init__(self, config: ThreeDMemConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or ThreeDMemConfig()
@@ -57,19 +56,19 @@ class ThreeDMem:
         self._diagnostics = RoundDiagnostics()
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Forgets everything."""
+        """Forget everything."""
         self._counters.clear()
         self._queries.counters.clear()
         self._navigator = Navigator(task.map_frame, self.config.navigator)
         self._snapshots = SnapshotMemory(self.config.recluster_reach_m)
 
     def begin_stage(self, stage: StageInput) -> None:
-        """A new goal; entries, snapshots, map and frontiers stay."""
+        """Take a new goal; entries, snapshots, map and frontiers stay."""
         self._goal = stage
         self._navigator.begin_stage(stage.stage)
 
     def act(self, observation: Observation) -> AgentAction:
-        """Stops at the object it was committed to; else looks, clusters, decides and goes on."""
+        """Stop at the committed object if it was reached; else look, cluster, decide and move on."""
         self._queries.begin_round()
         self._candidates = ()
         navigator = self._navigator
@@ -89,11 +88,11 @@ class ThreeDMem:
         return self._decide(observation)
 
     def _decide(self, observation: Observation) -> AgentAction:
-        """Asks which classes matter, then where to go: to an object of a snapshot, or to a frontier."""
+        """Ask which classes matter, then where to go: to an object of a snapshot, or to a frontier."""
         navigator = self._navigator
         here = (observation.pose.x_m, observation.pose.z_m)
-        entries = {entry.id: entry for entry in navigator.objects.entries}
-        shown = self._surviving(entries)
+        remembered = {entry.id: navigator.candidate(entry) for entry in navigator.objects.entries}
+        shown = self._surviving(remembered)
         frontiers = navigator.explorer.frontiers
         if not shown and not frontiers:
             self._counters["aborts_nothing_left"] += 1
@@ -102,9 +101,9 @@ class ThreeDMem:
         question = SnapshotQuestion(
             goal=self._goal,
             position_m=here,
-            snapshots=[self._candidate(snapshot, entries) for snapshot in shown],
+            snapshots=[self._candidate(snapshot, remembered) for snapshot in shown],
             frontiers=[navigator.frontier_candidate(f, here, with_images=with_images) for f in frontiers],
-            surroundings=[navigator.candidate(entry) for entry in entries.values()],
+            surroundings=list(remembered.values()),
             num_rounds_left=observation.num_rounds_left,
             heading_view=navigator.heading_view() if with_images else None,
         )
@@ -119,36 +118,36 @@ class ThreeDMem:
         self._details["snapshot"] = shown[choice.snapshot].view.id
         return self._go_to_object(question.snapshots[choice.snapshot].objects[choice.index], reason)
 
-    def _surviving(self, entries: dict[int, ObjectEntry]) -> list[Snapshot]:
-        """Snapshots with something of the classes that the decision model finds useful, and that alone."""
+    def _surviving(self, remembered: Mapping[int, ObjectCandidate]) -> list[Snapshot]:
+        """Return the snapshots with objects of the useful classes, without other objects."""
         snapshots = self._snapshots.snapshots
-        names = sorted({entries[entry_id].label for snapshot in snapshots for entry_id in snapshot.entry_ids})
-        kept: tuple[str, ...] = ()
+        names = sorted({remembered[entry_id].label for snapshot in snapshots for entry_id in snapshot.entry_ids})
+        useful: tuple[str, ...] = ()
         if names:
             answer = self._queries.ask(PrefilterQuestion(self._goal, names, self.config.max_classes))
-            kept = answer or ()  # without an answer there are no snapshots, as in the original
-        self._details["prefilter"] = list(kept)
-        useful = [
-            Snapshot(snapshot.view, tuple(i for i in snapshot.entry_ids if entries[i].label in kept))
+            useful = answer or ()  # without an answer there are no snapshots, as in the original
+        self._details["prefilter"] = list(useful)
+        filtered = [
+            Snapshot(snapshot.view, tuple(i for i in snapshot.entry_ids if remembered[i].label in useful))
             for snapshot in snapshots
         ]
-        surviving = [snapshot for snapshot in useful if snapshot.entry_ids]
+        surviving = [snapshot for snapshot in filtered if snapshot.entry_ids]
         self._details["num_snapshots_shown"] = len(surviving)
         return surviving
 
-    def _candidate(self, snapshot: Snapshot, entries: dict[int, ObjectEntry]) -> SnapshotCandidate:
-        """A snapshot as the question shows it; crops are of its own view."""
+    def _candidate(self, snapshot: Snapshot, remembered: Mapping[int, ObjectCandidate]) -> SnapshotCandidate:
+        """Return a snapshot as the question shows it; crops are from its own view."""
         navigator, view = self._navigator, snapshot.view
         objects: list[ObjectCandidate] = []
         for entry_id in snapshot.entry_ids:
             seen = navigator.views.seen_in(view, entry_id) if self.sensing.needs_rgb else None
             crop = None if seen is None else crop_of(view, seen.box_px)
-            objects.append(replace(navigator.candidate(entries[entry_id]), crop=crop))
+            objects.append(replace(remembered[entry_id], crop=crop))
         image = pixels_of(view, navigator.config.image_px) if self.sensing.needs_rgb else None
         return SnapshotCandidate(view.id, objects, image)
 
     def _go_to_object(self, chosen: ObjectCandidate, reason: str) -> AgentAction:
-        """Commits to an entry, wherever it is."""
+        """Commit to an entry, wherever it is."""
         goal_m = self._navigator.observation_point(chosen.ground_m)
         if goal_m is None:
             self._counters["unmapped_choices"] += 1
@@ -168,7 +167,7 @@ class ThreeDMem:
         return Stop(reason)
 
     def _tell(self, choice: str, reason: str, entry_id: int | None = None) -> None:
-        """Notes a round for `diagnostics`."""
+        """Store a round for `diagnostics`."""
         explorer = self._navigator.explorer
         counters = {
             **self._queries.counters,
@@ -181,16 +180,16 @@ class ThreeDMem:
             "num_snapshots": len(self._snapshots.snapshots),
             **({"reason": reason} if reason else {}),
         }
-        self._diagnostics = self._navigator.told(choice, entry_id, counters, details)
+        self._diagnostics = self._navigator.describe_round(choice, entry_id, counters, details)
 
     def diagnostics(self) -> RoundDiagnostics:
-        """Choice, prefilter, snapshots and counters of the last round."""
+        """Return the choice, the prefilter, the snapshots and the counters of the last round."""
         return self._diagnostics
 
     def entries(self) -> Sequence[EntryBelief]:
-        """The object memory."""
+        """Return the object memory."""
         return self._navigator.beliefs()
 
     def belief(self) -> Belief:
-        """Entries, map, frontiers, and what was asked."""
+        """Return entries, map, frontiers, and the questions of the last round."""
         return self._navigator.belief(self._queries.log, self._candidates)

@@ -1,4 +1,4 @@
-"""3D-Mem's snapshots: a few of the kept views, which together show every remembered object once."""
+"""3D-Mem's snapshots: a few of the stored views, which together show every remembered object once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,45 +15,45 @@ RECLUSTER_REACH_M = 4.0
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """A view, and the entries that it stands for."""
+    """A view, and the entries that it represents."""
 
     view: StoredView
     entry_ids: tuple[int, ...]
-    """Never empty; all are seen in the view."""
+    """Ids of the entries, at least one; all are seen in the view."""
 
 
 class SnapshotMemory:
     """Keeps each entry in exactly one snapshot, whose view shows it.
 
-    Frames (views with what was detected in them) and snapshots follow entries that merge or vanish.
+    Frames (views with their detections) and snapshots follow entries that merge or vanish.
     """
 
     def __init__(self, reach_m: float = RECLUSTER_REACH_M) -> None:
-        """A memory without snapshots.
+        """Create a memory without snapshots.
 
         Args:
             reach_m: Entries nearer to the agent than this are clustered anew at each update.
         """
         self.reach_m = reach_m
         self.snapshots: list[Snapshot] = []
-        """By ascending id of their views."""
+        """Snapshots by ascending id of their views."""
         self._frames: dict[int, dict[int, float]] = {}
         self._num_views = 0
 
     @property
     def num_frames(self) -> int:
-        """Views that show at least one entry that is still remembered."""
+        """Number of views that show at least one remembered entry."""
         return len(self._frames)
 
     def update(self, views: ViewStore, entries: Sequence[ObjectEntry], agent_m: Point2) -> None:
-        """Takes over the views that came since, and clusters what is new or near the agent.
+        """Add the views that came since the last update, and cluster the entries that are new or near the agent.
 
         Args:
-            views: The same store at each call.
-            entries: All that is remembered.
-            agent_m: `(x, z)`.
+            views: The view store, the same at each call.
+            entries: All remembered entries.
+            agent_m: `(x, z)` of the agent.
         """
-        self._take_over(views, {entry.id for entry in entries})
+        self._add_frames(views, {entry.id for entry in entries})
         frame_of_view = {view_id: index for index, view_id in enumerate(self._frames)}
         before = [
             (frame_of_view[snapshot.view.id], list(snapshot.entry_ids))
@@ -70,8 +70,8 @@ class SnapshotMemory:
         view_ids = list(self._frames)
         self.snapshots = [Snapshot(views.views[view_ids[frame]], tuple(entry_ids)) for frame, entry_ids in after]
 
-    def _take_over(self, views: ViewStore, remembered: set[int]) -> None:
-        """Makes frames of new views, and drops from all of them what is not remembered any more."""
+    def _add_frames(self, views: ViewStore, remembered: set[int]) -> None:
+        """Make frames of new views, and drop forgotten entries from all frames."""
         for view in views.views[self._num_views :]:
             self._frames[view.id] = {}
             for seen in view.seen:
@@ -90,5 +90,5 @@ class SnapshotMemory:
 
 
 def _note(frame: dict[int, float], entry_id: int, confidence: float) -> None:
-    """Of several detections of an entry the surest counts."""
+    """Store a detection's confidence; of several detections of an entry the largest counts."""
     frame[entry_id] = max(confidence, frame.get(entry_id, confidence))

@@ -1,4 +1,4 @@
-"""What 3D-Mem asks (paper, Sec. C.3): which classes matter, then which snapshot's object or frontier to go to."""
+"""Questions of 3D-Mem (paper, Sec. C.3): the classes that matter, then a snapshot's object or a frontier to go to."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -20,16 +20,16 @@ _NONE = "none"
 
 @dataclass(frozen=True, slots=True)
 class PrefilterQuestion(Question[tuple[str, ...]]):
-    """Which kinds of remembered things may lead to the goal, the most useful first?"""
+    """Ask which classes of remembered objects may lead to the goal, the most useful first."""
 
     kind: ClassVar[str] = "prefilter"
     goal: StageInput
     class_names: Sequence[str]
-    """Of what is in snapshots; each once, sorted."""
+    """Classes of the objects in snapshots; each once, sorted."""
     max_classes: int = 10
 
     def prompt(self) -> Prompt:
-        """The names. How many are kept is not said, as in the original."""
+        """Show the names. As in the original, the number of names that will be used is not stated."""
         return Prompt.of(
             *merged(
                 (
@@ -46,7 +46,7 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
         )
 
     def parse(self, text: str) -> tuple[str, ...]:
-        """Names of the list, whatever the case; others are dropped, and so is what comes after the first ten.
+        """Read names of the list, in any case; others are dropped, and so are names after the first `max_classes`.
 
         Raises:
             AnswerError: There is no line with a name of the list, nor one that says `none`.
@@ -59,15 +59,15 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
         return names
 
     def answer_text(self, answer: tuple[str, ...]) -> str:
-        """A name a line."""
+        """Return one name a line."""
         return "\n".join(answer) or _NONE
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """Lines, each a name of the list."""
+        """Return the schema of lines that are names of the list."""
         return {"type": "array", "items": {"type": "string", "enum": [*self.class_names, _NONE]}}
 
     def alternatives(self, answer: tuple[str, ...]) -> Sequence[tuple[str, ...]]:
-        """The same without its best name, and all that it leaves out."""
+        """Return the answer without its best name, and the names that it leaves out."""
         others = tuple(name for name in self.class_names if name not in answer)[: self.max_classes]
         return [names for names in dict.fromkeys((answer[1:], others)) if names != answer]
 
@@ -78,22 +78,22 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
-    """Where to go next: to an object in one of the snapshots, or to one of the frontiers?"""
+    """Ask where to go next: to an object in one of the snapshots, or to one of the frontiers."""
 
     kind: ClassVar[str] = "choose_snapshot"
     goal: StageInput
     position_m: Point2
-    """Of the agent."""
+    """`(x, z)` of the agent."""
     snapshots: Sequence[SnapshotCandidate]
     frontiers: Sequence[FrontierCandidate]
     surroundings: Sequence[ObjectCandidate]
     """Everything remembered: what the snapshots' images would show around their objects. Not part of the prompt."""
     num_rounds_left: int
-    """Not part of the prompt."""
+    """Number of rounds that are left. Not part of the prompt."""
     heading_view: Pixels | None = field(default=None, compare=False, repr=False)
 
     def prompt(self) -> Prompt:
-        """The heading view, each snapshot with its image and crops, each frontier with its image."""
+        """Show the heading view, each snapshot with its image and crops, each frontier with its image."""
         parts: list[Part] = [
             *goal_parts(self.goal),
             Text(
@@ -118,7 +118,7 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
         return Prompt.of(*merged(parts))
 
     def parse(self, text: str) -> SnapshotChoice:
-        """`Snapshot i, Object j` or `Frontier i`, whatever the case, with indices that there are."""
+        """Read `Snapshot i, Object j` or `Frontier i`, in any case, with indices of the question."""
         line = first_line(text)
         if (found := _OBJECT.fullmatch(line)) is not None:
             choice = SnapshotChoice(int(found[1]), int(found[2]))
@@ -132,13 +132,13 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
         return choice
 
     def answer_text(self, answer: SnapshotChoice) -> str:
-        """`Snapshot i, Object j` or `Frontier i`."""
+        """Return `Snapshot i, Object j` or `Frontier i`."""
         if answer.snapshot is None:
             return f"Frontier {answer.index}"
         return f"Snapshot {answer.snapshot}, Object {answer.index}"
 
     def choices(self) -> Sequence[SnapshotChoice]:
-        """Objects in the order of their snapshots, then frontiers."""
+        """Return objects in the order of their snapshots, then frontiers."""
         return [
             *(
                 SnapshotChoice(index, number)

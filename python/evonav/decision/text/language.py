@@ -174,8 +174,9 @@ def similarity(noun: str, label: str) -> float:
     return shared * (0.9 if a and b and noun.split()[-1] == other.split()[-1] else 0.4)
 
 
+@lru_cache(maxsize=4096)
 def parse_goal(instruction: str, category: str | None = None) -> Goal:
-    """Reads an instruction.
+    """Parse an instruction, each only once.
 
     Args:
         instruction: English, in evonav's grammar or freer.

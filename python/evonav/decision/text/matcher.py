@@ -73,14 +73,10 @@ class Matcher:
 
     def __init__(self, config: TextMatchConfig | None = None) -> None:
         self.config = config or TextMatchConfig()
-        self._goals: dict[tuple[str, str], Goal] = {}
 
     def parsed(self, goal: StageInput) -> Goal:
-        """The instruction, read once."""
-        key = (goal.unified_instruction, goal.category)
-        if key not in self._goals:
-            self._goals[key] = parse_goal(*key)
-        return self._goals[key]
+        """Return the parsed instruction."""
+        return parse_goal(goal.unified_instruction, goal.category)
 
     def names_goal(self, goal: Goal, entry: ObjectCandidate) -> bool:
         """Whether an entry's label is what the goal calls its target."""

@@ -1,4 +1,4 @@
-"""Where to stand so that remembered points show most of an object (MSGNav's visibility-based viewpoint decision)."""
+"""Find where to stand so that remembered points show most of an object (MSGNav's viewpoint decision)."""
 
 import math
 from dataclasses import dataclass, field
@@ -18,11 +18,11 @@ class ViewpointConfig:
     """MSGNav's constants."""
 
     num_candidates: int = 20
-    """Evenly on a circle around the mean of the object's points."""
+    """Number of places to try, evenly spaced on a circle around the mean of the object's points."""
     radius_m: float = 0.75
-    """Of that circle."""
+    """Radius of that circle."""
     eye_height_m: float = 1.5
-    """Over the floor."""
+    """Height of the eye over the floor."""
     sight: SightConfig = field(default_factory=SightConfig)
 
 
@@ -32,9 +32,9 @@ class Viewpoint:
 
     position_m: Point2
     share: float
-    """Of the object's points that are seen from there."""
+    """Share of the object's points that are seen from there."""
     found: Literal["circle", "snapped", "box"]
-    """On the circle; on free floor near it; or, as nothing shows the object, at its box."""
+    """The place is on the circle; on free floor near it; or, if no place shows the object, at the object's box."""
 
 
 def visible_viewpoint(
@@ -45,17 +45,17 @@ def visible_viewpoint(
     here_m: Point2,
     config: ViewpointConfig | None = None,
 ) -> Viewpoint:
-    """The place that shows most of an object, the first of those that show as much.
+    """Return the place that shows most of an object, the first of equals.
 
     Candidates lie on a circle around the object where the floor is free. If none of them shows anything, all of them
-    are moved to the nearest free cells; if those show nothing either, it is the middle of that bottom edge of the box
-    around the object that is nearest to the agent, wherever that is: the planner ends at the nearest free point.
+    are moved to the nearest free cells. If those show nothing either, the place is the middle of the bottom edge of the
+    object's box that is nearest to the agent, free or not: the planner ends at the nearest free point.
 
     Args:
-        objects: What may be in the way.
+        objects: Remembered objects, which may hide the target.
         target_m: `(N, 3)` points of the object, at least one.
         is_free: `(R, C)`, cells known to be free.
-        frame: Of the map.
+        frame: Frame of the map.
         here_m: `(x, z)` of the agent.
         config: MSGNav's constants.
     """
@@ -80,7 +80,7 @@ def visible_viewpoint(
 def _best(
     objects: ObjectMap, target_m: NDArray[np.float32], places_m: NDArray[np.float64], config: ViewpointConfig
 ) -> tuple[Point2, float] | None:
-    """The first of the places that show most; `None` if none shows anything."""
+    """Return the first of the places that show most; `None` if none shows anything."""
     if len(places_m) == 0:
         return None
     eyes_m = np.insert(places_m, 1, config.eye_height_m, axis=1)
@@ -100,7 +100,7 @@ def _are_free(places_m: NDArray[np.float64], is_free: NDArray[np.bool_], frame: 
 
 
 def _snapped(places_m: NDArray[np.float64], is_free: NDArray[np.bool_], frame: MapFrame) -> NDArray[np.float64]:
-    """Middles of the free cells that are nearest to some places; none where no cell is free."""
+    """Return the middles of the free cells that are nearest to some places; none if no cell is free."""
     cells = np.argwhere(is_free)
     if len(cells) == 0:
         return np.empty((0, 2))
