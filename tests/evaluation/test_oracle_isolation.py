@@ -12,7 +12,7 @@ from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_case, write_tas
 
 from evonav.agents.agent import NavigateTo, Sensing
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.oracle_baselines import PrivilegedAgent
+from evonav.evaluation.episode.oracle_baselines import OracleBaseline
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.run.components import Backend
@@ -155,8 +155,8 @@ def test_an_agents_process_loads_nothing_of_the_evaluator(process_loot):
     assert not [name for name in modules if name.startswith(FORBIDDEN) or name == "toy_house"]
 
 
-class Impostor(PrivilegedAgent):
-    """Inherits from the yardsticks and hopes to be told."""
+class Impostor(OracleBaseline):
+    """Inherits from the oracle baselines and hopes to be given something."""
 
     told = False
 
@@ -170,7 +170,7 @@ class Impostor(PrivilegedAgent):
         return self._go_to_target(observation)
 
 
-def test_inheriting_from_a_yardstick_gives_no_privilege():
+def test_inheriting_from_an_oracle_baseline_gives_nothing():
     episode = Episode(
         episode_case("toy-moved"), "i", Impostor(), ToySimulator(), GroundTruthPerception(), ProtocolConfig(), 0
     )

@@ -27,7 +27,7 @@ def run_episode(task_id, agent, protocol=None, simulator=None):
 
 
 @pytest.mark.parametrize("task_id", ["toy-static", "toy-moved"])
-def test_shortest_path_yardstick_scores_one(task_id):
+def test_the_shortest_path_scores_one(task_id):
     records = run_episode(task_id, "shortest-path")
     assert [record.state for record in records] == [EndState.SUCCESS] * 3
     assert [record.spl for record in records] == [1.0] * 3

@@ -188,6 +188,20 @@ def test_rewriting_alone_changes_nothing(packed: Path, tasks: list[TaskFile], tm
     assert verify(rewritten(packed, tmp_path / "same.zip"), tasks, scores_only=True).is_accepted
 
 
+def test_a_summary_of_version_1_is_compared_without_its_intervals(
+    packed: Path, tasks: list[TaskFile], tmp_path: Path
+) -> None:
+    def older(header: dict[str, Any], *, sr: float | None = None) -> None:
+        header["summary"]["schema_version"] = 1
+        agent = header["summary"]["agents"]["ftu"]
+        agent["sr_ci95"] = agent["spl_ci95"] = [0.25, 0.75]
+        agent["sr"] = agent["sr"] if sr is None else sr
+
+    assert verify(rewritten(packed, tmp_path / "o.zip", header=older), tasks, scores_only=True).is_accepted
+    forged = rewritten(packed, tmp_path / "f.zip", header=lambda header: older(header, sr=0.99))
+    assert rejected(forged, tasks) == "scores"
+
+
 def test_forged_success_is_found_from_the_path_alone(packed: Path, tasks: list[TaskFile], tmp_path: Path) -> None:
     def forge(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         rows[0] |= {"state": "success" if rows[0]["state"] == "failure" else "failure"}
@@ -329,7 +343,7 @@ def test_flipped_bytes_never_pass_as_another_file(packed: Path, tasks: list[Task
         assert not verdict.is_accepted or verdict == true
 
 
-def test_incomplete_runs_and_yardsticks_are_refused(run: Path, tasks: list[TaskFile], tmp_path: Path) -> None:
+def test_incomplete_runs_and_baselines_are_refused(run: Path, tasks: list[TaskFile], tmp_path: Path) -> None:
     import shutil
 
     with pytest.raises(InvalidArgumentError, match="no agent 'fu'; it has ftu"):
@@ -343,11 +357,21 @@ def test_incomplete_runs_and_yardsticks_are_refused(run: Path, tasks: list[TaskF
     evaluate(["shortest-path"], tasks, tmp_path / "still", num_workers=0)
     with pytest.raises(InvalidArgumentError, match="no agent to pack"):
         pack(tmp_path / "still", tmp_path / "x.zip")
-    with pytest.raises(InvalidArgumentError, match="shortest-path is a yardstick"):
+    with pytest.raises(InvalidArgumentError, match="shortest-path is a baseline"):
         pack(tmp_path / "still", tmp_path / "x.zip", agents=["shortest-path"])
     with pytest.raises(StoreError, match="no run here"):
         pack(tmp_path / "nowhere", tmp_path / "x.zip")
     assert not (tmp_path / "x.zip").exists()
+
+
+def test_baselines_of_a_run_are_not_packed(tasks: list[TaskFile], tmp_path: Path) -> None:
+    agents = ["random-walk", "shortest-path", "stay-still", "ftu"]
+    evaluate(agents, tasks[:1], tmp_path / "run", num_workers=0)
+    header = pack(tmp_path / "run", tmp_path / "p.zip")
+    assert [part.agent for part in header.records] == ["ftu"]
+    for agent in agents[:3]:
+        with pytest.raises(InvalidArgumentError, match=f"{agent} is a baseline"):
+            pack(tmp_path / "run", tmp_path / "p.zip", agents=[agent])
 
 
 def test_run_of_another_protocol_packs_but_is_rejected(tasks: list[TaskFile], tmp_path: Path) -> None:

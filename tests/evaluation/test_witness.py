@@ -55,7 +55,7 @@ def test_objects_are_seen_from_enough_pixels_near_enough():
     seen_by.look(frame(instance=2, num_px=24))
     assert not seen_by.is_target_seen
     seen_by.look(frame(instance=2, num_px=25, pose=Pose(0.0, 0.8, 2.0 - EVIDENCE_RANGE_M - 0.01, 0.0, 0.0)))
-    # From afar the target is in view, as success and yardsticks have it, but nothing that a memory would take.
+    # From afar the target is in view, as success and oracle baselines have it, but nothing that a memory would take.
     assert (seen_by.is_target_visible, seen_by.is_target_seen) == (True, False)
     seen_by.begin_round(1)
     assert not seen_by.is_target_visible

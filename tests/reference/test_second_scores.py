@@ -72,7 +72,7 @@ def test_the_walk_to_the_target_is_perfect_on_all_bundled_tasks(tmp_path):
     assert (summary.n, summary.sr) == (sum(task.num_stages for task in tasks), 1.0)
     with RunStore(tmp_path) as store:
         rows = stage_rows(store)
-    assert all(row.is_yardstick for row in rows)
+    assert all(row.is_baseline for row in rows)
     # It walks the reference path and no more; what is missing is the rounding of sums.
     assert min(row.spl for row in rows) == pytest.approx(1.0, abs=1e-9)
 

@@ -40,8 +40,8 @@ BUILT_IN: dict[str, tuple[str, str]] = {
         "UniGoal as released: single actions, detector, nearest frontiers",
     ),
     "unigoal-paper": ("evonav.agents.unigoal.agent:UniGoalAsPublished", "UniGoal as published: the graphs do match"),
-    "stay-still": ("evonav.agents.stay_still:StayStill", "yardstick: stops at once; its successes are free"),
-    "random-walk": ("evonav.agents.random_walk:RandomWalk", "yardstick: walks in random directions"),
+    "stay-still": ("evonav.agents.stay_still:StayStill", "baseline: stops at once; its successes are free"),
+    "random-walk": ("evonav.agents.random_walk:RandomWalk", "baseline: walks in random directions"),
 }
 """Import path and description of each built-in agent, by name."""
 

@@ -80,12 +80,12 @@ def options(
 
 @app.command(name="agents")
 def list_agents() -> None:
-    """Lists agents and yardsticks by name."""
+    """List agents and baselines by name."""
     from evonav.agents.registry import agent_descriptions
-    from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
+    from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 
-    yardsticks = {name: f"yardstick: {kind.description}" for name, kind in YARDSTICKS.items()}
-    for name, description in {**agent_descriptions(), **yardsticks}.items():
+    baselines = {name: f"oracle baseline: {kind.description}" for name, kind in ORACLE_BASELINES.items()}
+    for name, description in {**agent_descriptions(), **baselines}.items():
         typer.echo(f"{name:18}{description}")
     typer.echo(f"{'./file.py:Class':18}any class of yours, by its file")
     typer.echo(f"{'module:Class':18}any class of yours with the methods of evonav.agents.agent.Agent")

@@ -7,11 +7,11 @@ from typing import Any
 def agents(incomplete: str) -> list[str]:
     """Names of agents; after a comma, further ones."""
     from evonav.agents.registry import agent_descriptions
-    from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
+    from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 
     before, comma, last = incomplete.rpartition(",")
     taken = before.split(",")
-    names = [name for name in (*agent_descriptions(), *YARDSTICKS) if name.startswith(last) and name not in taken]
+    names = [name for name in (*agent_descriptions(), *ORACLE_BASELINES) if name.startswith(last) and name not in taken]
     return [f"{before}{comma}{name}" for name in names]
 
 

@@ -56,7 +56,7 @@ class ProtocolConfig:
     """A round; the cap on what an agent may ask for."""
     max_occupancy_range_m: float = 3.0
     min_visible_px: int = 25
-    """Pixels from which on the target counts as seen in a view (diagnostics and yardsticks)."""
+    """Pixels from which on the target counts as seen in a view (diagnostics and oracle baselines)."""
 
     def budget(self, sensing: Sensing) -> int:
         """Rounds of a stage: decisions, or single actions."""

@@ -15,7 +15,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
+from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.navigation import agent_pairs, summarise, summary_json
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
@@ -91,11 +91,11 @@ def pack(run_dir: Path, out: Path, *, agents: Sequence[str] | None = None, about
     Args:
         run_dir: A complete run.
         out: The file to write, whole or not at all.
-        agents: Of the run; default: all but yardsticks.
+        agents: Of the run; default: all but baselines.
         about: Who and what.
 
     Raises:
-        InvalidArgumentError: An agent is not of the run, is a yardstick, or has stages without a score.
+        InvalidArgumentError: An agent is not of the run, is a baseline, or has stages without a score.
         StoreError: There is no run, it was made by an earlier version, or the file cannot be written.
     """
     with RunStore(run_dir) as store:
@@ -204,7 +204,7 @@ class SubmissionFile:
 
 def _read_run(store: RunStore, run_dir: Path, agents: Sequence[str] | None) -> tuple[Submission, dict[str, bytes]]:
     there: list[str] = store.meta("agents") or []
-    chosen = list(agents) if agents is not None else [agent for agent in there if agent not in YARDSTICKS]
+    chosen = list(agents) if agents is not None else [agent for agent in there if agent not in BASELINES]
     digests: dict[str, str] | None = store.meta("task_digests")
     stages: dict[str, int] = store.meta("num_stages") or {}
     if not chosen:
@@ -217,8 +217,8 @@ def _read_run(store: RunStore, run_dir: Path, agents: Sequence[str] | None) -> t
     for agent in chosen:
         if agent not in there:
             raise InvalidArgumentError(f"{run_dir}: no agent {agent!r}; it has {', '.join(there)}")
-        if agent in YARDSTICKS:
-            raise InvalidArgumentError(f"{agent} is a yardstick: it is told what agents are not")
+        if agent in BASELINES:
+            raise InvalidArgumentError(f"{agent} is a baseline and no contestant: leave it out")
         mine = list(store.records(agent))
         num_scored = sum(record.is_scored or record.state is EndState.FORCED for record in mine)
         if num_scored != num_stages:

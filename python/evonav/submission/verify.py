@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
+from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.metrics.navigation import stage_soft_spl, stage_spl
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.former_paths import with_current_paths
@@ -196,8 +196,8 @@ def _gaps(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> I
     expected = sorted((task.task_id, stage) for task in header.tasks for stage in range(1, task.num_stages + 1))
     for part in header.records:
         mine = records[part.agent]
-        if part.agent in YARDSTICKS:
-            yield f"{part.agent} is a yardstick"
+        if part.agent in ORACLE_BASELINES:
+            yield f"{part.agent} is an oracle baseline: it knows what agents do not"
         if [(record.task_id, record.stage) for record in mine] != expected:
             yield f"{part.agent}: not every stage of every task, once and in order"
         for record in mine:

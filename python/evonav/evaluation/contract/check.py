@@ -15,7 +15,7 @@ from evonav.agents.agent import Agent, Sensing
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
+from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
@@ -107,8 +107,8 @@ class _Examination:
         self._name, self._factory = _named(agent)
 
     def report(self) -> AgentReport:
-        if self._name in YARDSTICKS:
-            self._say("importable", "fail", "a yardstick of the evaluator: it knows the target and is no agent")
+        if self._name in ORACLE_BASELINES:
+            self._say("importable", "fail", "an oracle baseline of the evaluator: it knows the target and is no agent")
         else:
             with bundled_tasks() as directory:
                 cases = _changing_cases(self._backend, directory)

@@ -1,7 +1,7 @@
-"""Yardsticks that know more than an agent may. They bound what agents can reach; no agent can become one by asking.
+"""Oracle baselines: they know more than an agent may, and so bound what agents can reach.
 
-Privilege is to be one of the classes of `YARDSTICKS`: neither methods of the same names nor inheriting from
-`PrivilegedAgent` hands a plug-in anything.
+Only the classes of `ORACLE_BASELINES` are given anything. A plug-in gets nothing by having methods of the same names,
+or by inheriting from `OracleBaseline`.
 """
 
 import math
@@ -14,12 +14,13 @@ from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.agents.registry import new_agent
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.baselines import ORACLE_BASELINE_NAMES
 from evonav.evaluation.records.schema import Point3
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
 
 STOP_DISTANCE_M = 1.0
-"""A yardstick stops this near the target: well inside the success radius, so that no rounding decides."""
+"""An oracle baseline stops this near the target: well inside the success radius, so that no rounding decides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +32,8 @@ class Sighting:
     """In this or an earlier round of the episode, from near enough to be remembered; it may have been elsewhere."""
 
 
-class PrivilegedAgent:
-    """A yardstick: an agent that the evaluator also tells where the target is and when it is in view."""
+class OracleBaseline:
+    """An agent that the evaluator also gives the target's place, and whether the target is in view."""
 
     description = ""
     sensing: Sensing = Sensing()
@@ -71,7 +72,7 @@ class PrivilegedAgent:
         return NavigateTo(self._target_m)
 
 
-class ShortestPath(PrivilegedAgent):
+class ShortestPath(OracleBaseline):
     """Walks the planner's path to the target: SR and SPL are 1 by construction, or the harness is wrong."""
 
     description = "the planner's path to the target, SR = SPL = 1 by construction"
@@ -81,7 +82,7 @@ class ShortestPath(PrivilegedAgent):
         return self._go_to_target(observation)
 
 
-class PerfectRecognition(PrivilegedAgent):
+class PerfectRecognition(OracleBaseline):
     """Nearest-frontier exploration that recognises the target instance at first sight: what search alone can reach."""
 
     description = "nearest-frontier exploration that recognises the target at first sight"
@@ -136,13 +137,13 @@ class OracleMemory(PerfectRecognition):
         )
 
 
-class OracleFlags(FrontierUpdate, PrivilegedAgent):
+class OracleFlags(FrontierUpdate, OracleBaseline):
     """Frontier-Update that is told, as a stage begins, which of its entries the change has made stale."""
 
     description = "Frontier-Update whose stale entries are taken out as a stage begins"
 
     def __init__(self, decision: DecisionModel | None = None) -> None:
-        PrivilegedAgent.__init__(self)
+        OracleBaseline.__init__(self)
         FrontierUpdate.__init__(self, decision=decision)
 
     def reveal_stale(self, entry_ids: Sequence[int]) -> None:
@@ -151,32 +152,29 @@ class OracleFlags(FrontierUpdate, PrivilegedAgent):
             self._navigator.objects.remove(entry_id)
 
 
-YARDSTICKS: dict[str, type[PrivilegedAgent]] = {
-    "shortest-path": ShortestPath,
-    "nearest-frontier": PerfectRecognition,
-    "oracle-memory": OracleMemory,
-    "oracle-flags": OracleFlags,
-}
+ORACLE_BASELINES: dict[str, type[OracleBaseline]] = dict(
+    zip(ORACLE_BASELINE_NAMES, (ShortestPath, PerfectRecognition, OracleMemory, OracleFlags), strict=True)
+)
 """By name, for `evonav evaluate --agents`."""
 
 
-def privileges_of(agent: object) -> PrivilegedAgent | None:
-    """The agent, if it is one of this module's own yardsticks."""
-    return agent if isinstance(agent, PrivilegedAgent) and type(agent) in YARDSTICKS.values() else None
+def as_oracle_baseline(agent: object) -> OracleBaseline | None:
+    """Return the agent, if its class is one of this module's own."""
+    return agent if isinstance(agent, OracleBaseline) and type(agent) in ORACLE_BASELINES.values() else None
 
 
-def yardstick(name: str, decision: DecisionModel | None = None) -> PrivilegedAgent:
-    """A privileged yardstick by name.
+def new_oracle_baseline(name: str, decision: DecisionModel | None = None) -> OracleBaseline:
+    """Make an oracle baseline.
 
     Args:
-        name: Of `YARDSTICKS`.
+        name: Of `ORACLE_BASELINES`.
         decision: Handed to one that takes one; default: its own.
 
     Raises:
         InvalidArgumentError: There is none of this name.
     """
-    if name not in YARDSTICKS:
-        raise InvalidArgumentError(f"no yardstick `{name}`; there are {', '.join(sorted(YARDSTICKS))}")
-    made = new_agent(YARDSTICKS[name], decision)
-    assert isinstance(made, PrivilegedAgent)
+    if name not in ORACLE_BASELINES:
+        raise InvalidArgumentError(f"no oracle baseline `{name}`; there are {', '.join(sorted(ORACLE_BASELINES))}")
+    made = new_agent(ORACLE_BASELINES[name], decision)
+    assert isinstance(made, OracleBaseline)
     return made

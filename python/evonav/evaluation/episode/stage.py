@@ -24,7 +24,7 @@ from evonav.evaluation.episode.observer import (
     blame,
     traceback_of,
 )
-from evonav.evaluation.episode.oracle_baselines import Sighting, privileges_of
+from evonav.evaluation.episode.oracle_baselines import Sighting, as_oracle_baseline
 from evonav.evaluation.episode.sensors import Sensors, map_frame
 from evonav.evaluation.episode.spec import room_at, stage_map
 from evonav.evaluation.episode.staleness import Witness, Witnessed
@@ -167,8 +167,8 @@ class StageRun:
             with self._stopwatch.timing("agent"):
                 self._tell_goal()
             beliefs = self._told_entries()
-            if beliefs and (privileged := privileges_of(self._agent)) is not None:
-                privileged.reveal_stale(self._witness.stale_ids(beliefs))
+            if beliefs and (baseline := as_oracle_baseline(self._agent)) is not None:
+                baseline.reveal_stale(self._witness.stale_ids(beliefs))
                 beliefs = self._told_entries()
         self._memory_at_start = None if beliefs is None else self._witness.begin(beliefs)
         self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensing)})
@@ -189,8 +189,8 @@ class StageRun:
             self._carried.has_begun = True
         self._agent.begin_stage(self._stage.public)
         self._sensing = self._granted()
-        if (privileged := privileges_of(self._agent)) is not None:
-            privileged.reveal_target(self._stage.target.position_m)
+        if (baseline := as_oracle_baseline(self._agent)) is not None:
+            baseline.reveal_target(self._stage.target.position_m)
 
     def _granted(self) -> Sensing:
         """What the agent asks of its sensors, within the protocol."""
@@ -269,8 +269,8 @@ class StageRun:
         if self._observer is not None:
             self._observer.round_begins(observation)
         with blame(ErrorKind.AGENT), self._stopwatch.timing("agent"):
-            if (privileged := privileges_of(self._agent)) is not None:
-                privileged.reveal_sighting(Sighting(self._witness.is_target_visible, self._witness.is_target_seen))
+            if (baseline := as_oracle_baseline(self._agent)) is not None:
+                baseline.reveal_sighting(Sighting(self._witness.is_target_visible, self._witness.is_target_seen))
             return wire.checked_action(self._agent.act(observation), self._sensing)
 
     def _end_round(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> None:

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, fields
 from itertools import groupby, pairwise
 from typing import TYPE_CHECKING, Any
 
+from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.failure_causes import cause_of
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import EndState, MemoryRecord, RoundRecord, StageRecord
@@ -18,14 +19,10 @@ from evonav.evaluation.records.schema import EndState, MemoryRecord, RoundRecord
 if TYPE_CHECKING:
     from evonav.evaluation.records.store import RunStore
 
-MEASURES_VERSION = 2
+MEASURES_VERSION = 3
 """Raised whenever a measure changes: measures kept under another version are derived again from their records."""
 STRICT_RADIUS_M = 1.0
 """Of `is_strict_success`."""
-YARDSTICKS = frozenset(
-    {"shortest-path", "nearest-frontier", "oracle-memory", "oracle-flags", "random-walk", "stay-still"}
-)
-"""Agents that are no contestants: floors, and bounds that know more than an agent may."""
 COUNTERS = {
     "decisions": "num_decisions",
     "failed_decisions": "num_failed_decisions",
@@ -41,8 +38,8 @@ class RecordMeasures:
     """What one record tells by itself. Without a score (errored, not run), scores and distances are `None`."""
 
     agent: str
-    is_yardstick: bool
-    """One of `YARDSTICKS`: never to be ranked among agents."""
+    is_baseline: bool
+    """One of `BASELINES`: never to be ranked among agents."""
     task_id: str
     house: str
     stage: int
@@ -249,7 +246,7 @@ def measures_of(record: StageRecord) -> RecordMeasures:
     num_stale = sum(entry.is_stale for entry in record.entries)
     return RecordMeasures(
         agent=record.agent,
-        is_yardstick=record.agent in YARDSTICKS,
+        is_baseline=record.agent in BASELINES,
         task_id=record.task_id,
         house=record.house,
         stage=record.stage,

@@ -11,7 +11,7 @@ from evonav.agents.agent import Agent
 from evonav.agents.registry import BUILT_IN, agent_descriptions, agent_factory, new_agent
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.episode.oracle_baselines import YARDSTICKS, yardstick
+from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES, new_oracle_baseline
 from evonav.evaluation.hosting.process import DecisionSpec, check_importable
 from evonav.evaluation.protocol import EpisodeCase
 from evonav.perception import Perception
@@ -121,7 +121,7 @@ class Backend:
 
 
 def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
-    """A fresh agent or yardstick.
+    """A fresh agent or oracle baseline.
 
     Args:
         name: Of a built-in agent, a plug-in or a class.
@@ -130,7 +130,7 @@ def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
     Raises:
         InvalidArgumentError: There is none of this name.
     """
-    return yardstick(name, decision) if name in YARDSTICKS else new_agent(agent_factory(name), decision)
+    return new_oracle_baseline(name, decision) if name in ORACLE_BASELINES else new_agent(agent_factory(name), decision)
 
 
 def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
@@ -143,7 +143,7 @@ def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
     Raises:
         InvalidArgumentError: There is none of this name, or it cannot be imported.
     """
-    if name in YARDSTICKS:
+    if name in ORACLE_BASELINES:
         return
     try:
         if is_in_process or name in BUILT_IN:
@@ -153,8 +153,9 @@ def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
     except InvalidArgumentError as error:
         if ":" in name or name.endswith(".py"):
             raise
-        near = get_close_matches(name, (*agent_descriptions(), *YARDSTICKS), 1)
-        hint = f"; did you mean `{near[0]}`?" if near else f"; yardsticks are {', '.join(sorted(YARDSTICKS))}"
+        near = get_close_matches(name, (*agent_descriptions(), *ORACLE_BASELINES), 1)
+        known = ", ".join(sorted(ORACLE_BASELINES))
+        hint = f"; did you mean `{near[0]}`?" if near else f"; oracle baselines are {known}"
         raise InvalidArgumentError(f"{error}{hint}") from error
 
 

@@ -1,7 +1,7 @@
 """What a worker of `evonav.parallel.pool` does in an evaluation: an episode a job, told stage by stage.
 
-Agents run in processes of their own (`agent_process.py`), unless they are yardsticks or it is switched off. A worker
-that dies or hangs costs its episode, not the run.
+Agents run in processes of their own (`agent_process.py`), unless they are oracle baselines or it is switched off. A
+worker that dies or hangs costs its episode, not the run.
 
 What is lost to the machine is tried again: the episode runs from its beginning, with a fresh agent and the same seed.
 That brings a deterministic agent to the state in which it began the stage, which no snapshot would do for every agent;
@@ -21,7 +21,7 @@ from evonav.agents import wire
 from evonav.agents.agent import Agent, AgentAction, Sensing
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
-from evonav.evaluation.episode.oracle_baselines import YARDSTICKS
+from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
 from evonav.evaluation.records.costs import StageCosts
@@ -98,8 +98,8 @@ class Workplace:
         self._processes = None if hosting.is_in_process else AgentProcesses(hosting)
 
     def agent(self, job: EpisodeJob) -> Agent:
-        """A fresh agent. Yardsticks are told oracle data: they stay here."""
-        if self._processes is not None and job.agent not in YARDSTICKS:
+        """A fresh agent. Oracle baselines are given oracle data: they stay here."""
+        if self._processes is not None and job.agent not in ORACLE_BASELINES:
             return RemoteAgent(self._processes, job.agent, self.setup.backend.decision_spec(), job.seed)
         try:
             return make_agent(job.agent, self.setup.backend.make_decision(job.seed))
