@@ -11,11 +11,10 @@ from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import (
     agent_pairs,
     rates,
-    stage_soft_spl,
-    stage_spl,
     summarise,
     summary_json,
 )
+from evonav.evaluation.metrics.scoring import score_stage, stage_soft_spl, stage_spl
 from evonav.evaluation.protocol import as_errored
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
@@ -38,6 +37,20 @@ def test_spl_is_the_papers_formula(is_success, path_m, reference_m):
 @given(LENGTHS, LENGTHS, LENGTHS, LENGTHS)
 def test_soft_spl_is_a_share(start_m, end_m, path_m, reference_m):
     assert 0.0 <= stage_soft_spl(start_m, end_m, path_m, reference_m) <= 1.0
+
+
+def test_a_stage_is_a_success_closer_than_the_radius() -> None:
+    """Start 10 m away, end 1.5 m away after 12 m, with a reference path of 9 m."""
+    score = score_stage((0.0, 0.0), (8.5, 0.0), (10.0, 0.0), path_length_m=12.0, reference_length_m=9.0)
+    assert (score.is_success, score.start_distance_m, score.terminal_distance_m) == (True, 10.0, 1.5)
+    assert (score.spl, score.soft_spl) == (9.0 / 12.0, pytest.approx(0.85 * 9.0 / 12.0))
+    at_radius = score_stage((0.0, 0.0), (8.0, 0.0), (10.0, 0.0), path_length_m=8.0, reference_length_m=9.0)
+    assert (at_radius.is_success, at_radius.spl) == (False, 0.0)
+
+
+def test_a_stage_without_a_reference_path_has_no_spl() -> None:
+    score = score_stage((0.0, 0.0), (1.0, 0.0), (2.0, 0.0), path_length_m=1.0, reference_length_m=None)
+    assert (score.is_success, score.spl, score.soft_spl) == (True, None, None)
 
 
 def made(agent, successes):

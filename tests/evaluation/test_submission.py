@@ -219,7 +219,7 @@ def test_teleport_within_a_round_is_found_when_carried_out(packed: Path, tasks: 
         entry["path_m"][1][0] += 0.01
         record = StageRecord.model_validate(row)
         from evonav.evaluation.episode.motion import polyline_length_m
-        from evonav.evaluation.metrics.navigation import stage_soft_spl, stage_spl
+        from evonav.evaluation.metrics.scoring import stage_soft_spl, stage_spl
 
         length_m = sum(polyline_length_m(part.path_m) for part in record.trace)
         assert record.reference_length_m is not None

@@ -9,7 +9,8 @@ import numpy as np
 
 from evonav.controlled.layout import ControlledRecord, read_controlled, run_of
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.navigation import SUCCESS_RADIUS_M, house_of
+from evonav.evaluation.metrics.navigation import house_of
+from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore

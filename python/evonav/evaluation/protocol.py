@@ -6,7 +6,7 @@ import numpy as np
 
 from evonav.agents.agent import Sensing
 from evonav.errors import EvonavError, InvalidArgumentError
-from evonav.evaluation.metrics.navigation import SUCCESS_RADIUS_M
+from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import (
     EndState,

@@ -15,7 +15,7 @@ from evonav.evaluation.episode import motion
 from evonav.gym import spaces
 from evonav.gym.config import ACTIONS, NavConfig
 from evonav.gym.source import NavTask, TaskSource
-from evonav.gym.stage import StageRun, task_result
+from evonav.gym.stage import RewardedStage, task_result
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action
@@ -106,10 +106,10 @@ class LifelongNavEnv(gymnasium.Env[Observation, Any]):
             raise ResetNeeded("the task is over, or none was begun: call reset first")
         done, is_stop = self._carry_out(action)
         end = self._simulator.pose
-        reward = self._run.advance(end, done.length_m, self._distance_m(), is_stop=is_stop)
-        if not self._run.is_over(is_stop=is_stop):
+        reward = self._rewarded.advance(end, done.length_m, self._distance_m(), is_stop=is_stop)
+        if not self._rewarded.progress.is_over:
             return self._observation(done), reward, False, False, self._info()
-        self._results.append(self._run.result(self._stage, end, is_stop=is_stop))
+        self._results.append(self._rewarded.result(self._stage, end))
         is_last = self._stage == len(self._task.stages)
         if not is_last:
             self._begin_stage(self._stage + 1, end)
@@ -142,7 +142,7 @@ class LifelongNavEnv(gymnasium.Env[Observation, Any]):
         self._field = _core.GeodesicField(core, path_m[-1]) if path_m else None
         self._labels = spaces.body_labels(core.bodies())
         length_m = motion.polyline_length_m(path_m) if path_m else None
-        self._run = StageRun(self.config, data.target_m, start, length_m, self._distance_m())
+        self._rewarded = RewardedStage.begin(self.config, data.target_m, start, length_m, self._distance_m())
 
     def _distance_m(self) -> float:
         pose = self._simulator.pose
@@ -180,7 +180,7 @@ class LifelongNavEnv(gymnasium.Env[Observation, Any]):
         seen["pose"] = spaces.relative_poses(as_row(self._simulator.pose)[None], self._origin[None])[0]
         seen["category"] = np.int64(spaces.category_index(goal.category))
         seen["stage"] = np.int64(self._stage)
-        seen["steps_left"] = np.int64(config.budget - self._run.num_steps)
+        seen["steps_left"] = np.int64(config.budget - self._rewarded.progress.num_steps)
         seen["is_action_success"] = np.int64(last.is_success)
         seen["has_arrived"] = np.int64(last.has_arrived)
         if config.has("instruction"):
@@ -193,7 +193,7 @@ class LifelongNavEnv(gymnasium.Env[Observation, Any]):
         assert self._task is not None  # set by reset
         info: Info = {"task_id": self._task.task_id, "stage": self._stage, "num_stages": len(self._task.stages)}
         if self.config.oracle_info:
-            info["oracle"] = oracle_info(self._run)
+            info["oracle"] = oracle_info(self._rewarded)
         return info
 
 
@@ -202,10 +202,11 @@ def as_row(pose: Pose) -> NDArray[np.float64]:
     return np.array([*pose.position_m, pose.yaw_rad, pose.horizon_rad])
 
 
-def oracle_info(run: StageRun) -> Info:
+def oracle_info(stage: RewardedStage) -> Info:
     """Return the entries that `NavConfig.oracle_info` adds."""
+    reference_length_m = stage.progress.reference_length_m
     return {
-        "target_m": np.array(run.target_m),
-        "geodesic_distance_m": run.distance_m,
-        "reference_length_m": float("nan") if run.reference_length_m is None else run.reference_length_m,
+        "target_m": np.array(stage.progress.target_m),
+        "geodesic_distance_m": stage.distance_m,
+        "reference_length_m": float("nan") if reference_length_m is None else reference_length_m,
     }

@@ -23,7 +23,7 @@ from evonav.gym import spaces
 from evonav.gym.config import STOP, NavConfig
 from evonav.gym.env import as_row, oracle_info
 from evonav.gym.source import TaskSource
-from evonav.gym.stage import StageRun, task_result
+from evonav.gym.stage import RewardedStage, task_result
 from evonav.gym.worlds import StageWorld, WorldLoader
 from evonav.world.pose import Pose
 
@@ -40,7 +40,7 @@ class _Episode:
     """Number of the task in the source."""
     next_number: int
     at: StageWorld
-    run: StageRun
+    rewarded: RewardedStage
     results: list[Infos]
     is_over: bool = False
 
@@ -180,9 +180,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
                 self._has_succeeded[index], self._has_arrived[index] = 1, 0
                 continue
             end = self._pose(index)
-            rewards[index] = episode.run.advance(end, lengths_m[index], distances_m[index], is_stop=is_stop[index])
-            if episode.run.is_over(is_stop=is_stop[index]):
-                ended[index] = self._end_stage(index, episode, end, is_stop=is_stop[index])
+            rewards[index] = episode.rewarded.advance(end, lengths_m[index], distances_m[index], is_stop=is_stop[index])
+            if episode.rewarded.progress.is_over:
+                ended[index] = self._end_stage(index, episode, end)
                 terminations[index] = episode.is_over
         if ended or any(is_reset):
             self._poses = self._batch.poses()
@@ -204,11 +204,13 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         at = self.loader.get(number, 1)
         # Each task is drawn one task ahead, so that its house can be built in the meantime.
         next_number = self.loader.source.draw(random)
-        run, start = self._begin_stage(index, (number, next_number), at, at.task.start)
+        rewarded, start = self._begin_stage(index, (number, next_number), at, at.task.start)
         self._origins[index] = as_row(start)
-        return _Episode(random, number, next_number, at, run, [])
+        return _Episode(random, number, next_number, at, rewarded, [])
 
-    def _begin_stage(self, index: int, numbers: tuple[int, int], at: StageWorld, pose: Pose) -> tuple[StageRun, Pose]:
+    def _begin_stage(
+        self, index: int, numbers: tuple[int, int], at: StageWorld, pose: Pose
+    ) -> tuple[RewardedStage, Pose]:
         """Put an agent into a stage; `numbers` are those of this task and the next."""
         simulator = at.world.entered()
         start = simulator.enter(pose)
@@ -226,19 +228,19 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         is_last = at.stage == len(at.task.stages)
         self.loader.prefetch(numbers[is_last], 1 if is_last else at.stage + 1)
         length_m = motion.polyline_length_m(path_m) if path_m else None
-        run = StageRun(self.config, at.data.target_m, start, length_m, self._batch.distance_m(index))
-        return run, start
+        rewarded = RewardedStage.begin(self.config, at.data.target_m, start, length_m, self._batch.distance_m(index))
+        return rewarded, start
 
-    def _end_stage(self, index: int, episode: _Episode, end: Pose, *, is_stop: bool) -> Infos:
+    def _end_stage(self, index: int, episode: _Episode, end: Pose) -> Infos:
         """Measure a stage and begin the next one, if there is one."""
         at = episode.at
-        episode.results.append(episode.run.result(at.stage, end, is_stop=is_stop))
+        episode.results.append(episode.rewarded.result(at.stage, end))
         ended: Infos = {"stage_result": dict(episode.results[-1])}
         if at.stage == len(at.task.stages):
             episode.is_over = True
             return ended | {"task_result": task_result(episode.results)}
         episode.at = self.loader.get(episode.number, at.stage + 1)
-        episode.run, _ = self._begin_stage(index, (episode.number, episode.next_number), episode.at, end)
+        episode.rewarded, _ = self._begin_stage(index, (episode.number, episode.next_number), episode.at, end)
         self._has_succeeded[index], self._has_arrived[index] = 1, 0
         return ended
 
@@ -296,7 +298,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         goals = [episode.at.data.goal for episode in self._episodes]
         seen["category"] = np.array([spaces.category_index(goal.category) for goal in goals], np.int64)
         seen["stage"] = np.array([episode.at.stage for episode in self._episodes], np.int64)
-        steps = [config.budget - episode.run.num_steps for episode in self._episodes]
+        steps = [config.budget - episode.rewarded.progress.num_steps for episode in self._episodes]
         seen["steps_left"] = np.array(steps, np.int64)
         seen["is_action_success"] = self._has_succeeded.copy()
         seen["has_arrived"] = self._has_arrived.copy()
@@ -326,7 +328,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             at = episode.at
             info: Infos = {"task_id": at.task.task_id, "stage": at.stage, "num_stages": len(at.task.stages)}
             if self.config.oracle_info:
-                info["oracle"] = oracle_info(episode.run)
+                info["oracle"] = oracle_info(episode.rewarded)
             infos = self._add_info(infos, info | ended.get(index, {}), index)
         return infos
 

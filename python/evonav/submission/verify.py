@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
-from evonav.evaluation.metrics.navigation import stage_soft_spl, stage_spl
+from evonav.evaluation.metrics.scoring import score_stage
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import EndState, StageRecord
@@ -131,19 +131,24 @@ def score_findings(record: StageRecord, header: Submission) -> Iterator[str]:
         yield f"{where}: the path does not lead from start to end"
     length_m = sum(math.fsum(math.dist(a, b) for a, b in pairwise(entry.path_m)) for entry in trace)
     target = (record.target.position_m[0], record.target.position_m[2])
-    start_distance_m, distance_m = math.dist(points[0], target), math.dist(points[-1], target)
-    is_success = distance_m < header.config["protocol"]["success_radius_m"]
-    reference_m = record.reference_length_m
+    score = score_stage(
+        points[0],
+        points[-1],
+        target,
+        path_length_m=length_m,
+        reference_length_m=record.reference_length_m,
+        success_radius_m=header.config["protocol"]["success_radius_m"],
+    )
     made: dict[str, object] = {
         "num_rounds": len(trace),
         "num_target_visible_rounds": sum(entry.is_target_visible for entry in trace),
         "has_stopped": trace[-1].action.kind == "stop",
-        "state": EndState.SUCCESS if is_success else EndState.FAILURE,
+        "state": EndState.SUCCESS if score.is_success else EndState.FAILURE,
         "path_length_m": length_m,
-        "start_distance_m": start_distance_m,
-        "terminal_distance_m": distance_m,
-        "spl": stage_spl(is_success, length_m, reference_m),
-        "soft_spl": stage_soft_spl(start_distance_m, distance_m, length_m, reference_m),
+        "start_distance_m": score.start_distance_m,
+        "terminal_distance_m": score.terminal_distance_m,
+        "spl": score.spl,
+        "soft_spl": score.soft_spl,
     }
     for field, value in made.items():
         told = getattr(record, field)

@@ -25,10 +25,10 @@ from evonav.evaluation.episode.observer import (
     traceback_of,
 )
 from evonav.evaluation.episode.oracle_baselines import Sighting, as_oracle_baseline
+from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.episode.sensors import Sensors, map_frame
 from evonav.evaluation.episode.spec import room_at, stage_map
 from evonav.evaluation.episode.staleness import Witness, Witnessed
-from evonav.evaluation.metrics.navigation import stage_soft_spl, stage_spl
 from evonav.evaluation.protocol import (
     EpisodeCase,
     ForcedWalk,
@@ -112,7 +112,6 @@ class StageRun:
         self._beliefs: Sequence[EntryBelief] | None = None
         """Of the last round, if they were asked for."""
         self._trace: list[RoundRecord] = []
-        self._length_m = 0.0
         self.plan: StageMap | None = None
         self.failure: ErrorKind | None = None
         """Why the stage could not be finished."""
@@ -127,8 +126,9 @@ class StageRun:
                     return self._forced(self._stage.forced)
                 with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     reference_m = self._path_to_target_m()
-                stop_reason = self._rounds()
-                return self._measured(reference_m, stop_reason)
+                progress = self._begin(self._protocol.budget(self._sensing), reference_m)
+                stop_reason = self._rounds(progress)
+                return self._measured(progress, reference_m, stop_reason)
         except StageFailedError as failure:
             self.failure = failure.kind
             self.traceback = traceback_of(failure)
@@ -203,23 +203,36 @@ class StageRun:
         x_m, _, z_m = self._stage.target.position_m
         return self._planner.path_m((x_m, z_m))
 
-    def _rounds(self) -> str | None:
-        """Decision rounds until the agent stops (returns why) or the budget ends (returns `None`)."""
+    def _begin(self, budget: int, reference_m: Sequence[motion.Point2]) -> StageProgress:
+        """Count steps from here; without a reference path, the stage has no score."""
+        pose = self._simulator.pose
+        x_m, _, z_m = self._stage.target.position_m
+        return StageProgress(
+            target_m=(x_m, z_m),
+            start_m=(pose.x_m, pose.z_m),
+            reference_length_m=motion.polyline_length_m(reference_m) if reference_m else None,
+            budget=budget,
+            success_radius_m=self._protocol.success_radius_m,
+        )
+
+    def _rounds(self, progress: StageProgress) -> str | None:
+        """Run decision rounds until the agent stops (return why) or the budget ends (return `None`)."""
         sensors = self._sensors()
         last = motion.Motion((), is_success=True)
-        budget = self._protocol.budget(self._sensing)
-        for number in range(budget):
+        while not progress.is_over:
+            number = progress.num_steps
             self._witness.begin_round(number)
             with blame(ErrorKind.SIMULATION):
                 observation = sensors.observe(
                     is_first=number == 0,
                     is_action_success=last.is_success,
                     has_arrived=last.has_arrived,
-                    num_rounds_left=budget - number,
+                    num_rounds_left=progress.budget - number,
                 )
             action = self._answer(observation)
             with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                 last = self._carry_out(action)
+            progress.advance(last.length_m, is_stop=isinstance(action, Stop))
             self._end_round(number, sensors.pose, action, last)
             if isinstance(action, Stop):
                 return action.reason
@@ -231,10 +244,12 @@ class StageRun:
         is_stepwise = self._sensing.motion == "actions"
         travel_m = self._protocol.waypoint_m if is_stepwise else self._protocol.max_travel_m
         legs = motion.legs(forced.path_m, travel_m)
-        for number in range(len(legs) + 1):
+        progress = self._begin(len(legs) + 1, ())
+        while not progress.is_over:
+            number = progress.num_steps
             self._witness.begin_round(number)
             with blame(ErrorKind.SIMULATION):
-                num_left = len(legs) + 1 - number
+                num_left = progress.budget - number
                 observation = sensors.observe(is_first=number == 0, num_rounds_left=num_left, is_guided=True)
             action = self._answer(observation)
             pose = self._simulator.pose
@@ -243,6 +258,7 @@ class StageRun:
                 is_last = number + 1 == len(legs)
                 with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     done = motion.walk(self._simulator, legs[number], forced.end.yaw_rad if is_last else None)
+            progress.advance(done.length_m, is_stop=False)
             self._end_round(number, sensors.pose, action, done)
             if not done.is_success:
                 raise StageFailedError(
@@ -250,7 +266,7 @@ class StageRun:
                 )
         end = self._simulator.pose
         return self._with_memory(self._with_trace(self._record)).model_copy(
-            update={"state": EndState.FORCED, "terminal": pose_record(end), "path_length_m": self._length_m}
+            update={"state": EndState.FORCED, "terminal": pose_record(end), "path_length_m": progress.path_length_m}
         )
 
     def _sensors(self) -> Sensors:
@@ -274,7 +290,6 @@ class StageRun:
             return wire.checked_action(self._agent.act(observation), self._sensing)
 
     def _end_round(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> None:
-        self._length_m += done.length_m
         self._trace.append(self._round_record(number, pose, action, done))
         self._beliefs = None
         if self._memory_at_start is not None and self._witness.wants_entries:
@@ -325,41 +340,37 @@ class StageRun:
             return told
         return wire.diagnostics_of(wire.read_json(wire.diagnostics_json(told).encode()))
 
-    def _measured(self, reference_m: list[motion.Point2], stop_reason: str | None) -> StageRecord:
-        start, end = self._record.effective_start, self._simulator.pose
-        assert start is not None  # set by _start
-        x_m, _, z_m = self._stage.target.position_m
-        radius_m = self._protocol.success_radius_m
-        start_distance_m = math.dist((start.x_m, start.z_m), (x_m, z_m))
-        distance_m = math.dist((end.x_m, end.z_m), (x_m, z_m))
-        is_success = distance_m < radius_m
+    def _measured(
+        self, progress: StageProgress, reference_m: Sequence[motion.Point2], stop_reason: str | None
+    ) -> StageRecord:
+        end, radius_m = self._simulator.pose, progress.success_radius_m
+        score = progress.score((end.x_m, end.z_m))
         with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
             left_m = self._path_to_target_m()
         geodesic_m = motion.polyline_length_m(left_m) if left_m else None
         record = self._with_memory(self._with_trace(self._record)).model_copy(
             update={
-                "state": EndState.SUCCESS if is_success else EndState.FAILURE,
+                "state": EndState.SUCCESS if score.is_success else EndState.FAILURE,
                 "terminal": pose_record(end),
                 "has_stopped": stop_reason is not None,
                 "stop_reason": stop_reason or "",
-                "start_distance_m": start_distance_m,
-                "terminal_distance_m": distance_m,
+                "start_distance_m": score.start_distance_m,
+                "terminal_distance_m": score.terminal_distance_m,
                 "terminal_box_distance_m": self._witness.target_box_distance_m((end.x_m, end.z_m)),
                 "terminal_geodesic_m": geodesic_m,
                 "is_geodesic_success": geodesic_m is not None and geodesic_m < radius_m,
-                "path_length_m": self._length_m,
+                "path_length_m": progress.path_length_m,
             }
         )
         if not reference_m:
             # The agent's memory and pose are sound, so the episode goes on; only this stage has no measure.
             return as_errored(record, ErrorKind.REFERENCE, "no path from the effective start to the target")
-        reference_length_m = motion.polyline_length_m(reference_m)
         return record.model_copy(
             update={
-                "reference_length_m": reference_length_m,
-                "reference_ring_m": motion.length_outside_m(reference_m, (x_m, z_m), radius_m),
-                "spl": stage_spl(is_success, self._length_m, reference_length_m),
-                "soft_spl": stage_soft_spl(start_distance_m, distance_m, self._length_m, reference_length_m),
+                "reference_length_m": progress.reference_length_m,
+                "reference_ring_m": motion.length_outside_m(list(reference_m), progress.target_m, radius_m),
+                "spl": score.spl,
+                "soft_spl": score.soft_spl,
             }
         )
 

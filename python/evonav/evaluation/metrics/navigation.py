@@ -16,7 +16,6 @@ from evonav.errors import StoreError
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.statistics import ClusterBootstrap, Interval, PairedEffect, paired_effects, wilson, with_holm
 
-SUCCESS_RADIUS_M = 2.0
 SUMMARY_VERSION = 2
 """Of `summary.json`. Version 1 resampled tasks instead of houses, and had no p and no verdict."""
 
@@ -35,23 +34,6 @@ def house_of(stage: _Stage) -> str:
         stage: A record, or a row made of one.
     """
     return stage.house or stage.task_id
-
-
-def stage_spl(is_success: bool, path_length_m: float, reference_length_m: float) -> float:
-    """`S L* / max(L, L*)`; 1 for a success that needed no step and took none (where the formula is 0/0)."""
-    if not is_success:
-        return 0.0
-    longest_m = max(path_length_m, reference_length_m)
-    return 1.0 if longest_m == 0.0 else reference_length_m / longest_m
-
-
-def stage_soft_spl(
-    start_distance_m: float, terminal_distance_m: float, path_length_m: float, reference_length_m: float
-) -> float:
-    """SPL with the share of the start distance covered in place of success (0 for an agent that ends farther away)."""
-    progress = 1.0 if start_distance_m == 0.0 else max(0.0, 1.0 - terminal_distance_m / start_distance_m)
-    longest_m = max(path_length_m, reference_length_m)
-    return progress * (1.0 if longest_m == 0.0 else reference_length_m / longest_m)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from importlib.resources import files
 
 from markupsafe import Markup
 
-from evonav.evaluation.metrics.navigation import SUCCESS_RADIUS_M
+from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
 from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
 from evonav.report.maps.floor_plan import Frame, frame_of, ground, item_labels, labels
 from evonav.report.maps.svg import escape, slug
