@@ -36,7 +36,7 @@ EXTRAS: dict[str, tuple[tuple[str, ...], str]] = {
         ("huggingface-hub", "open-clip-torch", "torch", "torchvision", "transformers"),
         "--perception predicted: models",
     ),
-    "video": (("imageio", "av"), "videos of episodes"),
+    "video": (("imageio", "av", "matplotlib", "resvg-py"), "videos of episodes"),
     "viz": (("matplotlib", "resvg-py", "typst"), "plots; maps as PNG and PDF"),
     "vlm": (("openai",), "--decision vlm: a model behind an endpoint"),
     "yolo": (("open-clip-torch", "torch", "ultralytics"), "--perception predicted:3d-mem, AGPL-3.0"),

@@ -36,7 +36,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "evonav export out/run --csv out/stages.csv --parquet out/stages.parquet",
         "evonav export out/run --rounds --parquet out/rounds.parquet",
     ),
-    "video": ("evonav video out/run --out episode.mp4", "evonav video out/run --agent ftu --stage 2 --out stage.gif"),
+    "video": ("evonav video out/run --out episode.mp4", "evonav video out/run --agent ftu --stage 2 --out stage.mp4"),
     "rerun": ("evonav rerun out/run --agent ftu --out episode.rrd",),
     "paper": ("evonav paper out/run", "evonav paper out/run --latex out/tables.tex"),
     "perception": (

@@ -61,20 +61,34 @@ def write_picture(svg: str, path: Path) -> Path:
     return path
 
 
-def png_of(svg: str, *, zoom: float = 1.0, background: str | None = "#ffffff") -> bytes:
+def png_of(svg: str, *, zoom: float = 1.0, background: str | None = "#ffffff", has_system_fonts: bool = True) -> bytes:
     """Return a drawing as a PNG.
 
     Args:
         svg: The drawing, as an SVG document.
         zoom: Dots to a unit of the drawing.
         background: Colour below the drawing; `None`: transparent.
+        has_system_fonts: Whether to look for the machine's fonts too, which may take longer than the drawing.
 
     Raises:
         StoreError: resvg is not installed.
     """
+    folders = _font_folders()
     families = dict.fromkeys(("font_family", "serif_family", "sans_serif_family"), FONT)
-    fonts: dict[str, Any] = {"font_dirs": _font_folders(), **families} if _font_folders() else {}
-    return bytes(_resvg().svg_to_bytes(svg_string=svg, zoom=zoom, background=background, **fonts))
+    fonts: dict[str, Any] = {"font_dirs": folders, **families} if folders else {}
+    # Without a folder of our own, the machine's fonts are the only ones.
+    skips_system = bool(folders) and not has_system_fonts
+    draw = _resvg().svg_to_bytes
+    return bytes(draw(svg_string=svg, zoom=zoom, background=background, skip_system_fonts=skips_system, **fonts))
+
+
+def check_png() -> None:
+    """Check that drawings can be made PNGs.
+
+    Raises:
+        StoreError: resvg is not installed.
+    """
+    _resvg()
 
 
 def _pdf(svg: str) -> bytes:

@@ -25,9 +25,19 @@ def map_css() -> Markup:
 
 
 def file_css() -> str:
-    """The same for a file of its own: colours written out, since few programs but browsers know custom properties."""
-    light, dark, rules = str(map_css()).split("/* --- */")
-    return f"{_inlined(rules, light)}@media (prefers-color-scheme:dark){{{_inlined(rules, dark)}}}"
+    """Return the same for a file of its own: colours written out, since few programs know custom properties."""
+    _, dark, rules = str(map_css()).split("/* --- */")
+    return f"{light_css()}@media (prefers-color-scheme:dark){{{_inlined(rules, dark)}}}"
+
+
+def light_css(more: str = "") -> str:
+    """Return the colours of a light page written out.
+
+    Args:
+        more: Further rules, which may have custom properties of their own.
+    """
+    light, _, rules = str(map_css()).split("/* --- */")
+    return _inlined(rules + more, light + more)
 
 
 def _inlined(rules: str, properties: str) -> str:

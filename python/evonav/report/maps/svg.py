@@ -108,6 +108,12 @@ def star(centre: Point, radius: float) -> str:
     return polyline(corners, closed=True)
 
 
+def cross(centre: Point, arm: float) -> str:
+    """Path data of a cross, page coordinates."""
+    x, y = centre
+    return f"M{x - arm:.0f} {y - arm:.0f}l{2 * arm:.0f} {2 * arm:.0f}m0 {-2 * arm:.0f}l{-2 * arm:.0f} {2 * arm:.0f}"
+
+
 def title(text: str) -> str:
     """A tooltip, also what a screen reader says."""
     return f"<title>{escape(text)}</title>"

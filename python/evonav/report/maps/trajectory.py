@@ -16,7 +16,7 @@ from evonav.evaluation.records.schema import (
     TransitionRecord,
 )
 from evonav.report.maps.floor_plan import Frame, distance_m, furniture
-from evonav.report.maps.svg import Point, arrow_head, cm, join, polyline, simplified, star, title
+from evonav.report.maps.svg import Point, arrow_head, cm, cross, join, polyline, simplified, star, title
 from evonav.tasks.language import noun_of
 
 NUM_TIMES = 10
@@ -256,7 +256,7 @@ def end_mark(at: tuple[int, int], is_success: bool, unit: float) -> str:
     if is_success:
         sign = f"M{x - d:.0f} {y + 0.1 * d:.0f}L{x - 0.2 * d:.0f} {y + 0.8 * d:.0f}L{x + d:.0f} {y - 0.7 * d:.0f}"
     else:
-        sign = _cross(x, y, 0.75 * d)
+        sign = cross((x, y), 0.75 * d)
     css = "end ok" if is_success else "end bad"
     hint = title("ended here: success" if is_success else "ended here: no success")
     return (
@@ -289,14 +289,8 @@ def _stale_mark(entry: EntryRecord, frame: Frame, *, is_stressed: bool, is_visit
         words += ", gone to by the agent"
     css = "visited" if is_visited else "goal" if is_stressed else "weak"
     box = f'x="{x - width / 2:.0f}" y="{y - height / 2:.0f}" width="{width:.0f}" height="{height:.0f}"'
-    cross = ""
-    if is_stressed:
-        cross = f'<path d="{_cross(x, y, 0.9 * u)}"/>'
-    return f'<g class="{css}">{title(words)}<rect {box}/>{cross}</g>'
-
-
-def _cross(x: int, y: int, arm: float) -> str:
-    return f"M{x - arm:.0f} {y - arm:.0f}l{2 * arm:.0f} {2 * arm:.0f}m0 {-2 * arm:.0f}l{-2 * arm:.0f} {2 * arm:.0f}"
+    mark = f'<path d="{cross((x, y), 0.9 * u)}"/>' if is_stressed else ""
+    return f'<g class="{css}">{title(words)}<rect {box}/>{mark}</g>'
 
 
 def _choice(entry: RoundRecord) -> str:

@@ -1,0 +1,154 @@
+"""Draw what an agent believed and did in one round, as SVG over the map of its house."""
+
+import base64
+import math
+from collections.abc import Mapping
+from io import BytesIO
+
+import numpy as np
+from PIL import Image
+
+from evonav.evaluation.records.schema import StageMap, StageRecord
+from evonav.replay.types import TracedEntry, TracedMap, TracedRound, TracedStage
+from evonav.report.maps.floor_plan import Frame, ground, labels
+from evonav.report.maps.svg import cm, cross, escape, join, polyline
+from evonav.report.maps.trajectory import change, ring, start_mark, target_mark
+from evonav.tasks.language import noun_of
+
+MAX_ENTRY_CM = 600.0
+CELL_COLOURS = ((208, 212, 218), (228, 235, 248), (121, 127, 139), (196, 224, 249))
+"""RGB of unknown, free, blocked and explored cells, as in the viewer on a light page."""
+UNKNOWN_COLOUR = "#d0d4da"
+"""The first of these, which also lies beyond the agent's map."""
+_TAG_UNITS = 2.6
+"""Height of the names of entries, in units of a frame."""
+
+
+def house_layer(record: StageRecord, maps: Mapping[int, StageMap], frame: Frame, success_radius_m: float) -> str:
+    """Return what stays the same in a stage: the house, what moved before, and the target in its radius."""
+    house = maps.get(record.stage)
+    below, names = "", ""
+    if house is not None:
+        below, names = ground(house, frame), labels(house, frame)
+    moved = change(record.transition, frame, stage_map=house, previous_map=maps.get(record.stage - 1))
+    return below + moved + names + ring(record, frame, success_radius_m) + target_mark(record.target, frame)
+
+
+def belief_layer(stage: TracedStage, step: TracedRound, frame: Frame) -> str:
+    """Return an agent's map, entries and frontiers in one round, and its way so far."""
+    if step.map is None:
+        return way_layer(stage, step, frame)
+    chosen = None if step.record is None else step.record.chosen_entry
+    entries = [
+        _entry(
+            entry,
+            frame,
+            is_candidate=entry.record.entry_id in step.candidate_ids,
+            is_chosen=chosen is not None and entry.record.entry_id == chosen.entry_id,
+            is_goal=entry.record.label == stage.record.goal.category,
+        )
+        for entry in sorted(step.entries, key=lambda entry: entry.record.entry_id in step.candidate_ids)
+    ]
+    r = 1.3 * frame.unit
+    diamonds = (
+        f'<path class="frontier" stroke-width="{0.2 * frame.unit:.1f}" d="M{x} {y - r:.0f}l{r:.0f} {r:.0f}l{-r:.0f} '
+        f'{r:.0f}l{-r:.0f} {-r:.0f}z"/>'
+        for x, y in (cm(frontier.position_m) for frontier in step.frontiers)
+    )
+    return _cells(step.map) + join(entries) + join(diamonds) + way_layer(stage, step, frame)
+
+
+def truth_layer(stage: TracedStage, step: TracedRound, frame: Frame) -> str:
+    """Return where the memory wrongly holds the target, and the agent's way so far."""
+    wrong = []
+    for entry in step.entries:
+        belief, truth = entry.record, entry.truth
+        is_target = truth is not None and truth.object_id == stage.record.target.object_id
+        if belief.is_stale and truth is not None and truth.now_m is not None and is_target:
+            ends = [cm((point[0], point[2])) for point in (belief.centre_m, truth.now_m)]
+            u = frame.unit
+            width = f'stroke-width="{0.45 * u:.1f}"'
+            line = f'<path stroke-dasharray="{u:.0f}" d="{polyline(ends)}"/>'
+            wrong.append(f'<g class="target-moved" {width}>{line}<path d="{cross(ends[0], 1.4 * u)}"/></g>')
+    return join(wrong) + way_layer(stage, step, frame)
+
+
+def way_layer(stage: TracedStage, step: TracedRound, frame: Frame) -> str:
+    """Return the start, the way of all rounds so far, where the agent goes, where it stands and what it looks at."""
+    u = frame.unit
+    at = cm((step.pose.x_m, step.pose.z_m))
+    sights = [(view.pose.yaw_rad, 9 * u, "sight side") for view in step.views[:-1]]
+    sights.append((step.pose.yaw_rad, 12 * u, "sight"))
+    start = stage.record.effective_start
+    return (
+        ("" if start is None else start_mark(cm((start.x_m, start.z_m)), frame, "start"))
+        + _trail(stage, step, u)
+        + join(_sight(at, yaw_rad, stage.fov_rad, reach_cm, css) for yaw_rad, reach_cm, css in sights)
+        + f'<circle class="agent" cx="{at[0]}" cy="{at[1]}" r="{1.5 * u:.1f}" stroke-width="{0.5 * u:.1f}"/>'
+    )
+
+
+def _trail(stage: TracedStage, step: TracedRound, unit: float) -> str:
+    pieces = []
+    for one in stage.rounds:
+        if one.record is not None:
+            css, width = ("step", 1.0) if one is step else ("trail", 0.9)
+            path = polyline([cm(point) for point in one.record.path_m])
+            pieces.append(f'<path class="{css}" stroke-width="{width * unit:.1f}" d="{path}"/>')
+        if one is step:
+            break
+    if step.record is None or step.record.action.position_m is None:
+        return join(pieces)
+    places = step.record.path_m or ((step.pose.x_m, step.pose.z_m),)
+    goal = cm(step.record.action.position_m)
+    line = f'<path stroke-dasharray="{unit:.0f}" d="{polyline([cm(places[-1]), goal])}"/>'
+    mark = f'<circle cx="{goal[0]}" cy="{goal[1]}" r="{0.8 * unit:.1f}"/>'
+    return join(pieces) + f'<g class="goto" stroke-width="{0.4 * unit:.1f}">{line}{mark}</g>'
+
+
+def _entry(entry: TracedEntry, frame: Frame, *, is_candidate: bool, is_chosen: bool, is_goal: bool) -> str:
+    belief, u = entry.record, frame.unit
+    x, y = cm((belief.centre_m[0], belief.centre_m[2]))
+    width, depth = (
+        min(MAX_ENTRY_CM, max(1.4 * u, 100 * abs(edge))) if math.isfinite(edge) else 1.4 * u
+        for edge in (belief.size_m[0], belief.size_m[2])
+    )
+    states = {"candidate": is_candidate, "chosen": is_chosen, "stale": belief.is_stale}
+    css = " ".join(name for name, holds in states.items() if holds)
+    box = f'x="{x - width / 2:.0f}" y="{y - depth / 2:.0f}" width="{width:.0f}" height="{depth:.0f}"'
+    mark = f'<path d="{cross((x, y), min(0.9 * u, width / 2))}"/>' if belief.is_stale else ""
+    tag = ""
+    if is_chosen or is_goal:
+        size = f'font-size="{_TAG_UNITS * u:.0f}" stroke-width="{0.5 * u:.1f}"'
+        name = f"{noun_of(belief.label)} #{belief.entry_id}"
+        half = 0.3 * _TAG_UNITS * u * len(name)  # a name stays inside of the picture
+        middle = min(max(x, frame.left + half), frame.left + frame.width - half)
+        place = f'x="{middle:.0f}" y="{y - depth / 2 - 0.8 * u:.0f}"'
+        tag = f'<text class="tag {css}" {size} {place}>{escape(name)}</text>'
+    line = f'stroke-width="{(0.75 if is_chosen else 0.35) * u:.1f}"'
+    return f'<g class="entry {css}" {line}><rect {box}/>{mark}</g>{tag}'
+
+
+def _cells(found: TracedMap) -> str:
+    """Return an agent's map as an image."""
+    rows, cols = found.cells.shape
+    picture = Image.fromarray(np.ascontiguousarray(found.cells[::-1]))
+    picture.putpalette([value for colour in CELL_COLOURS for value in colour])
+    buffer = BytesIO()
+    picture.save(buffer, "PNG", compress_level=1)
+    cell_cm = 100 * found.cell_m
+    x, y = cm(found.corner_m)
+    box = f'x="{x}" y="{y - rows * cell_cm:.0f}" width="{cols * cell_cm:.0f}" height="{rows * cell_cm:.0f}"'
+    look = 'preserveAspectRatio="none" image-rendering="optimizeSpeed"'
+    uri = f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}"
+    return f'<image {box} {look} href="{uri}"/>'
+
+
+def _sight(at: tuple[int, int], yaw_rad: float, fov_rad: float, reach_cm: float, css: str) -> str:
+    """Return the sector that a view looks at."""
+    (ax, ay), (bx, by) = (
+        (at[0] + reach_cm * math.sin(turn), at[1] - reach_cm * math.cos(turn))
+        for turn in (yaw_rad - fov_rad / 2, yaw_rad + fov_rad / 2)
+    )
+    arc = f"A{reach_cm:.0f} {reach_cm:.0f} 0 0 1 {bx:.0f} {by:.0f}"
+    return f'<path class="{css}" d="M{at[0]} {at[1]}L{ax:.0f} {ay:.0f}{arc}z"/>'
