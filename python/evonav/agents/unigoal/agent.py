@@ -1,7 +1,7 @@
 """UniGoal (Yin et al., CVPR 2025) on this protocol (paper, Sec. C.3; docs/agents.md).
 
 It explores frontiers with single actions, goes to what its detector takes for the goal, and lets the match of goal
-graph and scene graph draw exploration a little. What was once an obstacle stays one: its map takes nothing back.
+graph and scene graph attract exploration a little. An obstacle stays one for ever: the map takes nothing back.
 """
 
 import math
@@ -41,21 +41,21 @@ from evonav.world.simulator import Action
 Point2 = tuple[float, float]
 
 _BELIEF_STRIDE = 2
-"""Cells of the map that one cell of a picture stands for, along each axis."""
+"""Number of cells of the map in one cell of a picture, along each axis."""
 _NUM_DRAWS = 10
-"""Of a random place, until there is a way to one."""
+"""Number of random places to try until one has a path to it."""
 
 
 @dataclass(frozen=True, slots=True)
 class UniGoalConfig:
-    """UniGoal's constants, and what its paper and its code disagree about."""
+    """UniGoal's constants, and those on which its paper and its code disagree."""
 
     graph: GraphConfig = field(default_factory=GraphConfig)
     bev: BevConfig = field(default_factory=BevConfig)
     planner: PlannerConfig = field(default_factory=PlannerConfig)
     goal: GoalConfig = field(default_factory=GoalConfig)
     num_tries: int = 3
-    """Questions asked before an invalid answer is given up on, where UniGoal has no rule of its own."""
+    """Number of tries before a question counts as failed, where UniGoal has no rule of its own."""
 
 
 class UniGoal:
@@ -71,7 +71,7 @@ class UniGoal:
         self._task: TaskInfo | None = None
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Forgets everything; the map begins where the agent first stands."""
+        """Forget everything; the map begins where the agent first stands."""
         self._task = task
         self._queries.counters.clear()
         self._graphs = GraphReasoner(self.config.graph, self._queries)
@@ -80,7 +80,7 @@ class UniGoal:
         self._num_given_up = 0
 
     def begin_stage(self, stage: StageInput) -> None:
-        """Map, visited cells, collisions and scene graph stay; the goal graph and all goals go."""
+        """Drop the goal graph and all goals; map, visited cells, collisions and scene graph stay."""
         self._graphs.begin_stage(stage)
         self._advice: Advice | None = None
         self._wander_m: Point2 | None = None
@@ -89,7 +89,7 @@ class UniGoal:
         self._watch: GoalWatch | None = None
 
     def act(self, observation: Observation) -> AgentAction:
-        """One primitive action."""
+        """Return one primitive action."""
         self._queries.begin_round()
         view, pose = observation.views[-1], observation.pose
         bev, planner, watch = self._ready(pose)
@@ -109,7 +109,7 @@ class UniGoal:
         return Move(step.action)
 
     def _ready(self, pose: Pose) -> tuple[BevMap, UniGoalPlanner, GoalWatch]:
-        """Map and planner of the task, goals of the stage; made when first needed."""
+        """Return the task's map and planner and the stage's goals, made when first needed."""
         assert self._task is not None, "begin_task comes first"
         if self._bev is None:
             self._bev = BevMap((pose.x_m, pose.z_m), len(MAP_CATEGORIES), self.config.bev)
@@ -120,7 +120,7 @@ class UniGoal:
         return self._bev, self._planner, self._watch
 
     def _step(self, bev: BevMap, planner: UniGoalPlanner, watch: GoalWatch, pose: Pose) -> PlannedStep:
-        """Towards the confirmed goal, else the temporary one, else where there is something to explore."""
+        """Go towards the confirmed goal, else the temporary one, else an exploration target."""
         if watch.goal is None:
             target_m = self._exploration_target(bev, planner, watch, pose)
         if watch.confirmed is not None:
@@ -130,9 +130,9 @@ class UniGoal:
         return planner.step(pose, target_m, "exploration")
 
     def _exploration_target(self, bev: BevMap, planner: UniGoalPlanner, watch: GoalWatch, pose: Pose) -> Point2 | None:
-        """A frontier, chosen anew when due, after another match of the graphs.
+        """Return a frontier, chosen anew when due, after another match of the graphs.
 
-        Without a frontier left, a random place of what is explored: there the house may look different by now.
+        Without a frontier left, it is a random explored place: the house may look different there by now.
         """
         here = (pose.x_m, pose.z_m)
         reached_m, wander_m = planner.config.reached_m, self._wander_m
@@ -153,7 +153,7 @@ class UniGoal:
         return self._wander_m or planner.target_m
 
     def _somewhere(self, bev: BevMap, planner: UniGoalPlanner, pose: Pose) -> Point2 | None:
-        """A random place to go to when nothing is left to explore; `None` if ten draws bring none with a way to it."""
+        """Return a random place to go to when nothing is left to explore; `None` if ten draws give no reachable one."""
         open_cells = bev.explored
         blocked = bev.grown(np.ascontiguousarray(np.argwhere(bev.obstacles), np.int32), planner.config.obstacle_radius)
         open_cells[blocked[:, 0], blocked[:, 1]] = False
@@ -168,7 +168,7 @@ class UniGoal:
         return None
 
     def _cells_of(self, bev: BevMap, node: SceneNode) -> Cells:
-        """Cells under a node's points."""
+        """Return the cells under a node's points."""
         points_m = self._graphs.scene.objects.points_m(node.id)
         at_m = np.array([node.ground_m]) if points_m is None else points_m[:, [0, 2]].astype(np.float64)
         frame = bev.map_frame
@@ -176,14 +176,14 @@ class UniGoal:
         return np.ascontiguousarray(np.unique(cells, axis=0))
 
     def _is_given_up(self, node: SceneNode) -> bool:
-        """Whether all of a node lies where the goal was sought in vain."""
+        """Return whether all of a node lies where the goal was searched in vain."""
         assert self._bev is not None, "there is a map whenever goals are matched"
         if not self._planner.num_blacklisted:
             return False
         return len(self._planner.allowed(self._cells_of(self._bev, node))) == 0
 
     def _tell(self, planner: UniGoalPlanner, watch: GoalWatch, step: PlannedStep) -> None:
-        """Notes a round for `diagnostics`."""
+        """Store a round for `diagnostics`."""
         advice, goal = self._advice, watch.goal
         node = None if goal is None or goal.node_id is None else self._graphs.scene.node(goal.node_id)
         details: dict[str, object] = {"category": self._graphs.category, "step": step.goal}
@@ -213,7 +213,7 @@ class UniGoal:
         )
 
     def diagnostics(self) -> RoundDiagnostics:
-        """What the last action serves, how the graphs matched, and counters."""
+        """Return the goal of the last action, the match of the graphs, and the counters."""
         return self._diagnostics
 
     def _entry(self, node: SceneNode) -> EntryBelief:
@@ -221,11 +221,11 @@ class UniGoal:
         return EntryBelief(node.id, kind, node.centre_m, node.size_m, node.num_detections)
 
     def entries(self) -> Sequence[EntryBelief]:
-        """The scene graph's nodes, by ProcTHOR's type."""
+        """Return the scene graph's nodes, by ProcTHOR's type."""
         return [self._entry(node) for node in self._graphs.scene.nodes]
 
     def belief(self) -> Belief:
-        """Nodes, map at half its resolution, and the exploration target."""
+        """Return nodes, the map at half its resolution, and the exploration target."""
         assert self._bev is not None, "there is a map after the first round"
         target_m = self._wander_m or self._planner.target_m
         node_id = None if self._watch is None or self._watch.goal is None else self._watch.goal.node_id
@@ -241,7 +241,7 @@ class UniGoal:
 
 
 def _coarser(cells: NDArray[np.uint8], frame: MapFrame, stride: int) -> tuple[NDArray[np.uint8], MapFrame]:
-    """A map of larger cells around what is known: blocked if any of theirs is, else free if any is."""
+    """Return a map of larger cells around the known ones: blocked if any of theirs is, else free if any is."""
     known = np.argwhere(cells)
     low, high = (known.min(axis=0), known.max(axis=0) + 1) if len(known) else (np.zeros(2, int), np.ones(2, int))
     low = low // stride * stride
@@ -256,7 +256,7 @@ def _coarser(cells: NDArray[np.uint8], frame: MapFrame, stride: int) -> tuple[ND
 
 
 class UniGoalAsPublished(UniGoal):
-    """As its paper has it: captions are compared without their numbers, all mapped categories may be goals."""
+    """UniGoal as published: captions are compared without numbers, and all mapped categories may be goals."""
 
     def __init__(self, config: UniGoalConfig | None = None, decision: DecisionModel | None = None) -> None:
         super().__init__(config or UniGoalConfig(graph=GraphConfig(mode="paper")), decision)

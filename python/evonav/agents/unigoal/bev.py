@@ -1,4 +1,4 @@
-"""UniGoal's map seen from above: what stands in the way, what was seen, where which category is.
+"""UniGoal's bird's-eye map: obstacles, explored cells, and where each category is.
 
 Specification: UniGoal (Yin et al., CVPR 2025), whose mapping is SemExp's; docs/memory.md says where ours differs.
 """
@@ -42,14 +42,14 @@ class BevConfig:
 
 
 class BevMap:
-    """What one task has shown so far. Nothing that was seen is ever taken back: maxima of all views."""
+    """Everything seen in one task. Nothing is ever taken back: each cell has the maximum of all views."""
 
     def __init__(self, centre_m: Point2, num_categories: int, config: BevConfig | None = None) -> None:
-        """A map of nothing.
+        """Create an empty map.
 
         Args:
             centre_m: `(x, z)` of its middle: where the agent starts.
-            num_categories: Categories that pixels may have.
+            num_categories: Number of categories that pixels may have.
             config: Parameters.
 
         Raises:
@@ -70,15 +70,15 @@ class BevMap:
             stride_px=config.stride_px,
             category_points=config.category_points,
         )
-        """For the planner, which works on it."""
+        """The map in Rust, on which the planner works."""
         rows, cols = self.core.shape
         self.map_frame = MapFrame(rows, cols, config.cell_m, self.core.corner_m)
 
     def integrate(self, view: View, categories: NDArray[np.int32] | None = None) -> None:
-        """Adds what one view shows.
+        """Add a view.
 
         Args:
-            view: Its depth and camera count.
+            view: A view; only its depth and camera are used.
             categories: `(H, W)` category index of each pixel, -1 for none; `None`: no pixel has one.
 
         Raises:
@@ -94,7 +94,7 @@ class BevMap:
         )
 
     def cells_of(self, view: View, mask: NDArray[np.bool_]) -> Cells:
-        """Cells that the marked pixels `(H, W)` of a view lie in, each once, sorted; at any height and distance."""
+        """Return the cells of the marked pixels `(H, W)` of a view, sorted, each once; at any height and distance."""
         return self.core.cells_of(
             view.depth_m,
             mask,
@@ -105,48 +105,48 @@ class BevMap:
         )
 
     def cell_of(self, point_m: Point2) -> tuple[int, int] | None:
-        """`(row, col)` of the cell that `(x, z)` lies in; `None` off the map."""
+        """Return the `(row, col)` of the cell that contains `(x, z)`; `None` off the map."""
         frame = self.map_frame
         col = int(np.floor((point_m[0] - frame.corner_m[0]) / frame.cell_m))
         row = int(np.floor((point_m[1] - frame.corner_m[1]) / frame.cell_m))
         return (row, col) if 0 <= row < frame.rows and 0 <= col < frame.cols else None
 
     def centre_of(self, cell: tuple[int, int]) -> Point2:
-        """`(x, z)` of the middle of a cell `(row, col)`."""
+        """Return the `(x, z)` of the middle of a cell `(row, col)`."""
         (x_m, z_m), cell_m = self.map_frame.corner_m, self.map_frame.cell_m
         return (x_m + (cell[1] + 0.5) * cell_m, z_m + (cell[0] + 0.5) * cell_m)
 
     def grown(self, cells: Cells, radius: int) -> Cells:
-        """Cells within `radius` cells of some; those off the map are left out. Sorted, each once."""
+        """Return the cells within `radius` cells of some, sorted, each once; those off the map are left out."""
         return self.core.grown(cells, radius)
 
     @property
     def obstacles(self) -> NDArray[np.bool_]:
-        """`(R, C)` copy: something once stood in the way there."""
+        """`(R, C)` copy: True where an obstacle was ever seen."""
         return self.core.obstacles
 
     @property
     def explored(self) -> NDArray[np.bool_]:
-        """`(R, C)` copy: something was seen there, at any height."""
+        """`(R, C)` copy: True where anything was seen, at any height."""
         return self.core.explored
 
     @property
     def visited(self) -> NDArray[np.bool_]:
-        """`(R, C)` copy: the agent has been there."""
+        """`(R, C)` copy: True where the agent has been."""
         return self.core.visited
 
     @property
     def collisions(self) -> NDArray[np.bool_]:
-        """`(R, C)` copy: moves have failed there."""
+        """`(R, C)` copy: True where moves have failed."""
         return self.core.collisions
 
     def category(self, index: int) -> NDArray[np.float32]:
-        """`(R, C)` copy: how certain a category is in each cell, 0 to 1."""
+        """Return an `(R, C)` copy of how certain a category is in each cell, 0 to 1."""
         return self.core.category(index)
 
     @property
     def cells(self) -> NDArray[np.uint8]:
-        """`(R, C)`: `UNKNOWN`, `FREE` or `BLOCKED`, as other maps show it."""
+        """`(R, C)`: `UNKNOWN`, `FREE` or `BLOCKED`, as in other maps."""
         cells = np.full(self.core.shape, UNKNOWN, np.uint8)
         cells[self.explored | self.visited] = FREE
         cells[self.obstacles | self.collisions] = BLOCKED

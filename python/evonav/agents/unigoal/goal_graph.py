@@ -1,4 +1,4 @@
-"""UniGoal's goal graph, and how it is matched with the scene graph."""
+"""UniGoal's goal graph, and its match with the scene graph."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -9,8 +9,9 @@ from evonav.agents.unigoal.object_graph import SceneEdge, SceneNode
 
 Point2 = tuple[float, float]
 MatchMode = Literal["code", "paper"]
-"""`code`: names of scene nodes carry a number, as released, so that they never equal a goal's word; `paper`: captions
-are compared."""
+"""The names of scene nodes that are compared with a goal's words.
+
+`code`: names with a number, as released, so that they never equal a word; `paper`: captions."""
 
 MAX_GOAL_NODES = 5
 """Largest number of objects that a goal graph has."""
@@ -31,38 +32,38 @@ class GoalEdge:
 
 @dataclass(frozen=True, slots=True)
 class GoalGraph:
-    """Words for objects, the target first, and how they stand to each other."""
+    """Words for objects, the target first, and their relations."""
 
     nodes: tuple[str, ...]
     edges: tuple[GoalEdge, ...] = ()
 
     def degree(self, node: str) -> int:
-        """Edges at a node."""
+        """Return the number of edges at a node."""
         return sum(node in (edge.subject, edge.object) for edge in self.edges)
 
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """How much of a goal graph the scene graph holds."""
+    """The part of a goal graph that is found in the scene graph."""
 
     score: float
-    """S, in 0..1."""
+    """The score S, 0 to 1."""
     anchors: Mapping[str, int]
-    """Goal node to id of the scene node with its name, in the goal graph's order."""
+    """Ids of the matched scene nodes by goal node, in the goal graph's order."""
 
 
 def relation_kind(relation: str) -> str:
-    """`on`, `under` or `near`; other relations are of their own kind."""
-    words = relation.lower().split()
-    first = words[0] if words else ""
+    """Return `on`, `under` or `near`; any other relation is a kind of its own."""
+    tokens = relation.lower().split()
+    first = tokens[0] if tokens else ""
     for kind, known in (("on", _ON), ("under", _UNDER), ("near", _NEAR)):
         if first in known:
             return kind
-    return " ".join(words)
+    return " ".join(tokens)
 
 
 def is_edge_in(goal: GoalEdge, subject_id: int, object_id: int, edges: Mapping[tuple[int, int], str]) -> bool:
-    """Whether the scene relates two nodes as the goal does; an edge holds in both directions, `on` as `under`."""
+    """Return whether the scene relates two nodes as the goal does, in either direction (`on` is `under` mirrored)."""
     wanted = relation_kind(goal.relation)
     forward = edges.get((subject_id, object_id))
     if forward is not None and relation_kind(forward) == wanted:
@@ -79,7 +80,7 @@ def match_graphs(
     mode: MatchMode,
     spell: Callable[[str], str],
 ) -> Match:
-    """Scores how well the scene graph holds a goal graph.
+    """Score how well the scene graph matches a goal graph.
 
     S is the mean of node and edge similarity. Node similarity: mean of the share of goal nodes found and of how well
     their degrees agree (less over more; 0 if none is found). Edge similarity: share of goal edges found, 1 if there is
@@ -88,10 +89,10 @@ def match_graphs(
 
     Args:
         goal: A subgraph of the goal graph.
-        nodes: Of the scene.
-        edges: Of the scene.
-        mode: What a scene node is called.
-        spell: One spelling a word, such as `sofa` for "couch".
+        nodes: Nodes of the scene.
+        edges: Edges of the scene.
+        mode: The names of scene nodes.
+        spell: Returns one spelling for a word, such as `sofa` for "couch".
     """
     spelt = {word: spell(word) for word in goal.nodes}
     relation_of = {(edge.subject_id, edge.object_id): edge.relation for edge in edges}
@@ -104,8 +105,8 @@ def match_graphs(
     edge_similarity = len(found) / len(goal.edges) if goal.edges else 1.0
     agreements = []
     for word in anchors:
-        wanted, held = goal.degree(word), sum(word in (edge.subject, edge.object) for edge in found)
-        agreements.append(1.0 if wanted == held else min(wanted, held) / max(wanted, held))
+        wanted, matched = goal.degree(word), sum(word in (edge.subject, edge.object) for edge in found)
+        agreements.append(1.0 if wanted == matched else min(wanted, matched) / max(wanted, matched))
     share = len(anchors) / len(goal.nodes)
     agreement = math.fsum(agreements) / len(agreements) if agreements else 0.0
     return Match(((share + agreement) / 2.0 + edge_similarity) / 2.0, anchors)
@@ -119,36 +120,36 @@ def _holds(edge: GoalEdge, anchors: Mapping[str, int], relations: Mapping[tuple[
 def _assigned(
     goal: GoalGraph, candidates: Mapping[str, Sequence[SceneNode]], relations: Mapping[tuple[int, int], str]
 ) -> dict[str, int]:
-    """A scene node for each goal node: around each candidate of the first one found, those that keep most edges."""
-    words = [word for word in goal.nodes if candidates[word]]
+    """Assign scene nodes to goal nodes: around each candidate of the first one, those that satisfy most edges."""
+    found = [word for word in goal.nodes if candidates[word]]
     best: tuple[tuple[int, int, int], dict[str, int]] | None = None
-    for first in candidates[words[0]] if words else ():
-        anchors = {words[0]: first.id}
-        for word in words[1:]:
+    for first in candidates[found[0]] if found else ():
+        anchors = {found[0]: first.id}
+        for word in found[1:]:
             free = [node for node in candidates[word] if node.id not in anchors.values()]
             costs = [
-                (-_num_kept(goal, {**anchors, word: node.id}, relations), math.dist(node.ground_m, first.ground_m))
+                (-_num_matched(goal, {**anchors, word: node.id}, relations), math.dist(node.ground_m, first.ground_m))
                 for node in free
             ]
             if free:
                 anchors[word] = free[costs.index(min(costs))].id
-        key = (_num_kept(goal, anchors, relations), first.num_detections, -first.id)
+        key = (_num_matched(goal, anchors, relations), first.num_detections, -first.id)
         if best is None or key > best[0]:
             best = (key, anchors)
     return {} if best is None else best[1]
 
 
-def _num_kept(goal: GoalGraph, anchors: Mapping[str, int], relations: Mapping[tuple[int, int], str]) -> int:
+def _num_matched(goal: GoalGraph, anchors: Mapping[str, int], relations: Mapping[tuple[int, int], str]) -> int:
     return sum(_holds(edge, anchors, relations) for edge in goal.edges)
 
 
 def similarity_transform(layout: Sequence[Point2], places_m: Sequence[Point2], point: Point2) -> Point2 | None:
-    """Where a point of a layout is, when two others lie at known places: turned, scaled and shifted.
+    """Return where a point of a layout is, given two others at known places: turned, scaled and shifted.
 
     Args:
         layout: Two places in the layout's frame.
-        places_m: The same two, `(x, z)` in the world.
-        point: In the layout's frame.
+        places_m: The same two places, `(x, z)` in the world.
+        point: A place in the layout's frame.
 
     Returns:
         `(x, z)`; `None` if the two coincide in the layout.

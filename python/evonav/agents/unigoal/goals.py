@@ -1,4 +1,4 @@
-"""From a glimpse of the goal to its confirmation, or to giving the place up (UniGoal; docs/agents.md)."""
+"""Track the goal from its first sight to its confirmation, or until its place is abandoned (docs/agents.md)."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -19,27 +19,27 @@ class GoalConfig:
     """UniGoal's constants."""
 
     confirm_m: float = 0.15
-    """A temporary goal is confirmed when the way to it, grown as the planner does, is shorter."""
+    """A temporary goal is confirmed when the path to it, grown as the planner does, is shorter than this."""
     redetect_m: float = 1.0
-    """This near, the goal has to be in view, or its place is given up."""
+    """Nearer than this the goal has to be in view, or its place is abandoned."""
     same_place_m: float = 0.25
-    """Detections with cells this near each other are of the same thing."""
+    """Detections with cells this near each other are of the same object."""
 
 
 @dataclass(frozen=True, slots=True)
 class Glimpse:
-    """Where the goal seems to be."""
+    """A place where the goal seems to be."""
 
     cells: Cells = field(compare=False, repr=False)
     centre_m: Point2
-    """`(x, z)`: mean of the cells."""
+    """`(x, z)`: the mean of the cells."""
     source: Literal["detection", "graph"]
     node_id: int | None = None
-    """Of the matched node."""
+    """Id of the matched node."""
 
 
 class GoalWatch:
-    """Temporary goal and confirmed goal of one stage; places given up are the planner's to keep."""
+    """Temporary goal and confirmed goal of one stage; the planner stores the abandoned places."""
 
     def __init__(self, bev: BevMap, planner: UniGoalPlanner, config: GoalConfig) -> None:
         self.config = config
@@ -48,7 +48,7 @@ class GoalWatch:
         self.num_given_up = 0
         self._has_way = True
         self.is_in_view = False
-        """Whether the last view showed what the goal is."""
+        """True if the last view showed the goal's category or node."""
         self._bev = bev
         self._planner = planner
 
@@ -58,15 +58,15 @@ class GoalWatch:
         return self.confirmed or self.temporary
 
     def look(self, view: View, category: str | None, seen_ids: frozenset[int]) -> None:
-        """Takes over what a view shows of the goal: its largest detection becomes the temporary goal.
+        """Use a view's largest detection of the goal as the temporary goal.
 
-        One that is held gives way to a detection of the same place, or when the map shows no way to it. If every
-        largest detection took over, an agent that turns towards one chair would see another, and turn back, for ever.
+        A temporary goal is replaced only by a detection of the same place, or if the map shows no path to it.
+        Otherwise an agent that turns towards one chair would see another, and turn back, for ever.
 
         Args:
-            view: The present one.
-            category: That the goal goes under, if it goes under one.
-            seen_ids: Scene nodes in view.
+            view: The present view.
+            category: The goal's category, if it has one.
+            seen_ids: Ids of the scene nodes in view.
         """
         mask = None if category is None else largest_detection(view, category)
         found = None if mask is None else self._glimpse(self._bev.cells_of(view, mask), "detection")
@@ -76,22 +76,22 @@ class GoalWatch:
             self.temporary = found
 
     def _gives_way(self, found: Glimpse) -> bool:
-        held = self.temporary
-        if held is None or held.source == "graph" or not self._has_way:
+        present = self.temporary
+        if present is None or present.source == "graph" or not self._has_way:
             return True
-        around = self._bev.grown(held.cells, round(self.config.same_place_m / self._bev.map_frame.cell_m))
+        around = self._bev.grown(present.cells, round(self.config.same_place_m / self._bev.map_frame.cell_m))
         cols = self._bev.map_frame.cols
         return bool(np.isin(found.cells @ (cols, 1), around @ (cols, 1)).any())
 
     def pursue(self, node_id: int, cells: Cells) -> None:
-        """Goes for the node that the goal was matched with, if nothing better is in view."""
+        """Go for the node that was matched with the goal, if there is no other goal."""
         if self.goal is None:
             self.temporary = self._glimpse(cells, "graph", node_id)
 
     def _glimpse(
         self, cells: Cells, source: Literal["detection", "graph"], node_id: int | None = None
     ) -> Glimpse | None:
-        """Cells that were not given up; `None` if there are none."""
+        """Return the cells that were not abandoned as a place; `None` if there are none."""
         allowed = self._planner.allowed(cells)
         if not len(allowed):
             return None
@@ -101,9 +101,9 @@ class GoalWatch:
         return Glimpse(allowed, centre_m, source, node_id)
 
     def judge(self, pose: Pose) -> None:
-        """Confirms the temporary goal at its place; gives it up where it should be in view and is not.
+        """Confirm the temporary goal at its place; abandon it if it should be in view and is not.
 
-        One that is near, but far to walk to, is behind something and as near as it gets: confirmed.
+        A goal that is near, but has a long path, is behind something. The agent cannot come nearer: it is confirmed.
         """
         goal = self.temporary
         if goal is None or self.confirmed is not None:
@@ -128,11 +128,11 @@ class GoalWatch:
 
 
 def largest_detection(view: View, category: str) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]] | None:
-    """Pixels of the detection of a category with the largest box.
+    """Return the pixels of a category's detection with the largest box.
 
     Args:
-        view: With detections labelled with ProcTHOR's types.
-        category: Of the map.
+        view: A view whose detections are labelled with ProcTHOR's types.
+        category: A category of the map.
 
     Returns:
         `(H, W)` mask; `None` without a detection that has a depth.

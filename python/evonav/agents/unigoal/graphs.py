@@ -1,4 +1,4 @@
-"""What UniGoal makes of its graphs: the goal read, the scene related, both matched, and where that says to look."""
+"""UniGoal's reasoning: read the goal, relate the scene, match both graphs, and find where they point."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ Point2 = tuple[float, float]
 MatchStage = Literal["zero", "partial", "perfect"]
 
 ROOM_ZERO = "bedroom"
-"""Where every node is in mode `code`: the released code provides no map of rooms."""
+"""The room of every node in mode `code`: the released code provides no map of rooms."""
 ELSEWHERE = "other room"
 
 
@@ -40,7 +40,7 @@ _WORD_OF_NOUN = {canonical(kind): canonical(word) for kind, word in LABEL_OF_TYP
 
 
 def scene_word(word: str) -> str:
-    """One spelling for what goes under one word in the scene graph: `table` for a dining table, `sofa` for a couch."""
+    """Return one spelling for all nouns of a scene graph's word: `table` for a dining table, `sofa` for a couch."""
     noun = canonical(word)
     return _WORD_OF_NOUN.get(noun, noun)
 
@@ -50,58 +50,58 @@ class GraphConfig:
     """UniGoal's constants."""
 
     mode: MatchMode = "code"
-    """`code`: as released, six categories and names that never match; `paper`: as published, all that is mapped."""
+    """`code`: as released, six categories and names that never match; `paper`: as published, all mapped categories."""
     goal_input: Literal["text", "category", "image"] = "text"
-    """What the goal graph is made of: the unified instruction (the paper's setting), the category, or the image."""
+    """Source of the goal graph: the unified instruction (the paper's setting), the category, or the image."""
     scene: ObjectGraphConfig = field(default_factory=ObjectGraphConfig)
     steps_per_update: int = 2
-    """Of the scene graph."""
+    """Number of steps between two updates of the scene graph."""
     partial_score: float = 0.5
     perfect_score: float = 0.9
     num_decompositions: int = 10
-    """Tries before the whole graph is the only subgraph."""
+    """Number of tries before the whole graph is the only subgraph."""
     correction_hops: int = 2
     correction_reach_m: float = 2.0
-    """Longest edge of a hop: every two nodes are joined, so that two hops without a limit were the whole house."""
+    """Longest edge of a hop: every two nodes are joined, so two hops without a limit would be the whole house."""
 
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """Where the graphs say to look."""
+    """The place that the graphs point to."""
 
     stage: MatchStage
     score: float
-    """S."""
+    """The score S of the match."""
     num_anchors: int
-    """Goal nodes found in the scene."""
+    """Number of goal nodes found in the scene."""
     mid_term_m: Point2 | None = None
-    """Draws exploration a little."""
+    """`(x, z)` that attracts exploration a little."""
     target: SceneNode | None = None
-    """What to go to: the goal, found whole."""
+    """The node to go to: the goal, completely matched."""
     reason: str = ""
 
 
 class GraphReasoner:
     """Scene graph of the task, goal graph of the stage."""
 
-    def __init__(self, config: GraphConfig, asker: QuerySession) -> None:
+    def __init__(self, config: GraphConfig, queries: QuerySession) -> None:
         self.config = config
         self.scene = ObjectGraph(config.scene)
         self.goal_graph: GoalGraph | None = None
         self.subgraphs: tuple[GoalGraph, ...] = ()
         self.category: str | None = None
-        """Of the goal's detections; `None` if the detector has no word for it."""
-        self._queries = asker
+        """Category of the goal's detections; `None` if the detector has no category for it."""
+        self._queries = queries
         self._matcher = Matcher()
 
     def begin_stage(self, goal: StageInput) -> None:
-        """The goal graph goes, the scene graph stays."""
+        """Drop the goal graph; the scene graph stays."""
         self._goal = goal
         self.scene.begin_stage(goal.stage)
         self.goal_graph, self.subgraphs, self.category = None, (), None
 
     def understand(self) -> None:
-        """Reads the goal, once a stage: objects, relations, subgraphs, the detector's category."""
+        """Read the goal, once a stage: objects, relations, subgraphs, the detector's category."""
         goal, ask = self._goal, self._queries.ask
         text: str | None = goal.unified_instruction
         objects: tuple[str, ...]
@@ -124,16 +124,16 @@ class GraphReasoner:
         self.category = None if category in (None, NO_CATEGORY) else category
 
     def observe(self, view: View) -> None:
-        """Takes over a view, and relates what is new. A wrong number of relations: these pairs get none."""
+        """Add a view and relate its new nodes; an answer with a wrong number of relations relates none of them."""
         pairs = self.scene.update(view)
         if pairs:
             self.scene.relate(pairs, self._queries.ask(RelationLinesQuestion(self._goal, pairs), 1))
 
     def advise(self, is_given_up: Callable[[SceneNode], bool]) -> Advice:
-        """Matches the first subgraph (as released, the others are never used) with the scene.
+        """Match the first subgraph with the scene; as released, the other subgraphs are never used.
 
         Args:
-            is_given_up: Whether a node's place was visited in vain; it does not match.
+            is_given_up: True for a node whose place was visited in vain; it does not match.
         """
         match = self._match(is_given_up)
         if self._is_perfect(match):
@@ -149,21 +149,21 @@ class GraphReasoner:
         group = self._best_group()
         if group is None:
             return Advice("zero", match.score, num, reason="no group fits")
-        words = ", ".join(node.name for node in group.nodes)
-        return Advice("zero", match.score, num, mid_term_m=group.centre_m, reason=f"by {words}")
+        names = ", ".join(node.name for node in group.nodes)
+        return Advice("zero", match.score, num, mid_term_m=group.centre_m, reason=f"by {names}")
 
     def _match(self, is_given_up: Callable[[SceneNode], bool]) -> Match:
         nodes = [node for node in self.scene.nodes if not is_given_up(node)]
         return match_graphs(self.subgraphs[0], nodes, self.scene.edges, self.config.mode, scene_word)
 
     def _is_perfect(self, match: Match) -> bool:
-        """Found whole, its target included; the released code also wants fewer than two common nodes."""
+        """Return whether the graph is matched, its target included; released code also needs fewer than two anchors."""
         if match.score < self.config.perfect_score or self.subgraphs[0].nodes[0] not in match.anchors:
             return False
         return self.config.mode == "paper" or len(match.anchors) < 2
 
     def _correct(self, match: Match) -> None:
-        """Keeps, renames or deletes what is around the matched nodes, as the model says."""
+        """Keep, rename or delete nodes and edges around the match, as the model answers."""
         config, scene = self.config, self.scene
         nodes = scene.neighbourhood(tuple(match.anchors.values()), config.correction_hops, config.correction_reach_m)
         ids = {node.id for node in nodes}
@@ -181,9 +181,10 @@ class GraphReasoner:
                 scene.rename(node.id, verdict.word)
 
     def _predicted(self, match: Match) -> Point2 | None:
-        """Mean place of the goal nodes that were not found, from the first two that were.
+        """Return the mean place of the unmatched goal nodes, computed from the first two matched ones.
 
-        The original takes guessed relative places over into the scene by the similarity transform of two anchors.
+        As in the original, the similarity transform of two anchors turns guessed relative places into places in the
+        scene.
         """
         subgraph = self.subgraphs[0]
         anchors = {word: node for word, i in match.anchors.items() if (node := self.scene.node(i)) is not None}
@@ -200,7 +201,7 @@ class GraphReasoner:
         return (sum(x for x, _ in found) / len(found), sum(z for _, z in found) / len(found))
 
     def _best_group(self) -> Group | None:
-        """The likeliest group of the likeliest room; `None` if there is none that could be."""
+        """Return the likeliest group of the likeliest room; `None` if no group is likely at all."""
         groups = self.scene.groups(self._room_of())
         if not groups:
             return None
@@ -218,7 +219,7 @@ class GraphReasoner:
         return None if best is None else best[1]
 
     def _room_of(self) -> Callable[[SceneNode], str]:
-        """In which room a node is; as published by what stands around it, as released always in room 0."""
+        """Return a function that gives a node's room: as published, by nearby objects; as released, always room 0."""
         if self.config.mode == "code":
             return lambda _: ROOM_ZERO
         around = [ObjectCandidate(n.id, n.caption, n.centre_m, n.size_m, n.num_detections) for n in self.scene.nodes]

@@ -1,4 +1,4 @@
-"""UniGoal's scene graph: object nodes with captions, one relation between every two, groups of what stands together.
+"""UniGoal's scene graph: object nodes with captions, one relation between every two, groups of nearby nodes.
 
 Nodes are the entries of an `ObjectMap` that matches by overlap alone, whatever the label, so that a caption is the word
 that most detections at a place gave.
@@ -19,7 +19,7 @@ Point3 = tuple[float, float, float]
 
 
 def overlap_only() -> ObjectMapConfig:
-    """UniGoal's association; entries are never cleaned up, merged or dropped."""
+    """Return UniGoal's association, which never cleans up, merges or drops entries."""
     return ObjectMapConfig(
         voxel_m=0.025,
         max_distance_m=math.inf,
@@ -35,7 +35,7 @@ class ObjectGraphConfig:
 
     objects: ObjectMapConfig = field(default_factory=overlap_only)
     min_detections: int = 3
-    """From which on an entry is a node."""
+    """Smallest number of detections of an entry that is a node."""
     group_eps_m: float = 0.5
     """Nodes with centres this near belong to one group (DBSCAN, min. 1)."""
     group_cell_m: float = 0.05
@@ -44,7 +44,7 @@ class ObjectGraphConfig:
 
 @dataclass(frozen=True, slots=True)
 class SceneNode:
-    """An object as the scene graph knows it."""
+    """An object in the scene graph."""
 
     id: int
     caption: str
@@ -54,7 +54,7 @@ class SceneNode:
 
     @property
     def name(self) -> str:
-        """As questions call it."""
+        """The node's name in questions."""
         return f"{self.caption}_{self.id}"
 
     @property
@@ -74,13 +74,13 @@ class SceneEdge:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Nodes that stand together."""
+    """Nodes that are near each other."""
 
     nodes: tuple[SceneNode, ...]
 
     @property
     def centre_m(self) -> Point2:
-        """`(x, z)`: mean of the nodes' middles."""
+        """`(x, z)`: the mean of the nodes' middles."""
         num = len(self.nodes)
         return (
             math.fsum(node.ground_m[0] for node in self.nodes) / num,
@@ -102,7 +102,7 @@ class Verdict:
 
 
 class ObjectGraph:
-    """Nodes, edges, and pairs of nodes that no relation was proposed for yet."""
+    """Nodes, edges, and pairs of nodes without a proposed relation."""
 
     def __init__(self, config: ObjectGraphConfig | None = None) -> None:
         self.config = config or ObjectGraphConfig()
@@ -110,35 +110,35 @@ class ObjectGraph:
         self._nodes: dict[int, SceneNode] = {}
         self._relations: dict[tuple[int, int], str] = {}
         self._renamed: dict[int, tuple[str, str]] = {}
-        """What a correction called a node, and what detections called it then."""
+        """Caption that a correction gave a node, and the label that detections gave it then, by node."""
         self.seen_ids: frozenset[int] = frozenset()
-        """Entries that the last view showed."""
+        """Ids of the entries that the last view showed."""
         self._types: dict[int, Counter[str]] = {}
 
     @property
     def nodes(self) -> list[SceneNode]:
-        """By ascending id."""
+        """Nodes by ascending id."""
         return list(self._nodes.values())
 
     @property
     def edges(self) -> list[SceneEdge]:
-        """In the order in which they were proposed."""
+        """Edges in the order in which they were proposed."""
         return [SceneEdge(a, b, relation) for (a, b), relation in self._relations.items()]
 
     def node(self, node_id: int) -> SceneNode | None:
-        """The node of an id, if it is still there."""
+        """Return the node with an id, if it still exists."""
         return self._nodes.get(node_id)
 
     def type_of(self, node_id: int) -> str:
-        """ProcTHOR's type of most detections at a node: for records, which judge entries by it."""
+        """Return ProcTHOR's type of most detections at a node: for records, which judge entries by it."""
         return self._types[node_id].most_common(1)[0][0]
 
     def begin_stage(self, stage: int) -> None:
-        """Nodes and edges stay, stale or not."""
+        """Start a stage; nodes and edges stay, stale or not."""
         self.objects.begin_stage(stage)
 
     def update(self, view: View) -> list[tuple[SceneNode, SceneNode]]:
-        """Takes over a view's detections.
+        """Add a view's detections.
 
         Returns:
             Pairs that need a relation: every new node with each old one and each other new one. A node whose caption
@@ -151,7 +151,7 @@ class ObjectGraph:
                 self._types.setdefault(entry_id, Counter())[kind] += 1
         self.seen_ids = frozenset(entry_id for entry_id in update.entry_ids if entry_id is not None)
         new_ids = []
-        for entry_id in sorted(self.seen_ids):  # the others are as they were
+        for entry_id in sorted(self.seen_ids):  # all other entries are unchanged
             entry = self.objects.entry(entry_id)
             if entry is None or entry.num_detections < self.config.min_detections:
                 continue
@@ -169,21 +169,21 @@ class ObjectGraph:
         return [(node, other) for index, node in enumerate(new) for other in (*old, *new[index + 1 :])]
 
     def _caption(self, node_id: int, label: str) -> str:
-        word, was = self._renamed.get(node_id, (label, label))
-        return word if was == label else label
+        word, label_then = self._renamed.get(node_id, (label, label))
+        return word if label_then == label else label
 
     def relate(self, pairs: Sequence[tuple[SceneNode, SceneNode]], relations: Sequence[str] | None) -> None:
-        """Makes edges of proposed pairs.
+        """Make edges of proposed pairs.
 
         Args:
-            pairs: As `update` gave them.
-            relations: One a pair; `None`: there was no usable answer, and the pairs get no edge.
+            pairs: Pairs that `update` returned.
+            relations: One relation a pair; `None` if there was no valid answer, and the pairs get no edge.
         """
         for (a, b), relation in zip(pairs, relations or (), strict=relations is not None):
             self._relations[(a.id, b.id)] = relation
 
     def groups(self, room_of: Callable[[SceneNode], str]) -> dict[str, list[Group]]:
-        """Groups by room: what hangs together by steps of at most `group_eps_m` from centre to centre.
+        """Return groups by room: nodes connected by steps of at most `group_eps_m` from centre to centre.
 
         With a minimum of one, DBSCAN's clusters are just the connected components.
         """
@@ -211,7 +211,7 @@ class ObjectGraph:
         return groups
 
     def neighbourhood(self, node_ids: Sequence[int], num_hops: int, reach_m: float) -> list[SceneNode]:
-        """Nodes within so many hops of others, along edges no longer than `reach_m`, by ascending id.
+        """Return the nodes within some hops of others, along edges no longer than `reach_m`, by ascending id.
 
         Every two nodes are joined by an edge; without a limit to its length two hops would be the whole house.
         """
@@ -228,7 +228,7 @@ class ObjectGraph:
         return [self._nodes[node_id] for node_id in sorted(inside)]
 
     def rename(self, node_id: int, word: str) -> None:
-        """Calls a node something else, until detections change their mind about it."""
+        """Change a node's caption, until its detections get another label."""
         node = self._nodes.get(node_id)
         if node is None or node.caption == word:
             return
@@ -237,7 +237,7 @@ class ObjectGraph:
         self._nodes[node_id] = SceneNode(node.id, word, node.centre_m, node.size_m, node.num_detections)
 
     def delete(self, node_id: int) -> None:
-        """Takes a node out, with its edges and its points; it comes back if it is detected again."""
+        """Remove a node with its edges and its points; it comes back if it is detected again."""
         self._nodes.pop(node_id, None)
         self._renamed.pop(node_id, None)
         self._types.pop(node_id, None)
@@ -245,7 +245,7 @@ class ObjectGraph:
         self._drop_edges(node_id)
 
     def set_relation(self, edge: SceneEdge, relation: str | None) -> None:
-        """Changes what an edge says; `None` takes it out."""
+        """Change an edge's relation; `None` removes the edge."""
         key = (edge.subject_id, edge.object_id)
         if relation is None:
             self._relations.pop(key, None)

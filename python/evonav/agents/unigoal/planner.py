@@ -1,6 +1,6 @@
-"""How UniGoal gets about: exploration targets, ways by fast marching, single actions, and what to do when stuck.
+"""UniGoal's movement: exploration targets, paths by fast marching, single actions, and ways to get unstuck.
 
-The planner holds no goal of its own but the one to get unstuck; which goal counts is the agent's to say.
+The planner has no goal of its own but the one to get unstuck; the agent decides which goal counts.
 """
 
 import math
@@ -72,9 +72,9 @@ class PlannedStep:
     action: Action
     """`STOP`: a confirmed goal is reached."""
     goal: GoalKind | Literal["stuck", "none"]
-    """What the action serves; `none` without any goal."""
+    """The goal that the action serves; `none` without any goal."""
     distance_m: float | None = None
-    """Way to the grown goal; `None` if there is none."""
+    """Path length to the grown goal; `None` if there is no path."""
     straight_m: float = math.inf
     """Straight distance to it."""
     short_term_m: Point2 | None = None
@@ -83,7 +83,7 @@ class PlannedStep:
 
 @dataclass(slots=True)
 class _Stuck:
-    """What failed moves add up to."""
+    """The consequences of failed moves."""
 
     width: int = 1
     is_stuck: bool = False
@@ -98,7 +98,7 @@ class _Exploration:
 
 @dataclass(slots=True)
 class _Counters:
-    """Since the task began."""
+    """Counts since the task began."""
 
     collisions: int = 0
     stuck: int = 0
@@ -107,14 +107,14 @@ class _Counters:
 
 
 class UniGoalPlanner:
-    """Plans on a `BevMap`, and writes down there where the agent has been and bumped into something."""
+    """Plans on a `BevMap`, and marks there where the agent has been and where it collided."""
 
     def __init__(self, bev: BevMap, seed: int, config: PlannerConfig | None = None) -> None:
-        """For one task.
+        """Create the planner of one task.
 
         Args:
             bev: The agent's map; the planner adds visited cells and collisions.
-            seed: Of the goals to get unstuck.
+            seed: Seed of the random goals to get unstuck.
             config: Parameters.
         """
         self.bev = bev
@@ -129,7 +129,7 @@ class UniGoalPlanner:
         self._blacklist: set[tuple[int, int]] = set()
 
     def begin_stage(self) -> None:
-        """Keeps the map; drops the exploration target, what is blacklisted and being stuck."""
+        """Keep the map; drop the exploration target, the blacklist and the stuck state."""
         self._last = None
         self._last_action = None
         self._stuck = _Stuck()
@@ -138,11 +138,11 @@ class UniGoalPlanner:
         self._blacklist = set()
 
     def observe(self, pose: Pose, *, is_own_move: bool = True) -> None:
-        """Where the last action has brought the agent; to be called once before each `step`.
+        """Note the pose that the last action has led to; call this once before each `step`.
 
         Args:
-            pose: The agent's.
-            is_own_move: It came there by the last `step`; a move of another's tells nothing of obstacles.
+            pose: The agent's pose.
+            is_own_move: True if the last `step` led there; any other move reveals no obstacles.
         """
         here = (pose.x_m, pose.z_m)
         last = self._last or pose
@@ -157,7 +157,7 @@ class UniGoalPlanner:
         self._exploration.num_steps += 1
 
     def _learn_from_move(self, start: Pose, moved_m: float, is_still: bool) -> None:
-        """Blocks a strip ahead of a move that failed; failing again and again, the agent is stuck."""
+        """Block a strip ahead of a move that failed; after repeated failures the agent is stuck."""
         stuck = self._stuck
         length, buffer = 2, 4
         if is_still:
@@ -175,21 +175,21 @@ class UniGoalPlanner:
 
     @property
     def is_stuck(self) -> bool:
-        """Whether the agent is to get away from where it is before anything else."""
+        """True if the agent has to leave its place before anything else."""
         return self._stuck.is_stuck
 
     def blacklist(self, cells: Cells) -> None:
-        """Rejects goal cells, grown by `blacklist_radius`, for the rest of the stage."""
+        """Reject goal cells, grown by `blacklist_radius`, for the rest of the stage."""
         grown = self.bev.grown(cells, self.config.blacklist_radius)
         self._blacklist.update((int(row), int(col)) for row, col in grown)
 
     @property
     def num_blacklisted(self) -> int:
-        """Cells that goals may not lie in, in this stage."""
+        """Number of cells in which no goal may lie in this stage."""
         return len(self._blacklist)
 
     def allowed(self, cells: Cells) -> Cells:
-        """Of goal cells those that are not blacklisted."""
+        """Return the goal cells that are not blacklisted."""
         if not self._blacklist:
             return cells
         keep = [(int(row), int(col)) not in self._blacklist for row, col in cells]
@@ -197,11 +197,11 @@ class UniGoalPlanner:
 
     @property
     def target_m(self) -> Point2 | None:
-        """The exploration target that holds."""
+        """The present exploration target."""
         return self._exploration.target_m
 
     def needs_target(self, pose: Pose) -> bool:
-        """Whether an exploration target is due: none yet, reached, or `replan_steps` old."""
+        """Return whether an exploration target is due: none yet, reached, or `replan_steps` old."""
         exploration = self._exploration
         target_m = exploration.target_m
         return (
@@ -211,10 +211,10 @@ class UniGoalPlanner:
         )
 
     def exploration_target(self, pose: Pose, mid_term_goal_m: Point2 | None = None) -> Point2 | None:
-        """Chooses an exploration target, and holds on to it.
+        """Choose an exploration target, which stays until the next choice.
 
         Args:
-            pose: The agent's.
+            pose: The agent's pose.
             mid_term_goal_m: `(x, z)` that decides among frontiers about as near; ignored off the map.
 
         Returns:
@@ -242,22 +242,22 @@ class UniGoalPlanner:
         return self._exploration.target_m
 
     def frontiers(self) -> Cells:
-        """Frontier cells as the map has them now."""
+        """Return the frontier cells of the present map."""
         return self.bev.core.frontiers(
             obstacle_radius=self.config.frontier_obstacle_radius, min_cells=self.config.min_frontier_cells
         )
 
     def distance_m(self, pose: Pose, goal: Cells) -> float | None:
-        """Way from the agent to goal cells grown by `object_radius`.
+        """Return the path length from the agent to goal cells grown by `object_radius`.
 
         Returns:
-            Metres, 0 on the goal; `None` if there is no way, or nothing of it is on the map.
+            Metres, 0 on the goal; `None` if there is no path, or nothing of it is on the map.
         """
         plan = self._plan(pose, goal, self.config.object_radius)
         return None if plan is None else plan[0]
 
     def step(self, pose: Pose, goal: Cells | Point2 | None, kind: GoalKind) -> PlannedStep:
-        """The next action towards a goal. `observe` comes first.
+        """Return the next action towards a goal; call `observe` first.
 
         A stuck agent heads for a random place where it has been, until it moves, unless its goal is confirmed. Where
         the map shows no way to the goal, the agent goes to the reachable place nearest to it, from there to one where
@@ -265,9 +265,9 @@ class UniGoalPlanner:
         is shut in by what it has bumped into tries in turn to move and to turn.
 
         Args:
-            pose: The agent's.
+            pose: The agent's pose.
             goal: Cells, or a point `(x, z)`; `None` for nowhere.
-            kind: How the goal is grown; only a `confirmed` one ends in `STOP`.
+            kind: The kind of goal, which decides how it is grown; only a `confirmed` one ends in `STOP`.
         """
         if self.is_stuck and kind != "confirmed":
             if self._stuck.goal_m is None:
@@ -335,7 +335,7 @@ class UniGoalPlanner:
         return np.array([] if cell is None else [cell], np.int32).reshape(-1, 2)
 
     def _plan(self, pose: Pose, goal: Cells, radius: int) -> tuple[float | None, float, Point2 | None] | None:
-        """Way, straight distance and short-term goal; `None` if agent or goal are off the map."""
+        """Return path length, straight distance and short-term goal; `None` if agent or goal are off the map."""
         here = (pose.x_m, pose.z_m)
         if not len(goal) or self.bev.cell_of(here) is None:
             return None
@@ -352,7 +352,7 @@ class UniGoalPlanner:
         return None if math.isinf(plan[1]) else plan
 
     def _visited_place(self, pose: Pose) -> Point2 | None:
-        """A random place where the agent has been, farther than `stuck_cells` away if there is one."""
+        """Return a random place where the agent has been, farther than `stuck_cells` away if there is one."""
         cells = np.argwhere(self.bev.visited)
         here = self.bev.cell_of((pose.x_m, pose.z_m))
         if here is None or not len(cells):

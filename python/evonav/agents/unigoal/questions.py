@@ -1,4 +1,4 @@
-"""What UniGoal asks about the goal: its objects, their relations, subgraphs, its category."""
+"""Questions of UniGoal about the goal: its objects, their relations, subgraphs, its category."""
 
 import json
 import re
@@ -20,36 +20,36 @@ _RELATION = re.compile(r"(?P<a>.+?) and (?P<b>.+?): (?P<rest>.+)")
 
 
 def relation_line(a: str, b: str, subject: str, relation: str, object_: str) -> str:
-    """`A and B: A is <relation> B`."""
+    """Return `A and B: A is <relation> B`."""
     return f"{a} and {b}: {subject} is {relation} {object_}"
 
 
 def parse_relation(line: str) -> tuple[str, str, str] | None:
-    """Reads `A and B: A is <relation> B`.
+    """Read `A and B: A is <relation> B`.
 
     Returns:
-        Subject, relation and object; `None` if the line is none such, or says it of something other than A and B.
+        Subject, relation and object; `None` if the line has another form, or relates anything but A and B.
     """
     match = _RELATION.fullmatch(line.strip().rstrip("."))
     if match is None:
         return None
     for subject, other in ((match["a"], match["b"]), (match["b"], match["a"])):
-        said = re.fullmatch(rf"{re.escape(subject)} is (.+) {re.escape(other)}", match["rest"], re.IGNORECASE)
-        if said is not None:
-            return subject.lower(), said[1].lower(), other.lower()
+        found = re.fullmatch(rf"{re.escape(subject)} is (.+) {re.escape(other)}", match["rest"], re.IGNORECASE)
+        if found is not None:
+            return subject.lower(), found[1].lower(), other.lower()
     return None
 
 
 @dataclass(frozen=True, slots=True)
 class DescribeQuestion(Question[str]):
-    """What does the goal image show in its middle, and how does it stand to what is around?"""
+    """Ask what the goal image shows in its middle, and how that relates to its surroundings."""
 
     kind: ClassVar[str] = "describe"
     goal: StageInput
     image: Pixels = field(compare=False, repr=False)
 
     def prompt(self) -> Prompt:
-        """The reference image."""
+        """Show the reference image."""
         return Prompt.of(
             Picture(self.image),
             Text(
@@ -59,14 +59,14 @@ class DescribeQuestion(Question[str]):
         )
 
     def parse(self, text: str) -> str:
-        """A line with a word in it."""
+        """Read the first line, which must contain a letter."""
         line = first_line(text)
         if re.search(r"[A-Za-z]", line) is None:
             raise AnswerError("invalid", "no description", text)
         return line
 
     def answer_text(self, answer: str) -> str:
-        """The sentence."""
+        """Return the sentence."""
         return answer
 
     def by_rule(self, matcher: Matcher) -> tuple[str, str]:
@@ -76,15 +76,15 @@ class DescribeQuestion(Question[str]):
 
 @dataclass(frozen=True, slots=True)
 class ObjectsQuestion(Question[tuple[str, ...]]):
-    """Which objects does the goal speak of?"""
+    """Ask which objects the goal mentions."""
 
     kind: ClassVar[str] = "goal-objects"
     goal: StageInput
     text: str
-    """The goal in words: the instruction, or what was said of the goal image."""
+    """The goal in words: the instruction, or the description of the goal image."""
 
     def prompt(self) -> Prompt:
-        """The goal's words."""
+        """Show the goal in words."""
         return Prompt.of(
             Text(
                 f"A robot is told: {self.text}\nWhich objects does this speak of? Rooms are no objects. Answer on the "
@@ -94,18 +94,18 @@ class ObjectsQuestion(Question[tuple[str, ...]]):
         )
 
     def parse(self, text: str) -> tuple[str, ...]:
-        """`[a, b, ...]`; the first five different words."""
+        """Read `[a, b, ...]`; the first five different words count."""
         match = _LIST.fullmatch(first_line(text))
         if match is None:
             raise AnswerError("invalid", f"no list in brackets: {first_line(text)[:80]!r}", text)
-        words = [word.strip().strip("'\"").strip().lower() for word in match[1].split(",")]
-        objects = tuple(dict.fromkeys(word for word in words if word))[:MAX_GOAL_NODES]
+        names = [name.strip().strip("'\"").strip().lower() for name in match[1].split(",")]
+        objects = tuple(dict.fromkeys(name for name in names if name))[:MAX_GOAL_NODES]
         if not objects:
             raise AnswerError("invalid", "an empty list", text)
         return objects
 
     def answer_text(self, answer: tuple[str, ...]) -> str:
-        """`[a, b, ...]`."""
+        """Return `[a, b, ...]`."""
         return f"[{', '.join(answer)}]"
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
@@ -115,7 +115,7 @@ class ObjectsQuestion(Question[tuple[str, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
-    """How do the goal's objects stand to each other?"""
+    """Ask for the relations between the goal's objects."""
 
     kind: ClassVar[str] = "goal-relations"
     goal: StageInput
@@ -123,7 +123,7 @@ class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
     objects: tuple[str, ...]
 
     def prompt(self) -> Prompt:
-        """The goal's words, and its objects."""
+        """Show the goal in words, and its objects."""
         return Prompt.of(
             Text(
                 f"A robot is told: {self.text}\nThe objects are [{', '.join(self.objects)}]. How do they stand to each "
@@ -134,7 +134,7 @@ class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
         )
 
     def parse(self, text: str) -> tuple[GoalEdge, ...]:
-        """Lines of the form `A and B: A is <relation> B`; those of things that are not in the list are left out."""
+        """Read lines of the form `A and B: A is <relation> B`; lines about objects off the list are left out."""
         lines = lines_of(text)
         if lines and lines[0].lower().rstrip(".") == "none":
             return ()
@@ -151,7 +151,7 @@ class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
         return tuple(edges)
 
     def answer_text(self, answer: tuple[GoalEdge, ...]) -> str:
-        """A line an edge."""
+        """Return one line an edge."""
         lines = [relation_line(e.subject, e.object, e.subject, e.relation, e.object) for e in answer]
         return "\n".join(lines) or "none"
 
@@ -162,14 +162,14 @@ class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class DecomposeQuestion(Question[tuple[GoalGraph, ...]]):
-    """Into which parts does the goal graph fall?"""
+    """Ask into which parts the goal graph falls."""
 
     kind: ClassVar[str] = "decompose"
     goal: StageInput
     graph: GoalGraph
 
     def prompt(self) -> Prompt:
-        """The graph as JSON."""
+        """Show the graph as JSON."""
         return Prompt.of(
             Text(
                 f"This is a graph of objects and relations: {_json_of(self.graph)}\nDivide it into subgraphs of "
@@ -180,7 +180,7 @@ class DecomposeQuestion(Question[tuple[GoalGraph, ...]]):
         )
 
     def parse(self, text: str) -> tuple[GoalGraph, ...]:
-        """JSON at the beginning: numbered subgraphs of nodes and edges that there are, the target in the first."""
+        """Read JSON at the beginning: numbered subgraphs of the graph's nodes and edges, the target in the first."""
         try:
             value, _ = json.JSONDecoder().raw_decode(text.strip())
         except ValueError as error:
@@ -193,7 +193,7 @@ class DecomposeQuestion(Question[tuple[GoalGraph, ...]]):
         return subgraphs
 
     def _subgraph(self, name: str, part: object, text: str) -> GoalGraph:
-        """One part, its nodes in the graph's order."""
+        """Read one part, its nodes in the graph's order."""
         if not isinstance(part, dict) or set(part) != {"nodes", "edges"}:
             raise AnswerError("invalid", f"{name} is not nodes and edges", text)
         nodes, edges = part["nodes"], part["edges"]
@@ -202,23 +202,23 @@ class DecomposeQuestion(Question[tuple[GoalGraph, ...]]):
         if not isinstance(edges, list):
             raise AnswerError("invalid", f"{name} has no list of edges", text)
         known = {(edge.subject, edge.relation, edge.object): edge for edge in self.graph.edges}
-        kept = []
+        edges_inside: list[GoalEdge] = []
         for edge in edges:
             key = tuple(edge) if isinstance(edge, list) else ()
             if not all(isinstance(word, str) for word in key) or key not in known:
                 raise AnswerError("invalid", f"{name} has an edge that the graph has not: {str(edge)[:80]}", text)
             if key[0] not in nodes or key[2] not in nodes:
                 raise AnswerError("invalid", f"{name} has an edge that leaves it", text)
-            kept.append(known[key])
-        return GoalGraph(tuple(node for node in self.graph.nodes if node in nodes), tuple(kept))
+            edges_inside.append(known[key])
+        return GoalGraph(tuple(node for node in self.graph.nodes if node in nodes), tuple(edges_inside))
 
     def answer_text(self, answer: tuple[GoalGraph, ...]) -> str:
-        """JSON on one line."""
+        """Return JSON on one line."""
         parts = {f"subgraph_{i + 1}": json.loads(_json_of(graph)) for i, graph in enumerate(answer)}
         return json.dumps(parts)
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """A JSON text."""
+        """Return the schema of a JSON text."""
         return {"type": "string"}
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[GoalGraph, ...], str]:
@@ -233,7 +233,7 @@ def _json_of(graph: GoalGraph) -> str:
 
 @dataclass(frozen=True, slots=True)
 class CategoryQuestion(ClosedQuestion[str]):
-    """Which of its detector's categories is the goal?"""
+    """Ask which of its detector's categories the goal is."""
 
     kind: ClassVar[str] = "category"
     goal: StageInput
@@ -243,7 +243,7 @@ class CategoryQuestion(ClosedQuestion[str]):
     categories: tuple[str, ...]
 
     def prompt(self) -> Prompt:
-        """The goal's words, and the categories."""
+        """Show the goal in words, and the categories."""
         return Prompt.of(
             Text(
                 f"A robot is told: {self.text}\nIt is to find: {self.target}. Its detector knows "
@@ -253,18 +253,18 @@ class CategoryQuestion(ClosedQuestion[str]):
         )
 
     def parse(self, text: str) -> str:
-        """One of the categories, or `none`."""
+        """Read one of the categories, or `none`."""
         line = first_line(text).rstrip(".").lower()
         if line not in self.choices():
             raise AnswerError("invalid", f"no category: {line[:80]!r}", text)
         return line
 
     def answer_text(self, answer: str) -> str:
-        """The category."""
+        """Return the category."""
         return answer
 
     def choices(self) -> Sequence[str]:
-        """The categories, and `none`."""
+        """Return the categories, and `none`."""
         return (*self.categories, NO_CATEGORY)
 
     def by_rule(self, matcher: Matcher) -> tuple[str, str]:

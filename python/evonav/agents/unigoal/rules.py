@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from evonav.agents.unigoal.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph, relation_kind
 from evonav.agents.unigoal.object_graph import SceneNode, Verdict
 from evonav.decision.candidates import ObjectCandidate, Point2
-from evonav.decision.text.language import Goal, canonical, parse_goal
+from evonav.decision.text.language import canonical, parse_goal
 from evonav.decision.text.matcher import ROOM_SIGNS, Matcher, gap_m
-from evonav.tasks.public import StageInput
 from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 
 if TYPE_CHECKING:
@@ -37,35 +36,35 @@ _CATEGORY_OF_NOUN = {
 }
 _APART = "away from"
 _BESIDE_M = 0.7
-"""How far from what it is next to the layout puts a thing."""
+"""Distance of the layout between an object and one next to it."""
 
 
 def describe(_: Matcher, question: "DescribeQuestion") -> tuple[str, str]:
-    """The category alone: rules are blind."""
+    """Return the category alone: rules do not see images."""
     return f"the {canonical(question.goal.category)}", "images are not looked at"
 
 
-def objects(matcher: Matcher, question: "ObjectsQuestion") -> tuple[tuple[str, ...], str]:
-    """What to find, and what it is said to be on or near."""
-    goal = _parsed(matcher, question.goal, question.text)
+def objects(_: Matcher, question: "ObjectsQuestion") -> tuple[tuple[str, ...], str]:
+    """Name the target, and the objects that it should be on or near."""
+    goal = parse_goal(question.text, question.goal.category)
     nouns = (goal.noun, *(relation.noun for relation in goal.relations if relation.kind != "in"))
     return tuple(dict.fromkeys(nouns))[:MAX_GOAL_NODES], "read by rule"
 
 
-def goal_relations(matcher: Matcher, question: "GoalRelationsQuestion") -> tuple[tuple[GoalEdge, ...], str]:
-    """All that is said of the target."""
-    goal = _parsed(matcher, question.goal, question.text)
-    said = {"on": "on", "near": "next to"}
+def goal_relations(_: Matcher, question: "GoalRelationsQuestion") -> tuple[tuple[GoalEdge, ...], str]:
+    """Return all relations of the target that the goal states."""
+    goal = parse_goal(question.text, question.goal.category)
+    stated = {"on": "on", "near": "next to"}
     edges = [
-        GoalEdge(goal.noun, said[relation.kind], relation.noun)
+        GoalEdge(goal.noun, stated[relation.kind], relation.noun)
         for relation in goal.relations
-        if relation.kind in said and {goal.noun, relation.noun} <= set(question.objects)
+        if relation.kind in stated and {goal.noun, relation.noun} <= set(question.objects)
     ]
     return tuple(dict.fromkeys(edges)), "read by rule"
 
 
 def decompose(_: Matcher, question: "DecomposeQuestion") -> tuple[tuple[GoalGraph, ...], str]:
-    """Connected components, the target's first."""
+    """Return the connected components, the target's first."""
     graph = question.graph
     left, parts = list(graph.nodes), []
     while left:
@@ -87,13 +86,13 @@ def decompose(_: Matcher, question: "DecomposeQuestion") -> tuple[tuple[GoalGrap
 
 
 def category(_: Matcher, question: "CategoryQuestion") -> tuple[str, str]:
-    """The category that the target's noun goes under."""
+    """Return the category of the target's noun."""
     found = _CATEGORY_OF_NOUN.get(canonical(question.target), NO_CATEGORY)
     return (found if found in question.categories else NO_CATEGORY), "looked up"
 
 
 def scene_relations(matcher: Matcher, question: "RelationLinesQuestion") -> tuple[tuple[str, ...], str]:
-    """By boxes: on, under, next to, or apart."""
+    """Relate nodes by their boxes: on, under, next to, or apart."""
     known: dict[int, ObjectCandidate] = {}
     for pair in question.pairs:
         for node in pair:
@@ -102,17 +101,17 @@ def scene_relations(matcher: Matcher, question: "RelationLinesQuestion") -> tupl
 
 
 def room(matcher: Matcher, question: "RoomQuestion") -> tuple[str, str]:
-    """The room that the instruction names; else the one that the target mostly stands in; else the first."""
-    said = matcher.parsed(question.goal).room
+    """Choose the room that the instruction names; else the one where the target usually is; else the first."""
+    stated = matcher.parsed(question.goal).room
     usual = next((kind for kind, signs in ROOM_SIGNS.items() if canonical(question.subgraph.nodes[0]) in signs), None)
-    for found, reason in ((said, "named"), (usual, "where it mostly stands")):
+    for found, reason in ((stated, "named"), (usual, "where it mostly stands")):
         if found in question.rooms and found is not None:
             return found, reason
     return question.rooms[0], "nothing tells"
 
 
 def group_score(matcher: Matcher, question: "GroupScoreQuestion") -> tuple[float, str]:
-    """How well the best member's word fits the goal, and a little for the right room."""
+    """Score how well the best member's caption fits the goal, with a bonus for the right room."""
     goal = matcher.parsed(question.goal)
     score = max(matcher.label_score(goal, node.caption) for node in question.group.nodes)
     if goal.room is not None:
@@ -122,7 +121,7 @@ def group_score(matcher: Matcher, question: "GroupScoreQuestion") -> tuple[float
 
 
 def layout(_: Matcher, question: "LayoutQuestion") -> tuple[Mapping[str, Point2], str]:
-    """Known objects where they are; what is on one of them there, what is next to it a step off, towards the others."""
+    """Place anchors where they are, objects on them there, and objects next to them a step towards the others."""
     at = {word: node.ground_m for word, node in question.anchors.items()}
     mean = (sum(x for x, _ in at.values()) / len(at), sum(z for _, z in at.values()) / len(at))
     places = dict(at)
@@ -147,11 +146,6 @@ def correct(matcher: Matcher, question: "CorrectionQuestion") -> tuple[tuple[Ver
         relation = _relation(matcher, known[edge.subject_id], known[edge.object_id])
         verdicts.append(Verdict("keep") if relation == edge.relation else Verdict("rename", relation))
     return tuple(verdicts), "judged by boxes"
-
-
-def _parsed(matcher: Matcher, goal: StageInput, text: str) -> Goal:
-    is_instruction = text == goal.unified_instruction
-    return matcher.parsed(goal) if is_instruction else parse_goal(text, goal.category)
 
 
 def _candidate(node: SceneNode) -> ObjectCandidate:

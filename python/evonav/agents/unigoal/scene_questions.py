@@ -1,4 +1,4 @@
-"""What UniGoal asks about the scene graph: relations, groups, layout, corrections."""
+"""Questions of UniGoal about the scene graph: relations, groups, layout, corrections."""
 
 import math
 import re
@@ -22,21 +22,21 @@ _VERDICT = re.compile(r"(keep|delete|rename to ([a-z][a-z -]*))\.?", re.IGNORECA
 
 
 def describe_graph(graph: GoalGraph) -> str:
-    """A goal graph in words."""
+    """Return a goal graph in words."""
     relations = "; ".join(f"{edge.subject} is {edge.relation} {edge.object}" for edge in graph.edges)
     return f"objects [{', '.join(graph.nodes)}]" + (f", relations: {relations}" if relations else "")
 
 
 @dataclass(frozen=True, slots=True)
 class RelationLinesQuestion(Question[tuple[str, ...]]):
-    """How do new nodes of the scene graph stand to the others? One call for all pairs."""
+    """Ask for the relations of new nodes of the scene graph to the others, in one call for all pairs."""
 
     kind: ClassVar[str] = "scene-relations"
     goal: StageInput
     pairs: Sequence[tuple[SceneNode, SceneNode]]
 
     def prompt(self) -> Prompt:
-        """The pairs by name; the model is shown no image, as in the original."""
+        """Show the pairs by name; the model is shown no image, as in the original."""
         pairs = "\n".join(f"{a.name} and {b.name}" for a, b in self.pairs)
         return Prompt.of(
             Text(
@@ -47,7 +47,7 @@ class RelationLinesQuestion(Question[tuple[str, ...]]):
         )
 
     def parse(self, text: str) -> tuple[str, ...]:
-        """As many lines as pairs, each of its pair."""
+        """Read one line for each pair, in the order of the pairs."""
         lines = lines_of(text)
         if len(lines) != len(self.pairs):
             raise AnswerError("invalid", f"{len(lines)} lines for {len(self.pairs)} pairs", text)
@@ -60,12 +60,12 @@ class RelationLinesQuestion(Question[tuple[str, ...]]):
         return tuple(relations)
 
     def answer_text(self, answer: tuple[str, ...]) -> str:
-        """A line a pair."""
+        """Return one line a pair."""
         named = [(a.name, b.name, relation) for (a, b), relation in zip(self.pairs, answer, strict=True)]
         return "\n".join(relation_line(a, b, a, relation, b) for a, b, relation in named)
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """So many lines."""
+        """Return the schema of an array with a line for each pair."""
         num = len(self.pairs)
         return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
 
@@ -76,16 +76,16 @@ class RelationLinesQuestion(Question[tuple[str, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class RoomQuestion(ClosedQuestion[str]):
-    """In which room is the goal likely?"""
+    """Ask in which room the goal likely is."""
 
     kind: ClassVar[str] = "room"
     goal: StageInput
     subgraph: GoalGraph
     rooms: tuple[str, ...]
-    """Those that have nodes."""
+    """Rooms that have nodes."""
 
     def prompt(self) -> Prompt:
-        """The goal's subgraph, and the rooms."""
+        """Show the goal's subgraph, and the rooms."""
         return Prompt.of(
             Text(
                 f"A robot looks for {self.subgraph.nodes[0]}: {describe_graph(self.subgraph)}. In which of these rooms "
@@ -94,7 +94,7 @@ class RoomQuestion(ClosedQuestion[str]):
         )
 
     def parse(self, text: str) -> str:
-        """The one room that the first line names."""
+        """Read the first line, which must name exactly one of the rooms."""
         line = first_line(text).lower()
         named = [room for room in self.rooms if re.search(rf"\b{re.escape(room)}\b", line)]
         if len(named) != 1:
@@ -102,11 +102,11 @@ class RoomQuestion(ClosedQuestion[str]):
         return named[0]
 
     def answer_text(self, answer: str) -> str:
-        """The room."""
+        """Return the room."""
         return answer
 
     def choices(self) -> Sequence[str]:
-        """The rooms."""
+        """Return the rooms."""
         return self.rooms
 
     def by_rule(self, matcher: Matcher) -> tuple[str, str]:
@@ -116,33 +116,33 @@ class RoomQuestion(ClosedQuestion[str]):
 
 @dataclass(frozen=True, slots=True)
 class GroupScoreQuestion(Question[float]):
-    """How likely is the goal near this group? What the original asks in a dialogue of four turns."""
+    """Ask how likely the goal is near this group; the original asks in a dialogue of four turns."""
 
     kind: ClassVar[str] = "group-score"
     goal: StageInput
     subgraph: GoalGraph
     group: Group
     edges: Sequence[SceneEdge]
-    """Within the group."""
+    """Edges within the group."""
     nodes: Sequence[SceneNode]
-    """All that there are, for rules that judge by surroundings. Not part of the prompt."""
+    """All nodes, for rules that judge by surroundings. Not part of the prompt."""
 
     def prompt(self) -> Prompt:
-        """The goal's subgraph, and the group."""
+        """Show the goal's subgraph, and the group."""
         name = {node.id: node.name for node in self.group.nodes}
-        said = [f"{name[e.subject_id]} is {e.relation} {name[e.object_id]}" for e in self.edges]
+        relations = [f"{name[e.subject_id]} is {e.relation} {name[e.object_id]}" for e in self.edges]
         return Prompt.of(
             Text(
                 f"A robot looks for {self.subgraph.nodes[0]}: {describe_graph(self.subgraph)}.\nIt knows a group of "
                 f"objects that stand together: [{', '.join(name.values())}]"
-                + (f", relations: {'; '.join(said)}" if said else "")
+                + (f", relations: {'; '.join(relations)}" if relations else "")
                 + ".\nHow likely is it to find the goal near this group? Answer on the first line with exactly one "
                 "number from 0 to 1."
             )
         )
 
     def parse(self, text: str) -> float:
-        """A number from 0 to 1."""
+        """Read a number from 0 to 1."""
         line = first_line(text)
         value = float(line) if re.fullmatch(_NUMBER, line) else math.nan
         if not 0.0 <= value <= 1.0:
@@ -150,15 +150,15 @@ class GroupScoreQuestion(Question[float]):
         return value
 
     def answer_text(self, answer: float) -> str:
-        """The number."""
+        """Return the number."""
         return f"{answer:.3f}"
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """A number, as text."""
+        """Return the schema of a number as text."""
         return {"type": "string", "pattern": r"^(0(\.\d+)?|1(\.0+)?)$"}
 
     def alternatives(self, answer: float) -> Sequence[float]:
-        """The other end of the scale."""
+        """Return the other end of the scale."""
         return [0.0 if answer >= 0.5 else 1.0]
 
     def by_rule(self, matcher: Matcher) -> tuple[float, str]:
@@ -168,16 +168,16 @@ class GroupScoreQuestion(Question[float]):
 
 @dataclass(frozen=True, slots=True)
 class LayoutQuestion(Question[Mapping[str, Point2]]):
-    """How do the goal's objects lie to each other, seen from above?"""
+    """Ask how the goal's objects lie to each other, seen from above."""
 
     kind: ClassVar[str] = "layout"
     goal: StageInput
     subgraph: GoalGraph
     anchors: Mapping[str, SceneNode]
-    """Goal nodes that the scene graph has. Where they are is not part of the prompt."""
+    """Goal nodes that the scene graph has. Their places are not part of the prompt."""
 
     def prompt(self) -> Prompt:
-        """The goal's subgraph; the first two anchors fix scale and direction."""
+        """Show the goal's subgraph; the first two anchors fix scale and direction."""
         return Prompt.of(
             Text(
                 f"This is a goal of a robot: {describe_graph(self.subgraph)}. Guess where the objects lie, seen from "
@@ -188,7 +188,7 @@ class LayoutQuestion(Question[Mapping[str, Point2]]):
         )
 
     def parse(self, text: str) -> Mapping[str, Point2]:
-        """`object: (x, y)` for each object in order; anchors apart."""
+        """Read `object: (x, y)` for each object in order; no two anchors may be at the same place."""
         lines = lines_of(text)
         if len(lines) != len(self.subgraph.nodes):
             raise AnswerError("invalid", f"{len(lines)} lines for {len(self.subgraph.nodes)} objects", text)
@@ -204,11 +204,11 @@ class LayoutQuestion(Question[Mapping[str, Point2]]):
         return places
 
     def answer_text(self, answer: Mapping[str, Point2]) -> str:
-        """A line an object."""
+        """Return one line an object."""
         return "\n".join(f"{word}: ({answer[word][0]:.3f}, {answer[word][1]:.3f})" for word in self.subgraph.nodes)
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """So many lines."""
+        """Return the schema of an array with a line for each object."""
         num = len(self.subgraph.nodes)
         return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
 
@@ -219,18 +219,18 @@ class LayoutQuestion(Question[Mapping[str, Point2]]):
 
 @dataclass(frozen=True, slots=True)
 class CorrectionQuestion(Question[tuple[Verdict, ...]]):
-    """What of the scene graph around the goal is right?"""
+    """Ask which parts of the scene graph around the goal are right."""
 
     kind: ClassVar[str] = "correction"
     goal: StageInput
     subgraph: GoalGraph
     nodes: Sequence[SceneNode]
-    """Within two hops of what was matched."""
+    """Nodes within two hops of the match."""
     edges: Sequence[SceneEdge]
-    """Between them."""
+    """Edges between the nodes."""
 
     def prompt(self) -> Prompt:
-        """Nodes and edges, numbered."""
+        """Show nodes and edges, numbered."""
         name = {node.id: node.name for node in self.nodes}
         things = [
             *(node.name for node in self.nodes),
@@ -247,14 +247,14 @@ class CorrectionQuestion(Question[tuple[Verdict, ...]]):
         )
 
     def parse(self, text: str) -> tuple[Verdict, ...]:
-        """`<number>: keep | delete | rename to <word>`, a line for each node, then for each edge."""
+        """Read `<number>: keep | delete | rename to <word>`, a line for each node, then for each edge."""
         lines, num = lines_of(text), len(self.nodes) + len(self.edges)
         if len(lines) != num:
             raise AnswerError("invalid", f"{len(lines)} lines for {num} nodes and edges", text)
         verdicts = []
         for index, line in enumerate(lines):
-            number, _, said = line.partition(":")
-            match = _VERDICT.fullmatch(said.strip())
+            number, _, decision = line.partition(":")
+            match = _VERDICT.fullmatch(decision.strip())
             if number.strip() != str(index) or match is None:
                 raise AnswerError("invalid", f"no verdict on {index}: {line[:80]!r}", text)
             if match[2] is not None:
@@ -264,11 +264,11 @@ class CorrectionQuestion(Question[tuple[Verdict, ...]]):
         return tuple(verdicts)
 
     def answer_text(self, answer: tuple[Verdict, ...]) -> str:
-        """A line a verdict."""
+        """Return one line a verdict."""
         return "\n".join(f"{index}: {verdict}" for index, verdict in enumerate(answer))
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """So many lines."""
+        """Return the schema of an array with a line for each node and edge."""
         num = len(self.nodes) + len(self.edges)
         return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
 
