@@ -15,7 +15,8 @@ from typing import Any
 
 from evonav import _core
 from evonav.generation import worker
-from evonav.generation.worker import GenerationOptions, do_house
+from evonav.generation.journal import Outcome
+from evonav.generation.worker import GenerationOptions, process_house
 from evonav.house import House
 from evonav.house.files import HouseText, HouseTexts
 
@@ -53,7 +54,7 @@ def _row(name: str, path: Path, num_tasks: int) -> str:
     with tempfile.TemporaryDirectory() as out, _timed() as spans:
         for seed, house in _houses(path):
             with _span(spans, "all"):
-                outcome = do_house(0, house.name, house.text, GenerationOptions(seed=seed), Path(out))
+                outcome = _process(house, seed, Path(out))
             num_made += outcome.task_id is not None
             if num_made in (100, num_tasks) and outcome.task_id is not None:
                 memory_mb.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
@@ -65,11 +66,17 @@ def _row(name: str, path: Path, num_tasks: int) -> str:
     return f"| {name} | {num_objects:.0f} | {num_made} | {rate} | {shares} | {memory_mb[0]:.0f} | {memory_mb[-1]:.0f} |"
 
 
+def _process(house: HouseText, seed: int, out: Path) -> Outcome:
+    """Generate and write the task of a house."""
+    options = GenerationOptions(seed=seed)
+    return process_house(0, house.name, house.text, lambda parsed: {out: options.generate(parsed)})
+
+
 def _houses(path: Path) -> Iterator[tuple[int, HouseText]]:
     """Houses without an end, a seed for every time through the file; ten tasks are made before, as a warm-up."""
     with tempfile.TemporaryDirectory() as out:
         for house in islice(HouseTexts(path), 10):
-            do_house(0, house.name, house.text, GenerationOptions(), Path(out))
+            _process(house, 0, Path(out))
     for seed in count():
         for house in HouseTexts(path):
             yield seed, house
@@ -79,7 +86,7 @@ def _houses(path: Path) -> Iterator[tuple[int, HouseText]]:
 def _timed() -> Iterator[Counter[str]]:
     """CPU seconds by part of the work."""
     spans: Counter[str] = Counter()
-    generate, put = _core.generate_task, worker.put
+    generate, put = _core.generate_task, worker.put_task
 
     def in_span(part: str, call: Callable[..., Any]) -> Callable[..., Any]:
         def timed(*arguments: object, **keywords: object) -> Any:  # noqa: ANN401
@@ -88,11 +95,11 @@ def _timed() -> Iterator[Counter[str]]:
 
         return timed
 
-    _core.generate_task, worker.put = in_span("core", generate), in_span("files", put)
+    _core.generate_task, worker.put_task = in_span("core", generate), in_span("files", put)
     try:
         yield spans
     finally:
-        _core.generate_task, worker.put = generate, put
+        _core.generate_task, worker.put_task = generate, put
 
 
 @contextmanager

@@ -13,14 +13,13 @@ from evonav.controlled.layout import ControlledRecord, tasks_of, write_controlle
 from evonav.errors import InvalidArgumentError, TaskError
 from evonav.generation.dataset import Workforce
 from evonav.generation.journal import Journal, Outcome
-from evonav.generation.worker import PARTIAL_NAME, is_whole, outcome_of, worker_of
+from evonav.generation.worker import PARTIAL_NAME, is_complete, outcome_of, worker_of
 from evonav.house import House
 from evonav.house.files import HouseText, HouseTexts
 from evonav.parallel.folders import sha256_of_file, writing
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.tasks.dataset import (
     DatasetRecord,
-    HouseRejection,
     SourceFile,
     TaskEntry,
     write_dataset,
@@ -101,7 +100,7 @@ def generate_controlled(
                     on_progress(len(journal.outcomes), num_all)
             shutil.rmtree(out / PARTIAL_NAME, ignore_errors=True)
         journal.rewrite()
-        outcomes = [journal.outcomes[index] for index in sorted(journal.outcomes)]
+        outcomes = journal.ordered_outcomes()
         record = _write(out, options, sources, limit, outcomes)
         return ControlledSummary(record, len(outcomes) - num_before)
 
@@ -132,7 +131,7 @@ def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], st
 
 def _is_whole(outcome: Outcome, out: Path, options: ControlledOptions) -> bool:
     """Whether what the journal says is still there."""
-    return outcome.task_id is None or is_whole(outcome, tasks_of(out, options.arms[-1].name))
+    return outcome.task_id is None or is_complete(outcome, tasks_of(out, options.arms[-1].name))
 
 
 def _write(
@@ -148,11 +147,7 @@ def _write(
         TaskError: There is no task, or two have the same id.
     """
     made = sorted((done.task_id, done.house_sha256) for done in outcomes if done.task_id and done.house_sha256)
-    rejections = tuple(
-        HouseRejection(house=done.house, reason=done.reason, stage=done.stage, detail=done.detail)
-        for done in outcomes
-        if done.reason is not None
-    )
+    rejections = tuple(outcome.rejection for outcome in outcomes if outcome.rejection is not None)
     task_ids = tuple(task_id for task_id, _ in made)
     if not made:
         first = f"; the first: {rejections[0].detail}" if rejections else ""

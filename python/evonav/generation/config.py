@@ -1,4 +1,4 @@
-"""Θ from a file and from options of the command line."""
+"""Read the generation parameters from a file and from options of the command line."""
 
 import json
 from pathlib import Path
@@ -13,15 +13,15 @@ from evonav.toml import read_toml
 def read_parameters(
     path: Path | None = None, *, evolve_probability: float | None = None, num_stages: str | None = None
 ) -> GenerationParameters:
-    """Θ: the paper's, what a file says otherwise, and options over both.
+    """Return the paper's parameters, overridden by a file's, overridden by options.
 
     Args:
-        path: TOML with any of the fields of `GenerationParameters`.
+        path: TOML file with any of the fields of `GenerationParameters`.
         evolve_probability: Chance that a transition evolves the house.
-        num_stages: Numbers of stages to draw from, such as `6,8`.
+        num_stages: Numbers of stages to draw from, separated by commas, for example `6,8`.
 
     Raises:
-        TaskError: The file is no such record; it names the field.
+        TaskError: A field of the file is unknown or has a wrong value; names the field.
         InvalidArgumentError: An option is outside its domain, or the file cannot be read as TOML.
     """
     parameters = GenerationParameters()

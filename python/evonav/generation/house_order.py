@@ -1,4 +1,4 @@
-"""Which houses a named subset takes, before any task is made."""
+"""Order the houses of a named subset before any task is generated."""
 
 from collections.abc import Iterable
 
@@ -9,15 +9,15 @@ from evonav.tasks.records import sha256_of
 from evonav.tasks.subsets import Subset, SubsetError, parse_subset, subset_key
 
 MIN_ROOMS = 2
-"""Of the houses that tasks are made of."""
+"""Smallest number of rooms in a house that can give a task."""
 
 
-def wanted_of(name: str, split: str, limit: int | None) -> Subset:
-    """A named subset, checked against what else is asked for.
+def checked_subset(name: str, split: str, limit: int | None) -> Subset:
+    """Parse the name of a subset and check it against the other options.
 
     Raises:
-        InvalidArgumentError: There is a limit as well.
-        SubsetError: The name is none, or of another split.
+        InvalidArgumentError: A limit is given as well.
+        SubsetError: The name is malformed or of another split.
     """
     subset = parse_subset(name)
     if limit is not None:
@@ -28,9 +28,9 @@ def wanted_of(name: str, split: str, limit: int | None) -> Subset:
 
 
 def house_order(houses: Iterable[HouseText]) -> list[int]:
-    """Places of multi-room houses in their file, in the order of subsets; a house that is there twice counts once.
+    """Return the indices of multi-room houses in their file, in the order of subsets; each distinct house once.
 
-    Reads all houses. Those that cannot be read can give no task, and are left out.
+    All houses are read. Malformed houses give no task and are left out.
     """
     first: dict[str, int] = {}
     for index, text in enumerate(houses):

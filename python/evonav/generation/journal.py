@@ -1,7 +1,8 @@
-"""What became of every house of a run: an append-only file of which no interruption costs more than a line.
+"""Record the outcome of each house of a run in an append-only file; an interruption loses at most one line.
 
-`journal.jsonl` begins with what the run is; a line a house follows, in the order in which they were done. Once all are
-done it is written anew in the order of the houses, so that equal runs leave equal files.
+`journal.jsonl` begins with the identity of the run; one line a house follows, in the order in which the houses were
+finished. At the end it is rewritten in the order of the houses, so that equal runs leave equal files. The journal is
+the only record of progress: `dataset.json` is derived from it.
 """
 
 import json
@@ -15,43 +16,57 @@ from pydantic import NonNegativeInt, ValidationError
 from evonav.errors import StoreError
 from evonav.parallel.folders import check_same_run, write_atomically
 from evonav.parallel.pool import FailureKind
-from evonav.tasks.dataset import RejectReason
+from evonav.tasks.dataset import HouseRejection, RejectReason, TaskEntry
 from evonav.tasks.records import Record, Sha256
 
 NAME = "journal.jsonl"
 
 
 class Outcome(Record):
-    """What became of a house: a task, or a reason why not."""
+    """The outcome of a house: a task, or the reason why it gives none."""
 
     index: NonNegativeInt
-    """Of the house in its source."""
+    """Index of the house in its source."""
     house: str
     task_id: str | None = None
     house_sha256: Sha256 | None = None
     task_sha256: Sha256 | None = None
-    """Of `task.json`, which holds the checksums of the task's other files."""
+    """SHA-256 of `task.json`, which holds the checksums of the task's other files."""
     reason: RejectReason | None = None
     stage: NonNegativeInt = 0
-    """Of a reason: at which it was found."""
+    """Stage at which the reason was found; 0 before the first."""
     detail: str = ""
-    """Of a reason: a sentence, or the end of a traceback."""
+    """Explanation of the reason: a sentence, or the end of a traceback."""
 
     @property
     def is_failure(self) -> bool:
-        """Whether it was the generator that failed."""
+        """Whether the generator itself failed."""
         return self.reason in get_args(FailureKind)
+
+    @property
+    def task(self) -> TaskEntry | None:
+        """The entry of the task in `dataset.json`."""
+        if self.task_id is None or self.task_sha256 is None or self.house_sha256 is None:
+            return None
+        return TaskEntry(task_id=self.task_id, sha256=self.task_sha256, house_sha256=self.house_sha256)
+
+    @property
+    def rejection(self) -> HouseRejection | None:
+        """The entry of the house in the rejections of `dataset.json`."""
+        if self.reason is None:
+            return None
+        return HouseRejection(house=self.house, reason=self.reason, stage=self.stage, detail=self.detail)
 
 
 class Journal:
-    """Reads and writes `DIR/journal.jsonl`; the caller holds the folder's lock."""
+    """Reader and writer of `DIR/journal.jsonl`; the caller holds the folder's lock."""
 
     def __init__(self, folder: Path, run: Mapping[str, Any]) -> None:
-        """Opens the journal of a run, or begins it.
+        """Open the journal of a run, or begin it.
 
         Args:
-            folder: Where the tasks are.
-            run: What decides them, as JSON.
+            folder: Folder of the tasks.
+            run: Identity of the run: everything that determines its tasks, as JSON values.
 
         Raises:
             StoreError: The folder holds another run, or tasks without a journal; or the journal is damaged before its
@@ -59,11 +74,13 @@ class Journal:
         """
         self.path = folder / NAME
         self.outcomes: dict[int, Outcome] = {}
+        """Outcomes by the index of their house."""
         self._run = json.loads(json.dumps(dict(run)))
         if self.path.exists():
             self._read(folder)
         elif any(folder.glob("*/task.json")):
-            raise StoreError(f"{folder} holds tasks that this command did not make ({NAME} not found); use another")
+            problem = f"holds tasks that this command did not make ({NAME} not found)"
+            raise StoreError(f"{folder} {problem}; use another folder")
         else:
             write_atomically(self.path, _line(self._run))
         try:
@@ -72,10 +89,10 @@ class Journal:
             raise StoreError(f"{self.path}: {error}") from error
 
     def add(self, outcome: Outcome) -> None:
-        """Records what became of a house.
+        """Append the outcome of a house.
 
         Raises:
-            StoreError: It cannot be written.
+            StoreError: The file cannot be written.
         """
         try:
             self._file.write(outcome.model_dump_json(exclude_defaults=True) + "\n")
@@ -84,42 +101,46 @@ class Journal:
             raise StoreError(f"{self.path}: {error}") from error
         self.outcomes[outcome.index] = outcome
 
+    def ordered_outcomes(self) -> list[Outcome]:
+        """Return the outcomes in the order of the houses."""
+        return [self.outcomes[index] for index in sorted(self.outcomes)]
+
     def drop(self, indices: list[int]) -> None:
-        """Forgets houses, which are then to be done again."""
+        """Remove the outcomes of houses that have to be done again."""
         for index in indices:
             del self.outcomes[index]
         if indices:
             self.rewrite()
 
     def rewrite(self) -> None:
-        """Writes the journal anew, in the order of the houses.
+        """Rewrite the journal in the order of the houses.
 
         Raises:
-            StoreError: It cannot be written.
+            StoreError: The file cannot be written.
         """
         self._file.close()
-        lines = [self.outcomes[index].model_dump_json(exclude_defaults=True) for index in sorted(self.outcomes)]
+        lines = [outcome.model_dump_json(exclude_defaults=True) for outcome in self.ordered_outcomes()]
         write_atomically(self.path, "".join([_line(self._run), *(line + "\n" for line in lines)]))
         self._file = self.path.open("a", encoding="utf-8")
 
     def close(self) -> None:
-        """Closes the file; what was added is written."""
+        """Close the file."""
         self._file.close()
 
     def __enter__(self) -> "Journal":
-        """Nothing."""
+        """Return the journal."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Closes the file."""
+        """Close the file."""
         self.close()
 
     def _read(self, folder: Path) -> None:
-        whole_bytes = 0
-        for number, line in enumerate(self._whole_lines(), start=1):
-            whole_bytes += len(line)
+        num_bytes = 0
+        for number, line in enumerate(self._complete_lines(), start=1):
+            num_bytes += len(line)
             try:
                 if number == 1:
                     check_same_run(json.loads(line), self._run, folder)
@@ -127,16 +148,17 @@ class Journal:
                     outcome = Outcome.model_validate_json(line)
                     self.outcomes[outcome.index] = outcome
             except (ValueError, AttributeError, ValidationError) as error:
-                what = "the run" if number == 1 else "a house"
-                advice = "use another folder" if number == 1 else "remove the line to have the house done again"
-                raise StoreError(f"{self.path}:{number}: not the record of {what}: {_first(error)}; {advice}") from None
-        if not whole_bytes:
+                subject = "the run" if number == 1 else "a house"
+                advice = "use another folder" if number == 1 else "remove the line to process the house again"
+                problem = str(error).splitlines()[0]
+                raise StoreError(f"{self.path}:{number}: not the record of {subject}: {problem}; {advice}") from None
+        if not num_bytes:
             raise StoreError(f"{self.path}: empty; remove it if the folder holds no tasks")
         with self.path.open("r+b") as file:
-            file.truncate(whole_bytes)
+            file.truncate(num_bytes)
 
-    def _whole_lines(self) -> Iterator[bytes]:
-        """All lines but an unfinished last one, which a kill or a full disk left."""
+    def _complete_lines(self) -> Iterator[bytes]:
+        """Yield all lines except an unfinished last one, left by a kill or a full disk."""
         try:
             with self.path.open("rb") as file:
                 yield from (line for line in file if line.endswith(b"\n"))
@@ -146,7 +168,3 @@ class Journal:
 
 def _line(run: Mapping[str, Any]) -> str:
     return json.dumps(run, sort_keys=True, separators=(",", ":")) + "\n"
-
-
-def _first(error: Exception) -> str:
-    return str(error).splitlines()[0]

@@ -1,13 +1,11 @@
-"""What a worker does with a house: reads it, makes its task, and puts the task's folder where it belongs."""
+"""Generate the task of one house in a worker, and move the task's folder to its place."""
 
 import json
 import os
 import shutil
 import socket
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 from evonav.errors import EvonavError, HouseError, InvalidArgumentError, SimulationError, StoreError, TaskError
 from evonav.generation.journal import Outcome
@@ -19,39 +17,29 @@ from evonav.tasks import write_task
 from evonav.tasks.dataset import RejectReason
 from evonav.tasks.manifest import Task
 from evonav.tasks.parameters import GenerationParameters
+from evonav.tasks.records import Record
 
 WORK = "evonav.generation.worker:make_worker"
 PARTIAL_NAME = ".partial"
-"""Beside the tasks: those that are being written."""
+"""Folder beside the tasks, for those that are being written."""
 MAX_DETAIL = 2000
-"""Characters, as `dataset.json` has them."""
+"""Largest number of characters in the detail of an outcome, as in `dataset.json`."""
 
 
-@dataclass(frozen=True, slots=True)
-class GenerationOptions:
-    """What decides the task of a house."""
+class GenerationOptions(Record):
+    """The options that determine the task of a house."""
 
     seed: int = 0
-    parameters: GenerationParameters = field(default_factory=GenerationParameters)
+    parameters: GenerationParameters = GenerationParameters()
     dataset: str = "evonav"
     split: str = "none"
     allow_unknown_assets: bool = False
 
-    def as_json(self) -> dict[str, Any]:
-        """As JSON, to be read by `from_json`."""
-        return {**asdict(self), "parameters": self.parameters.model_dump(mode="json")}
-
-    @classmethod
-    def from_json(cls, values: dict[str, Any]) -> "GenerationOptions":
-        """What `as_json` gave."""
-        parameters = GenerationParameters.model_validate_json(json.dumps(values["parameters"]))
-        return cls(**{**values, "parameters": parameters})
-
     def generate(self, house: House) -> Task:
-        """The task of a house.
+        """Generate the task of a house.
 
         Raises:
-            EvonavError: As `evonav.generation.generate_task`.
+            EvonavError: The house gives no task, or an option is invalid; see `evonav.generation.generate_task`.
         """
         return generate_task(
             house,
@@ -63,51 +51,69 @@ class GenerationOptions:
         )
 
 
+class WorkerSettings(Record):
+    """The settings of a worker."""
+
+    out: str
+    """Folder of the tasks."""
+    options: GenerationOptions
+
+
+class _Reply(Record):
+    """The reply of a worker; exactly one field is set."""
+
+    outcome: Outcome | None = None
+    invalid_argument: str | None = None
+    """Message for an option outside its domain."""
+    write_error: str | None = None
+    """Message for a task that cannot be written."""
+
+
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
-    """The function from a house to its `Outcome`, as `evonav.parallel.pool` calls it.
+    """Return the function of a worker, for `evonav.parallel.pool`.
 
     Args:
-        settings: `{"out": ..., "options": ...}`.
+        settings: `WorkerSettings` as JSON.
 
     Returns:
-        See `worker_of`; nothing beside the name heads a house.
+        The function of `worker_of`; its jobs begin with `[index, name]`.
     """
-    values = json.loads(settings)
-    options, out = GenerationOptions.from_json(values["options"]), Path(values["out"])
-    return worker_of(lambda house: {out: options.generate(house)})
+    parsed = WorkerSettings.model_validate_json(settings)
+    return worker_of(lambda house: {Path(parsed.out): parsed.options.generate(house)})
 
 
-def worker_of(make: Callable[..., Mapping[Path, Task]]) -> Callable[[str], str]:
-    """What a worker does that makes tasks of houses and writes them.
+def worker_of(generate: Callable[..., Mapping[Path, Task]]) -> Callable[[str], str]:
+    """Return the function of a worker that generates tasks from houses and writes them.
 
     Args:
-        make: From a house, and what else heads it, to its tasks by the folder that each goes to. The last is written
-            last: if it is there, all are.
+        generate: Function from a house, and further values of the job, to tasks by the folder that each is written to.
+            The last task is written last: if it exists, all do.
 
     Returns:
-        It takes `[index, name, ...]` and, after a line feed, the house; and gives an `Outcome`, or `{"refused": ...}`
-        for bad options, or `{"stop": ...}` where nothing can be written. `outcome_of` reads it.
+        A function from a job to a reply, which `outcome_of` reads. A job is the JSON `[index, name, ...]`, a line feed,
+        and the text of a house.
     """
 
     def work(text: str) -> str:
         head, _, house = text.partition("\n")
         index, name, *more = json.loads(head)
         try:
-            return _do_house(index, name, house, lambda found: make(found, *more)).model_dump_json()
+            reply = _Reply(outcome=process_house(index, name, house, lambda parsed: generate(parsed, *more)))
         except InvalidArgumentError as error:
-            return json.dumps({"refused": str(error)})
+            reply = _Reply(invalid_argument=str(error))
         except (TaskError, OSError) as error:
-            return json.dumps({"stop": str(error)})
+            reply = _Reply(write_error=str(error))
+        return reply.model_dump_json(exclude_defaults=True)
 
     return work
 
 
 def outcome_of(answer: Answer, name: str) -> Outcome:
-    """What a worker said of a house.
+    """Return the outcome of a house from a worker's answer.
 
     Args:
-        answer: Of a worker that does what `worker_of` gave.
-        name: Of the house.
+        answer: The answer of a worker made by `worker_of`.
+        name: The name of the house.
 
     Raises:
         InvalidArgumentError: An option is outside its domain.
@@ -116,28 +122,34 @@ def outcome_of(answer: Answer, name: str) -> Outcome:
     if answer.failure is not None:
         detail = answer.detail[-MAX_DETAIL:]
         return Outcome(index=answer.key, house=short_name(name), reason=answer.failure, detail=detail)
-    values = json.loads(answer.text)
-    if "refused" in values:
-        raise InvalidArgumentError(values["refused"])
-    if "stop" in values:
-        raise StoreError(values["stop"])
-    return Outcome.model_validate(values)
+    reply = _Reply.model_validate_json(answer.text)
+    if reply.invalid_argument is not None:
+        raise InvalidArgumentError(reply.invalid_argument)
+    if reply.outcome is None:
+        raise StoreError(str(reply.write_error))
+    return reply.outcome
 
 
-def is_whole(outcome: Outcome, folder: Path) -> bool:
-    """Whether a task that the journal tells of is in a folder, as it was written."""
+def is_complete(outcome: Outcome, folder: Path) -> bool:
+    """Return whether the task of an outcome is in a folder as it was written."""
     try:
         return sha256_of_file(folder / str(outcome.task_id) / "task.json") == outcome.task_sha256
     except OSError:
         return False
 
 
-def _do_house(index: int, name: str, text: str, make: Callable[[House], Mapping[Path, Task]]) -> Outcome:
-    """Makes the tasks of a house and writes them.
+def process_house(index: int, name: str, text: str, generate: Callable[[House], Mapping[Path, Task]]) -> Outcome:
+    """Generate the tasks of a house and write them.
+
+    Args:
+        index: Index of the house in its source.
+        name: Name of the house.
+        text: ProcTHOR JSON.
+        generate: Function from the house to its tasks, by the folder that each is written to.
 
     Raises:
-        TaskError: One cannot be written.
-        OSError: One cannot be written.
+        TaskError: A task cannot be written.
+        OSError: A task cannot be moved to its place.
         InvalidArgumentError: A parameter is outside its domain.
     """
 
@@ -150,13 +162,13 @@ def _do_house(index: int, name: str, text: str, make: Callable[[House], Mapping[
     except HouseError as error:
         return without_task("malformed_house", error)
     try:
-        tasks = make(house)
+        tasks = generate(house)
     except TaskRejectedError as error:
         return without_task(error.reason, error, error.stage)
     except (HouseError, SimulationError) as error:
         return without_task("unusable_house", error)
     label = f"{socket.gethostname()}-{os.getpid()}"
-    roots = [put(task, folder, label) for folder, task in tasks.items()]
+    roots = [put_task(task, folder, label) for folder, task in tasks.items()]
     task = next(iter(tasks.values()))
     return Outcome(
         index=index,
@@ -167,20 +179,23 @@ def _do_house(index: int, name: str, text: str, make: Callable[[House], Mapping[
     )
 
 
-def put(task: Task, out: Path, label: str) -> Path:
-    """Writes a task's folder wholly or not at all.
+def put_task(task: Task, out: Path, label: str) -> Path:
+    """Write a task's folder atomically, and replace one of the same name.
 
     Args:
-        task: A task.
-        out: Where its folder is to be; one of the same name is replaced.
-        label: Of this process alone.
+        task: The task.
+        out: Folder of the tasks.
+        label: Label of this process, different from those of all others.
+
+    Returns:
+        The task's own folder.
 
     Raises:
-        TaskError: It cannot be written.
-        OSError: It cannot be moved.
+        TaskError: The task cannot be written.
+        OSError: The task cannot be moved to its place.
     """
-    beside = out / PARTIAL_NAME / label
-    shutil.rmtree(beside / task.task_id, ignore_errors=True)  # of an attempt that was not finished
+    partial = out / PARTIAL_NAME / label
+    shutil.rmtree(partial / task.task_id, ignore_errors=True)  # left by an attempt that was not finished
     root = out / task.task_id
-    put_folder(write_task(task, beside), root, aside=beside / "replaced")
+    put_folder(write_task(task, partial), root, aside=partial / "replaced")
     return root
