@@ -20,7 +20,7 @@ from evonav.decision.question import Question, Reply
 from evonav.decision.text.decision import TextMatch
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.perception import Perception, StageScene
 from evonav.report.run import PAPER_ORDER
@@ -154,22 +154,22 @@ def _peak_mb() -> float:
     return int(next(line for line in status.splitlines() if line.startswith("VmHWM")).split()[1]) / 1024
 
 
-def _case(backend: Backend) -> EpisodeCase:
+def _case(backend: Backend) -> EpisodeSpec:
     with bundled_tasks() as folder:
         return backend.load_case(task_file(folder / TASK).path)
 
 
-def _play(case: EpisodeCase, name: str, led: Led, simulator: Simulator, perception: Perception) -> None:
+def _play(case: EpisodeSpec, name: str, led: Led, simulator: Simulator, perception: Perception) -> None:
     for outcome in Episode(case, name, led, simulator, perception, ProtocolConfig(), 0).run():
         if outcome.record.error is not None:
             raise AssertionError(outcome.record.error)
 
 
-def _scene(case: EpisodeCase, simulator: Simulator) -> StageScene:
+def _scene(case: EpisodeSpec, simulator: Simulator) -> StageScene:
     return StageScene(case.task_id, case.stages[0].public, "", 0, simulator.objects)
 
 
-def _tour(agent: Agent, case: EpisodeCase, simulator: Simulator, perception: Perception) -> None:
+def _tour(agent: Agent, case: EpisodeSpec, simulator: Simulator, perception: Perception) -> None:
     """Leads an agent through every room: it looks ahead and back from places about 1.5 m apart."""
     start = simulator.pose
     sensors = Sensors(simulator, perception, agent.sensing, _scene(case, simulator))

@@ -4,7 +4,7 @@ from evonav.agents import wire
 from evonav.decision.metered import Metered
 from evonav.decision.question import Reply
 from evonav.decision.vlm.account import Account, Price, Usage
-from evonav.evaluation.metrics.stage_metrics import stage_rows
+from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import evaluate
@@ -79,7 +79,7 @@ def test_a_stage_of_an_agent_in_its_own_process_tells_what_it_cost(tmp_path):
     with bundled_tasks() as folder:
         evaluate(["fu"], task_files(folder, 1), tmp_path, num_workers=1)
     with RunStore(tmp_path) as store:
-        rows = stage_rows(store)
+        rows = read_stage_metrics(store)
         assert not any("cpu_s" in text for text in store.record_texts())
     for row in rows:
         parts = (row.simulation_cpu_s, row.perception_cpu_s, row.agent_cpu_s, row.evaluator_cpu_s)

@@ -2,7 +2,7 @@ import pytest
 from made_up_stage import entry, made_up_record, taken
 
 from evonav.evaluation.metrics.aggregate import COSTS, MEASURES, MEMORY, STALENESS, SUCCESS, explain
-from evonav.evaluation.metrics.stage_metrics import stage_rows
+from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
 from evonav.evaluation.records.schema import EndState, StaleEntryRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.tables.metric_tables import measures_table, measures_tables
@@ -37,7 +37,7 @@ def memory():
 
 def values(run_dir, measures):
     with RunStore(run_dir) as store:
-        (found,) = explain(stage_rows(store), measures).values()
+        (found,) = explain(read_stage_metrics(store), measures).values()
     return {one.measure.name: one for one in found}
 
 
@@ -69,7 +69,7 @@ def test_tables_leave_out_what_no_agent_has(run_dir):
 
 def _rows(run_dir):
     with RunStore(run_dir) as store:
-        return stage_rows(store)
+        return read_stage_metrics(store)
 
 
 def test_the_command_shows_and_writes_the_tables(run_dir, tmp_path_factory):

@@ -14,7 +14,7 @@ from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.metrics.navigation import summarise
 from evonav.evaluation.metrics.stage_metrics import measures_of
-from evonav.evaluation.protocol import EpisodeCase, ForcedWalk, ProtocolConfig
+from evonav.evaluation.protocol import EpisodeSpec, GuidedWalk, ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageRecord
 from evonav.evaluation.run.components import make_agent
 from evonav.perception.ground_truth import GroundTruthPerception
@@ -22,8 +22,8 @@ from evonav.world.pose import Pose
 
 AGENTS = ("fu", "stage-reset", "ftu", "3d-mem", "msgnav", "unigoal")
 START = Pose(1.0, 0.9, 3.0, 0.0)
-TO_CHAIR = ForcedWalk(((1.0, 3.0), (1.2, 2.9)), Pose(1.2, 0.9, 2.9, math.radians(135)))
-TO_BED = ForcedWalk(((1.2, 2.9), (3.4, 2.5), (4.6, 2.5), (5.2, 2.6)), Pose(5.2, 0.9, 2.6, math.radians(45)))
+TO_CHAIR = GuidedWalk(((1.0, 3.0), (1.2, 2.9)), Pose(1.2, 0.9, 2.9, math.radians(135)))
+TO_BED = GuidedWalk(((1.2, 2.9), (3.4, 2.5), (4.6, 2.5), (5.2, 2.6)), Pose(5.2, 0.9, 2.6, math.radians(45)))
 
 
 def pair_case(*, is_evolved):
@@ -35,7 +35,7 @@ def pair_case(*, is_evolved):
         replace(stage_case(2, "Bed|1"), forced=TO_BED),
         last,
     )
-    return EpisodeCase("toy", "toy", START, stages)
+    return EpisodeSpec("toy", "toy", START, stages)
 
 
 def run(agent, case, protocol=None):
@@ -58,7 +58,7 @@ def walked():
 @pytest.mark.parametrize("name", AGENTS)
 def test_every_agent_is_walked_along_the_same_way(walked, name):
     first, second, third = walked[name]
-    assert [first.state, second.state] == [EndState.FORCED] * 2
+    assert [first.state, second.state] == [EndState.GUIDED] * 2
     for record, forced in ((first, TO_CHAIR), (second, TO_BED)):
         corners = [point for point in way(record) if point in forced.path_m]
         assert corners == list(forced.path_m)
@@ -119,12 +119,12 @@ def test_runs_are_the_same_again():
 
 def test_a_walk_of_the_evaluators_blocks_nothing_on_the_agents_map():
     corners = [(1.0 + 0.05 * i, 3.0 - 0.1 * (i % 2)) for i in range(50)]  # a step of it is no step forward
-    zigzag = ForcedWalk(tuple(corners), Pose(*(corners[-1][0], 0.9, corners[-1][1]), 0.0))
+    zigzag = GuidedWalk(tuple(corners), Pose(*(corners[-1][0], 0.9, corners[-1][1]), 0.0))
     case = pair_case(is_evolved=False)
     case = replace(case, stages=(replace(case.stages[1], forced=zigzag), *case.stages[1:]))
     walk = run("unigoal", case, ProtocolConfig(max_rounds=1, max_actions=1))[0]
     steps = [taken.action.action for taken in walk.trace]
-    assert walk.state is EndState.FORCED
+    assert walk.state is EndState.GUIDED
     assert "MOVE_FORWARD" in steps[:-1]
     assert all(taken.counters["collisions"] == 0 for taken in walk.trace)
 
@@ -154,7 +154,7 @@ class Told:
 def test_agents_of_others_are_walked_too(kind):
     agent = Told(motion_kind=kind)
     first, second, third = run(agent, pair_case(is_evolved=False))
-    assert [first.state, second.state] == [EndState.FORCED] * 2
+    assert [first.state, second.state] == [EndState.GUIDED] * 2
     assert third.is_scored
     for stage, record in ((1, first), (2, second)):
         told = [one for one in agent.seen if one[0] == stage]
@@ -168,14 +168,14 @@ def test_agents_of_others_are_walked_too(kind):
 
 def test_an_agent_that_fails_in_a_walk_begins_the_evaluated_stage_where_it_ends():
     records = run(Told(fails_at=(2, 2)), pair_case(is_evolved=False))
-    assert [record.state for record in records[:2]] == [EndState.FORCED, EndState.ERRORED]
+    assert [record.state for record in records[:2]] == [EndState.GUIDED, EndState.ERRORED]
     assert records[1].error.kind is ErrorKind.AGENT
     assert records[2].failed_before == (2,)
     assert (records[2].requested_start.x_m, records[2].requested_start.z_m) == TO_BED.path_m[-1]
 
 
 def test_a_walk_that_is_blocked_is_no_failure_of_the_agent():
-    through_the_fridge = ForcedWalk(((1.0, 3.0), (0.5, 4.4)), Pose(0.5, 0.9, 4.4, 0.0))
+    through_the_fridge = GuidedWalk(((1.0, 3.0), (0.5, 4.4)), Pose(0.5, 0.9, 4.4, 0.0))
     case = pair_case(is_evolved=False)
     case = replace(case, stages=(replace(case.stages[0], forced=through_the_fridge), *case.stages[1:]))
     records = run("fu", case)

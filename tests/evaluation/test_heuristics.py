@@ -15,7 +15,7 @@ from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.agents.viewpoint import widest_direction_rad
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
 from evonav.perception.ground_truth import GroundTruthPerception
@@ -34,7 +34,7 @@ def run(agent, case, protocol=None):
 
 
 def case_of(*stages, start=START):
-    return EpisodeCase("toy", "toy", start, stages)
+    return EpisodeSpec("toy", "toy", start, stages)
 
 
 def moved_case():

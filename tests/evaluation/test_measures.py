@@ -5,7 +5,7 @@ from dataclasses import fields
 import pytest
 from made_up_stage import entry, made_up_record, taken
 
-from evonav.evaluation.metrics.stage_metrics import StageRow, measures_of, stage_rows
+from evonav.evaluation.metrics.stage_metrics import StageMetrics, measures_of, read_stage_metrics
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import EndState, MemoryRecord, MovedObjectRecord, StaleEntryRecord
 from evonav.evaluation.records.store import FILE_NAME, RunStore
@@ -84,7 +84,7 @@ def test_ring_spl_leaves_out_stages_that_start_within_the_radius():
 
 def test_other_radii_are_read_off_the_terminal_distance(tmp_path):
     with store_of(tmp_path, made_up_record(), made_up_record(EndState.ERRORED, stage=2, error="agent")) as store:
-        row, errored = stage_rows(store)
+        row, errored = read_stage_metrics(store)
     assert [row.is_success_at(radius_m) for radius_m in (2.0, 3.0, 3.1)] == [False, False, True]
     assert errored.is_success_at(9.0) is None
     assert not errored.is_scored
@@ -96,7 +96,7 @@ def test_counters_are_told_a_stage_and_begin_anew_with_the_agent(tmp_path):
         return made_up_record(stage=number, trace=(taken(0, counters=counters),), **fields)
 
     with store_of(tmp_path, stage(1, 4), stage(2, 10), stage(3, 3, memory_lost_at=3)) as store:
-        rows = stage_rows(store)
+        rows = read_stage_metrics(store)
     assert [row.num_decisions for row in rows] == [4, 6, 3]
     assert [row.num_failed_decisions for row in rows] == [2, 3, 1]
     assert [row.num_conflicts for row in rows] == [None, None, None]
@@ -106,14 +106,14 @@ def test_what_a_change_made_stale_is_the_precision_before_less_that_after(tmp_pa
     first = made_up_record(entries=(entry(), entry(), entry(), entry(is_stale=True)), memory_at_end=memory())
     second = made_up_record(stage=2, memory_at_start=memory(4, 1), memory_at_end=memory())
     with store_of(tmp_path, first, second) as store:
-        rows = stage_rows(store)
+        rows = read_stage_metrics(store)
     assert [(row.precision_before, row.precision_at_start) for row in rows] == [(None, None), (0.75, 0.25)]
 
 
 def test_costs_come_from_the_side_table_and_never_from_records(tmp_path):
     costs = StageCosts(agent_wall_s=1.5, input_tokens=7)
     with store_of(tmp_path, made_up_record(), costs=costs) as store:
-        (row,) = stage_rows(store)
+        (row,) = read_stage_metrics(store)
         assert "1.5" not in next(iter(store.record_texts()))
     assert (row.wall_s, row.cpu_s, row.agent_wall_s, row.input_tokens, row.cost_usd) == (2.0, 1.0, 1.5, 7, None)
     assert row.num_retries == 0
@@ -121,7 +121,7 @@ def test_costs_come_from_the_side_table_and_never_from_records(tmp_path):
 
 def test_measures_of_another_version_or_none_are_derived_again(tmp_path):
     with store_of(tmp_path, made_up_record(), made_up_record(stage=2), made_up_record(EndState.SUCCESS, stage=3)) as it:
-        kept = stage_rows(it)
+        kept = read_stage_metrics(it)
     with sqlite3.connect(tmp_path / FILE_NAME) as db:
         db.execute("DELETE FROM measures WHERE stage = 1")
         db.execute("UPDATE measures SET version = 0, measures = '{}' WHERE stage = 2")
@@ -131,22 +131,22 @@ def test_measures_of_another_version_or_none_are_derived_again(tmp_path):
         db.execute("UPDATE stages SET record = ? WHERE stage = 3", (json.dumps(old),))
         db.execute("DELETE FROM measures WHERE stage = 3")
     with RunStore(tmp_path) as store:
-        assert stage_rows(store) == kept
+        assert read_stage_metrics(store) == kept
 
 
 def test_rows_are_flat_and_of_the_agents_asked_for(tmp_path):
     with store_of(tmp_path, made_up_record(agent="a"), made_up_record(agent="b")) as store:
-        assert [row.agent for row in stage_rows(store, ["b"])] == ["b"]
-        (row, _) = stage_rows(store)
-    for field in fields(StageRow):
+        assert [row.agent for row in read_stage_metrics(store, ["b"])] == ["b"]
+        (row, _) = read_stage_metrics(store)
+    for field in fields(StageMetrics):
         assert isinstance(getattr(row, field.name), str | int | float | bool | None), field.name
-    assert next(field.name for field in fields(StageRow)) == "agent"
+    assert next(field.name for field in fields(StageMetrics)) == "agent"
 
 
 def test_forgetting_an_episode_forgets_its_measures(tmp_path):
     with store_of(tmp_path, made_up_record(), made_up_record(stage=2), costs=StageCosts(cost_usd=1.0)) as store:
         store.forget_episode("fu", "t", 2)
-        assert [row.stage for row in stage_rows(store)] == [1]
-        assert [key for key, _, _ in store.kept_measures()] == list(store.costs()) == [("fu", "t", 1)]
+        assert [row.stage for row in read_stage_metrics(store)] == [1]
+        assert [key for key, _, _ in store.encode_metrics()] == list(store.costs()) == [("fu", "t", 1)]
         store.add_stage(made_up_record(stage=2), wall_s=1.0, cpu_s=1.0, costs=StageCosts(cost_usd=2.0))
-        assert stage_rows(store)[1].cost_usd == 2.0
+        assert read_stage_metrics(store)[1].cost_usd == 2.0

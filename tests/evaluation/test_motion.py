@@ -130,12 +130,12 @@ def test_the_observation_point_is_free(seed, x_m, z_m):
 
 def test_a_pose_that_is_taken_is_snapped_and_recorded():
     from evonav.evaluation.episode.episode import Episode
-    from evonav.evaluation.protocol import EpisodeCase
+    from evonav.evaluation.protocol import EpisodeSpec
     from evonav.evaluation.run.components import make_agent
     from evonav.perception.ground_truth import GroundTruthPerception
 
     case = episode_case("toy-static")
-    inside_table = EpisodeCase("t", "toy", Pose(2.0, 0.9, 1.2, 1.25), case.stages)
+    inside_table = EpisodeSpec("t", "toy", Pose(2.0, 0.9, 1.2, 1.25), case.stages)
     episode = Episode(
         inside_table, "a", make_agent("random-walk"), ToySimulator(), GroundTruthPerception(), ProtocolConfig(), 0
     )

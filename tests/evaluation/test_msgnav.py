@@ -12,7 +12,7 @@ from evonav.agents.msgnav.scene_graph import SceneGraph
 from evonav.agents.msgnav.viewpoint import visible_viewpoint
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
 from evonav.perception.ground_truth import GroundTruthPerception
@@ -24,7 +24,7 @@ START = Pose(1.0, 0.9, 3.0, 0.0)
 
 
 def run(agent, *stages, start=START, protocol=None, seed=7):
-    case = EpisodeCase("toy", "toy", start, stages)
+    case = EpisodeSpec("toy", "toy", start, stages)
     episode = Episode(case, "a", agent, ToySimulator(), GroundTruthPerception(), protocol or ProtocolConfig(), seed)
     records = [outcome.record for outcome in episode.run()]
     assert all(record.is_scored for record in records), [record.error for record in records]

@@ -11,7 +11,7 @@ from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.unigoal.bev import BevMap
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.house import bundled_houses
@@ -27,7 +27,7 @@ from evonav.world.pose import Pose
 from evonav.world.simulator import SimulatorConfig
 
 START = Pose(1.0, 0.9, 3.0, 0.0)
-CASE = EpisodeCase("toy", "toy", START, (stage_case(1, "Bed|1"), stage_case(2, "Mug|1")))
+CASE = EpisodeSpec("toy", "toy", START, (stage_case(1, "Bed|1"), stage_case(2, "Mug|1")))
 
 
 class Erring(GroundTruthPerception):

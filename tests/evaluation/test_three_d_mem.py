@@ -12,7 +12,7 @@ from evonav.agents.three_d_mem.agent import NO_ANSWER, NOTHING_LEFT, ThreeDMem, 
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
 from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
@@ -59,7 +59,7 @@ def has_id(seen):
 
 
 def run(agent, *stages, start=START, max_rounds=50):
-    case = EpisodeCase("toy", "toy", start, stages)
+    case = EpisodeSpec("toy", "toy", start, stages)
     protocol = ProtocolConfig(max_rounds=max_rounds)
     episode = Episode(case, "a", agent, ToySimulator(120, 120), GroundTruthPerception(), protocol, 7)
     records = [outcome.record for outcome in episode.run()]

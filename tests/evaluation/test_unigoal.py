@@ -22,7 +22,7 @@ from evonav.agents.unigoal.scene_questions import (
 from evonav.decision.scripted import Scripted
 from evonav.decision.text.decision import TextMatch
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.pose import Pose
@@ -32,7 +32,7 @@ SHORT = ProtocolConfig(max_actions=60)
 
 
 def run(agent, *stages, start=START, perception=None, protocol=None):
-    case = EpisodeCase("toy", "toy", start, stages)
+    case = EpisodeSpec("toy", "toy", start, stages)
     simulator = ToySimulator(width_px=64, height_px=64)
     episode = Episode(case, "a", agent, simulator, perception or GroundTruthPerception(), protocol or SHORT, 7)
     records = [outcome.record for outcome in episode.run()]

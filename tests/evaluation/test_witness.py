@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evonav.agents.agent import EntryBelief
-from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M, Witness, Witnessed, held_by, shows_place
+from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M, StalenessTracker, TrackedState, held_by, shows_place
 from evonav.evaluation.records.schema import Relocation
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics, SceneObject
@@ -37,7 +37,7 @@ MUGS = [body("floor", "Floor", 0.0, 0.0, kind="floor"), body("a", "Mug", 0.0, 2.
 
 
 def witness(objects=MUGS, so_far=None, relocations=(), target="a"):
-    return Witness(objects, target, relocations, Witnessed() if so_far is None else so_far, 25)
+    return StalenessTracker(objects, target, relocations, TrackedState() if so_far is None else so_far, 25)
 
 
 def test_an_entry_stands_for_the_nearest_object_of_its_label_within_the_margin():
@@ -64,7 +64,7 @@ def test_objects_are_seen_from_enough_pixels_near_enough():
 
 
 def test_memory_is_held_against_what_was_seen():
-    so_far = Witnessed(seen_ids={"b", "gone"})
+    so_far = TrackedState(seen_ids={"b", "gone"})
     seen_by = witness(so_far=so_far)
     start = seen_by.begin([belief("Mug", 0.3, 2.0), belief("Mug", 3.0, 3.0)])
     assert (start.num_entries, start.num_right, start.num_held, start.num_seen, start.num_seen_held) == (2, 1, 1, 1, 1)
@@ -81,7 +81,7 @@ def test_memory_is_held_against_what_was_seen():
 
 def test_forgotten_is_what_was_known_after_the_stage_before_and_stands_where_it_stood():
     known = [belief("Mug", 0.0, 2.0), belief("Mug", 0.3, 2.0), belief("Mug", 5.0, 5.0)]
-    seen_by = witness(so_far=Witnessed(beliefs=known))
+    seen_by = witness(so_far=TrackedState(beliefs=known))
     seen_by.begin([])  # it forgot everything when it was told the goal
     _, num_forgotten = seen_by.end([belief("Mug", 0.32, 2.0)])
     assert num_forgotten == 1

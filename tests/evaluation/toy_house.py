@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evonav.evaluation.protocol import EpisodeCase, StageCase
+from evonav.evaluation.protocol import EpisodeSpec, StageSpec
 from evonav.evaluation.records.schema import Relocation, TargetRecord, TransitionRecord
 from evonav.tasks.public import StageInput
 from evonav.world.pose import Pose
@@ -245,7 +245,7 @@ def stage_case(stage, target_id, *, moves=None, before=None, instruction=None, m
     place = {key: (moves or {}).get(key, OBJECTS[key][1]) for key in OBJECTS}
     was = {key: (before or {}).get(key, OBJECTS[key][1]) for key in OBJECTS}
     text = instruction or f"Please navigate to the {category}."
-    return StageCase(
+    return StageSpec(
         public=StageInput(stage, category, text, text, text, np.zeros((8, 8, 3), dtype=np.uint8)),
         house_json=house_json(moves),
         target=TargetRecord(
@@ -281,7 +281,7 @@ EPISODES = {
 
 
 def episode_case(task_id):
-    return EpisodeCase(task_id=task_id, house="toy", start=Pose(1.0, 0.9, 3.0, 0.0), stages=EPISODES[task_id]())
+    return EpisodeSpec(task_id=task_id, house="toy", start=Pose(1.0, 0.9, 3.0, 0.0), stages=EPISODES[task_id]())
 
 
 def load_case(path: Path):

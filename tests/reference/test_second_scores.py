@@ -9,7 +9,7 @@ import pytest
 from second_scores import table
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.stage_metrics import stage_rows
+from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.run import evaluate
 from evonav.report.run import load_run
@@ -51,7 +51,7 @@ def test_a_second_implementation_has_the_same_scores(run_dir):
 def test_a_second_implementation_has_the_same_causes_and_rows(run_dir):
     second = table(run_dir / FILE_NAME)
     with RunStore(run_dir) as store:
-        rows = stage_rows(store)
+        rows = read_stage_metrics(store)
     for agent in AGENTS:
         own = [row for row in rows if row.agent == agent]
         assert Counter(row.cause for row in own) == second[agent]["causes"]
@@ -71,7 +71,7 @@ def test_the_walk_to_the_target_is_perfect_on_all_bundled_tasks(tmp_path):
         (summary,) = evaluate(["shortest-path"], tasks, tmp_path, num_workers=0)
     assert (summary.n, summary.sr) == (sum(task.num_stages for task in tasks), 1.0)
     with RunStore(tmp_path) as store:
-        rows = stage_rows(store)
+        rows = read_stage_metrics(store)
     assert all(row.is_baseline for row in rows)
     # It walks the reference path and no more; what is missing is the rounding of sums.
     assert min(row.spl for row in rows) == pytest.approx(1.0, abs=1e-9)

@@ -8,6 +8,7 @@ from evonav.evaluation.records.schema import (
     EndState,
     EntryRecord,
     ErrorKind,
+    FloorPlan,
     GoalRecord,
     ObjectFootprint,
     Opening,
@@ -16,7 +17,6 @@ from evonav.evaluation.records.schema import (
     RoomFootprint,
     RoundRecord,
     StageError,
-    StageMap,
     StageRecord,
     TargetRecord,
     TransitionRecord,
@@ -42,9 +42,9 @@ def box(object_id: str, category: str, centre_m: tuple[float, float, float], x_m
     )
 
 
-def stage_map(task_id: str, stage: int) -> StageMap:
+def stage_map(task_id: str, stage: int) -> FloorPlan:
     x, y, z = OLD_TABLE_M if stage == 1 else NEW_TABLE_M
-    return StageMap(
+    return FloorPlan(
         task_id=task_id,
         house=f"house-of-{task_id}",
         stage=stage,

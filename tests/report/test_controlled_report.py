@@ -64,7 +64,7 @@ def write_analysis(folder, kind, arms, outcomes, *, num_tasks=6, stages=(2,)):
 def made_up(agent, index, state, *, is_evolved, stages):
     """The walk, and the stage that counts; where the scene evolved, the target moves in even tasks only."""
     walk = stage_record(agent, TASKS[index], 1, S)
-    walk = walk.model_copy(update={"state": EndState.FORCED, "spl": None, "soft_spl": None, "has_stopped": False})
+    walk = walk.model_copy(update={"state": EndState.GUIDED, "spl": None, "soft_spl": None, "has_stopped": False})
     stale = entry("Plate", (OLD_TABLE_M[0] + 0.3, 0.8, OLD_TABLE_M[2]), is_stale=True)
     is_misled = is_evolved and state is F and agent == "fu"
     made = [walk]

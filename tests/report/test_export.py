@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import evonav
 from evonav.cli import app
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.stage_metrics import StageRow
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.report.export import ROUND_COLUMNS, round_table, stage_columns, stage_table, write_table
 
 
@@ -20,7 +20,7 @@ def test_a_row_a_stage_with_every_measure(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     result = CliRunner().invoke(app, ["export", str(run), *(f"--{key}={path}" for key, path in files.items())])
     assert result.exit_code == 0, result.output
-    names = [field.name for field in fields(StageRow)]
+    names = [field.name for field in fields(StageMetrics)]
     rows = stage_table(run)
     assert [list(row) for row in rows] == [names] * 6
     read = list(csv.DictReader(files["csv"].read_text().splitlines()))

@@ -11,7 +11,7 @@ from evonav.controlled.layout import ControlledRecord, read_controlled, run_of
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
-from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
+from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.run import PAPER_ORDER
@@ -37,7 +37,7 @@ MEASURES: dict[str, Measure] = {"SR": lambda one: one.success, "SPL": lambda one
 class Outcome:
     """A scored stage of one agent in one arm."""
 
-    row: StageRow
+    row: StageMetrics
     record: StageRecord
     """Without trace and entries."""
 
@@ -130,7 +130,7 @@ def load_analysis(directory: Path) -> Analysis:
             raise StoreError(f"{run_dir}: no run here yet: `evonav controlled evaluate {directory}` first")
         with RunStore(run_dir) as store:
             # In this order: the run may be going on.
-            rows = stage_rows(store)
+            rows = read_stage_metrics(store)
             records = {(one.agent, one.task_id, one.stage): one for one in store.records(is_brief=True)}
             for row in rows:
                 agents.add(row.agent)

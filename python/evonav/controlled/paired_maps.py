@@ -8,7 +8,7 @@ from pathlib import Path
 from evonav.controlled.analysis import SPLITS, Analysis, Key, has_moved_far, split_of
 from evonav.controlled.layout import run_of
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
+from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.maps.files import check_picture, write_picture
 from evonav.report.maps.floor_plan import Frame, ground, labels
@@ -35,7 +35,7 @@ class Rollout:
     record: StageRecord
     walks: tuple[StageRecord, ...]
     """Stages of the same episode in which it looked on."""
-    maps: Mapping[int, StageMap]
+    maps: Mapping[int, FloorPlan]
     success_radius_m: float
 
 
@@ -55,7 +55,7 @@ def load_rollouts(analysis: Analysis, agent: str, key: Key) -> list[Rollout]:
             radius_m = success_radius_of(store.meta("config") or {})
         if stage not in records:
             raise InvalidArgumentError(f"{analysis.directory}: no task {task_id!r} by agent {agent!r} in arm {arm}")
-        walks = tuple(one for _, one in sorted(records.items()) if one.state is EndState.FORCED)
+        walks = tuple(one for _, one in sorted(records.items()) if one.state is EndState.GUIDED)
         found.append(Rollout(arm, records[stage], walks, maps, radius_m))
     return found
 

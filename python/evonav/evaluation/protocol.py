@@ -11,11 +11,11 @@ from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import (
     EndState,
     ErrorKind,
+    FloorPlan,
     GoalRecord,
     Point2,
     StageError,
     StageFailure,
-    StageMap,
     StageRecord,
     TargetRecord,
     TransitionRecord,
@@ -85,7 +85,7 @@ class ProtocolConfig:
 
 
 @dataclass(frozen=True, slots=True)
-class ForcedWalk:
+class GuidedWalk:
     """A reference trajectory that the evaluator walks while the agent looks on."""
 
     path_m: tuple[Point2, ...]
@@ -95,14 +95,14 @@ class ForcedWalk:
 
 
 @dataclass(frozen=True, slots=True)
-class StageCase:
+class StageSpec:
     """A stage as the evaluator knows it; only `public` ever reaches an agent."""
 
     public: StageInput
     house_json: str
     target: TargetRecord
     transition: TransitionRecord
-    forced: ForcedWalk | None = None
+    forced: GuidedWalk | None = None
     """The stage is not the agent's to walk, and not scored."""
 
     @property
@@ -116,14 +116,14 @@ class StageCase:
 
 
 @dataclass(frozen=True, slots=True)
-class EpisodeCase:
+class EpisodeSpec:
     """A task as the evaluator knows it."""
 
     task_id: str
     house: str
     start: Pose
     """The manifest's, of stage 1."""
-    stages: tuple[StageCase, ...] = field(repr=False)
+    stages: tuple[StageSpec, ...] = field(repr=False)
 
     def blank_record(self, agent: str, stage: int) -> StageRecord:
         """The record of a stage that was not run; everything else is this plus what happened.
@@ -146,11 +146,11 @@ class EpisodeCase:
         )
 
 
-def unknown_case(task_id: str, num_stages: int) -> EpisodeCase:
+def unknown_case(task_id: str, num_stages: int) -> EpisodeSpec:
     """Stands for a task that cannot be read, so that its stages have records: nothing in it is known."""
     nothing = np.zeros((0, 0, 3), dtype=np.uint8)
     stages = tuple(
-        StageCase(
+        StageSpec(
             public=StageInput(stage, "", "", "", "", nothing),
             house_json="",
             target=TargetRecord(
@@ -165,7 +165,7 @@ def unknown_case(task_id: str, num_stages: int) -> EpisodeCase:
         )
         for stage in range(1, num_stages + 1)
     )
-    return EpisodeCase(task_id, "", Pose(0.0, 0.0, 0.0, 0.0), stages)
+    return EpisodeSpec(task_id, "", Pose(0.0, 0.0, 0.0, 0.0), stages)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +173,7 @@ class StageOutcome:
     """A finished stage, and what it cost."""
 
     record: StageRecord
-    stage_map: StageMap | None
+    stage_map: FloorPlan | None
     """Of the stage's house; `None` when the stage never got one."""
     wall_s: float
     cpu_s: float

@@ -11,7 +11,7 @@ from typing import Any
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.protocol import EpisodeCase
+from evonav.evaluation.protocol import EpisodeSpec
 from evonav.evaluation.run.components import Backend
 from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import Job, answers, open_pool
@@ -222,7 +222,7 @@ def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str
 
 
 def measure_task(
-    case: EpisodeCase,
+    case: EpisodeSpec,
     perception: Perception,
     simulator: Simulator,
     config: TourConfig,
@@ -301,7 +301,7 @@ class _BestView:
         if self.parts is None or truth.num_wanted > self.parts[0].num_wanted:
             self.pose, self.parts, self.rgb = pose, (truth, percept.detections, matched), frame.rgb
 
-    def drawn(self, case: EpisodeCase, simulator: Simulator) -> str | None:
+    def drawn(self, case: EpisodeSpec, simulator: Simulator) -> str | None:
         if self.pose is None or self.parts is None:
             return None
         if self.rgb is None:
@@ -310,7 +310,7 @@ class _BestView:
         return side_by_side(self.rgb, *self.parts)
 
 
-def _houses(case: EpisodeCase, count: int) -> list[int]:
+def _houses(case: EpisodeSpec, count: int) -> list[int]:
     """The first stage and those after it whose house is another than the one before."""
     found, house = [1], case.stages[0].house_json
     for number, stage in enumerate(case.stages[1:], start=2):

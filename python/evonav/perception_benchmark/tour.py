@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from evonav.evaluation.episode.spec import room_at, stage_map
-from evonav.evaluation.protocol import EpisodeCase
+from evonav.evaluation.protocol import EpisodeSpec
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator
 
@@ -16,7 +16,7 @@ VIEWS_PER_PLACE = 6
 """Evenly around: 60 degrees apart, so that views of 90 degrees overlap, as an agent's do."""
 
 
-def tour(case: EpisodeCase, stage: int, simulator: Simulator, *, views_per_room: int, seed: int) -> list[list[Pose]]:
+def tour(case: EpisodeSpec, stage: int, simulator: Simulator, *, views_per_room: int, seed: int) -> list[list[Pose]]:
     """Poses by place, from the task's start on, each next place the nearest of those left.
 
     Places of a room lie as far apart as they can, the first one drawn; so is the heading that a place begins with.

@@ -8,7 +8,7 @@ from io import BytesIO
 import numpy as np
 from PIL import Image
 
-from evonav.evaluation.records.schema import StageMap, StageRecord
+from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.replay.types import TracedEntry, TracedMap, TracedRound, TracedStage
 from evonav.report.maps.floor_plan import Frame, ground, labels
 from evonav.report.maps.svg import cm, cross, escape, join, polyline
@@ -24,7 +24,7 @@ _TAG_UNITS = 2.6
 """Height of the names of entries, in units of a frame."""
 
 
-def house_layer(record: StageRecord, maps: Mapping[int, StageMap], frame: Frame, success_radius_m: float) -> str:
+def house_layer(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, success_radius_m: float) -> str:
     """Return what stays the same in a stage: the house, what moved before, and the target in its radius."""
     house = maps.get(record.stage)
     below, names = "", ""

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.evaluation.records.schema import EndState, RoundRecord, StageMap, StageRecord
+from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord, StageRecord
 from evonav.replay.types import (
     TracedEntry,
     TracedFrontier,
@@ -79,7 +79,7 @@ class PageData:
             self.prompts.append(parts)
         return self._prompt_index[key]
 
-    def add_stage(self, stage: TracedStage, maps: Mapping[int, StageMap], frame: Frame, budget: int) -> None:
+    def add_stage(self, stage: TracedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int) -> None:
         """Takes a stage in.
 
         Args:

@@ -11,7 +11,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records.schema import StageMap, StageRecord
+from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.replay.page_data import PageData
 from evonav.replay.types import TracedStage
 from evonav.report.maps.floor_plan import Frame, floors, furniture, item_labels, labels, structure
@@ -124,7 +124,7 @@ def _tabs(stages: Sequence[TracedStage], here: Sequence[TracedStage]) -> list[tu
 
 def _page(
     stages: Sequence[TracedStage],
-    maps: Mapping[int, StageMap],
+    maps: Mapping[int, FloorPlan],
     tabs: Sequence[tuple[str, int, str, int]],
     budget: int,
     radius_m: float,
@@ -150,7 +150,7 @@ def _page(
     )
 
 
-def _drawing(stage: TracedStage, maps: Mapping[int, StageMap], frame: Frame, radius_m: float) -> StageDrawing:
+def _drawing(stage: TracedStage, maps: Mapping[int, FloorPlan], frame: Frame, radius_m: float) -> StageDrawing:
     record, stage_map = stage.record, stage.stage_map
     previous = maps.get(record.stage - 1)
     ends = ""
@@ -160,7 +160,7 @@ def _drawing(stage: TracedStage, maps: Mapping[int, StageMap], frame: Frame, rad
         ends += (
             f'<g class="terminal">{end_mark(cm((end.x_m, end.z_m)), record.state.value == "success", frame.unit)}</g>'
         )
-    house = stage_map or StageMap(
+    house = stage_map or FloorPlan(
         task_id=record.task_id, house=record.house, stage=record.stage, rooms=(), walls=(), openings=(), objects=()
     )
     layers = (

@@ -19,9 +19,9 @@ from evonav.decision.custom_model import load_custom_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.records.json_diff import record_differences
-from evonav.evaluation.records.schema import EndState, ErrorKind, StageMap, StageRecord
+from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.evaluation.run.run import agent_seed, perception_seed
@@ -127,10 +127,10 @@ class RunReplay:
 
     def _stages(
         self,
-        case: EpisodeCase,
+        case: EpisodeSpec,
         agent_name: str,
         stored: Mapping[int, StageRecord],
-        maps: Mapping[int, StageMap],
+        maps: Mapping[int, FloorPlan],
         on_round: Callable[[int, int], None],
     ) -> Iterator[TracedStage]:
         lost = [stage for stage, record in stored.items() if _is_beyond_replay(record)]

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.records.schema import StageMap, StageRecord
+from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.replay.page_data import choice_words, evaluator_words
 from evonav.replay.types import BLOCKED, TracedMap, TracedRound, TracedStage, TracedView
 from evonav.report.maps.stage_map import outcome_words
@@ -40,7 +40,7 @@ def check_recording(path: Path) -> None:
 
 
 def write_recording(
-    stages: Sequence[TracedStage], maps: Mapping[int, StageMap], path: Path, *, success_radius_m: float
+    stages: Sequence[TracedStage], maps: Mapping[int, FloorPlan], path: Path, *, success_radius_m: float
 ) -> Path:
     """Writes an episode as a recording, with the timelines `step`, `stage` and `round`.
 
@@ -91,7 +91,7 @@ class _Recorder:
         rr: Any,  # noqa: ANN401 - rerun is not there for the type checker
         stream: Any,  # noqa: ANN401
         stage: TracedStage,
-        maps: Mapping[int, StageMap],
+        maps: Mapping[int, FloorPlan],
         radius_m: float,
     ) -> None:
         self._rr, self._stream, self._stage = rr, stream, stage

@@ -9,7 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.evaluation.records.schema import EntryRecord, Point2, Point3, PoseRecord, RoundRecord, StageMap, StageRecord
+from evonav.evaluation.records.schema import (
+    EntryRecord,
+    FloorPlan,
+    Point2,
+    Point3,
+    PoseRecord,
+    RoundRecord,
+    StageRecord,
+)
 
 UNKNOWN, FREE, BLOCKED, EXPLORED = 0, 1, 2, 3
 """Values of `TracedMap.cells`; explored cells are free ones that were seen from close by."""
@@ -107,7 +115,7 @@ class TracedStage:
 
     record: StageRecord
     """The replayed one; where nothing was run again, the stored one."""
-    stage_map: StageMap | None
+    stage_map: FloorPlan | None
     rounds: tuple[TracedRound, ...]
     why_not: str
     """Why it was not run again; empty if it was."""

@@ -6,7 +6,7 @@ from io import BytesIO
 
 from PIL import Image
 
-from evonav.evaluation.records.schema import EndState, StageMap
+from evonav.evaluation.records.schema import EndState, FloorPlan
 from evonav.replay.frame_maps import UNKNOWN_COLOUR, belief_layer, house_layer, truth_layer
 from evonav.replay.page_data import choice_words, evaluator_words
 from evonav.replay.types import TracedRound, TracedStage
@@ -32,7 +32,7 @@ _LETTER = 0.56
 
 
 def stage_frames(
-    stage: TracedStage, maps: Mapping[int, StageMap], frame: Frame, *, budget: int, success_radius_m: float
+    stage: TracedStage, maps: Mapping[int, FloorPlan], frame: Frame, *, budget: int, success_radius_m: float
 ) -> Iterator[Image.Image]:
     """Yield a picture a round, and one of how the stage ended.
 
@@ -52,7 +52,7 @@ def stage_frames(
     yield film.end()
 
 
-def episode_frame(stages: Sequence[TracedStage], maps: Mapping[int, StageMap]) -> Frame:
+def episode_frame(stages: Sequence[TracedStage], maps: Mapping[int, FloorPlan]) -> Frame:
     """Return the frame of a task's maps."""
     return task_frame(maps, [stage.record for stage in stages])
 
@@ -61,7 +61,7 @@ class _StageFilm:
     """Draws what the pictures of a stage share once, and each round's own over it."""
 
     def __init__(
-        self, stage: TracedStage, maps: Mapping[int, StageMap], frame: Frame, budget: int, radius_m: float
+        self, stage: TracedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int, radius_m: float
     ) -> None:
         film_css = (files("evonav.report") / "templates" / "film.css").read_text(encoding="utf-8")
         self._style = f"<style>{light_css(film_css)}</style>"
@@ -113,7 +113,7 @@ class _StageFilm:
         return Image.open(BytesIO(png_of(svg, background=background, has_system_fonts=False)))
 
 
-def _header(stage: TracedStage, maps: Mapping[int, StageMap]) -> str:
+def _header(stage: TracedStage, maps: Mapping[int, FloorPlan]) -> str:
     """Return agent, task and goal, and the heads of the panels."""
     record = stage.record
     agent = record.agent[-40:]

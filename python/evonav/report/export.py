@@ -12,7 +12,7 @@ from typing import Any
 
 from evonav.errors import StoreError
 from evonav.evaluation.metrics import stage_metrics as measures
-from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
+from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records import costs
 from evonav.evaluation.records.schema import RoundRecord
 from evonav.evaluation.records.store import RunStore
@@ -43,9 +43,9 @@ _ARROW = {"str": "string", "bool": "bool_", "int": "int64", "float": "float64"}
 
 
 def stage_columns() -> dict[str, str]:
-    """Columns of a table of stages and what they hold: the fields of `StageRow`."""
+    """Columns of a table of stages and what they hold: the fields of `StageMetrics`."""
     told = {**_told(costs), **_told(measures)}
-    return {field.name: told.get(field.name, "") for field in fields(StageRow)}
+    return {field.name: told.get(field.name, "") for field in fields(StageMetrics)}
 
 
 def stage_table(run_dir: Path, agents: Sequence[str] | None = None) -> list[dict[str, Any]]:
@@ -55,7 +55,7 @@ def stage_table(run_dir: Path, agents: Sequence[str] | None = None) -> list[dict
         StoreError: The run cannot be read.
     """
     with RunStore(run_dir) as store:
-        return [asdict(row) for row in stage_rows(store, agents)]
+        return [asdict(row) for row in read_stage_metrics(store, agents)]
 
 
 def round_table(run_dir: Path, agents: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
@@ -142,7 +142,7 @@ def _write_parquet(rows: Iterable[dict[str, Any]], columns: dict[str, str], path
         import pyarrow.parquet as parquet
     except ImportError as error:
         raise StoreError(f"Parquet needs pyarrow ({error}): pip install 'evonav[data]'") from error
-    kinds = {**_kinds(StageRow), **_round_kinds()}
+    kinds = {**_kinds(StageMetrics), **_round_kinds()}
     schema = pyarrow.schema(
         [
             pyarrow.field(name, getattr(pyarrow, _ARROW[kinds[name]])(), metadata={"description": told})

@@ -36,7 +36,7 @@ class LoadedRun:
 
     @cached_property
     def stages(self) -> Columns:
-        """One row a recorded stage: the fields of `evonav.evaluation.metrics.stage_metrics.StageRow`."""
+        """One row a recorded stage: the fields of `evonav.evaluation.metrics.stage_metrics.StageMetrics`."""
         return _columns(stage_table(self.run_dir), stage_columns())
 
     @cached_property

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_pairs, summarise
-from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
+from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import FailureRow, RunStore
 from evonav.report.maps.stage_map import success_radius_of
 from evonav.report.tables.causes import Cause, cause_of
@@ -47,7 +47,7 @@ class Task:
     num_stages: int
     records: Mapping[tuple[str, int], StageRecord]
     """By (agent, stage); a stage that is not there was not run yet."""
-    maps: Mapping[int, StageMap]
+    maps: Mapping[int, FloorPlan]
 
 
 @dataclass(frozen=True, slots=True)

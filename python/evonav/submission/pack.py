@@ -220,7 +220,7 @@ def _read_run(store: RunStore, run_dir: Path, agents: Sequence[str] | None) -> t
         if agent in BASELINES:
             raise InvalidArgumentError(f"{agent} is a baseline and no contestant: leave it out")
         mine = list(store.records(agent))
-        num_scored = sum(record.is_scored or record.state is EndState.FORCED for record in mine)
+        num_scored = sum(record.is_scored or record.state is EndState.GUIDED for record in mine)
         if num_scored != num_stages:
             raise InvalidArgumentError(
                 f"{agent} is incomplete: {num_scored} of {num_stages} stages have a score;"

@@ -22,7 +22,7 @@ from evonav.agents.agent import (
 )
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.records.json_diff import record_differences
 from evonav.evaluation.records.schema import ActionRecord, EntryRecord, StageRecord
 from evonav.evaluation.run.components import Backend
@@ -111,7 +111,7 @@ def _nothing(frame: Frame) -> Detections:
 
 
 def reenact(
-    case: EpisodeCase, records: Mapping[int, StageRecord], simulator: Simulator, protocol: ProtocolConfig
+    case: EpisodeSpec, records: Mapping[int, StageRecord], simulator: Simulator, protocol: ProtocolConfig
 ) -> Iterator[tuple[int, tuple[str, ...]]]:
     """Carries out the actions of one episode again.
 

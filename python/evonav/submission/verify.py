@@ -114,7 +114,7 @@ def score_findings(record: StageRecord, header: Submission) -> Iterator[str]:
 
     The formulas are those of the protocol (paper, Sec. C.2), from rounds, target and reference length.
     """
-    if record.state is EndState.FORCED:
+    if record.state is EndState.GUIDED:
         return  # the evaluator walked: nothing was scored
     where = f"{record.agent} {record.task_id} stage {record.stage}"
     start, end, trace = record.effective_start, record.terminal, record.trace
@@ -209,7 +209,7 @@ def _gaps(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> I
             if record.agent != part.agent:
                 yield f"{part.agent}: a record of {record.agent}"
             # That a forced stage is one its task says: carried out again, the record would differ.
-            if not record.is_scored and record.state is not EndState.FORCED:
+            if not record.is_scored and record.state is not EndState.GUIDED:
                 yield f"{part.agent} {record.task_id} stage {record.stage} is {record.state.value}"
 
 

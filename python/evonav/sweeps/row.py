@@ -37,4 +37,4 @@ class SweepRow:
     @property
     def is_incomplete(self) -> bool:
         """Some stage is errored or not run: no rate may be quoted as final."""
-        return self.n + self.counts.get(EndState.FORCED.value, 0) != self.num_stages
+        return self.n + self.counts.get(EndState.GUIDED.value, 0) != self.num_stages

@@ -17,7 +17,7 @@ from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.tasks.bundled import bundled_tasks
@@ -118,7 +118,7 @@ class _Examination:
     def _say(self, name: str, verdict: Verdict, said: str) -> None:
         self._checks.append(Check(name, verdict, said))
 
-    def _examine(self, case: EpisodeCase, other: EpisodeCase) -> None:
+    def _examine(self, case: EpisodeSpec, other: EpisodeSpec) -> None:
         alone: _Run | None = None
         if self._factory is None or _is_found(self._name, self._factory):
             alone = self._own_process(case)
@@ -146,7 +146,7 @@ class _Examination:
             return
         self._compare(factory, case, other, first, alone)
 
-    def _own_process(self, case: EpisodeCase) -> _Run | None:
+    def _own_process(self, case: EpisodeSpec) -> _Run | None:
         """An episode in a process of its own; `None` where there is no use in going on."""
         run = _Run()
         with closing(AgentProcesses(self._hosting)) as processes:
@@ -168,7 +168,7 @@ class _Examination:
         self._say("importable", "pass", f"`{self._name}` is found by a process of its own")
         return run
 
-    def _here(self, factory: Callable[..., Agent], cases: Sequence[EpisodeCase], probe: Probe | None = None) -> _Run:
+    def _here(self, factory: Callable[..., Agent], cases: Sequence[EpisodeSpec], probe: Probe | None = None) -> _Run:
         """Episodes of one agent object in this process."""
         probe = probe or Probe(new_agent(factory, self._backend.make_decision(self._seed)))
         run = _Run(probe=probe)
@@ -176,7 +176,7 @@ class _Examination:
             run.records += self._episode(probe, case)
         return run
 
-    def _episode(self, agent: Agent, case: EpisodeCase) -> Iterator[StageRecord]:
+    def _episode(self, agent: Agent, case: EpisodeSpec) -> Iterator[StageRecord]:
         with closing(self._backend.make_simulator()) as simulator:
             perception = self._backend.make_perception()
             episode = Episode(case, self._name, agent, simulator, perception, PROTOCOL, self._seed)
@@ -276,7 +276,7 @@ class _Examination:
         self._say("time", "warn" if mean_s > SLOW_ROUND_S else "pass", said)
 
     def _compare(
-        self, factory: Callable[..., Agent], case: EpisodeCase, other: EpisodeCase, first: _Run, alone: _Run | None
+        self, factory: Callable[..., Agent], case: EpisodeSpec, other: EpisodeSpec, first: _Run, alone: _Run | None
     ) -> None:
         again = self._here(factory, [case])
         difference = _difference(first, again)
@@ -335,7 +335,7 @@ def _is_found(name: str, factory: Callable[..., Agent]) -> bool:
     return getattr(sys.modules.get(module), attribute, None) is factory
 
 
-def _changing_cases(backend: Backend, directory: Path) -> tuple[EpisodeCase, EpisodeCase]:
+def _changing_cases(backend: Backend, directory: Path) -> tuple[EpisodeSpec, EpisodeSpec]:
     """Two bundled tasks, each up to its first stage before which things were moved."""
     found = []
     for root in sorted(path.parent for path in directory.glob("*/task.json")):

@@ -10,8 +10,8 @@ from time import process_time
 
 from evonav.agents.agent import Agent
 from evonav.evaluation.episode.observer import LOSSES, EpisodeObserver, HasOwnProcess
-from evonav.evaluation.episode.stage import Carried, Participants, StageRun
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome, as_not_run
+from evonav.evaluation.episode.stage import EpisodeContext, EpisodeState, StageRun
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig, StageOutcome, as_not_run
 from evonav.evaluation.records.costs import LEVELS, Stopwatch
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
 from evonav.perception import Perception
@@ -24,7 +24,7 @@ class Episode:
 
     def __init__(
         self,
-        case: EpisodeCase,
+        case: EpisodeSpec,
         agent_name: str,
         agent: Agent,
         simulator: Simulator,
@@ -37,7 +37,7 @@ class Episode:
     ) -> None:
         self._case = case
         self._agent_name = agent_name
-        self._parts = Participants(
+        self._parts = EpisodeContext(
             case,
             agent,
             simulator,
@@ -47,7 +47,7 @@ class Episode:
             seed if perception_seed is None else perception_seed,
             observer,
         )
-        self._carried = Carried()
+        self._state = EpisodeState()
         self.replace_agent(agent)
         self._told_costs: Mapping[str, float] = {}
 
@@ -72,7 +72,7 @@ class Episode:
                 memory_lost_at, is_lost = stage, False
             record = record.model_copy(update={"failed_before": failed, "memory_lost_at": memory_lost_at})
             stopwatch = Stopwatch(self._cpu_s)
-            run = StageRun(self._parts, self._carried, record, pose, stopwatch)
+            run = StageRun(self._parts, self._state, record, pose, stopwatch)
             record = run.run()
             costs = stopwatch.costs(self._new_costs(run.failure))
             wall_s, cpu_s = costs.wall_s or 0.0, costs.cpu_s or 0.0
@@ -83,7 +83,7 @@ class Episode:
                 failed = (*failed, stage)
                 pose = self._end_pose(stage)
                 is_lost = run.failure in LOSSES
-                self._carried = Carried() if is_lost else self._carried
+                self._state = EpisodeState() if is_lost else self._state
             else:
                 failure = record
 

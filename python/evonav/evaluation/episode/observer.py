@@ -63,7 +63,7 @@ class StageFailedError(Exception):
 
 
 @contextmanager
-def blame(kind: ErrorKind) -> Iterator[None]:
+def attribute_errors(kind: ErrorKind) -> Iterator[None]:
     """Turns what is raised inside into a stage failure of `kind`; errors that name their own cause keep it."""
     try:
         yield

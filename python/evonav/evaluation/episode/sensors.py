@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 from evonav.agents.agent import Sensing, ViewSchedule
-from evonav.evaluation.episode.staleness import Witness
+from evonav.evaluation.episode.staleness import StalenessTracker
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.perception import Percept, Perception, StageScene
 from evonav.sensors.observation import MapFrame, Observation, View
@@ -37,7 +37,7 @@ class Sensors:
         perception: Perception,
         sensing: Sensing,
         scene: StageScene,
-        witness: Witness | None = None,
+        witness: StalenessTracker | None = None,
         stopwatch: Stopwatch | None = None,
     ) -> None:
         """Sensors at the simulator's pose, wherever it is.
@@ -54,7 +54,7 @@ class Sensors:
         self._perception = perception
         self._sensing = sensing
         self._grid = simulator.occupancy()
-        self._witness = witness
+        self._staleness = witness
         self._stopwatch = stopwatch or Stopwatch()
         self.pose = simulator.pose
         """Where the last observation was made, whatever the agent was told."""
@@ -83,9 +83,9 @@ class Sensors:
         with self._stopwatch.timing("perception"):
             percepts = self._perception.perceive(frames)
             views = tuple(self._view(frame, percept) for frame, percept in zip(frames, percepts, strict=True))
-        if self._witness is not None:
+        if self._staleness is not None:
             for frame in frames:
-                self._witness.look(frame)
+                self._staleness.look(frame)
         return Observation(
             views=views,
             pose=_believed(pose, frames[-1].pose, percepts[-1].pose),

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 
-from evonav.evaluation.protocol import EpisodeCase, ForcedWalk, StageCase
+from evonav.evaluation.protocol import EpisodeSpec, GuidedWalk, StageSpec
 from evonav.evaluation.records.floor_plan import house_map, image_uri, target_record, transition_record
-from evonav.evaluation.records.schema import ObjectFootprint, Point2, StageMap
+from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, Point2
 from evonav.house import House
 from evonav.tasks import Task
 from evonav.tasks.oracle import OracleStage
@@ -14,19 +14,19 @@ from evonav.world.simulator import SceneObject
 THUMBNAIL_PX = 160
 
 
-def episode_case(task: Task) -> EpisodeCase:
+def episode_case(task: Task) -> EpisodeSpec:
     """A task as the evaluator runs it.
 
     Raises:
         TaskError: A stage house is malformed.
     """
     numbers = range(1, task.num_stages + 1)
-    return EpisodeCase(
+    return EpisodeSpec(
         task_id=task.task_id,
         house=task.header.house.name,
         start=task.start_pose,
         stages=tuple(
-            StageCase(
+            StageSpec(
                 public=task.public(k),
                 house_json=task.house_json(k),
                 target=target_record(task, k),
@@ -38,11 +38,11 @@ def episode_case(task: Task) -> EpisodeCase:
     )
 
 
-def _forced_walk(oracle: OracleStage) -> ForcedWalk:
-    return ForcedWalk(path_m=oracle.reference_path_m, end=oracle.reference_pose.pose())
+def _forced_walk(oracle: OracleStage) -> GuidedWalk:
+    return GuidedWalk(path_m=oracle.reference_path_m, end=oracle.reference_pose.pose())
 
 
-def stage_map(case: EpisodeCase, stage: int, objects: Sequence[SceneObject]) -> StageMap:
+def stage_map(case: EpisodeSpec, stage: int, objects: Sequence[SceneObject]) -> FloorPlan:
     """A stage's house from above.
 
     Args:
@@ -64,7 +64,7 @@ def stage_map(case: EpisodeCase, stage: int, objects: Sequence[SceneObject]) -> 
     )
 
 
-def room_at(plan: StageMap, point_m: Point2) -> str | None:
+def room_at(plan: FloorPlan, point_m: Point2) -> str | None:
     """The id of the room over a point (even-odd rule), or `None` outside all of them."""
     return next((room.room_id for room in plan.rooms if _is_inside(room.polygon_m, point_m)), None)
 

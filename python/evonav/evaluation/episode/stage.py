@@ -21,17 +21,17 @@ from evonav.evaluation.episode.observer import (
     EpisodeObserver,
     HasOwnProcess,
     StageFailedError,
-    blame,
+    attribute_errors,
     traceback_of,
 )
 from evonav.evaluation.episode.oracle_baselines import Sighting, as_oracle_baseline
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.episode.sensors import Sensors, map_frame
 from evonav.evaluation.episode.spec import room_at, stage_map
-from evonav.evaluation.episode.staleness import Witness, Witnessed
+from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState
 from evonav.evaluation.protocol import (
-    EpisodeCase,
-    ForcedWalk,
+    EpisodeSpec,
+    GuidedWalk,
     ProtocolConfig,
     as_errored,
 )
@@ -41,9 +41,9 @@ from evonav.evaluation.records.schema import (
     EndState,
     EntryRecord,
     ErrorKind,
+    FloorPlan,
     MemoryRecord,
     RoundRecord,
-    StageMap,
     StageRecord,
 )
 from evonav.perception import Perception, StageScene
@@ -54,10 +54,10 @@ from evonav.world.simulator import Simulator
 
 
 @dataclass(frozen=True, slots=True)
-class Participants:
+class EpisodeContext:
     """Who and what takes part in an episode."""
 
-    case: EpisodeCase
+    case: EpisodeSpec
     agent: Agent
     simulator: Simulator
     perception: Perception
@@ -69,19 +69,19 @@ class Participants:
 
 
 @dataclass(slots=True)
-class Carried:
+class EpisodeState:
     """What lasts from one stage to the next."""
 
     has_begun: bool = False
     """The agent knows the task."""
-    witnessed: Witnessed = field(default_factory=Witnessed)
+    tracked: TrackedState = field(default_factory=TrackedState)
 
 
 class StageRun:
     """One stage of an episode: start, rounds, measures."""
 
     def __init__(
-        self, parts: Participants, carried: Carried, record: StageRecord, requested: Pose, stopwatch: Stopwatch
+        self, parts: EpisodeContext, carried: EpisodeState, record: StageRecord, requested: Pose, stopwatch: Stopwatch
     ) -> None:
         """Runs nothing yet.
 
@@ -92,7 +92,7 @@ class StageRun:
             requested: Where the agent is to start.
             stopwatch: Books what the stage takes.
         """
-        self._carried = carried
+        self._state = carried
         self._case = parts.case
         self._agent = parts.agent
         self._simulator = parts.simulator
@@ -107,12 +107,12 @@ class StageRun:
         self._sensing = Sensing()
         self._planner = motion.Planner(self._simulator)
         self._stopwatch = stopwatch
-        self._witness = Witness((), "", (), carried.witnessed, 1)
+        self._staleness = StalenessTracker((), "", (), carried.tracked, 1)
         self._memory_at_start: MemoryRecord | None = None
         self._beliefs: Sequence[EntryBelief] | None = None
         """Of the last round, if they were asked for."""
         self._trace: list[RoundRecord] = []
-        self.plan: StageMap | None = None
+        self.plan: FloorPlan | None = None
         self.failure: ErrorKind | None = None
         """Why the stage could not be finished."""
         self.traceback = ""
@@ -120,11 +120,11 @@ class StageRun:
     def run(self) -> StageRecord:
         """The stage's record; where it fails, `failure` and `traceback` say why."""
         try:
-            with blame(ErrorKind.HARNESS):
+            with attribute_errors(ErrorKind.HARNESS):
                 self._start()
                 if self._stage.forced is not None:
                     return self._forced(self._stage.forced)
-                with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+                with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     reference_m = self._path_to_target_m()
                 progress = self._begin(self._protocol.budget(self._sensing), reference_m)
                 stop_reason = self._rounds(progress)
@@ -132,20 +132,20 @@ class StageRun:
         except StageFailedError as failure:
             self.failure = failure.kind
             self.traceback = traceback_of(failure)
-            self._witness.close(())
+            self._staleness.close(())
             return as_errored(self._with_trace(self._record), failure.kind, str(failure))
 
     def _start(self) -> None:
         """Loads the stage's house, puts the agent where it ended, and tells it the goal."""
         stage = self._record.stage
-        with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+        with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
             start = self._simulator.reset(self._stage.house_json, self._requested)
             is_snapped = math.dist((start.x_m, start.z_m), (self._requested.x_m, self._requested.z_m)) > 1e-6
-        self._witness = Witness(
+        self._staleness = StalenessTracker(
             self._simulator.objects,
             self._stage.target.object_id,
             self._stage.transition.relocations,
-            self._carried.witnessed,
+            self._state.tracked,
             self._protocol.min_visible_px,
         )
         self.plan = stage_map(self._case, stage, self._simulator.objects)
@@ -163,20 +163,20 @@ class StageRun:
         )
         if self._observer is not None:
             self._observer.stage_begins(stage, self._simulator)
-        with blame(ErrorKind.AGENT):
+        with attribute_errors(ErrorKind.AGENT):
             with self._stopwatch.timing("agent"):
                 self._tell_goal()
             beliefs = self._told_entries()
             if beliefs and (baseline := as_oracle_baseline(self._agent)) is not None:
-                baseline.reveal_stale(self._witness.stale_ids(beliefs))
+                baseline.reveal_stale(self._staleness.stale_ids(beliefs))
                 beliefs = self._told_entries()
-        self._memory_at_start = None if beliefs is None else self._witness.begin(beliefs)
+        self._memory_at_start = None if beliefs is None else self._staleness.begin(beliefs)
         self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensing)})
 
     def _tell_goal(self) -> None:
         """Tells the agent of the task, if it does not know, and of the stage. Its sensing is held for the stage."""
         self._sensing = self._granted()
-        if not self._carried.has_begun:
+        if not self._state.has_begun:
             self._agent.begin_task(
                 TaskInfo(
                     task_id=self._case.task_id,
@@ -186,7 +186,7 @@ class StageRun:
                     seed=self._seed,
                 )
             )
-            self._carried.has_begun = True
+            self._state.has_begun = True
         self._agent.begin_stage(self._stage.public)
         self._sensing = self._granted()
         if (baseline := as_oracle_baseline(self._agent)) is not None:
@@ -221,8 +221,8 @@ class StageRun:
         last = motion.Motion((), is_success=True)
         while not progress.is_over:
             number = progress.num_steps
-            self._witness.begin_round(number)
-            with blame(ErrorKind.SIMULATION):
+            self._staleness.begin_round(number)
+            with attribute_errors(ErrorKind.SIMULATION):
                 observation = sensors.observe(
                     is_first=number == 0,
                     is_action_success=last.is_success,
@@ -230,7 +230,7 @@ class StageRun:
                     num_rounds_left=progress.budget - number,
                 )
             action = self._answer(observation)
-            with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+            with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                 last = self._carry_out(action)
             progress.advance(last.length_m, is_stop=isinstance(action, Stop))
             self._end_round(number, sensors.pose, action, last)
@@ -238,7 +238,7 @@ class StageRun:
                 return action.reason
         return None
 
-    def _forced(self, forced: ForcedWalk) -> StageRecord:
+    def _forced(self, forced: GuidedWalk) -> StageRecord:
         """Walks the reference trajectory; the agent is asked in every round as in any stage, and not heeded."""
         sensors = self._sensors()
         is_stepwise = self._sensing.motion == "actions"
@@ -247,8 +247,8 @@ class StageRun:
         progress = self._begin(len(legs) + 1, ())
         while not progress.is_over:
             number = progress.num_steps
-            self._witness.begin_round(number)
-            with blame(ErrorKind.SIMULATION):
+            self._staleness.begin_round(number)
+            with attribute_errors(ErrorKind.SIMULATION):
                 num_left = progress.budget - number
                 observation = sensors.observe(is_first=number == 0, num_rounds_left=num_left, is_guided=True)
             action = self._answer(observation)
@@ -256,7 +256,7 @@ class StageRun:
             done = motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
             if number < len(legs):
                 is_last = number + 1 == len(legs)
-                with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+                with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     done = motion.walk(self._simulator, legs[number], forced.end.yaw_rad if is_last else None)
             progress.advance(done.length_m, is_stop=False)
             self._end_round(number, sensors.pose, action, done)
@@ -266,7 +266,7 @@ class StageRun:
                 )
         end = self._simulator.pose
         return self._with_memory(self._with_trace(self._record)).model_copy(
-            update={"state": EndState.FORCED, "terminal": pose_record(end), "path_length_m": progress.path_length_m}
+            update={"state": EndState.GUIDED, "terminal": pose_record(end), "path_length_m": progress.path_length_m}
         )
 
     def _sensors(self) -> Sensors:
@@ -277,25 +277,25 @@ class StageRun:
             seed=self._perception_seed,
             objects=self._simulator.objects,
         )
-        with blame(ErrorKind.SIMULATION):
-            return Sensors(self._simulator, self._perception, self._sensing, scene, self._witness, self._stopwatch)
+        with attribute_errors(ErrorKind.SIMULATION):
+            return Sensors(self._simulator, self._perception, self._sensing, scene, self._staleness, self._stopwatch)
 
     def _answer(self, observation: Observation) -> AgentAction:
         """What the agent answers to what it is given."""
         if self._observer is not None:
             self._observer.round_begins(observation)
-        with blame(ErrorKind.AGENT), self._stopwatch.timing("agent"):
+        with attribute_errors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
             if (baseline := as_oracle_baseline(self._agent)) is not None:
-                baseline.reveal_sighting(Sighting(self._witness.is_target_visible, self._witness.is_target_seen))
+                baseline.reveal_sighting(Sighting(self._staleness.is_target_visible, self._staleness.is_target_seen))
             return wire.checked_action(self._agent.act(observation), self._sensing)
 
     def _end_round(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> None:
         self._trace.append(self._round_record(number, pose, action, done))
         self._beliefs = None
-        if self._memory_at_start is not None and self._witness.wants_entries:
-            with blame(ErrorKind.AGENT):
+        if self._memory_at_start is not None and self._staleness.wants_entries:
+            with attribute_errors(ErrorKind.AGENT):
                 self._beliefs = self._told_entries()
-            self._witness.take_entries(self._beliefs or ())
+            self._staleness.take_entries(self._beliefs or ())
         if self._observer is not None:
             self._observer.round_ends(self._trace[-1])
 
@@ -314,7 +314,7 @@ class StageRun:
         return motion.Motion(((pose.x_m, pose.z_m),), is_success=True)
 
     def _round_record(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> RoundRecord:
-        with blame(ErrorKind.AGENT):
+        with attribute_errors(ErrorKind.AGENT):
             told = self._told()
             return RoundRecord(
                 round=number,
@@ -322,7 +322,7 @@ class StageRun:
                 action=action_record(action),
                 path_m=done.path_m,
                 is_action_success=done.is_success,
-                is_target_visible=self._witness.is_target_visible,
+                is_target_visible=self._staleness.is_target_visible,
                 choice=told.choice,
                 chosen_entry=None if told.chosen_entry is None else self._entry_record(told.chosen_entry),
                 num_entries=told.num_entries,
@@ -345,7 +345,7 @@ class StageRun:
     ) -> StageRecord:
         end, radius_m = self._simulator.pose, progress.success_radius_m
         score = progress.score((end.x_m, end.z_m))
-        with blame(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
+        with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
             left_m = self._path_to_target_m()
         geodesic_m = motion.polyline_length_m(left_m) if left_m else None
         record = self._with_memory(self._with_trace(self._record)).model_copy(
@@ -356,7 +356,7 @@ class StageRun:
                 "stop_reason": stop_reason or "",
                 "start_distance_m": score.start_distance_m,
                 "terminal_distance_m": score.terminal_distance_m,
-                "terminal_box_distance_m": self._witness.target_box_distance_m((end.x_m, end.z_m)),
+                "terminal_box_distance_m": self._staleness.target_box_distance_m((end.x_m, end.z_m)),
                 "terminal_geodesic_m": geodesic_m,
                 "is_geodesic_success": geodesic_m is not None and geodesic_m < radius_m,
                 "path_length_m": progress.path_length_m,
@@ -376,20 +376,20 @@ class StageRun:
 
     def _with_memory(self, record: StageRecord) -> StageRecord:
         """The record with what the agent holds at the end, judged."""
-        with blame(ErrorKind.AGENT):
+        with attribute_errors(ErrorKind.AGENT):
             beliefs = self._told_entries() if self._beliefs is None else self._beliefs
         if beliefs is None:
-            self._witness.close(())
+            self._staleness.close(())
             return record
-        memory, num_forgotten = self._witness.end(beliefs)
+        memory, num_forgotten = self._staleness.end(beliefs)
         return record.model_copy(
             update={
                 "entries": tuple(self._entry_record(belief) for belief in beliefs),
                 "memory_at_start": self._memory_at_start,
                 "memory_at_end": memory,
                 "num_forgotten": num_forgotten,
-                "stale_entries": self._witness.stale_entries(),
-                "moved_objects": self._witness.moved_objects(),
+                "stale_entries": self._staleness.stale_entries(),
+                "moved_objects": self._staleness.moved_objects(),
             }
         )
 
@@ -413,4 +413,4 @@ class StageRun:
             return wire.entries_of(wire.read_json(wire.entries_json(entries).encode()))
 
     def _entry_record(self, belief: EntryBelief) -> EntryRecord:
-        return entry_record(belief, self._witness.bodies)
+        return entry_record(belief, self._staleness.bodies)

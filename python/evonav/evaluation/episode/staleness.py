@@ -39,7 +39,7 @@ class _Moved:
 
 
 @dataclass(slots=True)
-class Witnessed:
+class TrackedState:
     """What lasts from stage to stage of an episode."""
 
     seen_ids: set[str] = field(default_factory=set)
@@ -48,7 +48,7 @@ class Witnessed:
     """The agent's, at the end of the last stage."""
 
 
-class Witness:
+class StalenessTracker:
     """Of one stage."""
 
     def __init__(
@@ -56,7 +56,7 @@ class Witness:
         objects: Sequence[SceneObject],
         target_id: str,
         relocations: Sequence[Relocation],
-        so_far: Witnessed,
+        so_far: TrackedState,
         min_visible_px: int,
     ) -> None:
         """A witness who has seen nothing of the stage yet.

@@ -1,4 +1,4 @@
-"""What explains a rate: means of `StageRow`'s measures for every agent, with intervals over houses.
+"""What explains a rate: means of `StageMetrics`'s measures for every agent, with intervals over houses.
 
 Every figure is a ratio of sums: of a share, what is counted over what could have been; of a mean, the sum over the
 stages that have a value. Intervals are by house (`evonav.statistics`).
@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from evonav.evaluation.metrics.navigation import house_of
-from evonav.evaluation.metrics.stage_metrics import StageRow
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.statistics import ClusterBootstrap, Interval
 
 RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
@@ -29,11 +29,11 @@ class Measure:
     name: str
     words: str
     unit: Unit
-    part: Callable[[StageRow], Part]
+    part: Callable[[StageMetrics], Part]
 
 
 @dataclass(frozen=True, slots=True)
-class Explained:
+class MetricSummary:
     """A measure of one agent."""
 
     measure: Measure
@@ -45,54 +45,54 @@ class Explained:
     """Bootstrap by house; `None` of one house, or where all of them agree."""
 
 
-def _mean(name: str) -> Callable[[StageRow], Part]:
-    def part(row: StageRow) -> Part:
+def _mean(name: str) -> Callable[[StageMetrics], Part]:
+    def part(row: StageMetrics) -> Part:
         value = getattr(row, name)
         return None if value is None or not row.is_scored else (float(value), 1.0)
 
     return part
 
 
-def _share(of: str, among: str) -> Callable[[StageRow], Part]:
-    def part(row: StageRow) -> Part:
+def _share(of: str, among: str) -> Callable[[StageMetrics], Part]:
+    def part(row: StageMetrics) -> Part:
         num, den = getattr(row, of), getattr(row, among)
         return None if num is None or not den or not row.is_scored else (float(num), float(den))
 
     return part
 
 
-def _right(stale: str, entries: str) -> Callable[[StageRow], Part]:
-    def part(row: StageRow) -> Part:
+def _right(stale: str, entries: str) -> Callable[[StageMetrics], Part]:
+    def part(row: StageMetrics) -> Part:
         num, den = getattr(row, stale), getattr(row, entries)
         return None if num is None or not den or not row.is_scored else (float(den - num), float(den))
 
     return part
 
 
-def _recall(name: str) -> Callable[[StageRow], Part]:
-    def part(row: StageRow) -> Part:
+def _recall(name: str) -> Callable[[StageMetrics], Part]:
+    def part(row: StageMetrics) -> Part:
         recall, num_seen = getattr(row, name), row.num_seen_objects
         return None if recall is None or not num_seen or not row.is_scored else (recall, 1.0)
 
     return part
 
 
-def _later(part: Callable[[StageRow], Part]) -> Callable[[StageRow], Part]:
+def _later(part: Callable[[StageMetrics], Part]) -> Callable[[StageMetrics], Part]:
     return lambda row: part(row) if row.stage > 1 else None
 
 
-def _radius(radius_m: float) -> Callable[[StageRow], Part]:
-    def part(row: StageRow) -> Part:
+def _radius(radius_m: float) -> Callable[[StageMetrics], Part]:
+    def part(row: StageMetrics) -> Part:
         is_success = row.is_success_at(radius_m)
         return None if is_success is None else (float(is_success), 1.0)
 
     return part
 
 
-def _clearing(name: str, count: str) -> Callable[[StageRow], Part]:
+def _clearing(name: str, count: str) -> Callable[[StageMetrics], Part]:
     """A stage's mean over what it counted, weighted by the count."""
 
-    def part(row: StageRow) -> Part:
+    def part(row: StageMetrics) -> Part:
         value, num = getattr(row, name), getattr(row, count)
         return None if value is None or not num or not row.is_scored else (value * num, float(num))
 
@@ -155,7 +155,7 @@ MEASURES = {"success": SUCCESS, "staleness": STALENESS, "memory": MEMORY, "costs
 """By kind. Those of `costs` are of the machine, not of the run's inputs."""
 
 
-def explain(rows: Sequence[StageRow], measures: Sequence[Measure]) -> dict[str, list[Explained]]:
+def explain(rows: Sequence[StageMetrics], measures: Sequence[Measure]) -> dict[str, list[MetricSummary]]:
     """Measures by agent, in the order of the rows.
 
     Args:
@@ -164,15 +164,15 @@ def explain(rows: Sequence[StageRow], measures: Sequence[Measure]) -> dict[str, 
     """
     agents = dict.fromkeys(row.agent for row in rows)
     return {
-        agent: [_explained([row for row in rows if row.agent == agent], one) for one in measures] for agent in agents
+        agent: [_summary_of([row for row in rows if row.agent == agent], one) for one in measures] for agent in agents
     }
 
 
-def _explained(rows: Sequence[StageRow], measure: Measure) -> Explained:
+def _summary_of(rows: Sequence[StageMetrics], measure: Measure) -> MetricSummary:
     parts = [(house_of(row), part) for row in rows if (part := measure.part(row)) is not None]
     if not parts:
-        return Explained(measure, 0, 0, None, None)
+        return MetricSummary(measure, 0, 0, None, None)
     bootstrap = ClusterBootstrap([house for house, _ in parts])
     tops, bottoms = bootstrap.sums(np.array([part for _, part in parts])).T
     found = bootstrap.ratio(tops, bottoms, len(parts))
-    return Explained(measure, found.n, found.num_clusters, found.value, found.ci95)
+    return MetricSummary(measure, found.n, found.num_clusters, found.value, found.ci95)

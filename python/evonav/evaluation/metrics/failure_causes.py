@@ -63,7 +63,7 @@ def cause_of(record: StageRecord) -> Cause | None:
     Args:
         record: Whole: trace and entries are looked at.
     """
-    if record.state in (EndState.SUCCESS, EndState.FORCED):
+    if record.state in (EndState.SUCCESS, EndState.GUIDED):
         return None
     if record.state is EndState.NOT_RUN:
         return Cause.NOT_RUN

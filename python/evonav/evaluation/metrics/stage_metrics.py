@@ -1,7 +1,7 @@
 """One flat row a stage: everything that tables, exports and comparisons are made of (docs/measures.md defines it).
 
-`stage_rows` reads what the store keeps beside each record, so no trace is parsed; of runs that an older evonav wrote,
-it derives the same from the records. What old records do not hold is `None`.
+`read_stage_metrics` reads what the store holds beside each record, so no trace is parsed. For older runs it
+derives the same from the records. What old records lack is `None`.
 """
 
 import json
@@ -139,7 +139,7 @@ class RecordMeasures:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StageRow(StageCosts, RecordMeasures):
+class StageMetrics(StageCosts, RecordMeasures):
     """A stage in a row: what its record tells, what those before it add, and what it cost."""
 
     precision_before: float | None
@@ -172,8 +172,8 @@ class _Kept:
     """The agent began anew in this stage, and its counters with it."""
 
 
-def kept_measures(record: StageRecord) -> str:
-    """What `stage_rows` needs of a record, as JSON; derived from it alone.
+def encode_metrics(record: StageRecord) -> str:
+    """What `read_stage_metrics` needs of a record, as JSON; derived from it alone.
 
     Args:
         record: Whole, with its trace.
@@ -189,7 +189,7 @@ def kept_measures(record: StageRecord) -> str:
     return json.dumps(kept, separators=(",", ":"), allow_nan=False)
 
 
-def stage_rows(store: "RunStore", agents: Sequence[str] | None = None) -> list[StageRow]:
+def read_stage_metrics(store: "RunStore", agents: Sequence[str] | None = None) -> list[StageMetrics]:
     """A row for every recorded stage, by agent, task and stage.
 
     Args:
@@ -201,7 +201,7 @@ def stage_rows(store: "RunStore", agents: Sequence[str] | None = None) -> list[S
     """
     kept = _kept(store, agents)
     costs, timings, retries = store.costs(), store.timings(), store.retries()
-    rows: list[StageRow] = []
+    rows: list[StageMetrics] = []
     for _, episode in groupby(kept, key=lambda one: (one.measures.agent, one.measures.task_id)):
         before: _Kept | None = None
         counted: dict[str, int] = {}
@@ -222,7 +222,7 @@ def stage_rows(store: "RunStore", agents: Sequence[str] | None = None) -> list[S
                 },
                 "precision_before": before.measures.precision if before is not None and follows else None,
             }
-            rows.append(StageRow(**values))
+            rows.append(StageMetrics(**values))
             before, counted = one, {**counted, **one.counters}
     return rows
 
@@ -326,11 +326,11 @@ def _values(measures: RecordMeasures) -> dict[str, Any]:
 def _kept(store: "RunStore", agents: Sequence[str] | None) -> Iterator[_Kept]:
     """By agent, task and stage; derived anew where the store has none of this version."""
     wanted = None if agents is None else set(agents)
-    for (agent, task_id, stage), version, text in store.kept_measures():
+    for (agent, task_id, stage), version, text in store.encode_metrics():
         if wanted is not None and agent not in wanted:
             continue
         if version != MEASURES_VERSION or text is None:
-            text = kept_measures(store.record(agent, task_id, stage))
+            text = encode_metrics(store.record(agent, task_id, stage))
         kept = json.loads(text)
         yield _Kept(RecordMeasures(**kept["measures"]), kept["counters"], kept["is_fresh"])
 

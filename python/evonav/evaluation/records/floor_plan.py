@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from evonav.evaluation.records.schema import (
+    FloorPlan,
     ObjectFootprint,
     Opening,
     OpeningKind,
     Point2,
     Relocation,
     RoomFootprint,
-    StageMap,
     TargetRecord,
     TransitionRecord,
 )
@@ -28,7 +28,7 @@ from evonav.tasks.oracle import OracleStage
 
 def house_map(
     house: House, *, task_id: str, stage: int, objects: Sequence[ObjectFootprint], reference_image: str | None
-) -> StageMap:
+) -> FloorPlan:
     """A house from above.
 
     Args:
@@ -39,7 +39,7 @@ def house_map(
         reference_image: As a `data:` URI.
     """
     walls = {wall.id: wall for wall in house.walls}
-    return StageMap(
+    return FloorPlan(
         task_id=task_id,
         house=house.name,
         stage=stage,

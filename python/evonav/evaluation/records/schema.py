@@ -1,4 +1,4 @@
-"""What a run leaves behind: one `StageRecord` a stage, one `StageMap` a stage house.
+"""What a run leaves behind: one `StageRecord` a stage, one `FloorPlan` a stage house.
 
 A record holds all that tables, maps and reports need; nothing downstream reads houses, tasks or agents.
 Everything in it is a function of the run's inputs: wall-clock figures live in a table of their own (`store.py`).
@@ -33,7 +33,7 @@ class EndState(str, Enum):
     FAILURE = "failure"
     ERRORED = "errored"
     NOT_RUN = "not_run"
-    FORCED = "forced"
+    GUIDED = "forced"
     """The evaluator walked and the agent looked on: nothing to score (docs/controlled.md)."""
 
 
@@ -352,7 +352,7 @@ class Opening(_Record):
     to_m: Point2
 
 
-class StageMap(_Record):
+class FloorPlan(_Record):
     """A stage's house from above: the ground of every picture. The same for all agents."""
 
     schema_version: Literal[1] = 1

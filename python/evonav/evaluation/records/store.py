@@ -20,10 +20,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.stage_metrics import MEASURES_VERSION, kept_measures
+from evonav.evaluation.metrics.stage_metrics import MEASURES_VERSION, encode_metrics
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.former_paths import with_current_paths
-from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, StageFailure, StageMap, StageRecord
+from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
 from evonav.parallel.folders import is_on_network, sync_folder
 
 FILE_NAME = "records.sqlite"
@@ -183,7 +183,7 @@ class RunStore:
         with self._transaction(f"stage {key}: "):
             text = record.model_dump_json()
             self._db.execute("INSERT INTO stages VALUES (?, ?, ?, ?, ?)", (*key, record.state.value, text))
-            measures = kept_measures(record)
+            measures = encode_metrics(record)
             self._db.execute("INSERT INTO measures VALUES (?, ?, ?, ?, ?)", (*key, MEASURES_VERSION, measures))
             self._db.execute("INSERT INTO timings VALUES (?, ?, ?, ?, ?)", (*key, wall_s, cpu_s))
             if costs is not None:
@@ -198,7 +198,7 @@ class RunStore:
         what = (failure.kind.value, failure.message, failure.traceback, True)
         self._execute(_ADD_FAILURE, (agent, task_id, failure.stage, *what))
 
-    def add_map(self, stage_map: StageMap) -> None:
+    def add_map(self, stage_map: FloorPlan) -> None:
         """Records a stage's house from above; the first writer wins, all of them would write the same."""
         row = (stage_map.task_id, stage_map.stage, stage_map.model_dump_json())
         self._execute("INSERT OR IGNORE INTO stage_maps VALUES (?, ?, ?)", row)
@@ -273,7 +273,7 @@ class RunStore:
         except ValidationError as error:
             raise StoreError(f"{self.path}: {error}") from error
 
-    def kept_measures(self) -> Iterator[tuple[tuple[str, str, int], int | None, str | None]]:
+    def encode_metrics(self) -> Iterator[tuple[tuple[str, str, int], int | None, str | None]]:
         """By agent, task and stage: the version of the measures kept beside a record, and these; `None` without."""
         query = (
             "SELECT agent, task_id, stage, version, measures FROM stages LEFT JOIN measures "
@@ -288,12 +288,12 @@ class RunStore:
         rows = self._query(query, (agent, task_id, stage))
         return str(rows[0][0]) if rows else None
 
-    def maps(self, task_id: str | None = None) -> Iterator[StageMap]:
+    def maps(self, task_id: str | None = None) -> Iterator[FloorPlan]:
         """Stage maps by task and stage."""
         query = "SELECT map FROM stage_maps WHERE ?1 IS NULL OR task_id = ?1 ORDER BY task_id, stage"
         for (text,) in self._rows(query, (task_id,)):
             try:
-                yield StageMap.model_validate_json(text)
+                yield FloorPlan.model_validate_json(text)
             except ValidationError as error:
                 raise StoreError(f"{self.path}: {error}") from error
 

@@ -13,7 +13,7 @@ from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES, new_oracle_baseline
 from evonav.evaluation.hosting.process import DecisionSpec, check_importable
-from evonav.evaluation.protocol import EpisodeCase
+from evonav.evaluation.protocol import EpisodeSpec
 from evonav.perception import Perception
 from evonav.perception.words import GROUND_TRUTH
 from evonav.world.simulator import Simulator
@@ -42,7 +42,7 @@ class Backend:
     """Import paths (`module:function`) of what an episode needs."""
 
     cases: str = "evonav.evaluation.run.components:load_case"
-    """Takes a task's directory, returns an `EpisodeCase`."""
+    """Takes a task's directory, returns an `EpisodeSpec`."""
     simulator: str = "evonav.evaluation.run.components:embedded_simulator"
     """Makes a `Simulator`."""
     perception: str = GROUND_TRUTH
@@ -68,9 +68,9 @@ class Backend:
         host = ("host_options", "perception_host_options", "decision_host_options")
         return {key: value for key, value in asdict(self).items() if key not in host and value != {}}
 
-    def load_case(self, path: Path) -> EpisodeCase:
+    def load_case(self, path: Path) -> EpisodeSpec:
         """A task as the evaluator runs it."""
-        case: EpisodeCase = _imported(self.cases)(path)
+        case: EpisodeSpec = _imported(self.cases)(path)
         return case
 
     def make_simulator(self) -> Simulator:
@@ -159,7 +159,7 @@ def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
         raise InvalidArgumentError(f"{error}{hint}") from error
 
 
-def load_case(path: Path) -> EpisodeCase:
+def load_case(path: Path) -> EpisodeSpec:
     """A task on disk."""
     from evonav.evaluation.episode.spec import episode_case
     from evonav.tasks import load_task

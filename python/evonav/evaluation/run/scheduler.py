@@ -7,7 +7,7 @@ from itertools import count
 from pathlib import Path
 
 from evonav.evaluation.protocol import (
-    EpisodeCase,
+    EpisodeSpec,
     StageOutcome,
     as_errored,
     as_not_run,
@@ -15,7 +15,7 @@ from evonav.evaluation.protocol import (
 )
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageFailure, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.worker import RETRIED, EpisodeJob, Setup, read_news
+from evonav.evaluation.run.worker import RETRIED, EpisodeJob, Setup, decode_event
 from evonav.parallel.pool import Answer, Job, Pool
 from evonav.tasks.listing import TaskFile
 
@@ -119,7 +119,7 @@ class Run:
         """
         task = self._tasks[job.task_id]
         try:
-            case: EpisodeCase = self.setup.backend.load_case(task.path)
+            case: EpisodeSpec = self.setup.backend.load_case(task.path)
         except Exception as error:  # whatever a broken file does to whatever reads it
             message = f"the task cannot be read: {type(error).__name__}: {error}"
             failure = replace(failure, kind=ErrorKind.HARNESS, message=message)
@@ -216,4 +216,4 @@ def _news_of(answer: Answer, run: Run) -> StageOutcome | StageFailure | None:
     if answer.failure == "error":
         message = answer.detail.strip().rpartition("\n")[2]
         return StageFailure(0, ErrorKind.HARNESS, message, answer.detail)
-    return read_news(answer.text)
+    return decode_event(answer.text)

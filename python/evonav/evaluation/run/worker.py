@@ -23,9 +23,9 @@ from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
-from evonav.evaluation.protocol import EpisodeCase, ProtocolConfig, StageOutcome
+from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig, StageOutcome
 from evonav.evaluation.records.costs import StageCosts
-from evonav.evaluation.records.schema import ErrorKind, RoundRecord, StageFailure, StageMap, StageRecord
+from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord, StageFailure, StageRecord
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
@@ -34,7 +34,7 @@ from evonav.world.simulator import Simulator
 WORK = "evonav.evaluation.run.worker:EpisodeWork"
 RETRIED = (ErrorKind.HARNESS, ErrorKind.SIMULATOR_LOST, *LOSSES)
 """Failures that another attempt may not have; an exception of an agent's or of a simulator's is the same again."""
-MAX_WORKPLACES = 2
+MAX_CONTEXTS = 2
 """Kept by a worker; the one that was used longest ago makes room."""
 
 
@@ -82,7 +82,7 @@ class EpisodeJob:
         return f"{json.dumps(asdict(self))}\n{setup_text}"
 
 
-class Workplace:
+class WorkerContext:
     """Where episodes run one after another, with one simulator for all: one with a process takes long to start.
 
     So it is with the processes of agents.
@@ -166,25 +166,25 @@ class _Heartbeat:
         self._on_round()
 
 
-def run_job(job: EpisodeJob, workplace: Workplace) -> Generator[StageOutcome | StageFailure]:
+def run_job(job: EpisodeJob, context: WorkerContext) -> Generator[StageOutcome | StageFailure]:
     """Runs an episode in this process.
 
     Yields:
         Outcomes of the stages. After a failure that costs only the attempt, that, and the outcomes from stage 1 on
         again.
     """
-    case = workplace.setup.backend.load_case(Path(job.path))
+    case = context.setup.backend.load_case(Path(job.path))
     num_tried: Counter[int] = Counter()
     is_whole = False
     while not is_whole:
         is_whole = True
-        with closing(_attempt(case, job, workplace)) as outcomes:
+        with closing(_attempt(case, job, context)) as outcomes:
             for outcome in outcomes:
                 failure = outcome.failure
                 if failure is not None and failure.kind in RETRIED:
                     # What an agent does to itself is tried again so often an episode, not a stage: it costs time.
                     stage = 0 if failure.kind.is_agents else failure.stage
-                    if num_tried[stage] < workplace.setup.num_retries:
+                    if num_tried[stage] < context.setup.num_retries:
                         num_tried[stage] += 1
                         is_whole = False
                         yield failure
@@ -192,12 +192,12 @@ def run_job(job: EpisodeJob, workplace: Workplace) -> Generator[StageOutcome | S
                 yield outcome
 
 
-def _attempt(case: EpisodeCase, job: EpisodeJob, workplace: Workplace) -> Generator[StageOutcome]:
-    setup = workplace.setup
+def _attempt(case: EpisodeSpec, job: EpisodeJob, context: WorkerContext) -> Generator[StageOutcome]:
+    setup = context.setup
     perception = setup.backend.make_perception()
-    with workplace.simulator() as simulator:
-        agent = workplace.agent(job)
-        observer = _Heartbeat(workplace.on_round)
+    with context.simulator() as simulator:
+        agent = context.agent(job)
+        observer = _Heartbeat(context.on_round)
         yield from Episode(
             case,
             job.agent,
@@ -212,18 +212,18 @@ def _attempt(case: EpisodeCase, job: EpisodeJob, workplace: Workplace) -> Genera
 
 
 class EpisodeWork:
-    """A worker's, as `evonav.parallel.pool` calls it. Cells of a sweep share it: each setup has a workplace."""
+    """A worker's, as `evonav.parallel.pool` calls it. Cells of a sweep share it: each setup has a context."""
 
     def __init__(self, _settings: str, alive: Callable[[], None]) -> None:
         self._alive = alive
-        self._workplaces: dict[str, Workplace] = {}
+        self._contexts: dict[str, WorkerContext] = {}
 
     def __call__(self, text: str) -> Generator[str, None, str]:
-        """Runs the episode of `EpisodeJob.text`; what it yields and returns is for `read_news`."""
+        """Runs the episode of `EpisodeJob.text`; what it yields and returns is for `decode_event`."""
         head, _, setup_text = text.partition("\n")
         try:
-            workplace = self._workplace(setup_text)
-            with closing(run_job(EpisodeJob(**json.loads(head)), workplace)) as said:
+            context = self._context(setup_text)
+            with closing(run_job(EpisodeJob(**json.loads(head)), context)) as said:
                 for news in said:
                     yield _outcome_text(news) if isinstance(news, StageOutcome) else _failure_text(news)
         except Exception as error:
@@ -231,29 +231,29 @@ class EpisodeWork:
             return _failure_text(StageFailure(0, ErrorKind.HARNESS, message, wire.traceback_of(error)))
         return "{}"
 
-    def _workplace(self, setup_text: str) -> Workplace:
-        found = self._workplaces.pop(setup_text, None)
-        while found is None and len(self._workplaces) >= MAX_WORKPLACES:
-            self._workplaces.pop(next(iter(self._workplaces))).close()
-        self._workplaces[setup_text] = place = found or Workplace(
+    def _context(self, setup_text: str) -> WorkerContext:
+        found = self._contexts.pop(setup_text, None)
+        while found is None and len(self._contexts) >= MAX_CONTEXTS:
+            self._contexts.pop(next(iter(self._contexts))).close()
+        self._contexts[setup_text] = place = found or WorkerContext(
             Setup.from_values(json.loads(setup_text)), self._alive
         )
         return place
 
     def close(self) -> None:
         """Closes all workplaces."""
-        while self._workplaces:
-            self._workplaces.popitem()[1].close()
+        while self._contexts:
+            self._contexts.popitem()[1].close()
 
 
-def read_news(text: str) -> StageOutcome | StageFailure | None:
+def decode_event(text: str) -> StageOutcome | StageFailure | None:
     """What a job says: a stage that ended, a failure, or nothing that went wrong."""
     values = json.loads(text)
     if "record" in values:
         plan, costs = values.pop("map"), values.pop("costs")
         return StageOutcome(
             record=StageRecord.model_validate_json(values.pop("record")),
-            stage_map=None if plan is None else StageMap.model_validate_json(plan),
+            stage_map=None if plan is None else FloorPlan.model_validate_json(plan),
             costs=None if costs is None else StageCosts(**costs),
             **values,
         )

@@ -8,7 +8,7 @@ import numpy as np
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import house_of
-from evonav.evaluation.metrics.stage_metrics import StageRow
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.store import RunStore
 from evonav.report.compare.compare import MODES, STRATA, check_measure
 from evonav.report.compare.selection import Side
@@ -58,7 +58,7 @@ class Grouping:
     """How stages are grouped."""
 
     words: str
-    group_of: Callable[[StageRow], str | None]
+    group_of: Callable[[StageMetrics], str | None]
     """`None` for a stage that belongs nowhere."""
     order: Sequence[str] | None
     """Of groups; `None`: the largest first."""
@@ -85,7 +85,7 @@ def breakdown(sides: Sequence[Side], by: str, measure: str = "success") -> Break
     if by == RADIUS:
         return _by_radius(sides)
     grouping = _grouping(sides, by)
-    rows: dict[tuple[str, str], list[StageRow]] = {}
+    rows: dict[tuple[str, str], list[StageMetrics]] = {}
     for side in sides:
         for row in side.rows.values():
             group = grouping.group_of(row)
@@ -106,7 +106,7 @@ def breakdown(sides: Sequence[Side], by: str, measure: str = "success") -> Break
     )
 
 
-def _cell(rows: Sequence[StageRow], values: Sequence[float]) -> Cell:
+def _cell(rows: Sequence[StageMetrics], values: Sequence[float]) -> Cell:
     bootstrap = ClusterBootstrap([house_of(row) for row in rows])
     (mean,) = bootstrap.column_means(np.array(values)[:, None])
     return Cell(mean.n, mean.num_clusters, mean.value, mean.ci95)
@@ -154,7 +154,7 @@ def _grouping(sides: Sequence[Side], by: str) -> Grouping:
 
 
 def _field_grouping(sides: Sequence[Side], field: str) -> Grouping:
-    known = {one.name for one in fields(StageRow)}
+    known = {one.name for one in fields(StageMetrics)}
     if field not in known:
         raise InvalidArgumentError(
             f"argument `by` is {field!r}, expected one of {', '.join(STANDARD)}, or a field of a stage's row: "
@@ -191,7 +191,7 @@ def _bin(value: float | None, edges: Sequence[float], names: Sequence[str]) -> s
     return names[min(len(names) - 1, max(0, int(np.searchsorted(edges, value, side="right")) - 1))]
 
 
-def _length_bin(row: StageRow, names: Sequence[str]) -> str | None:
+def _length_bin(row: StageMetrics, names: Sequence[str]) -> str | None:
     return _bin(row.reference_length_m, LENGTH_EDGES_M, names)
 
 
@@ -215,7 +215,7 @@ def _room_group(first: int) -> str:
     return str(first) if following[0] == first + 1 else f"{first}-{following[0] - 1}"
 
 
-def _rooms_of(counts: Mapping[str, int], row: StageRow) -> str | None:
+def _rooms_of(counts: Mapping[str, int], row: StageMetrics) -> str | None:
     count = counts.get(row.task_id)
     return None if count is None else _room_group(max(edge for edge in ROOM_EDGES if edge <= max(1, count)))
 

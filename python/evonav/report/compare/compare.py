@@ -15,7 +15,7 @@ import numpy as np
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import house_of
-from evonav.evaluation.metrics.stage_metrics import StageRow
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.selection import Side, config_differences
 from evonav.report.maps.stage_map import VIEW_DIR, page_name
@@ -36,7 +36,7 @@ MODES = {
     "extensions": "other extensions",
 }
 ALL = "all"
-FORCED = EndState.FORCED.value
+FORCED = EndState.GUIDED.value
 """Stages that the evaluator walked: nobody is scored on them, and nobody misses them."""
 
 
@@ -136,7 +136,7 @@ def check_measure(name: str) -> None:
     Raises:
         InvalidArgumentError: It cannot, or there is none of that name.
     """
-    numeric = [field.name for field in fields(StageRow) if any(kind in str(field.type) for kind in _NUMBERS)]
+    numeric = [field.name for field in fields(StageMetrics) if any(kind in str(field.type) for kind in _NUMBERS)]
     if name not in numeric:
         raise InvalidArgumentError(f"measure {name!r} is none of {', '.join(sorted(numeric))}")
 
@@ -208,7 +208,7 @@ def _compare(a: Side, b: Side, fields: Sequence[str], allow_differences: bool) -
             "--allow-differences compares the stages that they have in common"
         )
     dropped: Counter[str] = Counter()
-    pairs: list[tuple[StageRow, StageRow]] = []
+    pairs: list[tuple[StageMetrics, StageMetrics]] = []
     for key in sorted(_stages(a) | _stages(b)):
         reason = _reason(a, b, key, allow_differences)
         if reason == FORCED:
@@ -252,7 +252,7 @@ def _reason(a: Side, b: Side, key: tuple[str, int], allow_differences: bool) -> 
     return None
 
 
-def _part(key: str, words: str, pairs: Sequence[tuple[StageRow, StageRow]], fields: Sequence[str]) -> Part:
+def _part(key: str, words: str, pairs: Sequence[tuple[StageMetrics, StageMetrics]], fields: Sequence[str]) -> Part:
     by_missing: dict[tuple[int, ...], list[str]] = {}
     for field in fields:
         there = tuple(i for i, pair in enumerate(pairs) if all(getattr(row, field) is not None for row in pair))
@@ -269,7 +269,7 @@ def _part(key: str, words: str, pairs: Sequence[tuple[StageRow, StageRow]], fiel
     return Part(key, words, len(pairs), only_a, only_b, mcnemar(only_a, only_b), ordered)
 
 
-def _flip(a: Side, b: Side, pair: tuple[StageRow, StageRow]) -> Flip:
+def _flip(a: Side, b: Side, pair: tuple[StageMetrics, StageMetrics]) -> Flip:
     winner, loser, row = (a, b, pair[1]) if pair[0].success else (b, a, pair[0])
     return Flip(
         task_id=row.task_id,
@@ -285,7 +285,7 @@ def _flip(a: Side, b: Side, pair: tuple[StageRow, StageRow]) -> Flip:
     )
 
 
-def _page(side: Side, row: StageRow) -> str | None:
+def _page(side: Side, row: StageMetrics) -> str | None:
     for stage in (None, row.stage):
         path = side.run_dir / VIEW_DIR / page_name(row.task_id, side.agent, stage)
         if path.is_file():
@@ -293,7 +293,7 @@ def _page(side: Side, row: StageRow) -> str | None:
     return None
 
 
-def _view_command(a: Side, b: Side, row: StageRow) -> str:
+def _view_command(a: Side, b: Side, row: StageMetrics) -> str:
     agents: dict[Path, list[str]] = {}
     for side in (a, b):
         agents.setdefault(side.run_dir, []).append(side.agent)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
+from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.report.run import agents_in_order
 
@@ -22,7 +22,7 @@ class Side:
     config: Mapping[str, Any]
     num_stages: Mapping[str, int]
     """By task id, of all that the run consists of."""
-    rows: Mapping[tuple[str, int], StageRow]
+    rows: Mapping[tuple[str, int], StageMetrics]
     """By task and stage."""
 
 
@@ -76,7 +76,7 @@ def _sides_of(folder: Path, agents: Sequence[str]) -> list[Side]:
             if agent not in known:
                 raise InvalidArgumentError(f"{folder} has no agent {agent!r}; it has {', '.join(known) or 'none'}")
         chosen = list(agents or known)
-        rows = stage_rows(store, chosen)
+        rows = read_stage_metrics(store, chosen)
     return [
         Side(
             name=agent,

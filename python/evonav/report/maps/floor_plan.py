@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evonav.evaluation.records.schema import ObjectFootprint, RoomFootprint, StageMap
+from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, RoomFootprint
 from evonav.report.maps.svg import Point, cm, escape, join, polyline, title
 from evonav.tasks.language import noun_of
 
@@ -76,7 +76,7 @@ class Frame:
         return Frame(left, top, max(xs) + MARGIN_CM - left, max(ys) + MARGIN_CM - top)
 
 
-def frame_of(maps: Iterable[StageMap]) -> Frame:
+def frame_of(maps: Iterable[FloorPlan]) -> Frame:
     """The frame that all stages of a task share."""
     maps = list(maps)
     points: list[Point] = [point for m in maps for room in m.rooms for point in room.polygon_m]
@@ -84,7 +84,7 @@ def frame_of(maps: Iterable[StageMap]) -> Frame:
     return Frame.around(points)
 
 
-def moving_ids(maps: Sequence[StageMap]) -> frozenset[str]:
+def moving_ids(maps: Sequence[FloorPlan]) -> frozenset[str]:
     """Objects that do not stand in the same place in all of the stages."""
     places: dict[str, set[tuple[tuple[int, int], ...]]] = {}
     seen: dict[str, int] = {}
@@ -95,13 +95,13 @@ def moving_ids(maps: Sequence[StageMap]) -> frozenset[str]:
     return frozenset(name for name, found in places.items() if len(found) > 1 or seen[name] != len(maps))
 
 
-def ground(stage_map: StageMap, frame: Frame, without: frozenset[str] = frozenset()) -> str:
+def ground(stage_map: FloorPlan, frame: Frame, without: frozenset[str] = frozenset()) -> str:
     """Floors, furniture, walls and openings; `without` names objects to leave out."""
     items = furniture([item for item in stage_map.objects if item.object_id not in without], frame)
     return floors(stage_map) + items + structure(stage_map, frame)
 
 
-def floors(stage_map: StageMap) -> str:
+def floors(stage_map: FloorPlan) -> str:
     """Rooms, coloured by type."""
     return join(
         f'<path class="floor {FLOORS.get(room.room_type, "other")}" d="{outline(room.polygon_m)}"/>'
@@ -109,7 +109,7 @@ def floors(stage_map: StageMap) -> str:
     )
 
 
-def structure(stage_map: StageMap, frame: Frame) -> str:
+def structure(stage_map: FloorPlan, frame: Frame) -> str:
     """Walls, doors and windows."""
     u = frame.unit
     walls = join(f'<path d="{polyline([cm(a), cm(b)])}"/>' for a, b in _distinct(stage_map.walls))
@@ -130,7 +130,7 @@ def furniture(items: Iterable[ObjectFootprint], frame: Frame, css: str = "items"
     return f'<g class="{css}" stroke-width="{max(1.0, 0.2 * frame.unit):.1f}">{drawn}</g>'
 
 
-def labels(stage_map: StageMap, frame: Frame) -> str:
+def labels(stage_map: FloorPlan, frame: Frame) -> str:
     """Names of rooms, where there is least furniture."""
     u = frame.unit
     taken = [_box(item) for item in stage_map.objects if item.category not in FLAT_CATEGORIES]

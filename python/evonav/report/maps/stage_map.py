@@ -7,7 +7,7 @@ from importlib.resources import files
 from markupsafe import Markup
 
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
-from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
+from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.report.maps.floor_plan import Frame, frame_of, ground, item_labels, labels
 from evonav.report.maps.svg import escape, slug
 from evonav.report.maps.trajectory import change, course
@@ -48,7 +48,7 @@ def _inlined(rules: str, properties: str) -> str:
 
 def stage_svg(
     record: StageRecord,
-    maps: Mapping[int, StageMap],
+    maps: Mapping[int, FloorPlan],
     *,
     success_radius_m: float = SUCCESS_RADIUS_M,
 ) -> str:
@@ -81,7 +81,7 @@ def page_name(task_id: str, agent: str, stage: int | None = None) -> str:
     return f"{slug(task_id)}_{slug(agent)}{'' if stage is None else f'_stage{stage}'}.html"
 
 
-def change_words(record: StageRecord, maps: Mapping[int, StageMap]) -> str:
+def change_words(record: StageRecord, maps: Mapping[int, FloorPlan]) -> str:
     """What happened before the stage, in a few words."""
     transition = record.transition
     if record.stage == 1:
@@ -110,7 +110,7 @@ def outcome_words(record: StageRecord) -> str:
     return str(record.state.value).replace("_", " ")
 
 
-def task_frame(maps: Mapping[int, StageMap], records: Sequence[StageRecord]) -> Frame:
+def task_frame(maps: Mapping[int, FloorPlan], records: Sequence[StageRecord]) -> Frame:
     """The frame that a task's pictures share: the house, or the path where no house was recorded."""
     if any(stage_map.rooms or stage_map.walls for stage_map in maps.values()):
         return frame_of(maps.values())
@@ -127,7 +127,7 @@ def success_radius_of(config: Mapping[str, object]) -> float:
 
 
 def stage_drawing(
-    record: StageRecord, maps: Mapping[int, StageMap], frame: Frame, success_radius_m: float, *, has_item_names: bool
+    record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, success_radius_m: float, *, has_item_names: bool
 ) -> str:
     """A stage's house and what happened in it, as the content of an `svg` element."""
     stage_map = maps.get(record.stage)

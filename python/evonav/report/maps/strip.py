@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records.schema import EndState, StageMap, StageRecord
+from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.maps.files import check_picture, write_picture
 from evonav.report.maps.floor_plan import Frame
@@ -66,7 +66,7 @@ def write_strip(
     return write_picture(strip_svg(rows, maps, success_radius_m=success_radius_of(config)), path)
 
 
-def strip_svg(rows: Sequence[Sequence[StageRecord]], maps: Mapping[int, StageMap], *, success_radius_m: float) -> str:
+def strip_svg(rows: Sequence[Sequence[StageRecord]], maps: Mapping[int, FloorPlan], *, success_radius_m: float) -> str:
     """The strip: a row an agent, a column a stage."""
     everything = [record for row in rows for record in row]
     frame = task_frame(maps, everything)
@@ -92,7 +92,7 @@ def strip_svg(rows: Sequence[Sequence[StageRecord]], maps: Mapping[int, StageMap
     )
 
 
-def _head(record: StageRecord, maps: Mapping[int, StageMap], left_px: int) -> str:
+def _head(record: StageRecord, maps: Mapping[int, FloorPlan], left_px: int) -> str:
     """What was asked in a stage, what the agents were shown, and what had changed."""
     image = None if record.stage not in maps else maps[record.stage].reference_image
     width = 54 if image is None else 38
@@ -115,7 +115,7 @@ def _head(record: StageRecord, maps: Mapping[int, StageMap], left_px: int) -> st
 
 def _panel(
     record: StageRecord,
-    maps: Mapping[int, StageMap],
+    maps: Mapping[int, FloorPlan],
     frame: Frame,
     map_px: int,
     success_radius_m: float,

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from evonav.evaluation.records.schema import (
     EndState,
     EntryRecord,
+    FloorPlan,
     ObjectFootprint,
     Relocation,
     RoundRecord,
-    StageMap,
     StageRecord,
     TargetRecord,
     TransitionRecord,
@@ -43,7 +43,7 @@ def course(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
 
 
 def change(
-    transition: TransitionRecord, frame: Frame, *, stage_map: StageMap | None, previous_map: StageMap | None
+    transition: TransitionRecord, frame: Frame, *, stage_map: FloorPlan | None, previous_map: FloorPlan | None
 ) -> str:
     """Relocated objects: where they stood (dashed), where they stand (stressed), and an arrow between.
 
@@ -62,7 +62,7 @@ def change(
 
 
 def relocation_arrows(
-    relocations: Sequence[Relocation], frame: Frame, *, stage_map: StageMap | None, previous_map: StageMap | None
+    relocations: Sequence[Relocation], frame: Frame, *, stage_map: FloorPlan | None, previous_map: FloorPlan | None
 ) -> str:
     """An arrow for each object that was not carried along by a larger one."""
     now, before = _by_id(stage_map), _by_id(previous_map)
@@ -85,7 +85,7 @@ def rounds(trace: Sequence[RoundRecord]) -> list[str]:
     return [choice if count == 1 else f"{choice} ×{count}" for choice, count in runs]
 
 
-def _by_id(stage_map: StageMap | None) -> Mapping[str, ObjectFootprint]:
+def _by_id(stage_map: FloorPlan | None) -> Mapping[str, ObjectFootprint]:
     return {} if stage_map is None else {item.object_id: item for item in stage_map.objects}
 
 

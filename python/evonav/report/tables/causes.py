@@ -32,7 +32,7 @@ def sentence(record: StageRecord) -> str:
             f"{record.state.value.replace('_', ' ').capitalize()} ({record.error.kind.value}): {record.error.message}"
         )
     cause = cause_of(record)
-    if record.state is EndState.FORCED:
+    if record.state is EndState.GUIDED:
         return "The evaluator walked the reference trajectory; the agent looked on."
     if record.state is EndState.NOT_RUN:
         return "Not run."

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from evonav.evaluation.metrics.aggregate import MEASURES, Explained, explain
-from evonav.evaluation.metrics.stage_metrics import StageRow, stage_rows
+from evonav.evaluation.metrics.aggregate import MEASURES, MetricSummary, explain
+from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records.store import RunStore
 from evonav.report.tables.table import NONE, Table
 
@@ -29,14 +29,14 @@ def measures_tables(run_dir: Path, agents: Sequence[str] | None = None) -> list[
         StoreError: There is no run, or it cannot be read.
     """
     with RunStore(run_dir) as store:
-        rows = stage_rows(store, agents)
+        rows = read_stage_metrics(store, agents)
     if agents is not None:
         rank = {agent: i for i, agent in enumerate(agents)}
         rows.sort(key=lambda row: rank[row.agent])
     return [measures_table(rows, kind) for kind in MEASURES]
 
 
-def measures_table(rows: Sequence[StageRow], kind: str) -> Table:
+def measures_table(rows: Sequence[StageMetrics], kind: str) -> Table:
     """A table of one kind.
 
     Args:
@@ -57,7 +57,7 @@ def measures_table(rows: Sequence[StageRow], kind: str) -> Table:
     return Table(TITLES[kind], ("Measure", *found), tuple(lines), (note,))
 
 
-def _cell(cell: Explained, num_stages: int) -> str:
+def _cell(cell: MetricSummary, num_stages: int) -> str:
     if cell.value is None:
         return NONE
     scale = 100.0 if cell.measure.unit == "%" else 1.0

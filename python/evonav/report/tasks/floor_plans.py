@@ -13,7 +13,7 @@ from evonav.evaluation.records.floor_plan import (
     transition_record,
     true_footprints,
 )
-from evonav.evaluation.records.schema import ObjectFootprint, RoomFootprint, StageMap
+from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, RoomFootprint
 from evonav.house import House
 from evonav.report.maps.floor_plan import (
     FLAT_CATEGORIES,
@@ -56,7 +56,7 @@ class TaskDrawing:
     prefix: str
     """Of the ids of shared groups, different for every task of a page."""
     frame: Frame
-    maps: Mapping[int, StageMap]
+    maps: Mapping[int, FloorPlan]
     """By stage."""
     doors: Mapping[str, tuple[Point, Point]]
     """Ends of doors on the floor plan, by id."""

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable
 
-from evonav.evaluation.records.schema import StageMap
+from evonav.evaluation.records.schema import FloorPlan
 from evonav.tasks.language import noun_of
 from evonav.tasks.oracle import Evolution, OracleStage
 
@@ -21,7 +21,7 @@ FAILURES = {
 }
 
 
-def stage_facts(stage_map: StageMap, oracle: OracleStage) -> list[tuple[str, str]]:
+def stage_facts(stage_map: FloorPlan, oracle: OracleStage) -> list[tuple[str, str]]:
     """Name and value of what a stage's page lists."""
     nouns = {item.object_id: noun_of(item.category) for item in stage_map.objects}
     rooms = room_namer(stage_map)
@@ -49,7 +49,7 @@ def stage_facts(stage_map: StageMap, oracle: OracleStage) -> list[tuple[str, str
     return facts
 
 
-def changed_words(stage_map: StageMap, evolution: Evolution) -> str:
+def changed_words(stage_map: FloorPlan, evolution: Evolution) -> str:
     """What changed before a stage, in a sentence."""
     words = OUTCOMES[evolution.outcome]
     if evolution.outcome == "no_placement":
@@ -65,7 +65,7 @@ def changed_words(stage_map: StageMap, evolution: Evolution) -> str:
     return f"{words} By extensions: {more}.".strip() if more else words
 
 
-def move_rows(stage_map: StageMap, evolution: Evolution) -> list[tuple[str, ...]]:
+def move_rows(stage_map: FloorPlan, evolution: Evolution) -> list[tuple[str, ...]]:
     """Moved objects, the farthest first: object, id, distance, turn, from and to what, cause."""
     nouns = {item.object_id: noun_of(item.category) for item in stage_map.objects}
     rows: list[tuple[str, ...]] = []
@@ -87,7 +87,7 @@ def move_rows(stage_map: StageMap, evolution: Evolution) -> list[tuple[str, ...]
     return rows
 
 
-def room_namer(stage_map: StageMap) -> Callable[[str], str]:
+def room_namer(stage_map: FloorPlan) -> Callable[[str], str]:
     """How rooms are called: their type, with the number of the room where several are of that type."""
     types = Counter(room.room_type for room in stage_map.rooms)
     names = {}
