@@ -14,10 +14,11 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from behaviour_tables import STRATA, behaviour_of, cause_share_table, counter_table, end_table, success_by_group
+
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import Progress, RunConfig, evaluate
-from evonav.report.mechanisms import STRATA, cause_share_table, counter_table, deeds_of, end_table, success_by_group
 from evonav.report.paper.tables import paper_tables
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
@@ -78,7 +79,7 @@ def noisy_backend(rate: float) -> Backend:
 def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
     """The marked parts of the page, by name; draws the plot."""
     run = load_run(out / "main")
-    deeds = deeds_of(run)
+    behaviour = behaviour_of(run)
     main_table, relocation, first, order, differences = paper_tables(run)
     sweep = {rate: load_run(folder) for rate in RATES if (folder := out / f"wrong-{rate:g}").exists()}
     errors = ""
@@ -98,8 +99,8 @@ def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:
             f"**{title.capitalize()}**\n\n{cause_share_table(run, stratum).markdown()}"
             for stratum, title in STRATA.items()
         ),
-        "ends": end_table(deeds).markdown(),
-        "counters": counter_table(deeds).markdown(),
+        "ends": end_table(behaviour).markdown(),
+        "counters": counter_table(behaviour).markdown(),
         "effort": effort_table(run).markdown(),
         "errors": errors,
     }

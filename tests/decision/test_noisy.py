@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from scripted_model import Scripted
 
 from evonav.decision.noisy import GARBAGE, NoiseRates, Noisy
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.query import QuerySession
 from evonav.decision.question import AnswerError, Question, Reply
-from evonav.decision.scripted import Scripted
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import StageRecord

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scripted_model import Scripted
 from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 
 from evonav.agents.explorer import Explorer, ExplorerConfig
@@ -13,7 +14,6 @@ from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailT
 from evonav.agents.frontier_update.stage_reset import StageReset, StageResetConfig
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.agents.viewpoint import widest_direction_rad
-from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.records.schema import EndState

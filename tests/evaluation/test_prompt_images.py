@@ -4,11 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scripted_model import Scripted
 
 from evonav.agents.frontier_update.fail_then_update import FailThenUpdate, FailThenUpdateConfig
 from evonav.agents.frontier_update.questions import ChooseQuestion, VerifyQuestion
 from evonav.decision.prompts import Picture, Text
-from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend

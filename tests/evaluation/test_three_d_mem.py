@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scripted_model import Scripted
 from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, stage_case
 
 from evonav.agents.agent import NavigateTo
 from evonav.agents.three_d_mem.agent import NO_ANSWER, NOTHING_LEFT, ThreeDMem, ThreeDMemConfig
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
-from evonav.decision.scripted import Scripted
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
 from evonav.evaluation.records.schema import EndState

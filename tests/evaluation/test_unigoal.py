@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scripted_model import Scripted
 from toy_house import OBJECTS, ToySimulator, stage_case
 
 from evonav.agents.unigoal.agent import UniGoal, UniGoalAsPublished, UniGoalConfig
@@ -19,7 +20,6 @@ from evonav.agents.unigoal.scene_questions import (
     LayoutQuestion,
     RelationLinesQuestion,
 )
-from evonav.decision.scripted import Scripted
 from evonav.decision.text.decision import TextMatch
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig

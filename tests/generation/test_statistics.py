@@ -14,13 +14,17 @@ from evonav.generation import generate_tasks
 from evonav.generation.dataset import generate_dataset
 from evonav.generation.statistics.compute import statistics_of, statistics_of_folders
 from evonav.generation.statistics.metrics import MEASURES, PAPER_EVOLUTIONS
-from evonav.generation.statistics.task_summary import expected_evolutions, facts_of_task, read_all_facts
+from evonav.generation.statistics.task_summary import TaskFacts, expected_evolutions, facts_of, read_all_facts
 from evonav.house import bundled_houses
 from evonav.report.plots.render import check_plot
 from evonav.report.tasks.dataset_page import write_dataset_report, write_statistics_plot
 from evonav.tasks import Task, load_tasks
 from evonav.tasks.records import parse_record
 from evonav.tasks.statistics import TaskStatistics
+
+
+def facts_of_task(task: Task) -> TaskFacts:
+    return facts_of(task.header, task.oracle_stages, task.public_stages, task.house_json(1))
 
 
 @pytest.fixture(scope="module")

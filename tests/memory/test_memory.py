@@ -111,10 +111,10 @@ def test_a_stale_entry_is_distinguished_from_a_valid_one() -> None:
     assert entries.update(here).entry_ids == (1,)
     entries.begin_stage(2)
     assert entries.update(moved).entry_ids == (2,)
-    assert entries.is_supported(1, here)
-    assert not entries.is_supported(1, moved)
-    other = replace(here, detections=replace(here.detections, labels=("Bowl",)))
-    assert not entries.is_supported(1, other), "another object stands there now"
+    same, other = entries.compare(1, here), entries.compare(1, moved)
+    assert (same.overlap[0], same.distance_m[0]) == (pytest.approx(1.0), pytest.approx(0.0, abs=0.05))
+    assert other.overlap[0] == 0.0
+    assert other.distance_m[0] > 0.5
     entry = entries.entries[0]
     assert (entry.label, entry.label_counts, entry.num_detections) == ("Mug", [("Mug", 2)], 2)
     assert (entry.first_seen_stage, entry.last_seen_stage, entry.last_seen_view) == (1, 1, 2)
@@ -129,7 +129,7 @@ def test_a_stale_entry_is_distinguished_from_a_valid_one() -> None:
     assert entries.entry(1) is None
     assert len(entries) == 1
     with pytest.raises(InvalidArgumentError, match="entry_id"):
-        entries.is_supported(1, here)
+        entries.compare(1, here)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import perception_results
 import pytest
+from behaviour_tables import behaviour_of, cause_share_table, counter_table, end_table, success_by_group
 from made_up_run import WriteRun, entry, record_run, stage_record
 from scipy import stats
 from typer.testing import CliRunner
@@ -15,7 +16,6 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.evaluation.metrics.navigation import AgentPair
 from evonav.evaluation.records.schema import EndState
-from evonav.report.mechanisms import cause_share_table, counter_table, deeds_of, end_table, success_by_group
 from evonav.report.paper import tables as paper
 from evonav.report.run import load_run
 from evonav.statistics import paired_effect
@@ -195,9 +195,9 @@ def test_counters_are_summed_over_tasks_and_over_what_a_lost_agent_began_anew(tm
         counted(stage_record("fu", "b", 2, failure, has_stopped=False), decisions=2, conflicts=0),  # began anew
     ]
     run = load_run(record_run(tmp_path / "run", records, {"a": 2, "b": 2}, ["fu"]))
-    deeds = deeds_of(run)
-    assert counter_table(deeds).rows == (("conflicts", "1"), ("decisions", "18"))
-    assert end_table(deeds).rows == (("arrived", "3"), ("budget", "1"))
+    behaviour = behaviour_of(run)
+    assert counter_table(behaviour).rows == (("conflicts", "1"), ("decisions", "18"))
+    assert end_table(behaviour).rows == (("arrived", "3"), ("budget", "1"))
     shares = {row[0]: row[1] for row in cause_share_table(run, "relocated").rows}
     assert shares == {"n": "2", "success": "0.0", "stopped at a stale entry": "50.0", "target never in view": "50.0"}
     assert success_by_group(run, {"a": "x", "b": "x"}) == {"x": {"fu": (2, 4)}}

@@ -2,8 +2,9 @@
 
 import re
 
+from scripted_model import Scripted
+
 from evonav.decision.question import AnswerError
-from evonav.decision.scripted import Scripted
 
 MARKUP = "<b>bold</b> & </script> reasons"
 

@@ -201,18 +201,3 @@ class ObjectMap:
             InvalidArgumentError: A position is not finite, or a parameter is out of range; the message names it.
         """
         return self._map.visible_shares(target_m, eyes_m, **asdict(config or SightConfig()))
-
-    def is_supported(self, entry_id: int, view: View, *, max_distance_m: float = 0.5, min_overlap: float = 0.2) -> bool:
-        """Return whether a view still shows the object of an entry in its place.
-
-        It does if some detection with the entry's label overlaps it, or has its centroid near the centre of its box.
-
-        Raises:
-            InvalidArgumentError: The entry does not exist, or an array has the wrong shape.
-        """
-        compared = self.compare(entry_id, view)
-        entry = self._map.entry(entry_id)
-        is_here = (compared.overlap > min_overlap) | (compared.distance_m < max_distance_m)
-        return entry is not None and any(
-            label == entry.label and here for label, here in zip(view.detections.labels, is_here.tolist(), strict=True)
-        )

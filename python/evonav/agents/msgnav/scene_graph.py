@@ -55,11 +55,6 @@ class SceneGraph:
         edge = self._edges.get(pair)
         return [] if edge is None else list(edge.view_ids)
 
-    def edges_of(self, view_id: int) -> list[Pair]:
-        """Return the ends of the edges that a view shows, ascending."""
-        mask = self._masks.get(view_id, 0)
-        return sorted(pair for pair, edge in self._edges.items() if mask >> edge.bit & 1)
-
     def neighbours(self) -> dict[int, set[int]]:
         """Return the entries one edge away, by entry; an entry is not its own neighbour."""
         found: dict[int, set[int]] = {}

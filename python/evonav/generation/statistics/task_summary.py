@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 from evonav.errors import HouseError, TaskError
 from evonav.house import House
 from evonav.parallel.pool import Answer, Job, answers, open_pool
-from evonav.tasks.manifest import PublicStage, Task, TaskHeader
+from evonav.tasks.manifest import PublicStage, TaskHeader
 from evonav.tasks.oracle import Evolution, OracleStage
 from evonav.tasks.records import parse_record, read_file, read_gzip
 
@@ -204,11 +204,6 @@ def _note_transition(
             facts.note("displacement_m", change.displacement_m)
     if previous is not None and previous.outcome == "evolved":
         facts.add("room_again", previous.room_id == evolution.room_id)
-
-
-def facts_of_task(task: Task) -> TaskFacts:
-    """Facts of a task in memory."""
-    return facts_of(task.header, task.oracle_stages, task.public_stages, task.house_json(1))
 
 
 def read_facts(root: Path) -> TaskFacts:

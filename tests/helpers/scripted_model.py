@@ -1,4 +1,4 @@
-"""A decision model that says what it is told to: for tests of agents, and for agents of yours."""
+"""A decision model whose answers are given by a function."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -9,10 +9,10 @@ A = TypeVar("A")
 
 
 class Scripted:
-    """Puts a script's words through the grammar of the question, as if a model had said them."""
+    """Parses a script's texts by the grammar of the question, as a model's answers are."""
 
     def __init__(self, script: Callable[[Question[Any]], str], *, needs_images: bool = False) -> None:
-        """A model whose answers are `script(question)`.
+        """Make a model whose answers are `script(question)`.
 
         Args:
             script: May raise `AnswerError` for a refusal or a lost answer.
@@ -21,13 +21,13 @@ class Scripted:
         self._script = script
         self.needs_images = needs_images
         self.questions: list[Question[Any]] = []
-        """All that was asked."""
+        """All questions so far."""
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
-        """What the script says.
+        """Return the parsed answer of the script.
 
         Raises:
-            AnswerError: It is no answer.
+            AnswerError: The question's grammar refuses it.
         """
         self.questions.append(question)
         text = self._script(question)

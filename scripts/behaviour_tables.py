@@ -1,4 +1,4 @@
-"""What agents did, told by their own counters and by how stages ended: to see why one is ahead of another."""
+"""Tabulate what agents did, by their own counters and by how stages ended: it shows why one is ahead of another."""
 
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
@@ -10,12 +10,12 @@ from evonav.report.tables.causes import WORDS, Cause
 from evonav.report.tables.table import NONE, Table, percent
 
 STRATA = {"stage_1": "stage 1", "relocated": "relocated", "not_relocated": "not relocated"}
-"""The paper's, in words."""
+"""Names of the paper's strata."""
 
 
 @dataclass(slots=True)
-class Deeds:
-    """Of one agent."""
+class BehaviourCounts:
+    """Counts of one agent."""
 
     counters: Counter[str] = field(default_factory=Counter)
     """Over all tasks."""
@@ -24,13 +24,13 @@ class Deeds:
     num_stages: int = 0
 
 
-def deeds_of(run: Run) -> dict[str, Deeds]:
-    """Counters and stop reasons of every agent.
+def behaviour_of(run: Run) -> dict[str, BehaviourCounts]:
+    """Return counters and stop reasons of every agent.
 
     Raises:
         StoreError: The run cannot be read.
     """
-    found = {agent: Deeds() for agent in run.agents}
+    found = {agent: BehaviourCounts() for agent in run.agents}
     for task in run.tasks():
         for agent in run.agents:
             records = [record for (name, _), record in sorted(task.records.items()) if name == agent]
@@ -38,49 +38,49 @@ def deeds_of(run: Run) -> dict[str, Deeds]:
     return found
 
 
-def _add(deeds: Deeds, records: Sequence[StageRecord]) -> None:
+def _add(behaviour: BehaviourCounts, records: Sequence[StageRecord]) -> None:
     # Counters count over a task; an agent that was lost on the way began anew.
     last: Counter[str] = Counter()
     for record in records:
         if record.is_scored:
-            deeds.num_stages += 1
-            deeds.ends[record.stop_reason or "stopped" if record.has_stopped else "budget"] += 1
+            behaviour.num_stages += 1
+            behaviour.ends[record.stop_reason or "stopped" if record.has_stopped else "budget"] += 1
         if record.trace:
             counters = Counter(record.trace[-1].counters)
             if any(counters[name] < count for name, count in last.items()):
-                deeds.counters.update(last)
+                behaviour.counters.update(last)
             last = counters
-    deeds.counters.update(last)
+    behaviour.counters.update(last)
 
 
-def counter_table(deeds: Mapping[str, Deeds]) -> Table:
-    """Every counter, summed over tasks."""
-    names = sorted({name for one in deeds.values() for name in one.counters})
+def counter_table(behaviour: Mapping[str, BehaviourCounts]) -> Table:
+    """Tabulate every counter, summed over tasks."""
+    names = sorted({name for one in behaviour.values() for name in one.counters})
     rows = tuple(
         (
             name.replace("_", " "),
-            *(str(one.counters[name]) if name in one.counters else NONE for one in deeds.values()),
+            *(str(one.counters[name]) if name in one.counters else NONE for one in behaviour.values()),
         )
         for name in names
     )
-    return Table("What agents counted", ("Counter", *deeds), rows, ("Sums over all tasks.",))
+    return Table("What agents counted", ("Counter", *behaviour), rows, ("Sums over all tasks.",))
 
 
-def end_table(deeds: Mapping[str, Deeds]) -> Table:
-    """Scored stages by why they ended."""
+def end_table(behaviour: Mapping[str, BehaviourCounts]) -> Table:
+    """Tabulate scored stages by why they ended."""
     total: Counter[str] = Counter()
-    for one in deeds.values():
+    for one in behaviour.values():
         total.update(one.ends)
-    rows = tuple((reason, *(str(one.ends[reason]) for one in deeds.values())) for reason, _ in total.most_common())
-    return Table("How stages ended", ("The agent stopped for", *deeds), rows, ("Budget: it did not stop.",))
+    rows = tuple((reason, *(str(one.ends[reason]) for one in behaviour.values())) for reason, _ in total.most_common())
+    return Table("How stages ended", ("The agent stopped for", *behaviour), rows, ("Budget: it did not stop.",))
 
 
 def cause_share_table(run: Run, stratum: str) -> Table:
-    """Share of a stratum's scored stages by cause of failure.
+    """Tabulate the share of a stratum's scored stages by cause of failure.
 
     Args:
         run: With outcomes.
-        stratum: Of `STRATA`.
+        stratum: A key of `STRATA`.
     """
     counts: dict[str, Counter[Cause | None]] = {agent: Counter() for agent in run.agents}
     for (agent, _, _), outcome in run.outcomes.items():
@@ -97,14 +97,14 @@ def cause_share_table(run: Run, stratum: str) -> Table:
 
 
 def stratum_of(record: StageRecord) -> str:
-    """Of `STRATA`."""
+    """Return the key of a record in `STRATA`."""
     if record.stage == 1:
         return "stage_1"
     return "relocated" if record.target.is_relocated else "not_relocated"
 
 
 def success_by_group(run: Run, group_of: Mapping[str, str]) -> dict[str, dict[str, tuple[int, int]]]:
-    """Successes and scored stages by group of tasks and agent.
+    """Return successes and scored stages by group of tasks and agent.
 
     Args:
         run: With outcomes.
