@@ -1,4 +1,4 @@
-"""A house from above: floors, walls, openings, furniture, labels, as SVG groups that many pictures share."""
+"""Draw a house from above: floors, walls, openings, furniture, labels, as SVG groups that many pictures share."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -35,7 +35,7 @@ ROUND_CATEGORIES = frozenset(
     }
 )
 FLAT_CATEGORIES = frozenset(["Painting", "Window", "Doorway"])
-"""On walls: drawn without a label."""
+"""Categories of what hangs on walls: drawn without a label."""
 FLOORS = {"Kitchen": "kitchen", "LivingRoom": "living", "Bedroom": "bedroom", "Bathroom": "bathroom"}
 LABEL_MIN_M2 = 0.25
 """Footprint from which on furniture is named on the map."""
@@ -64,12 +64,12 @@ class Frame:
 
     @property
     def view_box(self) -> str:
-        """For the `viewBox` attribute."""
+        """The value of the `viewBox` attribute."""
         return f"{self.left} {self.top} {self.width} {self.height}"
 
     @staticmethod
     def around(points_m: Iterable[Point]) -> "Frame":
-        """The frame that holds all points with a margin; 10 m wide if there are none."""
+        """Return the frame that holds all points with a margin; 10 m wide if there are none."""
         points = [cm(point) for point in points_m] or [(-500, -500), (500, 500)]
         xs, ys = [x for x, _ in points], [y for _, y in points]
         left, top = min(xs) - MARGIN_CM, min(ys) - MARGIN_CM
@@ -77,7 +77,7 @@ class Frame:
 
 
 def frame_of(maps: Iterable[FloorPlan]) -> Frame:
-    """The frame that all stages of a task share."""
+    """Return the frame that all stages of a task share."""
     maps = list(maps)
     points: list[Point] = [point for m in maps for room in m.rooms for point in room.polygon_m]
     points += [point for m in maps for wall in m.walls for point in wall]
@@ -85,7 +85,7 @@ def frame_of(maps: Iterable[FloorPlan]) -> Frame:
 
 
 def moving_ids(maps: Sequence[FloorPlan]) -> frozenset[str]:
-    """Objects that do not stand in the same place in all of the stages."""
+    """Return the ids of objects that do not stand in the same place in all of the stages."""
     places: dict[str, set[tuple[tuple[int, int], ...]]] = {}
     seen: dict[str, int] = {}
     for m in maps:
@@ -96,13 +96,13 @@ def moving_ids(maps: Sequence[FloorPlan]) -> frozenset[str]:
 
 
 def ground(stage_map: FloorPlan, frame: Frame, without: frozenset[str] = frozenset()) -> str:
-    """Floors, furniture, walls and openings; `without` names objects to leave out."""
+    """Draw floors, furniture, walls and openings; `without` names objects to leave out."""
     items = furniture([item for item in stage_map.objects if item.object_id not in without], frame)
     return floors(stage_map) + items + structure(stage_map, frame)
 
 
 def floors(stage_map: FloorPlan) -> str:
-    """Rooms, coloured by type."""
+    """Draw rooms, coloured by type."""
     return join(
         f'<path class="floor {FLOORS.get(room.room_type, "other")}" d="{outline(room.polygon_m)}"/>'
         for room in stage_map.rooms
@@ -110,7 +110,7 @@ def floors(stage_map: FloorPlan) -> str:
 
 
 def structure(stage_map: FloorPlan, frame: Frame) -> str:
-    """Walls, doors and windows."""
+    """Draw walls, doors and windows."""
     u = frame.unit
     walls = join(f'<path d="{polyline([cm(a), cm(b)])}"/>' for a, b in _distinct(stage_map.walls))
     doors = [(o.from_m, o.to_m) for o in stage_map.openings if o.kind == "door"]
@@ -124,14 +124,14 @@ def structure(stage_map: FloorPlan, frame: Frame) -> str:
 
 
 def furniture(items: Iterable[ObjectFootprint], frame: Frame, css: str = "items", *, has_parts: bool = True) -> str:
-    """Footprints, lower ones first, each with its category as tooltip; `has_parts` draws what is large in detail."""
+    """Draw footprints, lower ones first, each with its category as tooltip; `has_parts` draws large ones in detail."""
     ordered = sorted(items, key=lambda item: (item.centre_m[1] + item.size_m[1] / 2, item.object_id))
     drawn = join(_footprint(item, has_parts=has_parts) for item in ordered)
     return f'<g class="{css}" stroke-width="{max(1.0, 0.2 * frame.unit):.1f}">{drawn}</g>'
 
 
 def labels(stage_map: FloorPlan, frame: Frame) -> str:
-    """Names of rooms, where there is least furniture."""
+    """Write the names of rooms where there is least furniture."""
     u = frame.unit
     taken = [_box(item) for item in stage_map.objects if item.category not in FLAT_CATEGORIES]
     rooms = join(_room_label(room, u, taken) for room in stage_map.rooms)
@@ -141,11 +141,11 @@ def labels(stage_map: FloorPlan, frame: Frame) -> str:
 def item_labels(
     items: Iterable[ObjectFootprint], frame: Frame, min_m2: float = LABEL_MIN_M2, letters: float = ITEM_LETTERS
 ) -> str:
-    """Names of the furniture large enough to hold them, none over another.
+    """Write the names of the furniture that is large enough to hold them, none over another.
 
     Args:
         items: Furniture.
-        frame: Of the picture.
+        frame: The frame of the picture.
         min_m2: Footprint from which furniture is named.
         letters: Their height, in units of the frame.
     """
@@ -164,7 +164,9 @@ def item_labels(
 def label_point(
     polygon_m: Sequence[Point], num: int = 24, *, taken_m: Sequence[Box] = (), size_m: Point = (0.0, 0.0)
 ) -> Point:
-    """Where in a polygon a label stands best: over little, and far from the edges; to about a `num`-th of its size.
+    """Return where in a polygon a label stands best: over little, and far from the edges.
+
+    The place is right to about a `num`-th of the polygon's size.
 
     Args:
         polygon_m: The room.
@@ -215,7 +217,7 @@ def _footprint(item: ObjectFootprint, *, has_parts: bool) -> str:
 
 
 def _shape(item: ObjectFootprint, css: str, hint: str, *, has_parts: bool) -> str:
-    """All parts as one outline, and in what is large the parts themselves, higher ones over lower ones."""
+    """Draw all parts as one outline, and in a large object the parts themselves, higher ones over lower ones."""
     parts = [outline(part) for part in item.outlines_m]
     # The fill hides the inner half of every stroke (`paint-order`): what is left is the outline of the union.
     union = f'<path class="{css}" d="{join(parts)}">{hint}</path>'
@@ -240,7 +242,7 @@ def _room_label(room: RoomFootprint, unit: float, taken_m: Sequence[Box]) -> str
 
 
 def _item_label(item: ObjectFootprint, font_cm: float) -> tuple[Box, str] | None:
-    """Box and text of a label that fits into the largest part of an object."""
+    """Return box and text of a label that fits into the largest part of an object."""
     x0, z0, x1, z1 = max((_box_of(part) for part in item.outlines_m), key=_area_m2, default=_box(item))
     name = noun_of(item.category)
     x, y = cm(((x0 + x1) / 2, (z0 + z1) / 2))
@@ -257,7 +259,7 @@ def _item_label(item: ObjectFootprint, font_cm: float) -> tuple[Box, str] | None
 
 
 def _box(item: ObjectFootprint) -> Box:
-    """Around an object, metres."""
+    """Return the box around an object, in metres."""
     (x, _, z), (width_m, _, depth_m) = item.centre_m, item.size_m
     return (x - width_m / 2, z - depth_m / 2, x + width_m / 2, z + depth_m / 2)
 
@@ -276,7 +278,7 @@ def _meet(a: Box, b: Box) -> bool:
 
 
 def outline(polygon_m: Sequence[Point]) -> str:
-    """Path data of a closed polygon."""
+    """Return path data of a closed polygon."""
     return polyline([cm(point) for point in polygon_m], closed=True)
 
 
@@ -285,7 +287,7 @@ def _lines(segments: Iterable[tuple[Point, Point]]) -> str:
 
 
 def _distinct(walls: Iterable[tuple[Point, Point]]) -> list[tuple[Point, Point]]:
-    """ProcTHOR has a wall once a side: both lie on the same line."""
+    """Return each wall once: ProcTHOR has one a side, and both lie on the same line."""
     found: dict[tuple[tuple[int, int], ...], tuple[Point, Point]] = {}
     for a, b in walls:
         found.setdefault(tuple(sorted((cm(a), cm(b)))), (a, b))
@@ -293,5 +295,5 @@ def _distinct(walls: Iterable[tuple[Point, Point]]) -> list[tuple[Point, Point]]
 
 
 def distance_m(a: Sequence[float], b: Sequence[float]) -> float:
-    """Ground-plane distance of two `(x, y, z)` points."""
+    """Return the ground-plane distance of two `(x, y, z)` points."""
     return math.hypot(a[0] - b[0], a[2] - b[2])

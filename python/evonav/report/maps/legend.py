@@ -1,4 +1,4 @@
-"""What the marks of a map mean, drawn by the code that draws the maps."""
+"""Draw the legend of maps, with the same code as their marks."""
 
 from collections.abc import Iterable
 
@@ -65,36 +65,36 @@ ENTRIES = (
 
 
 def legend() -> Markup:
-    """The legend as HTML."""
+    """Return the legend as HTML."""
     return legend_html(ENTRIES)
 
 
 def legend_html(entries: Iterable[tuple[str, str, int]]) -> Markup:
-    """Marks and what they mean, as HTML.
+    """Return marks and what they mean, as HTML.
 
     Args:
-        entries: Words, drawing in a box 24 px high, and its width in pixels.
+        entries: The meaning, the drawing in a box 24 px high, and its width in pixels.
     """
     items = [
         Markup(
             '<span class="key"><svg class="map" width="{}" height="24" viewBox="0 0 {} 24" aria-hidden="true">'
         ).format(width, width)
         + Markup(drawing)  # noqa: S704 - our own SVG
-        + Markup("</svg>{}</span>").format(words)
-        for words, drawing, width in entries
+        + Markup("</svg>{}</span>").format(meaning)
+        for meaning, drawing, width in entries
     ]
     return Markup("").join(items)
 
 
 def legend_row(width_px: int) -> tuple[str, int]:
-    """The legend as SVG, broken into lines of `width_px`, and its height in pixels."""
+    """Return the legend as SVG, broken into lines of `width_px`, and its height in pixels."""
     parts = []
     x = y = 0.0
-    for words, drawing, icon_px in ENTRIES:
-        item_px = icon_px + 6 + 6.3 * len(words) + 18
+    for meaning, drawing, icon_px in ENTRIES:
+        item_px = icon_px + 6 + 6.3 * len(meaning) + 18
         if x > 0 and x + item_px > width_px:
             x, y = 0.0, y + 26
-        label = f'<text class="quiet" x="{icon_px + 6}" y="16">{escape(words)}</text>'
+        label = f'<text class="quiet" x="{icon_px + 6}" y="16">{escape(meaning)}</text>'
         parts.append(f'<g transform="translate({x:.0f} {y:.0f})">{drawing}{label}</g>')
         x += item_px
     return join(parts), round(y + 26)

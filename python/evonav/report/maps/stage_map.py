@@ -1,4 +1,4 @@
-"""A stage's map: as a drawing, as an SVG file, and in words."""
+"""Draw the map of a stage, and say in words what happened before it and how it ended."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ from evonav.tasks.language import noun_of
 
 STAGE_WIDTH_PX = 900
 VIEW_DIR = "view"
-"""Of a run, with the pages of `evonav view`."""
+"""Folder of a run with the pages of `evonav view`."""
 
 
 def map_css() -> Markup:
@@ -41,7 +41,7 @@ def light_css(more: str = "") -> str:
 
 
 def _inlined(rules: str, properties: str) -> str:
-    """Rules with every `var(--name)` replaced by its value."""
+    """Return rules with every `var(--name)` replaced by its value."""
     values = dict(re.findall(r"--(\w+):(#\w+)", properties))
     return re.sub(r"var\(--(\w+)\)", lambda match: values[match[1]], rules)
 
@@ -52,12 +52,12 @@ def stage_svg(
     *,
     success_radius_m: float = SUCCESS_RADIUS_M,
 ) -> str:
-    """A file of its own with one stage.
+    """Return one stage as an SVG document.
 
     Args:
         record: The stage.
         maps: The task's maps by stage; a stage without one is drawn without its house.
-        success_radius_m: Of the ring around the target.
+        success_radius_m: Radius of the ring around the target.
     """
     frame = task_frame(maps, [record])
     height_px = round(STAGE_WIDTH_PX * frame.height / frame.width)
@@ -72,17 +72,17 @@ def stage_svg(
 
 
 def map_name(record: StageRecord) -> str:
-    """File name of a stage's map."""
+    """Return the file name of a stage's map."""
     return f"{slug(record.task_id)}_{slug(record.agent)}_stage{record.stage}.svg"
 
 
 def page_name(task_id: str, agent: str, stage: int | None = None) -> str:
-    """File name of a viewer's page, of an episode or one stage of it."""
+    """Return the file name of a viewer's page of an episode, or of one stage of it."""
     return f"{slug(task_id)}_{slug(agent)}{'' if stage is None else f'_stage{stage}'}.html"
 
 
 def change_words(record: StageRecord, maps: Mapping[int, FloorPlan]) -> str:
-    """What happened before the stage, in a few words."""
+    """Describe what happened before the stage in a few words."""
     transition = record.transition
     if record.stage == 1:
         return "first stage"
@@ -91,12 +91,12 @@ def change_words(record: StageRecord, maps: Mapping[int, FloorPlan]) -> str:
     rooms = {room.room_id: noun_of(room.room_type) for m in maps.values() for room in m.rooms}
     room = rooms.get(transition.room_id or "", transition.room_id or "a room")
     moved = f"{_objects(len(transition.relocations))} moved"
-    words = [f"{transition.mode} in the {room}: {moved}"] if transition.mode is not None else []
+    phrases = [f"{transition.mode} in the {room}: {moved}"] if transition.mode is not None else []
     if transition.kind == "activities":
-        words.append(f"daily activities, most in the {room}: {moved}")
+        phrases.append(f"daily activities, most in the {room}: {moved}")
     counts = {"came": transition.num_added, "went": transition.num_removed, "opened or switched": transition.num_states}
-    words.extend(f"{_objects(count)} {what}" for what, count in counts.items() if count)
-    return ", ".join(words)
+    phrases.extend(f"{_objects(count)} {what}" for what, count in counts.items() if count)
+    return ", ".join(phrases)
 
 
 def _objects(count: int) -> str:
@@ -104,14 +104,14 @@ def _objects(count: int) -> str:
 
 
 def outcome_words(record: StageRecord) -> str:
-    """`success, SPL 0.83` and the like."""
+    """Return `success, SPL 0.83` and the like."""
     if record.state is EndState.SUCCESS:
         return "success" if record.spl is None else f"success, SPL {record.spl:.2f}"
     return str(record.state.value).replace("_", " ")
 
 
 def task_frame(maps: Mapping[int, FloorPlan], records: Sequence[StageRecord]) -> Frame:
-    """The frame that a task's pictures share: the house, or the path where no house was recorded."""
+    """Return the frame that a task's pictures share: the house, or the path where no house was recorded."""
     if any(stage_map.rooms or stage_map.walls for stage_map in maps.values()):
         return frame_of(maps.values())
     points = [point for record in records for entry in record.trace for point in entry.path_m]
@@ -120,7 +120,7 @@ def task_frame(maps: Mapping[int, FloorPlan], records: Sequence[StageRecord]) ->
 
 
 def success_radius_of(config: Mapping[str, object]) -> float:
-    """The run's success radius, from its header."""
+    """Return the success radius of a run from its header."""
     protocol = config.get("protocol")
     radius_m = protocol.get("success_radius_m") if isinstance(protocol, dict) else None
     return float(radius_m) if isinstance(radius_m, int | float) else SUCCESS_RADIUS_M
@@ -129,7 +129,7 @@ def success_radius_of(config: Mapping[str, object]) -> float:
 def stage_drawing(
     record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, success_radius_m: float, *, has_item_names: bool
 ) -> str:
-    """A stage's house and what happened in it, as the content of an `svg` element."""
+    """Return a stage's house and what happened in it, as the content of an `svg` element."""
     stage_map = maps.get(record.stage)
     changed = change(record.transition, frame, stage_map=stage_map, previous_map=maps.get(record.stage - 1))
     below, names = changed, ""

@@ -1,4 +1,4 @@
-"""A task as a strip, for a README or a paper: stages side by side, agents below each other."""
+"""Draw a task as a strip, for a README or a paper: stages side by side, agents below each other."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -32,14 +32,14 @@ IMAGE_PX = 78
 def write_strip(
     run_dir: Path, task_id: str | None, agents: str | Sequence[str], path: Path, *, stages: Sequence[int] | None = None
 ) -> Path:
-    """Writes a task as a strip.
+    """Write a task as a strip.
 
     Args:
         run_dir: A run.
         task_id: One of its tasks; `None` for the `most_telling` one.
         agents: One of its agents, or several: a row each.
         path: The `.svg`, `.png` or `.pdf` file to write.
-        stages: Which stages; default all that have a record (of the most telling task, three).
+        stages: Numbers of stages; default all that have a record (of the most telling task, three).
 
     Returns:
         `path`.
@@ -51,8 +51,8 @@ def write_strip(
     check_picture(path)
     agents = [agents] if isinstance(agents, str) else list(agents)
     if task_id is None:
-        task_id, telling = most_telling(load_run(run_dir), agents)
-        stages = stages or telling
+        task_id, default_stages = most_telling(load_run(run_dir), agents)
+        stages = stages or default_stages
     with RunStore(run_dir) as store:
         rows = [
             [record for record in store.records(agent, task_id) if stages is None or record.stage in stages]
@@ -67,14 +67,14 @@ def write_strip(
 
 
 def strip_svg(rows: Sequence[Sequence[StageRecord]], maps: Mapping[int, FloorPlan], *, success_radius_m: float) -> str:
-    """The strip: a row an agent, a column a stage."""
+    """Return the strip: a row an agent, a column a stage."""
     everything = [record for row in rows for record in row]
     frame = task_frame(maps, everything)
     map_px = round(PANEL_PX * frame.height / frame.width)
-    told = {record.stage: record for record in reversed(everything)}
-    left_px = {stage: GAP_PX + i * (PANEL_PX + GAP_PX) for i, stage in enumerate(sorted(told))}
-    width_px = GAP_PX + len(told) * (PANEL_PX + GAP_PX)
-    heads = join(_head(record, maps, left_px[stage]) for stage, record in sorted(told.items()))
+    shown = {record.stage: record for record in reversed(everything)}
+    left_px = {stage: GAP_PX + i * (PANEL_PX + GAP_PX) for i, stage in enumerate(sorted(shown))}
+    width_px = GAP_PX + len(shown) * (PANEL_PX + GAP_PX)
+    heads = join(_head(record, maps, left_px[stage]) for stage, record in sorted(shown.items()))
     panels = join(
         _panel(record, maps, frame, map_px, success_radius_m, left_px[record.stage], HEAD_PX + i * (map_px + FOOT_PX))
         for i, row in enumerate(rows)
@@ -93,7 +93,7 @@ def strip_svg(rows: Sequence[Sequence[StageRecord]], maps: Mapping[int, FloorPla
 
 
 def _head(record: StageRecord, maps: Mapping[int, FloorPlan], left_px: int) -> str:
-    """What was asked in a stage, what the agents were shown, and what had changed."""
+    """Draw the goal of a stage, its reference image, and what had changed."""
     image = None if record.stage not in maps else maps[record.stage].reference_image
     width = 54 if image is None else 38
     lines = join(

@@ -1,4 +1,4 @@
-"""Small pieces of SVG: escaping, numbers, paths, markers.
+"""Write small pieces of SVG: escaped text, numbers, paths, marks.
 
 Drawings are in centimetres seen from above, x to the right and z up the page, so that coordinates are short integers.
 Colours are CSS classes (`templates/map.css`); only geometry is written here.
@@ -21,17 +21,17 @@ _NOT_SLUG = re.compile(r"[^A-Za-z0-9._-]+")
 
 
 def clean(text: str) -> str:
-    """`text` with the characters that no XML or HTML page may hold replaced."""
+    """Return `text` with the characters replaced that no XML or HTML page may hold."""
     return _NOT_XML.sub("\ufffd", text)
 
 
 def escape(text: str) -> str:
-    """`text` as the content of an element or a quoted attribute."""
+    """Return `text` as the content of an element or a quoted attribute."""
     return html.escape(clean(text))
 
 
 def slug(name: str) -> str:
-    """A file name or anchor for `name`: ASCII, no separator, different for different names."""
+    """Return a file name or anchor for `name`: ASCII, no separator, different for different names."""
     plain = _NOT_SLUG.sub("_", name).lstrip(".-")[:MAX_SLUG_LENGTH]
     if plain == name and plain:
         return plain
@@ -40,7 +40,7 @@ def slug(name: str) -> str:
 
 
 def cm(point_m: Point) -> tuple[int, int]:
-    """Page coordinates of a point; the origin for one that is not finite or not on this planet."""
+    """Return page coordinates of a point; the origin for one that is not finite or not on this planet."""
     x_m, z_m = point_m
     if not (abs(x_m) < MAX_M and abs(z_m) < MAX_M):
         return (0, 0)
@@ -48,7 +48,7 @@ def cm(point_m: Point) -> tuple[int, int]:
 
 
 def polyline(points_cm: Sequence[tuple[int, int]], *, closed: bool = False) -> str:
-    """Path data through points, relative and without separators it does not need. A single point is a dot."""
+    """Return path data through points, relative and without needless separators. A single point is a dot."""
     if not points_cm:
         return ""
     x, y = points_cm[0]
@@ -65,10 +65,10 @@ def polyline(points_cm: Sequence[tuple[int, int]], *, closed: bool = False) -> s
 
 
 def simplified(points_cm: Sequence[tuple[int, int]], tolerance_cm: float = 2.0) -> list[tuple[int, int]]:
-    """A polyline without the points that lie within `tolerance_cm` of the line they are on (Douglas-Peucker)."""
+    """Return a polyline without the points that lie within `tolerance_cm` of the line they are on (Douglas-Peucker)."""
     if len(points_cm) < 3:
         return list(points_cm)
-    kept = {0, len(points_cm) - 1}
+    chosen = {0, len(points_cm) - 1}
     todo = [(0, len(points_cm) - 1)]
     while todo:
         first, last = todo.pop()
@@ -78,13 +78,13 @@ def simplified(points_cm: Sequence[tuple[int, int]], tolerance_cm: float = 2.0) 
             if d > distance_cm:
                 farthest, distance_cm = i, d
         if farthest != first:
-            kept.add(farthest)
+            chosen.add(farthest)
             todo += [(first, farthest), (farthest, last)]
-    return [points_cm[i] for i in sorted(kept)]
+    return [points_cm[i] for i in sorted(chosen)]
 
 
 def arrow_head(tip: Point, direction: Point, size: float) -> str:
-    """Path data of a filled triangle whose tip is at `tip` (page coordinates), pointing along `direction`."""
+    """Return path data of a filled triangle whose tip is at `tip` (page coordinates), pointing along `direction`."""
     length = math.hypot(*direction)
     if length == 0.0:
         return ""
@@ -99,7 +99,7 @@ def arrow_head(tip: Point, direction: Point, size: float) -> str:
 
 
 def star(centre: Point, radius: float) -> str:
-    """Path data of a five-pointed star, page coordinates."""
+    """Return path data of a five-pointed star, page coordinates."""
     corners = []
     for i in range(10):
         r = radius if i % 2 == 0 else radius * 0.42
@@ -109,18 +109,18 @@ def star(centre: Point, radius: float) -> str:
 
 
 def cross(centre: Point, arm: float) -> str:
-    """Path data of a cross, page coordinates."""
+    """Return path data of a cross, page coordinates."""
     x, y = centre
     return f"M{x - arm:.0f} {y - arm:.0f}l{2 * arm:.0f} {2 * arm:.0f}m0 {-2 * arm:.0f}l{-2 * arm:.0f} {2 * arm:.0f}"
 
 
 def title(text: str) -> str:
-    """A tooltip, also what a screen reader says."""
+    """Return a tooltip, which a screen reader reads out too."""
     return f"<title>{escape(text)}</title>"
 
 
 def text_lines(text: str, width: int, max_lines: int) -> list[str]:
-    """`text` broken into lines of at most `width` characters, with an ellipsis where it does not fit."""
+    """Return `text` broken into lines of at most `width` characters, with an ellipsis where it does not fit."""
     lines: list[str] = []
     for word in clean(text).split():
         if lines and len(lines[-1]) + 1 + len(word) <= width:
@@ -134,7 +134,7 @@ def text_lines(text: str, width: int, max_lines: int) -> list[str]:
 
 
 def join(parts: Iterable[str]) -> str:
-    """Concatenates, for readability of callers."""
+    """Concatenate parts; it makes callers easier to read."""
     return "".join(parts)
 
 

@@ -1,4 +1,4 @@
-"""What the marks of a task's plans mean."""
+"""Draw the legend of a task's floor plans."""
 
 from markupsafe import Markup
 
@@ -42,5 +42,5 @@ _ENTRIES = (
 
 
 def task_legend() -> Markup:
-    """The legend as HTML."""
+    """Return the legend as HTML."""
     return legend_html(_ENTRIES)

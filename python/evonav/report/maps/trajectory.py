@@ -1,4 +1,4 @@
-"""What happened in a stage, drawn over its house: change, path in time, beliefs, start, end and target."""
+"""Draw what happened in a stage over its house: change, path in time, beliefs, start, end and target."""
 
 import itertools
 import math
@@ -28,11 +28,11 @@ MANY_ROUNDS = 100
 LARGE_M2 = 0.3
 """Footprint from which on a relocated object has a thick arrow."""
 CARRIED_GAP_M = 0.05
-"""How far outside of a moved object's footprint something that it carries may lie."""
+"""Largest distance between a moved object's footprint and an object that it carries."""
 
 
 def course(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
-    """What one agent did in a stage: path, beliefs, start and end, and where the target was."""
+    """Draw what one agent did in a stage: path, beliefs, start and end, and where the target was."""
     return (
         ring(record, frame, success_radius_m)
         + _path(record, frame)
@@ -45,7 +45,7 @@ def course(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
 def change(
     transition: TransitionRecord, frame: Frame, *, stage_map: FloorPlan | None, previous_map: FloorPlan | None
 ) -> str:
-    """Relocated objects: where they stood (dashed), where they stand (stressed), and an arrow between.
+    """Draw relocated objects: where they stood (dashed), where they stand (stressed), and an arrow between.
 
     The same for all agents. What was carried along on a moved piece of furniture is stressed, but has no arrow.
     """
@@ -64,7 +64,7 @@ def change(
 def relocation_arrows(
     relocations: Sequence[Relocation], frame: Frame, *, stage_map: FloorPlan | None, previous_map: FloorPlan | None
 ) -> str:
-    """An arrow for each object that was not carried along by a larger one."""
+    """Draw an arrow for each object that was not carried along by a larger one."""
     now, before = _by_id(stage_map), _by_id(previous_map)
     return join(
         _relocation_arrow(relocation, frame, is_large=_area_m2(now.get(relocation.object_id)) >= LARGE_M2)
@@ -74,7 +74,7 @@ def relocation_arrows(
 
 
 def rounds(trace: Sequence[RoundRecord]) -> list[str]:
-    """Decision rounds in words, runs of the same choice together: `frontier 3 x4`."""
+    """Describe decision rounds, runs of the same choice together: `frontier 3 x4`."""
     runs: list[tuple[str, int]] = []
     for entry in trace:
         choice = _choice(entry)
@@ -95,7 +95,7 @@ def _is_carried(
     before: Mapping[str, ObjectFootprint],
     now: Mapping[str, ObjectFootprint],
 ) -> bool:
-    """Whether it lay on (or in) a larger moved object and still does."""
+    """Return whether an object lay on (or in) a larger moved object and still does."""
     area_m2 = _area_m2(now.get(relocation.object_id))
     for other in relocations:
         old, new = before.get(other.object_id), now.get(other.object_id)
@@ -123,8 +123,8 @@ def _relocation_arrow(relocation: Relocation, frame: Frame, *, is_large: bool) -
     width = f'stroke-width="{0.55 * u:.1f}"'
     dx, dy = end[0] - start[0], end[1] - start[1]
     length = math.hypot(dx, dy)
-    words = f"{noun_of(relocation.category)}: moved {distance_m(relocation.from_m, relocation.to_m):.1f} m"
-    hint = title(words)
+    text = f"{noun_of(relocation.category)}: moved {distance_m(relocation.from_m, relocation.to_m):.1f} m"
+    hint = title(text)
     if length < 3 * u:
         return f'<circle class="arrow" {width} cx="{end[0]}" cy="{end[1]}" r="{1.4 * u:.0f}">{hint}</circle>'
     # A curve, so that arrows to and fro do not hide each other.
@@ -142,7 +142,7 @@ def _relocation_arrow(relocation: Relocation, frame: Frame, *, is_large: bool) -
 
 
 def ring(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
-    """The circle around the target within which a stage is a success."""
+    """Draw the circle around the target within which a stage is a success."""
     x, y = cm(_ground(record.target.position_m))
     radius_cm = round(100 * success_radius_m)
     hint = title(f"success within {success_radius_m:g} m of the target")
@@ -151,7 +151,7 @@ def ring(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
 
 
 def target_mark(target: TargetRecord, frame: Frame) -> str:
-    """A star where the target is, and an empty one where it stood in stage 1."""
+    """Draw a star where the target is, and an empty one where it stood in stage 1."""
     u = frame.unit
     centre = cm(_ground(target.position_m))
     first = ""
@@ -190,12 +190,12 @@ def _path(record: StageRecord, frame: Frame) -> str:
 
 
 def _time(entry: RoundRecord, last: int) -> int:
-    """Which colour of the path a round has."""
+    """Return the number of the path's colour in a round."""
     return min(NUM_TIMES - 1, NUM_TIMES * entry.round // (last + 1))
 
 
 def _legs(trace: Sequence[RoundRecord]) -> list[list[RoundRecord]]:
-    """What is drawn as one: a round, or, of an agent whose rounds are single actions, rounds of the same choice."""
+    """Group rounds that are drawn as one: those of the same choice, of an agent whose rounds are single actions."""
     if len(trace) <= MANY_ROUNDS:
         return [[entry] for entry in trace]
     legs: list[list[RoundRecord]] = []
@@ -210,7 +210,7 @@ def _legs(trace: Sequence[RoundRecord]) -> list[list[RoundRecord]]:
 
 
 def _direction_arrow(piece: Sequence[tuple[int, int]], gone: float, frame: Frame) -> tuple[str, float]:
-    """An arrow if this piece of the path reaches the next arrow's place, and the way gone since the last one."""
+    """Return an arrow if the path reaches the place of the next one here, and the way since the last arrow."""
     every = ARROW_EVERY * frame.unit
     for a, b in itertools.pairwise(piece):
         length = math.dist(a, b)
@@ -228,18 +228,18 @@ def _direction_arrow(piece: Sequence[tuple[int, int]], gone: float, frame: Frame
     return "", gone
 
 
-def start_mark(at: tuple[int, int], frame: Frame, words: str) -> str:
-    """A ring where a way begins."""
+def start_mark(at: tuple[int, int], frame: Frame, text: str) -> str:
+    """Draw a ring where a way begins."""
     size = f'r="{1.5 * frame.unit:.0f}" stroke-width="{0.7 * frame.unit:.1f}"'
-    return f'<circle class="start" cx="{at[0]}" cy="{at[1]}" {size}>{title(words)}</circle>'
+    return f'<circle class="start" cx="{at[0]}" cy="{at[1]}" {size}>{title(text)}</circle>'
 
 
 def _ends(record: StageRecord, frame: Frame) -> str:
     u = frame.unit
     marks = []
     if (start := record.effective_start) is not None:
-        words = "start, moved here since the carried pose was no longer free" if record.is_snapped else "start"
-        marks.append(start_mark(cm((start.x_m, start.z_m)), frame, words))
+        text = "start, moved here since the carried pose was no longer free" if record.is_snapped else "start"
+        marks.append(start_mark(cm((start.x_m, start.z_m)), frame, text))
     if (end := record.terminal) is not None:
         marks.append(end_mark(cm((end.x_m, end.z_m)), record.state is EndState.SUCCESS, u))
     elif record.state is EndState.ERRORED and record.trace:
@@ -249,7 +249,7 @@ def _ends(record: StageRecord, frame: Frame) -> str:
 
 
 def end_mark(at: tuple[int, int], is_success: bool, unit: float) -> str:
-    """Where a stage ended."""
+    """Draw where a stage ended."""
     x, y = at
     r = 1.9 * unit
     d = 0.8 * unit
@@ -266,7 +266,7 @@ def end_mark(at: tuple[int, int], is_success: bool, unit: float) -> str:
 
 
 def _stale_entries(record: StageRecord, frame: Frame) -> str:
-    """Stale entries of the memory at the end, those of the goal's category and those gone to stressed."""
+    """Draw stale entries of the memory at the end; those of the goal's category and those gone to are stressed."""
     visited: dict[int, EntryRecord] = {}
     for decision in record.trace:
         if decision.chosen_entry is not None and decision.chosen_entry.is_stale:
@@ -284,25 +284,25 @@ def _stale_mark(entry: EntryRecord, frame: Frame, *, is_stressed: bool, is_visit
     u = frame.unit
     least = (3.2 if is_stressed else 1.5) * u
     width, height = (min(300.0, max(least, 100 * size)) for size in (entry.size_m[0], entry.size_m[2]))
-    words = f"stale entry: {noun_of(entry.label)} (no longer here), seen {entry.num_detections} times"
+    text = f"stale entry: {noun_of(entry.label)} (no longer here), seen {entry.num_detections} times"
     if is_visited:
-        words += ", gone to by the agent"
+        text += ", gone to by the agent"
     css = "visited" if is_visited else "goal" if is_stressed else "weak"
     box = f'x="{x - width / 2:.0f}" y="{y - height / 2:.0f}" width="{width:.0f}" height="{height:.0f}"'
     mark = f'<path d="{cross((x, y), 0.9 * u)}"/>' if is_stressed else ""
-    return f'<g class="{css}">{title(words)}<rect {box}/>{mark}</g>'
+    return f'<g class="{css}">{title(text)}<rect {box}/>{mark}</g>'
 
 
 def _choice(entry: RoundRecord) -> str:
-    """What a round chose, in words."""
-    words = entry.choice or entry.action.kind.replace("_", " ")
+    """Describe what a round chose."""
+    text = entry.choice or entry.action.kind.replace("_", " ")
     if entry.chosen_entry is not None:
-        words += f" ({noun_of(entry.chosen_entry.label)}{', stale' if entry.chosen_entry.is_stale else ''})"
+        text += f" ({noun_of(entry.chosen_entry.label)}{', stale' if entry.chosen_entry.is_stale else ''})"
     if entry.action.kind == "stop":
-        words += ", stop"
+        text += ", stop"
     if not entry.is_action_success:
-        words += ", action failed"
-    return words
+        text += ", action failed"
+    return text
 
 
 def _ground(point_m: Sequence[float]) -> Point:
