@@ -1,4 +1,4 @@
-"""What makes decision models, by import path: see `evonav.evaluation.run.components.Backend.decision`.
+"""Make decision models by import path: see `evonav.evaluation.run.components.Backend.decision`.
 
 Options are JSON. Those that decide what is answered are `decision_options`, part of what makes runs the same; those on
 how the model is reached are `decision_host_options`. A key is neither: it is read from the environment.
@@ -20,15 +20,15 @@ SAMPLING: Mapping[str, Any] = {
     "seed": 0,
     "image_detail": "high",
 }
-"""3D-Mem's, whose questions the paper's agents build on; the paper does not state its own. The seed is ours."""
+"""Sampling of 3D-Mem, on which the paper's agents build; the paper does not state its own. The seed is ours."""
 
 
 def text_match(seed: int, *, noise: Mapping[str, float] | None = None) -> DecisionModel:
-    """The rules of `evonav.decision.text.decision`, which draw nothing.
+    """Make the text matcher, which draws no random numbers.
 
     Args:
-        seed: Of the agent.
-        noise: Rates of mistakes, by the names of `NoiseRates`; so for all of these.
+        seed: Seed of the agent.
+        noise: Rates of mistakes, by the names of `NoiseRates`; all models accept them.
     """
     from evonav.decision.text.decision import TextMatch
 
@@ -52,22 +52,22 @@ def vlm(
     max_cost_usd: float | None = None,
     noise: Mapping[str, float] | None = None,
 ) -> DecisionModel:
-    """A model behind an OpenAI-compatible endpoint.
+    """Make a model behind an OpenAI-compatible endpoint.
 
     Args:
-        seed: Of the agent; questions do not depend on it, so agents that ask the same have the same answer.
-        model: Its name, as the server calls it.
-        structured: Whether answers are held to a JSON Schema: auto, on, off.
-        images: Whether the model is shown images.
-        request: What else requests say, by the names of `VlmConfig`; what is not given is `SAMPLING`.
-        server: How the server is reached, by the names of `VlmConfig`.
+        seed: Seed of the agent. Questions do not depend on it, so agents that ask the same get the same answer.
+        model: The model's name on the server.
+        structured: Answers by JSON Schema: auto, on, off.
+        images: True if the model is shown images.
+        request: Other fields of requests, by the names of `VlmConfig`; missing ones are those of `SAMPLING`.
+        server: Connection to the server, by the names of `VlmConfig`.
         cache: File of recorded exchanges.
-        mode: Default `auto` with a file, else `live`.
-        keeps_images: Whether that file gets the images too.
-        ledger: File that books what all processes of the run spend.
-        account: Name in that file; default: the model's.
-        price: Of the model: dollars a million tokens, in and out.
-        max_cost_usd: Most that the run may spend; needs `price`.
+        mode: Default `auto` with a cache, else `live`.
+        keeps_images: True to store the images in the cache too.
+        ledger: File with the spending of all processes of the run.
+        account: Name in the ledger; default: the model's.
+        price: Dollars a million tokens, in and out.
+        max_cost_usd: Largest cost of the run; needs `price`.
         noise: Rates of mistakes.
 
     Raises:
@@ -103,16 +103,16 @@ def own(
     account: str | None = None,
     noise: Mapping[str, float] | None = None,
 ) -> DecisionModel:
-    """A model of your own: an object with `answer(question, attempt)`, or just with `ask(prompt) -> str`.
+    """Make a model of your own: an object with `answer(question, attempt)`, or just with `ask(prompt) -> str`.
 
     Args:
-        seed: Of the agent; handed to what has a parameter `seed`.
+        seed: Seed of the agent, for a factory with a parameter `seed`.
         path: Import path `module:name` of a class, or of a function that makes the object.
         cache: File of recorded exchanges, for a model with `ask`.
-        mode: Default `auto` with a file, else `live`.
-        keeps_images: Whether that file gets the images too.
+        mode: Default `auto` with a cache, else `live`.
+        keeps_images: True to store the images in the cache too.
         ledger: File that counts the run's questions.
-        account: Name in that file; default: the model's path.
+        account: Name in the ledger; default: the model's path.
         noise: Rates of mistakes.
 
     Raises:
@@ -145,7 +145,7 @@ def counting(
     request: Mapping[str, Any] | None = None,
     noise: Mapping[str, float] | None = None,
 ) -> DecisionModel:
-    """The text matcher, booking in `ledger` what `vlm` with the same options would be asked; see `vlm`."""
+    """Make a text matcher that notes in `ledger` what `vlm` would be asked with the same options; see `vlm`."""
     from evonav.decision.text.decision import TextMatch
     from evonav.decision.vlm.client import VlmClient
     from evonav.decision.vlm.counting import Counting
@@ -168,7 +168,7 @@ def _with_noise(model: DecisionModel, noise: Mapping[str, float] | None, seed: i
 def vlm_config(
     model: str, request: Mapping[str, Any] | None = None, server: Mapping[str, Any] | None = None
 ) -> "VlmConfig":
-    """How decisions are asked for, with `SAMPLING` where nothing else is said.
+    """Return the configuration of a client, with `SAMPLING` for missing fields.
 
     Raises:
         InvalidArgumentError: A name is unknown, or a value makes no sense.

@@ -1,4 +1,4 @@
-"""What questions offer to choose from."""
+"""Candidates that questions offer."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -16,7 +16,7 @@ Pixels = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True)
 class ObjectCandidate:
-    """A remembered object: a label and an axis-aligned box; images where the model looks at them."""
+    """A remembered object: a label and an axis-aligned box, with images if the model looks at them."""
 
     entry_id: int
     label: str
@@ -24,9 +24,9 @@ class ObjectCandidate:
     size_m: Point3
     num_detections: int
     crop: Pixels | None = field(default=None, compare=False, repr=False)
-    """Its best view, cut out."""
+    """The object, cut out of its best view."""
     view: Pixels | None = field(default=None, compare=False, repr=False)
-    """The image that it was last seen in."""
+    """The view in which the object was last seen."""
 
     @property
     def ground_m(self) -> Point2:
@@ -43,7 +43,7 @@ class FrontierCandidate:
     travel_m: float
     """Distance from the agent."""
     image: Pixels | None = field(default=None, compare=False, repr=False)
-    """Towards it."""
+    """The view towards the frontier."""
 
 
 @dataclass(frozen=True, slots=True)

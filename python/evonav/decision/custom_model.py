@@ -1,4 +1,4 @@
-"""Models of your own: any object with `ask(prompt) -> str`, asked and kept as a model behind an endpoint is."""
+"""Models of your own: any object with `ask(prompt) -> str`, with a cache as for a model behind an endpoint."""
 
 import inspect
 from collections.abc import Callable
@@ -16,10 +16,10 @@ from evonav.errors import DecisionError, InvalidArgumentError
 
 
 class CustomModel(Protocol):
-    """What a model of your own has at least. `needs_images = False` on it leaves images out."""
+    """The least that a model of your own must have. With `needs_images = False` it gets no images."""
 
     def ask(self, prompt: Prompt) -> str:
-        """The answer to a prompt, in its grammar.
+        """Answer a prompt in its grammar.
 
         Raises:
             TimeoutError, ConnectionError: No answer came this time; the question is asked again.
@@ -28,7 +28,7 @@ class CustomModel(Protocol):
 
 
 class CustomClient:
-    """Asks a model of your own, and keeps what came as `VlmClient` does; content-addressed by name and prompt."""
+    """Asks a model of your own, and caches its answers by name and prompt as `VlmClient` does."""
 
     def __init__(
         self,
@@ -40,15 +40,15 @@ class CustomClient:
         account: Account | None = None,
         keeps_images: bool = True,
     ) -> None:
-        """A client.
+        """Create a client.
 
         Args:
-            name: Part of what exchanges are found by: another name, other exchanges.
-            model: Answers.
-            store: Of exchanges.
+            name: Name of the model in the keys of the cache: another name, other exchanges.
+            model: The model that answers.
+            store: Cache of exchanges.
             mode: `live`, `auto` or `replay`; default `auto` with a store, else `live`.
-            account: Counts questions.
-            keeps_images: Keep the images' files beside their hashes.
+            account: Account that counts questions.
+            keeps_images: True to store the images' files beside their hashes.
 
         Raises:
             InvalidArgumentError: The mode is unknown, or needs a store.
@@ -64,18 +64,18 @@ class CustomClient:
 
     @property
     def never_asks(self) -> bool:
-        """Whether there are no answers but those that are kept."""
+        """True if only cached answers are returned."""
         return self.mode == "replay"
 
     def check(self) -> None:
-        """There is nothing to find out."""
+        """Do nothing: there is nothing to check."""
 
     def is_cached(self, prompt: Prompt, attempt: int = 0) -> bool:
-        """Whether what came of a question is kept."""
+        """Return whether the outcome of a question is cached."""
         return self.store is not None and self.store.outcome(key_of(self.cached_request(prompt, attempt))) is not None
 
     def cached_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
-        """What an exchange is found by."""
+        """Return the content that an exchange's key is computed from."""
         turns = [
             {
                 "role": turn.role,
@@ -88,15 +88,15 @@ class CustomClient:
         return {"own_model": self.name, "turns": turns, "attempt": attempt}
 
     def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
-        """The model's answer.
+        """Return the model's answer.
 
         Raises:
             VlmError: There is none.
             DecisionError: The model broke.
             StoreError: The exchanges cannot be read or written.
         """
-        kept = self.cached_request(prompt, attempt)
-        key = key_of(kept)
+        request = self.cached_request(prompt, attempt)
+        key = key_of(request)
         outcome = None if self.store is None or self.mode == "live" else self.store.outcome(key)
         is_replayed = outcome is not None
         if outcome is not None:
@@ -107,12 +107,13 @@ class CustomClient:
             outcome = self._ask_anew(prompt)
             if self.store is not None and self.mode == "auto":
                 pixels = [picture.pixels for picture in prompt.pictures] if self.keeps_images else []
-                outcome = self.store.keep_first(kept, {image_name(image): png_of(image) for image in pixels}, outcome)
+                images = {image_name(image): png_of(image) for image in pixels}
+                outcome = self.store.keep_first(request, images, outcome)
         if isinstance(outcome, Failure):
             raise VlmError(cast("VlmFailure", outcome.kind), outcome.message)
         text = str(outcome["text"])
         if not text.strip():
-            raise VlmError("empty", "an answer without words")
+            raise VlmError("empty", "an empty answer")
         return Answer(text, self.name, Usage(), key, is_replayed)
 
     def _ask_anew(self, prompt: Prompt) -> JsonObject | Failure:
@@ -141,7 +142,7 @@ class CustomClient:
 
 
 class _MadeWhenAsked:
-    """A class's instance with `ask`, made at the first question: a replay loads no weights."""
+    """An instance of a class with `ask`, made at the first question: a replay loads no weights."""
 
     def __init__(self, path: str, factory: Callable[..., Any], seed: int) -> None:
         self.needs_images = bool(getattr(factory, "needs_images", True))
@@ -156,13 +157,13 @@ class _MadeWhenAsked:
 
 
 def load_custom_model(path: str, seed: int) -> CustomModel | DecisionModel:
-    """What `module:name` makes: a class's instance, or what a function returns.
+    """Load the model at `module:name`: a class's instance, or what a function returns.
 
     Made once a process and used for all its episodes, unless it has a parameter `seed`: then once an episode.
 
     Args:
         path: Import path.
-        seed: Of the agent; handed to what has a parameter `seed`.
+        seed: Seed of the agent, for a factory with a parameter `seed`.
 
     Raises:
         InvalidArgumentError: It cannot be imported or made, or has neither `answer` nor `ask`.
@@ -182,7 +183,7 @@ def load_custom_model(path: str, seed: int) -> CustomModel | DecisionModel:
 
 
 _MADE: dict[str, Any] = {}
-"""By import path; weights are loaded once."""
+"""Models by import path, so that weights are loaded once."""
 
 
 def _made(path: str, factory: Callable[..., Any], seed: int) -> Any:  # noqa: ANN401 - a stranger's

@@ -1,4 +1,4 @@
-"""A decision model, and what it costs: time, questions, tokens and money."""
+"""Measure what a decision model costs: time, questions, tokens and money."""
 
 import time
 from typing import Any, TypeVar
@@ -10,10 +10,10 @@ A = TypeVar("A")
 
 
 class Metered:
-    """Answers what another model answers, and adds up."""
+    """Answers as another model does, and adds up the costs."""
 
     def __init__(self, model: DecisionModel) -> None:
-        """Meters `model`."""
+        """Measure the costs of `model`."""
         self.model = model
         self._wall_s = 0.0
         self._cpu_s = 0.0
@@ -21,11 +21,11 @@ class Metered:
 
     @property
     def needs_images(self) -> bool:
-        """The model's."""
+        """True if the measured model needs images."""
         return self.model.needs_images
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
-        """The model's answer."""
+        """Return the measured model's answer."""
         wall_s, cpu_s = time.perf_counter(), time.process_time()
         self._num_questions += 1
         try:
@@ -35,7 +35,7 @@ class Metered:
             self._cpu_s += time.process_time() - cpu_s
 
     def costs(self) -> dict[str, float]:
-        """So far; tokens and money of a model that keeps an account."""
+        """Return the costs so far; tokens and money only if the model has an account."""
         costs: dict[str, float] = {
             "decision_wall_s": self._wall_s,
             "decision_cpu_s": self._cpu_s,
@@ -51,8 +51,8 @@ class Metered:
         return costs
 
 
-def _account_of(model: Any) -> Account | None:  # noqa: ANN401 - of whatever wraps what
-    """The account of a model, or of the one that it wraps."""
+def _account_of(model: Any) -> Account | None:  # noqa: ANN401 - any wrapper
+    """Return the account of a model, or of the model that it wraps."""
     while model is not None:
         account = getattr(getattr(model, "client", None), "account", None)
         if isinstance(account, Account):

@@ -1,9 +1,9 @@
-"""Controlled mistakes: how much does an agent depend on its model being right? Measured without asking one.
+"""Controlled mistakes measure how much an agent depends on the correctness of its model.
 
     model = Noisy(TextMatch(), NoiseRates(wrong=0.1, unparsable=0.05), seed=0)
 
-What goes wrong is drawn per question from a stream of its own, named by the seed, the kind of question, how many of
-that kind the episode has asked, and the attempt: not by when or where it is asked.
+Each question's mistake is drawn from a stream of its own, named by the seed, the kind of question, the number of
+questions of that kind in the episode so far, and the attempt. Time and place of asking make no difference.
 """
 
 import hashlib
@@ -27,26 +27,26 @@ GARBAGE = (
     "?",
     "As a language model, I would first look around in the kitchen, and then decide.",
 )
-"""What comes instead of an answer; it goes through the question's grammar, which may yet find an answer in it."""
+"""Texts in place of an answer; they go through the question's grammar, which may find an answer in one."""
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseRates:
-    """Shares of tries that go wrong; at most one thing goes wrong with a try."""
+    """Shares of tries that go wrong; at most one mistake happens in a try."""
 
     wrong: float = 0.0
-    """Another of the question's valid answers, each as likely; questions without another keep theirs."""
+    """Share of wrong answers: another valid answer, each as likely; a question without another keeps its answer."""
     unparsable: float = 0.0
-    """Words against the grammar."""
+    """Share of answers against the grammar."""
     refusal: float = 0.0
-    """The model would not answer."""
+    """Share of refusals."""
     lost: float = 0.0
-    """No answer came."""
+    """Share of lost answers."""
     delay: float = 0.0
-    """Seconds that every try takes longer; changes no answer."""
+    """Seconds added to every try; they change no answer."""
 
     def __post_init__(self) -> None:
-        """Checks the shares.
+        """Check the shares.
 
         Raises:
             InvalidArgumentError: One is not within 0 to 1, they add up to more than 1, or the delay is not finite.
@@ -62,7 +62,7 @@ class NoiseRates:
 
     @classmethod
     def read(cls, options: Mapping[str, Any]) -> "NoiseRates":
-        """Rates by name, as JSON.
+        """Read rates by name from JSON.
 
         Raises:
             InvalidArgumentError: A name is unknown, or a rate makes no sense.
@@ -75,40 +75,40 @@ class NoiseRates:
 
 
 class Noisy:
-    """Any decision model, with mistakes. One an episode: it counts questions."""
+    """A decision model with mistakes. It counts questions, so each episode needs its own."""
 
     def __init__(
         self, model: DecisionModel, rates: NoiseRates, seed: int, *, sleep: Callable[[float], None] = time.sleep
     ) -> None:
-        """A model that errs.
+        """Create a model that makes mistakes.
 
         Args:
-            model: Answers.
-            rates: How often what goes wrong.
-            seed: Of the episode's agent.
-            sleep: Waits so many seconds.
+            model: The model that answers.
+            rates: Shares of the mistakes.
+            seed: Seed of the episode's agent.
+            sleep: Waits for a number of seconds.
         """
         self.model = model
         self.rates = rates
         self.counts: Counter[str] = Counter()
-        """What went wrong, by name; `no_other` counts wrong answers that there were none of."""
+        """Number of mistakes by name; `no_other` counts questions without another answer."""
         self._seed = seed
         self._sleep = sleep
         self._num_asked: Counter[str] = Counter()
 
     @property
     def needs_images(self) -> bool:
-        """As the model does."""
+        """True if the model needs images."""
         return self.model.needs_images
 
     def check(self) -> None:
-        """As the model does."""
+        """Check the model."""
         check = getattr(self.model, "check", None)
         if check is not None:
             check()
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
-        """The model's answer, or what comes in its place. A lost or refused question does not reach the model.
+        """Return the model's answer, or a mistake; a lost or refused question does not reach the model.
 
         Raises:
             AnswerError: There is no usable answer this time.
@@ -133,7 +133,7 @@ class Noisy:
         return reply if mistake is None else self._wrong(question, reply, draws)
 
     def _mistake(self, share: float) -> str | None:
-        """What goes wrong with a try, if anything does."""
+        """Return the mistake of a try, if there is one."""
         for name in ("lost", "refusal", "unparsable", "wrong"):
             rate: float = getattr(self.rates, name)
             if share < rate:

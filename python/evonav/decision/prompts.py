@@ -1,4 +1,4 @@
-"""What a model is given to read and to look at: words and images in turns."""
+"""Build prompts: text and images in turns."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -12,14 +12,14 @@ from evonav.tasks.public import StageInput
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """Words of a prompt."""
+    """A text in a prompt."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """An image of a prompt."""
+    """An image in a prompt."""
 
     pixels: NDArray[np.uint8]
     """`(H, W, 3)` RGB."""
@@ -30,7 +30,7 @@ Part = Text | Picture
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """One side's words in a conversation."""
+    """One side's message in a conversation."""
 
     role: Literal["system", "user", "assistant"]
     parts: tuple[Part, ...]
@@ -38,20 +38,20 @@ class Turn:
 
 @dataclass(frozen=True, slots=True)
 class Prompt:
-    """A conversation that the model is to go on with."""
+    """A conversation that the model continues."""
 
     turns: tuple[Turn, ...]
     schema: Mapping[str, Any] | None = None
-    """JSON Schema that the answer has to follow (`response_format`), for servers that can."""
+    """JSON Schema that the answer must follow (`response_format`), for servers that support it."""
 
     @classmethod
     def of(cls, *parts: Part) -> "Prompt":
-        """A prompt of one turn."""
+        """Create a prompt of one turn."""
         return cls((Turn("user", parts),))
 
     @property
     def parts(self) -> list[Part]:
-        """Words and images of all turns, in order."""
+        """Texts and images of all turns, in order."""
         return [part for turn in self.turns for part in turn.parts]
 
     @property
@@ -61,11 +61,11 @@ class Prompt:
 
     @property
     def text(self) -> str:
-        """The words alone; `<image>` stands for an image."""
+        """The texts alone; `<image>` stands for an image."""
         return "\n".join(part.text if isinstance(part, Text) else "<image>" for part in self.parts)
 
     def then(self, answer: str, reply: str) -> "Prompt":
-        """The prompt that follows an answer."""
+        """Return the prompt that follows an answer."""
         turns = (*self.turns, Turn("assistant", (Text(answer),)), Turn("user", (Text(reply),)))
         return Prompt(turns, self.schema)
 

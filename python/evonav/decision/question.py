@@ -1,4 +1,4 @@
-"""What a question to a decision model is: a prompt, a grammar for its answer, and a type for what the answer means.
+"""Define questions to a decision model: a prompt, a grammar for the answer, and a type for the answer's meaning.
 
 A rule, a recording, a script and a VLM are interchangeable behind `DecisionModel`. Nothing in a question is oracle
 data: candidates are what the agent itself remembers, images what it saw.
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
     from evonav.decision.text.matcher import Matcher
 
 A = TypeVar("A")
-"""What an answer means."""
+"""Type of a parsed answer."""
 
 Fault = Literal["invalid", "refusal", "lost"]
-"""Why there is no answer: one that is against the grammar or names no candidate; the model would not; none came."""
+"""The reason for a missing answer: invalid (against the grammar, or no candidate), refused, or lost on the way."""
 
 
 class AnswerError(DecisionError):
     """A model gave no usable answer to this question; asking again may help."""
 
     def __init__(self, fault: Fault, message: str, text: str = "") -> None:
-        """An error.
+        """Create an error.
 
         Args:
-            fault: Why.
-            message: In words.
-            text: What came instead of an answer.
+            fault: The reason.
+            message: An explanation.
+            text: The model's text, which is no valid answer.
         """
         super().__init__(f"{fault}: {message}")
         self.fault: Fault = fault
@@ -42,27 +42,27 @@ class AnswerError(DecisionError):
 
 @dataclass(frozen=True, slots=True)
 class Reply(Generic[A]):
-    """An answer, and the words that it came in."""
+    """An answer, and the text in which it came."""
 
     answer: A
     text: str
-    """The whole answer: the line that was read, then reasons."""
+    """The whole text: the line that was parsed, then reasons."""
 
 
 class Question(ABC, Generic[A]):
-    """One purpose. Subclasses are frozen dataclasses of what the agent knows, with `kind` and a `goal`."""
+    """A question of one kind. Subclasses are frozen dataclasses of the agent's knowledge, with `kind` and a `goal`."""
 
     kind: ClassVar[str]
-    """Its name in records, counters and pictures, such as `choose`."""
+    """The question's name in records, counters and pictures, such as `choose`."""
     goal: StageInput
 
     @abstractmethod
     def prompt(self) -> Prompt:
-        """What a model is given, its answer's grammar included. Same question, same prompt."""
+        """Return what the model is given, the answer's grammar included; equal questions have equal prompts."""
 
     @abstractmethod
     def parse(self, text: str) -> A:
-        """Reads an answer strictly: the answer proper comes first, reasons on later lines.
+        """Parse an answer strictly: the answer proper comes first, reasons on later lines.
 
         Raises:
             AnswerError: `invalid`: against the grammar, or it names no candidate.
@@ -70,14 +70,14 @@ class Question(ABC, Generic[A]):
 
     @abstractmethod
     def answer_text(self, answer: A) -> str:
-        """An answer as a model should have put it: `parse(words(answer)) == answer`."""
+        """Return an answer as a model should give it: `parse(answer_text(answer)) == answer`."""
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """JSON Schema of what `parse` reads, for servers that hold a model to one: a line, or an array of lines."""
+        """Return the JSON Schema of an answer: one line, or an array of lines."""
         return {"type": "string"}
 
     def alternatives(self, answer: A) -> Sequence[A]:
-        """The other valid answers, in a fixed order: what a model that errs could have said."""
+        """Return the other valid answers, in a fixed order: those that a mistaken model could give."""
         return ()
 
     def by_rule(self, matcher: "Matcher") -> tuple[A, str]:
@@ -98,14 +98,14 @@ class ClosedQuestion(Question[A]):
 
     @abstractmethod
     def choices(self) -> Sequence[A]:
-        """All valid answers, in a fixed order."""
+        """Return all valid answers, in a fixed order."""
 
     def answer_schema(self) -> Mapping[str, Any]:
-        """One of the choices."""
+        """Return the schema of one of the choices."""
         return {"type": "string", "enum": [self.answer_text(choice) for choice in self.choices()]}
 
     def alternatives(self, answer: A) -> Sequence[A]:
-        """Every other choice."""
+        """Return every other choice."""
         return [choice for choice in self.choices() if choice != answer]
 
 
@@ -113,35 +113,35 @@ class YesNoQuestion(ClosedQuestion[bool]):
     """A question that is answered by `yes` or `no`."""
 
     def choices(self) -> Sequence[bool]:
-        """Yes and no."""
+        """Return yes and no."""
         return (True, False)
 
     def parse(self, text: str) -> bool:
-        """A first line that begins with the word `yes` or `no`, whatever the case."""
+        """Read a first line that begins with the word `yes` or `no`, in any case."""
         match = re.match(r"(yes|no)\b", first_line(text), re.IGNORECASE)
         if match is None:
             raise AnswerError("invalid", f"neither yes nor no: {first_line(text)[:80]!r}", text)
         return match[1].lower() == "yes"
 
     def answer_text(self, answer: bool) -> str:
-        """`yes` or `no`."""
+        """Return `yes` or `no`."""
         return "yes" if answer else "no"
 
 
 class DecisionModel(Protocol):
-    """Answers questions."""
+    """A model that answers questions."""
 
     @property
     def needs_images(self) -> bool:
-        """Whether questions should hold images; agents then ask for colours, which cost rendering time."""
+        """True if questions should have images; agents then ask for colours, which cost rendering time."""
         ...
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
-        """The answer to a question.
+        """Answer a question.
 
         Args:
-            question: What is asked.
-            attempt: How often the same question was asked before without use.
+            question: The question.
+            attempt: Number of earlier tries of this question without a valid answer.
 
         Raises:
             AnswerError: There is no usable answer this time.
@@ -151,10 +151,10 @@ class DecisionModel(Protocol):
 
 
 def first_line(text: str) -> str:
-    """The first line that is not empty, without surrounding space; empty if there is none."""
+    """Return the first line that is not empty, without surrounding space; empty if there is none."""
     return next((line.strip() for line in text.splitlines() if line.strip()), "")
 
 
 def lines_of(text: str) -> list[str]:
-    """The lines that are not empty, without surrounding space."""
+    """Return the lines that are not empty, without surrounding space."""
     return [line.strip() for line in text.splitlines() if line.strip()]

@@ -6,10 +6,10 @@ from evonav.errors import InvalidArgumentError
 
 
 def read_rates(text: str, known: Sequence[str]) -> dict[str, float]:
-    """Reads `name=number,name=number`.
+    """Read `name=number,name=number`.
 
     Raises:
-        InvalidArgumentError: A name is not known, said twice, or has no number.
+        InvalidArgumentError: A name is unknown, occurs twice, or has no number.
     """
     rates: dict[str, float] = {}
     for item in filter(None, (part.strip() for part in text.split(","))):

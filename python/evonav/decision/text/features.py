@@ -1,4 +1,4 @@
-"""Instructions and labels compared by meaning: a stand-in for CLIP's image features where a perception has none.
+"""Compare instructions and labels by meaning: a stand-in for CLIP's image features if a perception has none.
 
 Needs the extra `evonav[text]`. It is a reading of ours, not the paper's: Sec. C.4 compares images with text.
 """
@@ -12,12 +12,12 @@ from evonav.decision.text.language import canonical
 from evonav.decision.text.minilm import encoder
 
 _DECIMALS = 4
-"""Of a similarity: how many threads add up a product shows in the seventh."""
+"""Decimals of a similarity: the number of threads changes a product in the seventh."""
 
 
 @lru_cache(maxsize=4096)
 def text_feature(text: str) -> NDArray[np.float32]:
-    """`(384,)` unit feature of a sentence.
+    """Return the `(384,)` unit feature of a sentence.
 
     Raises:
         InvalidArgumentError: The extra is missing or broken.
@@ -28,10 +28,10 @@ def text_feature(text: str) -> NDArray[np.float32]:
 
 
 def similarity_of_label(instruction: str, label: str) -> float:
-    """Cosine between an instruction and what a label says, -1 to 1.
+    """Return the cosine between an instruction and a label, -1 to 1.
 
     Args:
-        instruction: English.
+        instruction: English text.
         label: ProcTHOR's type or a detector's word.
 
     Raises:

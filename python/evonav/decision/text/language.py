@@ -1,4 +1,4 @@
-"""Reads navigation instructions by rule: what to find, in which room, on what, beside what.
+"""Read navigation instructions by rule: what to find, in which room, on what, beside what.
 
 The grammar of evonav's own instructions is in `evonav.tasks.language`; this reads that and freer wording, since
 released tasks carry sentences of a language model. Words are compared as nouns: lower case, CamelCase split, synonyms
@@ -64,7 +64,7 @@ SYNONYMS: dict[str, str] = {
     "waste basket": "garbage can",
     "wastebasket": "garbage can",
 }
-"""Other words for ProcTHOR's types, as `canonical` writes them."""
+"""Synonyms of ProcTHOR's types, as `canonical` writes them."""
 
 ROOMS = ("bedroom", "kitchen", "living room", "bathroom")
 """ProcTHOR's room types."""
@@ -101,7 +101,7 @@ _RELATIONS: tuple[tuple[RelationKind, str], ...] = (
     ("near", r"directly below|just below|below|underneath|beneath|under|above|over"),
     ("in", r"located in|in"),
 )
-_RELATION = re.compile("|".join(f"(?P<r{i}>\\b(?:{words})\\b)" for i, (_, words) in enumerate(_RELATIONS)))
+_RELATION = re.compile("|".join(f"(?P<r{i}>\\b(?:{phrases})\\b)" for i, (_, phrases) in enumerate(_RELATIONS)))
 _GOAL = re.compile(
     r"\b(?:navigate|go|head|walk|move|drive|proceed|get|come)\s+(?:over\s+)?(?:to|towards?)\b"
     r"|\b(?:find|locate|reach|approach|search for|look for|looking for|visit)\b"
@@ -112,34 +112,34 @@ _COLOUR_PAIR = re.compile(rf"\b({'|'.join(COLOURS)}) and ({'|'.join(COLOURS)})\b
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """The target is in, on or near something."""
+    """A relation of the target: in, on or near something."""
 
     kind: RelationKind
     noun: str
-    """Canonical."""
+    """Canonical name of the other object or of the room."""
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What an instruction asks for."""
+    """The content of an instruction."""
 
     noun: str
-    """Canonical name of what to find."""
+    """Canonical name of the target."""
     relations: tuple[Relation, ...] = ()
     adjectives: tuple[str, ...] = ()
-    """Words of `evonav.tasks.language` for its size, form, colours and material."""
+    """Words of `evonav.tasks.language` for its size, shape, colours and material."""
 
     @property
     def room(self) -> str | None:
-        """The room it is in, if said."""
+        """The room of the target, if stated."""
         return next((relation.noun for relation in self.relations if relation.kind == "in"), None)
 
 
 @lru_cache(maxsize=4096)
-def canonical(words: str) -> str:
-    """One spelling a thing: "DiningTable", "the dining tables" and "dining table" are all `dining table`."""
-    words = noun_of(words) if re.fullmatch(r"[A-Z]\w*", words) and any(c.islower() for c in words) else words
-    tokens = [token for token in re.findall(r"[a-z0-9]+", words.lower()) if token not in _ARTICLES]
+def canonical(phrase: str) -> str:
+    """Return one spelling of a noun: "DiningTable", "the dining tables" and "dining table" are all `dining table`."""
+    phrase = noun_of(phrase) if re.fullmatch(r"[A-Z]\w*", phrase) and any(c.islower() for c in phrase) else phrase
+    tokens = [token for token in re.findall(r"[a-z0-9]+", phrase.lower()) if token not in _ARTICLES]
     noun = " ".join(tokens)
     for spelling in (noun, _singular(noun)):
         if spelling in SYNONYMS:
@@ -159,10 +159,10 @@ def _singular(noun: str) -> str:
 
 @lru_cache(maxsize=65536)
 def similarity(noun: str, label: str) -> float:
-    """How well a label names a canonical noun: 1 the same, 0 no word in common.
+    """Return how well a label names a canonical noun: 1 the same, 0 no word in common.
 
     Args:
-        noun: Canonical.
+        noun: A canonical noun.
         label: A detector's word, in any spelling.
     """
     other = canonical(label)
@@ -179,8 +179,8 @@ def parse_goal(instruction: str, category: str | None = None) -> Goal:
     """Parse an instruction, each only once.
 
     Args:
-        instruction: English, in evonav's grammar or freer.
-        category: Of the target, when it is given; else it is read from the sentence.
+        instruction: English text, in evonav's grammar or freer.
+        category: Category of the target; by default it is read from the sentence.
 
     Returns:
         What was understood; never fails. A noun that cannot be made out is empty.
@@ -195,15 +195,15 @@ def parse_goal(instruction: str, category: str | None = None) -> Goal:
     relations: list[Relation] = []
     for match, following in zip_longest(matches, matches[1:]):
         kind = next(_RELATIONS[i][0] for i in range(len(_RELATIONS)) if match.group(f"r{i}"))
-        said = text[match.end() : following.start() if following else len(text)]
-        for thing in _things(said):
+        clause = text[match.end() : following.start() if following else len(text)]
+        for thing in _things(clause):
             relation = _relation(kind, thing)
             if relation is not None and relation.noun != noun and relation not in relations:
                 relations.append(relation)
-    # Up to the parts, whose colours are not its own.
-    looks = re.split(r"\bwith\b", text[: matches[0].start()] if matches else text)[0]
-    words = [word for word in re.findall(r"[a-z]+(?:-[a-z]+)?", looks) if word not in noun.split()]
-    adjectives = tuple(dict.fromkeys(_ADJECTIVES[word] for word in words if word in _ADJECTIVES))
+    # Up to the description of parts, whose colours are not the target's.
+    appearance = re.split(r"\bwith\b", text[: matches[0].start()] if matches else text)[0]
+    tokens = [token for token in re.findall(r"[a-z]+(?:-[a-z]+)?", appearance) if token not in noun.split()]
+    adjectives = tuple(dict.fromkeys(_ADJECTIVES[token] for token in tokens if token in _ADJECTIVES))
     return Goal(noun, tuple(relations), adjectives)
 
 
@@ -218,26 +218,26 @@ def _relation(kind: RelationKind, thing: str) -> Relation | None:
     return Relation("on" if kind == "in" else kind, noun)
 
 
-def _things(said: str) -> Iterable[str]:
-    """Noun phrases of `the sink and the mug`."""
-    for part in re.split(r"\band\b|,", said):
+def _things(clause: str) -> Iterable[str]:
+    """Yield the noun phrases of `the sink and the mug`."""
+    for part in re.split(r"\band\b|,", clause):
         phrase = _phrase(part)
         if phrase:
             yield phrase
 
 
-def _phrase(said: str) -> str:
-    """The first noun phrase: up to punctuation or a clause."""
-    end = _STOP.search(said)
-    return (said[: end.start()] if end else said).strip()
+def _phrase(clause: str) -> str:
+    """Return the first noun phrase: up to punctuation or a clause."""
+    end = _STOP.search(clause)
+    return (clause[: end.start()] if end else clause).strip()
 
 
 def _without_adjectives(phrase: str) -> str:
-    """The last known noun of the phrase, or all of it without articles and adjectives."""
+    """Return the last known noun of the phrase, or all of it without articles and adjectives."""
     tokens = [t for t in re.findall(r"[a-z0-9']+", phrase) if t not in _ARTICLES]
     for end in range(len(tokens), 0, -1):
         for length in range(min(3, end), 0, -1):
-            words = " ".join(tokens[end - length : end])
-            if canonical(words) in _NOUNS:
-                return words
+            known = " ".join(tokens[end - length : end])
+            if canonical(known) in _NOUNS:
+                return known
     return " ".join(t for t in tokens if t not in _ADJECTIVES)

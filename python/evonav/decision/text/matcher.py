@@ -1,4 +1,4 @@
-"""What rules know of goals and homes: nouns, relations by geometry, and rooms by what stands in them."""
+"""Match goals with remembered objects: nouns, relations by geometry, and rooms by the objects in them."""
 
 import math
 from collections import defaultdict
@@ -34,42 +34,42 @@ ROOM_SIGNS: dict[str, tuple[str, ...]] = {
     "bedroom": ("bed", "dresser", "alarm clock", "laundry hamper"),
     "living room": ("sofa", "television", "tv stand", "coffee table", "arm chair", "remote control"),
 }
-"""Things that mostly stand in one type of room."""
+"""Objects that mostly stand in one type of room."""
 _ROOM_OF_SIGN = {sign: room for room, signs in ROOM_SIGNS.items() for sign in signs}
 
 
 @dataclass(frozen=True, slots=True)
 class TextMatchConfig:
-    """The rules' thresholds."""
+    """Thresholds of the rules."""
 
     near_m: float = 1.0
     """Largest gap between boxes that are near each other."""
     support_margin_m: float = 0.15
-    """How far the centre of what stands on something may lie outside its box, and its bottom above it."""
+    """Largest distance of an object's centre outside of its support's box, and of its bottom above that box."""
     room_radius_m: float = 3.5
-    """Within which things speak for a room."""
+    """Distance up to which objects indicate a room."""
     min_relations: float = 0.6
     """Share of an instruction's relations that must hold before exploration ends for a candidate."""
     unknown_room: float = 0.5
-    """What a room that cannot be told counts for."""
+    """Value of a room that is unknown."""
     hurry_rounds: int = 8
-    """With no more rounds left than this, any candidate of the right category will do."""
+    """Number of remaining rounds from which any candidate of the right category is accepted."""
     min_similarity: float = 0.99
-    """From which on a label names the goal."""
+    """Smallest similarity at which a label names the goal."""
     lead_radius_m: float = 3.0
     """A frontier this near something that the instruction mentions is worth a detour..."""
     lead_m: float = 3.0
     """...of this length."""
     min_image_share: float = 0.002
-    """Verification: an object that would cover less of the image is not missed (detectors give up at 0.001)."""
+    """Verification: an object that would cover less of the image cannot be missed (detectors give up at 0.001)."""
     same_place_m: float = 0.5
     """Verification: centres this near are the same place."""
     min_overlap: float = 0.2
-    """Verification: or this share of what is seen lies by what is remembered."""
+    """Verification: or this share of the object's points lies by the remembered object's points."""
 
 
 class Matcher:
-    """Compares goals with remembered things."""
+    """Compares goals with remembered objects."""
 
     def __init__(self, config: TextMatchConfig | None = None) -> None:
         self.config = config or TextMatchConfig()
@@ -79,21 +79,21 @@ class Matcher:
         return parse_goal(goal.unified_instruction, goal.category)
 
     def names_goal(self, goal: Goal, entry: ObjectCandidate) -> bool:
-        """Whether an entry's label is what the goal calls its target."""
+        """Return whether an entry's label is the goal's name for its target."""
         return similarity(goal.noun, entry.label) >= self.config.min_similarity
 
     def label_score(self, goal: Goal, label: str) -> float:
-        """1 for the goal's own label, less for part of it, less again for what it is said to be on or near."""
+        """Return 1 for the goal's own label, less for part of it, still less for a related object."""
         own = similarity(goal.noun, label)
         if own >= self.config.min_similarity:
             return own
-        said = [0.5 if r.kind == "on" else 0.4 for r in goal.relations if similarity(r.noun, label) >= 1.0]
-        return max([0.9 * own if own >= 0.4 else 0.0, *said])
+        related = [0.5 if r.kind == "on" else 0.4 for r in goal.relations if similarity(r.noun, label) >= 1.0]
+        return max([0.9 * own if own >= 0.4 else 0.0, *related])
 
     def relation_share(self, goal: Goal, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
-        """Share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.
+        """Return the share of the relations that hold, 1 if there is none. Doors and windows are in no object memory.
 
-        What is said of looks is left out: memory has no colours, and a thing that is small for its kind may be the
+        Adjectives do not count: memory has no colours, and an object that is small for its kind may be the
         larger of two that are remembered.
         """
         judged = [
@@ -102,7 +102,7 @@ class Matcher:
         return sum(judged) / len(judged) if judged else 1.0
 
     def _holds(self, relation: Relation, entry: ObjectCandidate, around: Sequence[ObjectCandidate]) -> float:
-        """1 if a relation of an entry holds, 0 if not."""
+        """Return 1 if a relation of an entry holds, 0 if not."""
         if relation.kind == "in":
             room = self.room_around(entry.ground_m, around)
             return self.config.unknown_room if room is None else float(room == relation.noun)
@@ -112,7 +112,7 @@ class Matcher:
         return float(any(gap_m(entry, other) <= self.config.near_m for other in others))
 
     def is_on(self, entry: ObjectCandidate, support: ObjectCandidate) -> bool:
-        """Whether a thing stands on, or in, another, by their boxes."""
+        """Return whether an object stands on, or in, another, by their boxes."""
         margin_m = self.config.support_margin_m
         for axis in (0, 2):
             if abs(entry.centre_m[axis] - support.centre_m[axis]) > support.size_m[axis] / 2 + margin_m:
@@ -122,16 +122,16 @@ class Matcher:
         return low_m - margin_m <= bottom_m <= low_m + support.size_m[1] + margin_m
 
     def room_around(self, place_m: Point2, around: Sequence[ObjectCandidate]) -> str | None:
-        """The type of room that things around a place speak for, the nearer the louder; `None` if none does."""
+        """Return the type of room that nearby objects indicate, the nearer the more; `None` if none does."""
         return self.room_of_signs(place_m, self.room_signs(around))
 
     def room_signs(self, around: Sequence[ObjectCandidate]) -> list[tuple[str, Point2]]:
-        """The things that speak for a type of room: that room, and where they stand."""
+        """Return the objects that indicate a type of room: that room, and where they stand."""
         rooms = ((_ROOM_OF_SIGN.get(canonical(other.label)), other) for other in around)
         return [(room, other.ground_m) for room, other in rooms if room is not None]
 
     def room_of_signs(self, place_m: Point2, signs: Sequence[tuple[str, Point2]]) -> str | None:
-        """As `room_around`, of things that were read before: for many places among the same ones."""
+        """Return the same as `room_around`, from objects that were read before: for many places among the same ones."""
         votes: dict[str, list[float]] = defaultdict(list)
         (x_m, z_m), radius_m = place_m, self.config.room_radius_m
         for room, (other_x_m, other_z_m) in signs:
@@ -143,7 +143,7 @@ class Matcher:
         return max(sorted(votes), key=lambda room: math.fsum(votes[room]), default=None)
 
     def frontier_cost_m(self, goal: Goal, frontier: FrontierCandidate, around: Sequence[ObjectCandidate]) -> float:
-        """Travel, less what a hint is worth: something the instruction mentions, or the right kind of room."""
+        """Return the distance to travel, less the value of a hint: a mentioned object, or the right type of room."""
         mentioned = {relation.noun for relation in goal.relations if relation.kind != "in"}
         is_lead = any(
             canonical(other.label) in mentioned
@@ -156,7 +156,7 @@ class Matcher:
 
 
 def gap_m(a: ObjectCandidate, b: ObjectCandidate) -> float:
-    """Distance between two boxes on the ground plane; 0 if they overlap there."""
+    """Return the distance between two boxes on the ground plane; 0 if they overlap there."""
     gaps_m = (
         max(0.0, abs(a.centre_m[axis] - b.centre_m[axis]) - (a.size_m[axis] + b.size_m[axis]) / 2) for axis in (0, 2)
     )

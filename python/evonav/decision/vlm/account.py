@@ -1,4 +1,4 @@
-"""What asking a model costs: tokens, money, and a limit that is not passed."""
+"""Account for what asking a model costs: tokens, money, and a limit."""
 
 import json
 import math
@@ -11,9 +11,9 @@ from evonav.decision.vlm.ledger import Ledger
 from evonav.errors import InvalidArgumentError
 
 CHARACTERS_PER_TOKEN = 3.0
-"""Fewest that English has on average (about 4): estimates are too high rather than too low."""
+"""Smallest average number of characters a token in English (about 4): estimates are rather too high."""
 LOW_DETAIL_TOKENS, TILE_TOKENS, TILE_PX = 85, 170, 512
-"""Of images, as gpt-4o counts them: a base, and so much a tile."""
+"""Tokens of images, as gpt-4o counts them: a base, and a number for each tile."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,27 +24,27 @@ class Usage:
     output_tokens: int = 0
 
     def __add__(self, other: "Usage") -> "Usage":
-        """Both together."""
+        """Return the sum of both."""
         return Usage(self.input_tokens + other.input_tokens, self.output_tokens + other.output_tokens)
 
 
 @dataclass(frozen=True, slots=True)
 class Price:
-    """US dollars a million tokens."""
+    """A model's price in US dollars a million tokens."""
 
     input_usd: float
     output_usd: float
 
     def of(self, usage: Usage) -> float:
-        """US dollars."""
+        """Return the cost in US dollars."""
         return (self.input_usd * usage.input_tokens + self.output_usd * usage.output_tokens) / 1e6
 
 
 def read_prices(path: Path | str) -> dict[str, Price]:
-    """A price table: `{"gpt-4o": {"input_usd": 2.5, "output_usd": 10.0}}`, dollars a million tokens.
+    """Read a price table: `{"gpt-4o": {"input_usd": 2.5, "output_usd": 10.0}}`, dollars a million tokens.
 
     Raises:
-        InvalidArgumentError: With file, field and value.
+        InvalidArgumentError: The table is invalid; the message has file, field and value.
     """
     try:
         table = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -65,7 +65,7 @@ def read_prices(path: Path | str) -> dict[str, Price]:
 
 
 def image_tokens(size_px: tuple[int, int], detail: str) -> int:
-    """Tokens of an image, as gpt-4o counts them; other models differ.
+    """Return the tokens of an image, as gpt-4o counts them; other models differ.
 
     Args:
         size_px: Width and height.
@@ -74,14 +74,14 @@ def image_tokens(size_px: tuple[int, int], detail: str) -> int:
     if detail == "low":
         return LOW_DETAIL_TOKENS
     scale = min(1.0, 2048 / max(size_px))
-    sides = [side * scale for side in size_px]
-    scale = min(1.0, 768 / min(sides))
-    tiles = math.prod(math.ceil(side * scale / TILE_PX) for side in sides)
+    edges_px = [edge_px * scale for edge_px in size_px]
+    scale = min(1.0, 768 / min(edges_px))
+    tiles = math.prod(math.ceil(edge_px * scale / TILE_PX) for edge_px in edges_px)
     return LOW_DETAIL_TOKENS + TILE_TOKENS * tiles
 
 
 class Account:
-    """Counts what is spent, and refuses what would pass the limit. Any number of threads may use it."""
+    """Counts spending, and refuses questions that might pass the limit. Any number of threads may use it."""
 
     def __init__(
         self,
@@ -91,13 +91,13 @@ class Account:
         ledger: Ledger | None = None,
         model: str = "",
     ) -> None:
-        """An account with nothing spent.
+        """Create an account without spending.
 
         Args:
-            price: Without one, costs are unknown.
-            max_cost_usd: Most that may be spent; needs a price.
-            ledger: Books everything as well, and holds the limit over all processes that share it.
-            model: Whose account this is in the ledger.
+            price: The model's price; without one, costs are unknown.
+            max_cost_usd: Largest total cost; needs a price.
+            ledger: Ledger that stores everything as well, and applies the limit to all processes that share it.
+            model: The account's name in the ledger.
 
         Raises:
             InvalidArgumentError: The limit is not finite and positive, or there is no price to hold it by.
@@ -118,11 +118,11 @@ class Account:
 
     @property
     def cost_usd(self) -> float | None:
-        """Spent so far by this process; `None` without prices."""
+        """Cost of this process so far; `None` without a price."""
         return None if self.price is None else self.price.of(self.usage)
 
     def reserve(self, estimate: Usage) -> float:
-        """Sets the cost of a question aside before it is asked.
+        """Reserve the cost of a question before it is asked.
 
         Returns:
             What `settle` has to be given.
@@ -143,7 +143,7 @@ class Account:
         return cost_usd
 
     def settle(self, reserved_usd: float, usage: Usage | None) -> None:
-        """Books what was used in place of what was set aside; `None` if nothing was."""
+        """Replace a reserved cost by what was used; `None` if nothing was."""
         with self._lock:
             self._reserved_usd -= reserved_usd
             if usage is not None:
@@ -161,7 +161,7 @@ class Account:
             )
 
     def replayed(self) -> None:
-        """Counts an answer that was had for nothing."""
+        """Count an answer that came from the cache."""
         with self._lock:
             self.num_replayed += 1
         if self._ledger is not None:

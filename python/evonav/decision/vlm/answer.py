@@ -1,4 +1,4 @@
-"""What a server's response says: the answer whole, or what is wrong with it."""
+"""Read a server's response: a complete answer, or an error."""
 
 import json
 from collections.abc import Sequence
@@ -12,19 +12,19 @@ from evonav.decision.vlm.response_cache import Failure, JsonObject
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A whole answer."""
+    """A complete answer."""
 
     text: str
     model: str
-    """As the server calls it, with its version."""
+    """The model's name and version, from the server."""
     usage: Usage
     key: str
-    """Of the exchange."""
+    """Key of the exchange in the cache."""
     is_replayed: bool
 
 
 def usage_of(response: JsonObject) -> Usage | None:
-    """Tokens as the server counts them; `None` where it does not."""
+    """Return the tokens that the server counted; `None` if it counts none."""
     usage = response.get("usage")
     counts = [usage.get(name) for name in ("prompt_tokens", "completion_tokens")] if isinstance(usage, dict) else []
     numbers = [count for count in counts if isinstance(count, int) and count >= 0]
@@ -32,10 +32,10 @@ def usage_of(response: JsonObject) -> Usage | None:
 
 
 def read_answer(response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
-    """The answer in a response.
+    """Return the answer in a response.
 
     Raises:
-        VlmError: There is none that is whole.
+        VlmError: There is no complete answer.
     """
     choices = response.get("choices")
     choice = choices[0] if isinstance(choices, list) and choices else None
@@ -51,13 +51,13 @@ def read_answer(response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
     if reason == "length":
         raise VlmError("truncated", f"cut off after {len(content)} characters: {content[:80]!r}")
     if not content.strip():
-        raise VlmError("empty", f"an answer without words (finish_reason {reason!r})")
+        raise VlmError("empty", f"an empty answer (finish_reason {reason!r})")
     model = response.get("model")
     return Answer(content, model if isinstance(model, str) else "", usage_of(response) or Usage(), key, is_replayed)
 
 
 def is_malformed(outcome: JsonObject | Failure) -> bool:
-    """Whether it is no response of a model at all; one that refuses or is cut off is one."""
+    """Return whether it is no response of a model at all; a refusal or a truncated answer is one."""
     if isinstance(outcome, Failure):
         return True
     try:
@@ -68,7 +68,7 @@ def is_malformed(outcome: JsonObject | Failure) -> bool:
 
 
 def _content(content: Any) -> str:  # noqa: ANN401
-    """A message's words: a string, or parts of which some are text.
+    """Return a message's text, which is a string, or parts of which some are text.
 
     Raises:
         VlmError: It is neither.
@@ -79,4 +79,4 @@ def _content(content: Any) -> str:  # noqa: ANN401
         return content
     if isinstance(content, Sequence) and all(isinstance(part, dict) for part in content):
         return "".join(part["text"] for part in content if isinstance(part.get("text"), str))
-    raise VlmError("malformed", f"content: expected words, got {str(content)[:80]!r}")
+    raise VlmError("malformed", f"content: expected text, got {str(content)[:80]!r}")

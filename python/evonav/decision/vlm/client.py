@@ -1,4 +1,4 @@
-"""Asks a vision-language model behind any OpenAI-compatible endpoint.
+"""Ask a vision-language model behind any OpenAI-compatible endpoint.
 
     client = VlmClient(VlmConfig("gpt-4o"), store=ResponseCache("exchanges.sqlite"))
     answer = client.ask(Prompt.of(Text("What is this?"), Picture(image)))
@@ -31,47 +31,47 @@ if TYPE_CHECKING:
     import openai
 
 Mode = Literal["live", "record", "replay", "auto"]
-"""`live` keeps nothing, `record` asks and keeps, `replay` never asks, `auto` asks what is not kept."""
+"""`live` stores nothing, `record` asks and stores, `replay` never asks, `auto` asks only what is not cached."""
 MODES: tuple[Mode, ...] = ("live", "record", "replay", "auto")
 MAX_ANSWER_BYTES = 2**20
-"""Longest response that is read as one."""
+"""Longest response that is read."""
 MIN_SECRET_CHARACTERS = 8
-"""Local servers are given keys such as `x`, which answers are full of."""
+"""Shortest key that is removed from messages: local servers have keys such as `x`, a common letter in answers."""
 KEY_VARIABLE, URL_VARIABLE = "OPENAI_API_KEY", "OPENAI_BASE_URL"
 
 
 @dataclass(frozen=True, slots=True)
 class VlmConfig:
-    """How to reach a model."""
+    """Settings to reach a model."""
 
     model: str
     base_url: str | None = None
-    """Of the API, with its `/v1`; default `OPENAI_BASE_URL`, else OpenAI's."""
+    """URL of the API, with its `/v1`; default `OPENAI_BASE_URL`, else OpenAI's."""
     api_key: str | None = field(default=None, repr=False)
-    """Default `OPENAI_API_KEY`; servers of one's own mostly need none."""
+    """Key of the API; default `OPENAI_API_KEY`. Your own server mostly needs none."""
     timeout_s: float = 60.0
-    """Of one try."""
+    """Longest time of one try."""
     max_retries: int = 4
     max_concurrency: int = 4
-    """Most questions under way at a time, over all threads."""
+    """Largest number of concurrent questions, over all threads."""
     temperature: float | None = 0.0
-    """`None` leaves it to the server; some models allow no other."""
+    """Sampling temperature. `None` leaves it to the server; some models allow no other."""
     top_p: float | None = None
-    """`None` leaves it to the server."""
+    """Nucleus sampling. `None` leaves it to the server."""
     seed: int | None = 0
-    """Of the first attempt; `None` leaves it to the server."""
+    """Seed of the first attempt; `None` leaves it to the server."""
     max_tokens: int = 300
-    """Of an answer."""
+    """Longest answer."""
     max_tokens_field: Literal["max_tokens", "max_completion_tokens"] = "max_tokens"
-    """How the server calls that; OpenAI's reasoning models know the second alone."""
+    """Name of that field on the server; OpenAI's reasoning models know only the second."""
     image_detail: Literal["low", "high", "auto"] = "auto"
     requests_per_minute: float | None = None
-    """Most that are begun, by this process; retries of the SDK are not counted."""
+    """Largest rate of requests of this process; retries of the SDK are not counted."""
     tokens_per_minute: float | None = None
-    """Most that may be used, by this process and by estimate."""
+    """Largest rate of tokens of this process, by estimate."""
 
     def __post_init__(self) -> None:
-        """Checks what a typing mistake may have made of it.
+        """Check all fields.
 
         Raises:
             InvalidArgumentError: It names the field.
@@ -95,7 +95,7 @@ class VlmConfig:
 
 
 class VlmClient:
-    """Asks, keeps what came back, and counts what it cost. Any number of threads may use one client."""
+    """Asks a model, caches its responses, and counts the costs. Any number of threads may use one client."""
 
     def __init__(
         self,
@@ -107,16 +107,16 @@ class VlmClient:
         keeps_failures: bool = False,
         keeps_images: bool = True,
     ) -> None:
-        """A client; nothing is asked or imported yet.
+        """Create a client; nothing is asked or imported yet.
 
         Args:
             config: Model and endpoint.
-            store: Of exchanges; every mode but `live` needs one.
-            mode: Default `auto` with a store, else `live`.
-            account: Default one without prices or limit.
-            keeps_failures: In mode `auto`, keep timeouts, lost connections, servers' errors and broken responses as
-                well, so that going on with a run or replaying it meets them again; else they are asked again.
-            keeps_images: Keep the images' files beside their hashes, for people; replays need none.
+            store: Cache of exchanges; every mode but `live` needs one.
+            mode: Default `auto` with a cache, else `live`.
+            account: Default: an account without prices or limit.
+            keeps_failures: In mode `auto`, True caches timeouts, lost connections, servers' errors and broken responses
+                as well, so that they happen again when a run is resumed or replayed; else they are asked again.
+            keeps_images: Store the images' files beside their hashes, for people; replays need none.
 
         Raises:
             InvalidArgumentError: The mode needs a store.
@@ -137,19 +137,19 @@ class VlmClient:
         self._sdk: openai.OpenAI | None = None
 
     def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
-        """The model's answer.
+        """Return the model's answer.
 
         Args:
-            prompt: What is asked.
-            attempt: How often the same was asked before without use: another attempt is another request.
+            prompt: The question.
+            attempt: Number of earlier tries without a valid answer; another attempt is another request.
 
         Raises:
-            VlmError: There is none that could be used; `kind` says why.
+            VlmError: There is no valid answer; `kind` says why.
             StoreError: The exchanges cannot be read or written.
             DecisionError: The package `openai` is missing.
         """
-        kept = self.cached_request(prompt, attempt)
-        key = key_of(kept)
+        cached = self.cached_request(prompt, attempt)
+        key = key_of(cached)
         outcome = None if self.store is None or self.mode not in ("replay", "auto") else self.store.outcome(key)
         is_replayed = outcome is not None
         if outcome is not None:
@@ -157,13 +157,13 @@ class VlmClient:
         elif self.mode == "replay":
             raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {key}")
         else:
-            outcome = self._ask_anew(prompt, attempt, kept)
+            outcome = self._ask_anew(prompt, attempt, cached)
         if isinstance(outcome, Failure):
             raise VlmError(cast("VlmFailure", outcome.kind), outcome.message)
         return read_answer(outcome, key, is_replayed=is_replayed)
 
-    def _ask_anew(self, prompt: Prompt, attempt: int, kept: JsonObject) -> JsonObject | Failure:
-        """Asks the server, and keeps what comes of it as far as the mode and `keeps_failures` say."""
+    def _ask_anew(self, prompt: Prompt, attempt: int, cached: JsonObject) -> JsonObject | Failure:
+        """Ask the server, and store the outcome if the mode and `keeps_failures` require it."""
         images = {image_name(picture.pixels): png_of(picture.pixels) for picture in prompt.pictures}
         request = self.request_of(prompt, lambda pixels: _data_url(images[image_name(pixels)]), attempt)
         outcome: JsonObject | Failure
@@ -176,18 +176,18 @@ class VlmClient:
         if self.store is None or self.mode == "live":
             return outcome
         if self.mode == "auto" and (self.keeps_failures or not is_malformed(outcome)):
-            return self.store.keep_first(kept, images if self.keeps_images else {}, outcome)
+            return self.store.keep_first(cached, images if self.keeps_images else {}, outcome)
         if self.mode == "record" and not isinstance(outcome, Failure) and not is_malformed(outcome):
-            self.store.put(kept, images if self.keeps_images else {}, outcome)
+            self.store.put(cached, images if self.keeps_images else {}, outcome)
         return outcome
 
     @property
     def never_asks(self) -> bool:
-        """Whether there are no answers but those that are kept."""
+        """True if only cached answers are returned."""
         return self.mode == "replay"
 
     def check(self) -> None:
-        """Finds out before the first question what would make all of them fail here; asks nothing.
+        """Check before the first question that the model can be asked; ask nothing.
 
         Raises:
             DecisionError: The package `openai` is missing, or there is no key.
@@ -196,23 +196,23 @@ class VlmClient:
             self._client()
 
     def is_cached(self, prompt: Prompt, attempt: int = 0) -> bool:
-        """Whether the store has what came of a question."""
+        """Return whether the outcome of a question is cached."""
         return self.store is not None and self.store.outcome(key_of(self.cached_request(prompt, attempt))) is not None
 
     def cached_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
-        """The request as it is kept: images by name, and the attempt where nothing else would tell it apart."""
+        """Return the request as it is cached: with names of images, and the attempt if nothing else tells it apart."""
         request = self.request_of(prompt, image_name, attempt)
         return {**request, "attempt": attempt} if attempt and self.config.seed is None else request
 
     def request_of(
         self, prompt: Prompt, url_of: Callable[[NDArray[np.uint8]], str] | None = None, attempt: int = 0
     ) -> JsonObject:
-        """The body that is posted to `/chat/completions`.
+        """Return the body that is posted to `/chat/completions`.
 
         Args:
-            prompt: What is asked.
-            url_of: Of an image; default all of it, as PNG in a `data:` URL.
-            attempt: Counts the seed up.
+            prompt: The question.
+            url_of: Returns the URL of an image; default: the whole image as PNG in a `data:` URL.
+            attempt: Number that is added to the seed.
         """
         config = self.config
         url_of = url_of or (lambda pixels: _data_url(png_of(pixels)))
@@ -233,7 +233,7 @@ class VlmClient:
         return request
 
     def estimate(self, prompt: Prompt) -> Usage:
-        """Tokens that a question may cost, rather too many than too few."""
+        """Estimate the tokens of a question, rather too high than too low."""
         tokens = 0.0
         for part in (part for turn in prompt.turns for part in turn.parts):
             if isinstance(part, Text):
@@ -244,14 +244,14 @@ class VlmClient:
         return Usage(int(tokens) + 1, self.config.max_tokens)
 
     def _ask_server(self, request: JsonObject, estimate: Usage) -> JsonObject:
-        """Asks within the limits of money and of questions at a time."""
+        """Ask within the limits of money and of concurrent questions."""
         reserved_usd = self.account.reserve(estimate)
         usage: Usage | None = None
         try:
             with self._slots:
                 self._pace.wait(estimate.input_tokens)
                 response = self._post(request)
-            # Servers that count no tokens are taken to have used what was expected.
+            # A server that counts no tokens is assumed to have used the estimate.
             usage = usage_of(response) or estimate
             return response
         finally:
@@ -267,18 +267,18 @@ class VlmClient:
         except openai.APITimeoutError as error:
             raise VlmError("timeout", f"no answer in {self.config.timeout_s:g} s") from error
         except openai.APIConnectionError as error:
-            raise VlmError("connection", self._told(error.__cause__ or error)) from None
+            raise VlmError("connection", self._message_of(error.__cause__ or error)) from None
         except openai.RateLimitError as error:
-            # OpenAI answers so too when the account is empty, and waiting does not fill it.
+            # OpenAI also answers so if the account is empty, and waiting does not fill it.
             is_broke = error.code == "insufficient_quota"
-            raise VlmError("over_budget" if is_broke else "rate_limited", self._told(error)) from None
+            raise VlmError("over_budget" if is_broke else "rate_limited", self._message_of(error)) from None
         except (openai.AuthenticationError, openai.PermissionDeniedError) as error:
-            raise VlmError("unauthorized", self._told(error)) from None
+            raise VlmError("unauthorized", self._message_of(error)) from None
         except openai.APIStatusError as error:
             kind: Literal["server", "bad_request"] = "server" if error.status_code >= 500 else "bad_request"
-            raise VlmError(kind, self._told(error)) from None
+            raise VlmError(kind, self._message_of(error)) from None
         except openai.OpenAIError as error:
-            raise VlmError("malformed", self._told(error)) from None
+            raise VlmError("malformed", self._message_of(error)) from None
         if len(text) > MAX_ANSWER_BYTES:
             raise VlmError("oversized", f"a response of {len(text)} characters")
         text = self._without_secrets(text)
@@ -291,7 +291,7 @@ class VlmClient:
         return response
 
     def _client(self) -> "openai.OpenAI":
-        """The SDK's client, made once.
+        """Return the SDK's client, made once.
 
         Raises:
             DecisionError: The package is missing, or there is no key.
@@ -317,15 +317,15 @@ class VlmClient:
     def _key(self) -> str:
         return self.config.api_key or os.environ.get(KEY_VARIABLE) or ""
 
-    def _told(self, error: BaseException) -> str:
-        """An error's words."""
+    def _message_of(self, error: BaseException) -> str:
+        """Return an error's message without secrets."""
         return self._without_secrets(" ".join(str(error).split())[:500])
 
-    def _without_secrets(self, words: str) -> str:
-        """Words without key and address, which servers quote; keys of a few letters are no secrets but words."""
+    def _without_secrets(self, text: str) -> str:
+        """Remove the key and the address, which servers quote, from a text; very short keys stay."""
         for secret in (self._key(), self.config.base_url or os.environ.get(URL_VARIABLE) or ""):
-            words = words.replace(secret, "***") if len(secret) >= MIN_SECRET_CHARACTERS else words
-        return words
+            text = text.replace(secret, "***") if len(secret) >= MIN_SECRET_CHARACTERS else text
+        return text
 
 
 def _message(turn: Turn, detail: str, url_of: Callable[[NDArray[np.uint8]], str]) -> JsonObject:

@@ -1,4 +1,4 @@
-"""What a run would ask a model, found out without asking: the text matcher decides, and every prompt is built."""
+"""Count what a run would ask a model, without asking: the text matcher decides, and every prompt is built."""
 
 from typing import TypeVar
 
@@ -11,24 +11,24 @@ from evonav.decision.vlm.ledger import Ledger
 A = TypeVar("A")
 
 OUTPUT_TOKENS = 100
-"""Taken for an answer: a line and a sentence or two of reasons."""
+"""Assumed length of an answer: a line and a sentence or two of reasons."""
 
 
 class Counting:
-    """A decision model that books what its questions would cost."""
+    """A decision model that notes what its questions would cost."""
 
     def __init__(
         self, model: DecisionModel, client: VlmClient, ledger: Ledger, name: str, *, needs_images: bool, is_json: bool
     ) -> None:
-        """Counts the questions to `model`.
+        """Count the questions to `model`.
 
         Args:
-            model: Answers.
-            client: Estimates; asks nothing.
-            ledger: Books requests and tokens, a row a kind of question.
-            name: Of the episode, before the kind.
-            needs_images: Whether questions shall hold images, as they would for the model.
-            is_json: Whether requests would come with a JSON Schema.
+            model: The model that answers.
+            client: Client that estimates and asks nothing.
+            ledger: Ledger of requests and tokens, a row a kind of question.
+            name: Name of the episode, which precedes the kind.
+            needs_images: True if questions should have images, as they would for the model.
+            is_json: True if requests would come with a JSON Schema.
         """
         self.needs_images = needs_images
         self._model = model
@@ -38,7 +38,7 @@ class Counting:
         self._is_json = is_json
 
     def answer(self, question: Question[A], attempt: int = 0) -> Reply[A]:
-        """The model's answer."""
+        """Return the model's answer."""
         prompt = question.prompt()
         if self._is_json:
             prompt = with_schema(prompt, question.answer_schema())

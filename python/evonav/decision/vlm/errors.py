@@ -1,4 +1,4 @@
-"""What can go wrong between a question and its answer."""
+"""Errors between a question and its answer."""
 
 from typing import Literal
 
@@ -20,11 +20,11 @@ VlmFailure = Literal[
     "not_recorded",
     "over_budget",
 ]
-"""`unusable` is an answer that the asker cannot use though it is one; `not_recorded` a question that a replay lacks."""
+"""Kinds of failures. `unusable`: an answer that the asking program rejects; `not_recorded`: a replay lacks it."""
 
 
 LASTING: frozenset[VlmFailure] = frozenset({"unauthorized", "bad_request", "not_recorded", "over_budget"})
-"""The next question would meet them as well."""
+"""Failures that the next question would meet as well."""
 
 
 class VlmError(DecisionError):

@@ -8,7 +8,7 @@ from PIL import Image
 
 
 def png_of(pixels: NDArray[np.uint8]) -> bytes:
-    """An image as a PNG file.
+    """Return an image as a PNG file.
 
     Args:
         pixels: `(H, W, 3)` RGB.

@@ -1,7 +1,7 @@
-"""What all processes of a run spend together: one SQLite file (WAL), each booking a transaction.
+"""Add up the spending of all processes of a run in one SQLite file (WAL), in transactions.
 
-Costs are set aside before a question is asked, so that no number of processes passes the limit. A process that dies
-with a question under way leaves what it had set aside: the server may have counted it.
+Costs are reserved before a question is asked, so that no number of processes passes the limit. A process that dies
+during a question leaves its reservation: the server may have counted the question.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.shared_file import SharedFile
 
 LEDGER_NAME = "spending.sqlite"
-"""In the folder of a run."""
+"""Name of the file in a run's folder."""
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS spending (
@@ -24,28 +24,28 @@ CREATE TABLE IF NOT EXISTS spending (
 
 @dataclass(frozen=True, slots=True)
 class Spending:
-    """On one model."""
+    """The spending on one model."""
 
     model: str
     num_asked: int
-    """Questions that a server was asked."""
+    """Number of questions put to a server."""
     num_replayed: int
-    """Questions answered by kept exchanges."""
+    """Number of questions answered from the cache."""
     num_without_answer: int
-    """Of those asked: nothing came back that was counted."""
+    """Number of questions put to a server that had no counted answer."""
     input_tokens: int
     output_tokens: int
     cost_usd: float
-    """By the prices given; 0 without."""
+    """Cost by the given prices; 0 without prices."""
     set_aside_usd: float
-    """For questions under way, or of processes that died with one."""
+    """Costs reserved by open questions, or by processes that died during one."""
 
 
 class Ledger(SharedFile):
-    """The file; any number of threads and processes may use it."""
+    """A ledger file; any number of threads and processes may use it."""
 
     def __init__(self, path: Path | str) -> None:
-        """Opens or makes it.
+        """Open or create the file.
 
         Raises:
             StoreError: It cannot be opened.
@@ -53,10 +53,10 @@ class Ledger(SharedFile):
         super().__init__(path, _SCHEMA, "spending")
 
     def reserve(self, model: str, cost_usd: float, max_cost_usd: float | None) -> None:
-        """Sets the cost of a question aside.
+        """Reserve the cost of a question.
 
         Raises:
-            VlmError: With all that is spent and set aside, it might pass the limit.
+            VlmError: Together with all spent and reserved costs it might pass the limit.
             StoreError: The file cannot be written.
         """
         with self._writing():
@@ -77,7 +77,7 @@ class Ledger(SharedFile):
         cost_usd: float,
         is_answered: bool,
     ) -> None:
-        """Books what was used in place of what was set aside.
+        """Replace a reserved cost by what was used.
 
         Raises:
             StoreError: The file cannot be written.
@@ -94,12 +94,12 @@ class Ledger(SharedFile):
             )
 
     def replayed(self, model: str) -> None:
-        """Counts an answer that was had for nothing."""
+        """Count an answer that came from the cache."""
         with self._writing():
             self._add(model, num_replayed=1)
 
     def spending(self) -> list[Spending]:
-        """What was spent, by model."""
+        """Return the spending by model."""
         with self._reading():
             return [Spending(*row) for row in self._db.execute("SELECT * FROM spending ORDER BY model")]
 

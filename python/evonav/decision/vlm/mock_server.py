@@ -1,4 +1,4 @@
-"""A server that speaks the part of OpenAI's API that evonav uses, and misbehaves on request.
+"""Serve the part of OpenAI's API that evonav uses, and misbehave on request.
 
 It lets everything between an agent and a model be tried without a key: `evonav mock-vlm`. Tests script it.
 """
@@ -18,7 +18,7 @@ from evonav.errors import InvalidArgumentError
 JsonObject = dict[str, Any]
 
 MockReply = dict[str, Any]
-"""What the server does with a request; all of it may be left out:
+"""The server's reaction to a request; every key is optional:
 
 `text` or whole `message` of the answer, `finish_reason`; `status`, `headers` and `raw` bytes of the response; `cut`:
 bytes announced but not sent, then the connection is closed; `hang_s`: seconds before anything is sent."""
@@ -43,38 +43,38 @@ FAULTS: dict[str, MockReply] = {
     "empty": {"text": ""},
     "off_topic": {"text": "What a nice home! I would look in the kitchen first."},
 }
-"""What goes wrong with models and servers, by name."""
+"""Failures of models and servers, by name."""
 
 
 class MockServer:
-    """What a server does, and what it saw."""
+    """A mock server's behaviour, and the requests that it received."""
 
     def __init__(
         self, reply: Callable[[JsonObject], MockReply], check: Callable[[JsonObject], None] = lambda request: None
     ) -> None:
-        """A server.
+        """Create a server.
 
         Args:
-            reply: To a request's body.
-            check: Raises if a request is not valid; that is answered with 400 and the error's words.
+            reply: Returns the reply to a request's body.
+            check: Raises if a request is invalid; the server answers with 400 and the error's message.
         """
         self.reply = reply
         self.check = check
         self.script: list[MockReply] = []
         """Replies that come first, one a request."""
         self.requests: list[JsonObject] | None = []
-        """Bodies; `None` to keep none."""
+        """Bodies of requests; `None` to store none."""
         self.keys: set[str] = set()
-        """`Authorization` headers."""
+        """`Authorization` headers of requests."""
         self.num_requests = 0
         self.most_at_once = 0
         self.at_once = 0
         self.lock = threading.Lock()
         self.url = ""
-        """Of the API, once it serves."""
+        """URL of the API, once it serves."""
 
     def response(self, request: JsonObject) -> MockReply:
-        """The reply to a request, by script or rule; 400 if it is not valid."""
+        """Return the reply to a request, by script or rule; 400 if the request is invalid."""
         with self.lock:
             self.num_requests += 1
             if self.requests is not None:
@@ -90,12 +90,12 @@ class MockServer:
 def faulty(
     rates: Mapping[str, float], seed: int = 0, answer: Callable[[JsonObject], str] = mock_answer
 ) -> Callable[[JsonObject], MockReply]:
-    """Replies of a server on which things go wrong.
+    """Return a function that replies as a faulty server does.
 
     Args:
-        rates: Share of requests by name in `FAULTS`.
-        seed: Decides which requests, by their number.
-        answer: To the others.
+        rates: Share of requests, by name in `FAULTS`.
+        seed: Seed that selects the faulty requests, by their number.
+        answer: Answers the other requests.
 
     Raises:
         InvalidArgumentError: A fault is unknown, or the shares are not within 0 to 1.
@@ -123,10 +123,10 @@ def faulty(
 
 
 def without_schemas(request: JsonObject) -> None:
-    """A check for servers that hold no answer to a schema.
+    """Check requests as a server does that supports no schema.
 
     Raises:
-        InvalidArgumentError: The request asks for it.
+        InvalidArgumentError: The request has a schema.
     """
     if "response_format" in request:
         raise InvalidArgumentError("Unsupported parameter: 'response_format' of type 'json_schema'")
@@ -134,10 +134,10 @@ def without_schemas(request: JsonObject) -> None:
 
 @contextmanager
 def serving(server: MockServer, *, host: str = "127.0.0.1", port: int = 0) -> Iterator[MockServer]:
-    """Serves while the context lasts; `server.url` says where.
+    """Serve while the context lasts; `server.url` has the address.
 
     Raises:
-        InvalidArgumentError: The port cannot be had.
+        InvalidArgumentError: The port is not available.
     """
     try:
         http = ThreadingHTTPServer((host, port), _handler(server))

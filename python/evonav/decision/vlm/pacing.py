@@ -1,4 +1,4 @@
-"""Keeping to a server's limits before it has to say so: requests and tokens a minute, evenly spread."""
+"""Respect a server's limits before it complains: requests and tokens a minute, evenly spread."""
 
 import threading
 import time
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 
 class Pace:
-    """Lets questions begin no faster than the limits allow. Any number of threads may use one.
+    """Delays questions so that they begin no faster than the limits allow. Any number of threads may use one.
 
     Each question moves the earliest start of the next one on by its share of a minute, so there is no burst that a
     server with another idea of where minutes begin could object to. `Retry-After` is the client's business.
@@ -20,7 +20,7 @@ class Pace:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Limits; `None` is none."""
+        """Set the limits; `None` is no limit."""
         self._s_a_request = 60.0 / requests_per_minute if requests_per_minute else 0.0
         self._s_a_token = 60.0 / tokens_per_minute if tokens_per_minute else 0.0
         self._clock = clock
@@ -29,7 +29,7 @@ class Pace:
         self._next_s = 0.0
 
     def wait(self, num_tokens: int) -> None:
-        """Waits until a question of so many tokens may begin."""
+        """Wait until a question of a number of tokens may begin."""
         share_s = max(self._s_a_request, self._s_a_token * num_tokens)
         if share_s == 0.0:
             return

@@ -1,10 +1,10 @@
-"""Exchanges with a model, kept: what was asked and what came back, so that it can be had again without asking.
+"""Cache exchanges with a model, requests and responses, so that a question is answered again without asking.
 
 An exchange is found by its question alone: the SHA-256 of the request as canonical JSON, each image replaced by the
-SHA-256 of its pixels. Images are kept once. No key, address or time is kept, so the same exchanges make the same rows.
+SHA-256 of its pixels. Images are stored once. No key, address or time is stored, so equal exchanges make equal rows.
 
-What came instead of a response (a timeout, a lost connection, a server's error) is kept apart, in `failures`, by who
-wants it to happen again in a replay.
+A client may also store failures (timeouts, lost connections, a server's errors), in a table of their own, so that they
+happen again in a replay.
 """
 
 import hashlib
@@ -30,15 +30,15 @@ CREATE TABLE IF NOT EXISTS images (name TEXT PRIMARY KEY, png BLOB NOT NULL) STR
 """
 
 
-def canonical(value: Any) -> str:  # noqa: ANN401
-    """JSON with sorted keys and no spaces: one spelling a value."""
+def canonical_json(value: Any) -> str:  # noqa: ANN401
+    """Return JSON with sorted keys and no spaces: one spelling for a value."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
 
 def image_name(pixels: NDArray[np.uint8]) -> str:
-    """Stands for an image in a kept request: `sha256:` and the hash of its shape and values.
+    """Return the name of an image in a cached request: `sha256:` and the hash of its shape and values.
 
-    Not of its file, whose bytes depend on who compressed it.
+    It is not the hash of its file, whose bytes depend on the compression.
 
     Args:
         pixels: `(H, W, 3)` RGB.
@@ -48,23 +48,23 @@ def image_name(pixels: NDArray[np.uint8]) -> str:
 
 
 def key_of(request: JsonObject) -> str:
-    """What an exchange is found by: SHA-256 of a request with names in place of its images."""
-    return hashlib.sha256(canonical(request).encode()).hexdigest()
+    """Return the key of an exchange: the SHA-256 of a request with names in place of its images."""
+    return hashlib.sha256(canonical_json(request).encode()).hexdigest()
 
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """What came of a question instead of a response."""
+    """The outcome of a question without a response."""
 
     kind: str
     message: str
 
 
 class ResponseCache(SharedFile):
-    """Exchanges in one SQLite file (WAL); any number of threads and processes may use it."""
+    """A cache of exchanges in one SQLite file (WAL); any number of threads and processes may use it."""
 
     def __init__(self, path: Path | str) -> None:
-        """Opens or makes the file.
+        """Open or create the file.
 
         Raises:
             StoreError: It cannot be opened or is no such file.
@@ -72,18 +72,18 @@ class ResponseCache(SharedFile):
         super().__init__(path, _SCHEMA, "exchanges")
 
     def __len__(self) -> int:
-        """Number of exchanges."""
+        """Return the number of exchanges."""
         with self._reading():
             return int(self._db.execute("SELECT count(*) FROM exchanges").fetchone()[0])
 
     @property
     def num_failures(self) -> int:
-        """Number of questions of which something else came."""
+        """Number of questions that failed."""
         with self._reading():
             return int(self._db.execute("SELECT count(*) FROM failures").fetchone()[0])
 
     def get(self, key: str) -> JsonObject | None:
-        """The response kept for a key.
+        """Return the response stored for a key.
 
         Raises:
             StoreError: The file cannot be read, or the response in it is no JSON object.
@@ -101,7 +101,7 @@ class ResponseCache(SharedFile):
         return response
 
     def outcome(self, key: str) -> JsonObject | Failure | None:
-        """What is kept for a key: the response, or what came instead.
+        """Return the response or failure stored for a key.
 
         Raises:
             StoreError: The file cannot be read, or the response in it is no JSON object.
@@ -113,12 +113,12 @@ class ResponseCache(SharedFile):
             return self._failure(key)
 
     def put(self, request: JsonObject, images: Mapping[str, bytes], response: JsonObject) -> str:
-        """Keeps an exchange in place of an older one of the same question; all of it or nothing.
+        """Store an exchange in place of an older one with the same question, in one transaction.
 
         Args:
-            request: With names in place of its images.
+            request: The request, with names in place of its images.
             images: PNG files by `image_name`.
-            response: What came back.
+            response: The response.
 
         Returns:
             Its key.
@@ -136,10 +136,10 @@ class ResponseCache(SharedFile):
     def keep_first(
         self, request: JsonObject, images: Mapping[str, bytes], outcome: JsonObject | Failure
     ) -> JsonObject | Failure:
-        """Keeps an outcome unless there is one of the same question, which another process may have got meanwhile.
+        """Store an outcome unless another process has stored one of the same question meanwhile.
 
         Returns:
-            What is kept: all who ask the same have the same answer, in this run and in every replay of it.
+            The stored outcome: all who ask the same get the same answer, in this run and in every replay of it.
 
         Raises:
             StoreError: The file cannot be written.
@@ -153,7 +153,7 @@ class ResponseCache(SharedFile):
         return outcome if there is None else there
 
     def forget_failures(self) -> int:
-        """Drops what came instead of responses, so that it is asked again; the number of them."""
+        """Drop all failures, so that their questions are asked again, and return their number."""
         with self._writing():
             return self._db.execute("DELETE FROM failures").rowcount
 
@@ -166,19 +166,21 @@ class ResponseCache(SharedFile):
     ) -> None:
         self._db.executemany("INSERT OR IGNORE INTO images VALUES (?, ?)", images.items())
         if isinstance(outcome, Failure):
-            row = (key, canonical(request), outcome.kind, outcome.message)
+            row = (key, canonical_json(request), outcome.kind, outcome.message)
             self._db.execute("INSERT INTO failures VALUES (?, ?, ?, ?)", row)
         else:
-            self._db.execute("INSERT INTO exchanges VALUES (?, ?, ?)", (key, canonical(request), canonical(outcome)))
+            self._db.execute(
+                "INSERT INTO exchanges VALUES (?, ?, ?)", (key, canonical_json(request), canonical_json(outcome))
+            )
 
     def image(self, name: str) -> bytes | None:
-        """An image's PNG file."""
+        """Return an image's PNG file."""
         with self._reading():
             row = self._db.execute("SELECT png FROM images WHERE name = ?", (name,)).fetchone()
         return None if row is None else bytes(row[0])
 
     def requests(self) -> Iterator[JsonObject]:
-        """What was asked, in order of key; images as hashes."""
+        """Yield all requests in order of key, with hashes in place of images."""
         with self._reading():
             rows = self._db.execute("SELECT request FROM exchanges ORDER BY key").fetchall()
         for (text,) in rows:

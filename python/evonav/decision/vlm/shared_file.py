@@ -1,4 +1,4 @@
-"""A SQLite file (WAL) that any number of threads and processes read and write, a transaction at a time."""
+"""A SQLite file (WAL) that any number of threads and processes read and write in transactions."""
 
 import sqlite3
 import threading
@@ -10,15 +10,15 @@ from evonav.errors import StoreError
 
 
 class SharedFile:
-    """Base of what is kept in such a file."""
+    """A file with one schema, opened for reading and writing."""
 
     def __init__(self, path: Path | str, schema: str, what: str) -> None:
-        """Opens or makes the file.
+        """Open or create the file.
 
         Args:
-            path: Its folder is made if need be.
-            schema: SQL that makes what is not there.
-            what: Is kept, for messages.
+            path: Path of the file; its folder is created if it is missing.
+            schema: SQL that creates missing tables.
+            what: The content, for error messages.
 
         Raises:
             StoreError: It cannot be opened or is no such file.
@@ -26,7 +26,7 @@ class SharedFile:
         self.path = Path(path)
         self._what = what
         self._lock = threading.Lock()
-        with self._told():
+        with self._store_errors():
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(self.path, timeout=60.0, check_same_thread=False, isolation_level=None)
             self._db.execute("PRAGMA journal_mode = WAL")
@@ -34,19 +34,19 @@ class SharedFile:
             self._db.executescript(schema)
 
     def close(self) -> None:
-        """Closes the file."""
+        """Close the file."""
         with self._reading():
             self._db.close()
 
     @contextmanager
     def _reading(self) -> Iterator[None]:
-        with self._lock, self._told():
+        with self._lock, self._store_errors():
             yield
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """All of it or nothing, and nobody else's in between."""
-        with self._lock, self._told():
+        """Run the block as one exclusive transaction."""
+        with self._lock, self._store_errors():
             self._db.execute("BEGIN IMMEDIATE")
             try:
                 yield
@@ -56,7 +56,7 @@ class SharedFile:
                 raise
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _store_errors(self) -> Iterator[None]:
         try:
             yield
         except (sqlite3.Error, OSError, ValueError) as error:
