@@ -114,8 +114,8 @@ class VlmClient:
             store: Cache of exchanges; every mode but `live` needs one.
             mode: Default `auto` with a cache, else `live`.
             account: Default: an account without prices or limit.
-            keeps_failures: In mode `auto`, True caches timeouts, lost connections, servers' errors and broken responses
-                as well, so that they happen again when a run is resumed or replayed; else they are asked again.
+            keeps_failures: True to cache timeouts, lost connections, servers' errors and broken responses in mode
+                `auto`, so that they happen again when a run is resumed or replayed; else they are asked again.
             keeps_images: Store the images' files beside their hashes, for people; replays need none.
 
         Raises:
