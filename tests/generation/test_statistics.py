@@ -13,8 +13,8 @@ from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.generation import generate_tasks
 from evonav.generation.dataset import generate_dataset
 from evonav.generation.statistics.compute import statistics_of, statistics_of_folders
-from evonav.generation.statistics.metrics import MEASURES, PAPER_EVOLUTIONS
-from evonav.generation.statistics.task_summary import TaskFacts, expected_evolutions, facts_of, read_all_facts
+from evonav.generation.statistics.metrics import METRICS, PAPER_EVOLUTIONS
+from evonav.generation.statistics.task_summary import TaskSummary, expected_evolutions, read_summaries, summary_of
 from evonav.house import bundled_houses
 from evonav.report.plots.render import check_plot
 from evonav.report.tasks.dataset_page import write_dataset_report, write_statistics_plot
@@ -23,8 +23,8 @@ from evonav.tasks.records import parse_record
 from evonav.tasks.statistics import TaskStatistics
 
 
-def facts_of_task(task: Task) -> TaskFacts:
-    return facts_of(task.header, task.oracle_stages, task.public_stages, task.house_json(1))
+def summary_of_task(task: Task) -> TaskSummary:
+    return summary_of(task.header, task.oracle_stages, task.public_stages, task.house_json(1))
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +47,11 @@ def tasks(folder: Path) -> list[Task]:
 
 @pytest.fixture(scope="module")
 def found(tasks: list[Task]) -> TaskStatistics:
-    return statistics_of(map(facts_of_task, tasks), mix="procthor-10k")
+    return statistics_of(map(summary_of_task, tasks), mix="procthor-10k")
 
 
 def value_of(found: TaskStatistics, key: str) -> float:
-    raw = found.measure(key).raw
+    raw = found.metric(key).raw
     assert raw is not None
     return raw.value
 
@@ -74,7 +74,7 @@ def test_measures_are_what_a_plain_count_says(tasks: list[Task], found: TaskStat
         for task, stage in later
     ]
     assert value_of(found, "goal_relocated") == pytest.approx(fmean(moved_before))
-    assert found.measure("goal_relocated").n == len(later)
+    assert found.metric("goal_relocated").n == len(later)
     moved_now = [
         any(change.id == stage.target.id and change.is_relocated for change in stage.evolution.changes)
         for _, stage in evolved
@@ -98,7 +98,7 @@ def test_measures_are_what_a_plain_count_says(tasks: list[Task], found: TaskStat
         for before, after in zip(task.oracle_stages, task.oracle_stages[1:], strict=False)
         if before.evolution.outcome == after.evolution.outcome == "evolved"
     ]
-    assert found.measure("room_again").n == len(pairs) > 3
+    assert found.metric("room_again").n == len(pairs) > 3
     assert value_of(found, "room_again") == pytest.approx(fmean(a.room_id == b.room_id for a, b in pairs))
     again = [stage.target.room_id == task.oracle_stages[stage.stage - 2].target.room_id for task, stage in later]
     assert value_of(found, "goal_room_again") == pytest.approx(fmean(again))
@@ -150,7 +150,7 @@ def test_reweighted_figures_are_weighted_means_by_hand(tasks: list[Task], found:
         by_hand = sum(w * above(t) for w, t in zip(weights, tasks, strict=True)) / sum(
             w * below(t) for w, t in zip(weights, tasks, strict=True)
         )
-        reweighted = found.measure(key).reweighted
+        reweighted = found.metric(key).reweighted
         assert reweighted is not None
         assert reweighted.value == pytest.approx(by_hand)
     assert found.weighting.effective_num_tasks == pytest.approx(sum(weights) ** 2 / sum(w * w for w in weights))
@@ -163,19 +163,19 @@ def test_reweighted_figures_are_weighted_means_by_hand(tasks: list[Task], found:
 
 def test_tasks_of_one_house_count_as_one_unit() -> None:
     """Ten copies of each task tell no more than one: the interval stays, and Wilson's no longer holds."""
-    facts = [facts_of_task(task) for task in generate_tasks(bundled_houses(12), seed=1)]
-    once, often = statistics_of(facts), statistics_of(facts * 10)
+    summaries = [summary_of_task(task) for task in generate_tasks(bundled_houses(12), seed=1)]
+    once, often = statistics_of(summaries), statistics_of(summaries * 10)
     assert (often.num_tasks, often.num_houses) == (10 * once.num_tasks, once.num_houses)
-    assert once.measure("goal_relocated").raw == often.measure("goal_relocated").raw
-    assert once.measure("evolved_twice").interval == "wilson"
-    assert often.measure("evolved_twice").interval == "bootstrap"
+    assert once.metric("goal_relocated").raw == often.metric("goal_relocated").raw
+    assert once.metric("evolved_twice").interval == "wilson"
+    assert often.metric("evolved_twice").interval == "bootstrap"
 
 
 def test_moved_now_is_told_from_moved_ever() -> None:
     """Many seeds of few houses: among the goals after a change are some that only an earlier change moved."""
     small = sorted(bundled_houses(16), key=lambda house: len(house.objects))[:4]
     made = [task for seed in range(8) for task in generate_tasks(small, seed=seed)]
-    found = statistics_of(map(facts_of_task, made))
+    found = statistics_of(map(summary_of_task, made))
     evolved = [s for task in made for s in task.oracle_stages if s.evolution.outcome == "evolved"]
     moved_now = [any(c.id == s.target.id and c.is_relocated for c in s.evolution.changes) for s in evolved]
     assert fmean(moved_now) < fmean(s.target.is_relocated_ever for s in evolved)
@@ -197,7 +197,7 @@ def test_folders_give_what_tasks_in_memory_give(tasks: list[Task], folder: Path,
     assert houses is not None
     assert (houses.names, houses.counts) == (("malformed_house",), (1,))
     roots = sorted(path.parent for path in folder.glob("*/task.json")) * 3
-    assert list(read_all_facts(roots, num_workers=2)) == list(read_all_facts(roots))
+    assert list(read_summaries(roots, num_workers=2)) == list(read_summaries(roots))
 
 
 def test_what_is_wrong_is_named(folder: Path, tmp_path: Path) -> None:
@@ -213,7 +213,7 @@ def test_what_is_wrong_is_named(folder: Path, tmp_path: Path) -> None:
         statistics_of_folders([tmp_path])
     good = sorted(path.parent for path in folder.glob("*/task.json"))[:1] * 40
     with pytest.raises(TaskError, match=r"bad/task\.json: field"):
-        list(read_all_facts([*good, tmp_path / "bad"], num_workers=2))
+        list(read_summaries([*good, tmp_path / "bad"], num_workers=2))
     with pytest.raises(InvalidArgumentError, match=r"\.png"):
         check_plot(Path("plot.bmp"))
 
@@ -263,7 +263,7 @@ def test_the_command_prints_eighty_columns_and_writes_the_page(folder: Path, tmp
     lines = done.stdout.splitlines()
     assert max(len(line) for line in lines if not line.startswith("report: ")) <= 80
     shown = "\n".join(lines)
-    for info in MEASURES:
+    for info in METRICS:
         if info.key in ("goal_relocated", "relocated_ratio", "evolved_once", "room_again"):
             assert info.label in shown
     assert "37.9" in shown

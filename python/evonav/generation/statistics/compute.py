@@ -1,9 +1,7 @@
-"""What a set of tasks is like, in the paper's own measures (Sec. 3.2, its figure of statistics)."""
+"""Compute the statistics of a set of tasks in the paper's metrics (Sec. 3.2 and its plot of statistics)."""
 
-from array import array
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +10,16 @@ from numpy.typing import NDArray
 from evonav.errors import TaskError
 from evonav.generation.statistics.metrics import (
     DISTRIBUTIONS,
-    MEASURES,
+    MEDIANS,
+    METRICS,
     PAPER_EVOLUTIONS,
     PAPER_MODES,
     QUANTITIES,
+    RATIOS,
 )
 from evonav.generation.statistics.room_mix import Reweighting, check_mix, reweight
-from evonav.generation.statistics.task_summary import MODES, RATIO_CLASSES, TaskFacts, read_all_facts
+from evonav.generation.statistics.tally import Tally
+from evonav.generation.statistics.task_summary import MODES, RATIO_CLASSES, TaskSummary, read_summaries
 from evonav.statistics import ClusterBootstrap, chi_square, effective_size, weighted_quantiles, wilson
 from evonav.tasks.dataset import DATASET_NAME, read_dataset
 from evonav.tasks.listing import task_roots
@@ -34,98 +35,52 @@ from evonav.tasks.statistics import (
 )
 
 NUM_RESAMPLES = 2000
-_RATIOS = tuple(info for info in MEASURES if info.unit != "median share")
-_MEDIANS = tuple(info for info in MEASURES if info.unit == "median share")
-
-
-@dataclass
-class _Tally:
-    """Tasks taken in so far: a row of sums each, counts by kind of house, and quantities as bare numbers."""
-
-    rows: "array[float]" = field(default_factory=lambda: array("d"))
-    """Per task, numerator and denominator of each of `_RATIOS`."""
-    houses: list[str] = field(default_factory=list)
-    num_rooms: list[int] = field(default_factory=list)
-    plans: list[str | None] = field(default_factory=list)
-    counts: dict[str, dict[tuple[int, str | None], Counter[str]]] = field(default_factory=dict)
-    """By distribution, then by kind of house: all that a task's weight depends on."""
-    values: "dict[str, array[float]]" = field(default_factory=dict)
-    tasks_of_values: "dict[str, array[int]]" = field(default_factory=dict)
-    expected_evolutions: list[float] = field(default_factory=list)
-    expected_modes: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
-    seeds: set[int] = field(default_factory=set)
-    generators: set[str] = field(default_factory=set)
-    parameters: set[str] = field(default_factory=set)
-    num_stages: int = 0
-
-    def take(self, facts: TaskFacts) -> None:
-        """Adds a task."""
-        task = len(self.houses)
-        self.houses.append(facts.house_sha256)
-        self.num_rooms.append(facts.num_rooms)
-        self.plans.append(facts.plan)
-        for info in _RATIOS:
-            self.rows.extend(facts.sums.get(info.key, (0.0, 0.0)))
-        for key, counts in facts.counts.items():
-            by_house = self.counts.setdefault(key, {})
-            by_house.setdefault((facts.num_rooms, facts.plan), Counter()).update(counts)
-        for key, values in facts.values.items():
-            self.values.setdefault(key, array("d")).extend(values)
-            self.tasks_of_values.setdefault(key, array("q")).extend([task] * len(values))
-        num_cells = max(len(self.expected_evolutions), len(facts.expected_evolutions))
-        self.expected_evolutions += [0.0] * (num_cells - len(self.expected_evolutions))
-        for i, chance in enumerate(facts.expected_evolutions):
-            self.expected_evolutions[i] += chance
-        num_evolved = sum(facts.counts.get("modes", Counter()).values())
-        self.expected_modes += num_evolved * np.array(facts.expected_modes)
-        self.seeds.add(facts.seed)
-        self.generators.add(facts.generator)
-        self.parameters.add(facts.parameters)
-        self.num_stages += facts.num_stages
 
 
 def statistics_of(
-    facts: Iterable[TaskFacts],
+    summaries: Iterable[TaskSummary],
     *,
     sources: Sequence[str] = (),
     mix: str | None = None,
     house_rejections: Counter[str] | None = None,
 ) -> TaskStatistics:
-    """Statistics of a set of tasks, which is gone through once and not kept.
+    """Compute the statistics of a set of tasks, which is iterated once and not stored.
 
-    Intervals resample houses, so that several tasks of one house (other seeds) do not count as independent.
+    Intervals resample houses, so that several tasks of one house (with other seeds) do not count as independent.
 
     Args:
-        facts: Of each task.
-        sources: Recorded.
-        mix: Also reweight to this data set's rooms (`evonav.generation.statistics.room_mix`).
-        house_rejections: Houses without a task, by reason.
+        summaries: Summary of each task.
+        sources: Names of the sources, recorded in the result.
+        mix: Data set to whose rooms the tasks are also reweighted (`evonav.generation.statistics.room_mix`).
+        house_rejections: Number of houses without a task, by reason.
 
     Raises:
-        TaskError: There is no task.
-        InvalidArgumentError: There is no such mix, or no house is of it.
+        TaskError: The set is empty.
+        InvalidArgumentError: The mix is unknown, or contains no house of the set.
     """
-    tally = _Tally()
-    for one in facts:
-        tally.take(one)
+    tally = Tally()
+    for summary in summaries:
+        tally.add(summary)
     if not tally.houses:
         raise TaskError("statistics: there is no task")
     if house_rejections:
-        tally.counts["house_rejections"] = {(0, None): house_rejections}
+        tally.counts_by_house["house_rejections"] = {(0, None): house_rejections}
     weighting = None if mix is None else reweight(mix, tally.num_rooms, tally.plans)
     return TaskStatistics(
         sources=tuple(sources),
         generators=tuple(sorted(tally.generators)),
         seeds=tuple(sorted(tally.seeds)),
-        num_tasks=len(tally.houses),
+        num_tasks=tally.num_tasks,
         num_houses=len(set(tally.houses)),
         num_stages=tally.num_stages,
         parameters=tuple(sorted(tally.parameters)),
         weighting=None if weighting is None else _weighting(weighting),
-        measures=_measures(tally, weighting),
+        measures=_metrics(tally, weighting),
         tests=_tests(tally, weighting),
         distributions=tuple(
-            _distribution(tally, weighting, key, label) for key, label in DISTRIBUTIONS.items() if key in tally.counts
+            _distribution(tally, weighting, key, label)
+            for key, label in DISTRIBUTIONS.items()
+            if key in tally.counts_by_house
         ),
         quantities=tuple(
             _quantity(tally, weighting, key, *label) for key, label in QUANTITIES.items() if key in tally.values
@@ -140,17 +95,17 @@ def statistics_of_folders(
     num_workers: int = 1,
     on_task: Callable[[int, int], None] = lambda done, total: None,
 ) -> TaskStatistics:
-    """Statistics of the tasks in some folders.
+    """Compute the statistics of the tasks in folders.
 
     Args:
-        folders: Each holds one folder a task.
-        mix: As for `statistics_of`.
-        num_workers: Processes that read tasks.
-        on_task: Told how many tasks are read, of how many.
+        folders: Folders with one folder a task.
+        mix: Data set to whose rooms the tasks are also reweighted, see `statistics_of`.
+        num_workers: Number of processes that read tasks.
+        on_task: Called with the number of read tasks and the number of all tasks.
 
     Raises:
         TaskError: A folder holds no task, or a task is malformed.
-        InvalidArgumentError: As `statistics_of`.
+        InvalidArgumentError: The mix is unknown, or contains no house of the set.
     """
     check_mix(mix)
     roots = [root for folder in folders for root in task_roots(folder)]
@@ -158,19 +113,19 @@ def statistics_of_folders(
     for folder in folders:
         rejections.update(house_rejections(folder))
 
-    def facts() -> Iterator[TaskFacts]:
-        for done, one in enumerate(read_all_facts(roots, num_workers=num_workers), start=1):
-            yield one
-            on_task(done, len(roots))
+    def summaries() -> Iterator[TaskSummary]:
+        for num_read, summary in enumerate(read_summaries(roots, num_workers=num_workers), start=1):
+            yield summary
+            on_task(num_read, len(roots))
 
-    return statistics_of(facts(), sources=[str(f) for f in folders], mix=mix, house_rejections=rejections)
+    return statistics_of(summaries(), sources=[str(f) for f in folders], mix=mix, house_rejections=rejections)
 
 
 def house_rejections(folder: Path) -> Counter[str]:
-    """Houses that gave no task, by reason, as generation records them beside the tasks; none where it does not.
+    """Count the houses without a task by reason, from `dataset.json`; empty if the file does not exist.
 
     Raises:
-        TaskError: The record is malformed.
+        TaskError: The file is malformed.
     """
     return read_dataset(folder).num_rejected if (folder / DATASET_NAME).is_file() else Counter()
 
@@ -187,22 +142,22 @@ def _weighting(weighting: Reweighting) -> Weighting:
     )
 
 
-def _measures(tally: _Tally, weighting: Reweighting | None) -> tuple[Metric, ...]:
+def _metrics(tally: Tally, weighting: Reweighting | None) -> tuple[Metric, ...]:
     raw = _estimates(tally, None)
     reweighted = {} if weighting is None else _estimates(tally, weighting)
-    sums = _rows(tally).sum(axis=0)
-    trials = {info.key: round(n) for info, n in zip(_RATIOS, sums[:, 1], strict=True)}
-    is_one_task_a_house = len(set(tally.houses)) == len(tally.houses)
-    measures = []
-    for info in MEASURES:
+    sums = tally.ratio_rows().sum(axis=0)
+    trials = {info.key: round(n) for info, n in zip(RATIOS, sums[:, 1], strict=True)}
+    is_one_task_a_house = len(set(tally.houses)) == tally.num_tasks
+    metrics = []
+    for info in METRICS:
         estimate = raw.get(info.key)
         n = trials.get(info.key, len(tally.values.get(info.key, ())))
         is_wilson = estimate is not None and info.unit == "share" and info.is_of_tasks and is_one_task_a_house
-        # Resampling says nothing of what never, or always, happened.
+        # Resampling gives no interval for events that never or always happened.
         is_wilson |= estimate is not None and info.unit == "share" and estimate.value in (0.0, 1.0)
         if estimate is not None and is_wilson:
             estimate = Estimate(value=estimate.value, ci95=wilson(estimate.value * n, n))
-        measures.append(
+        metrics.append(
             Metric(
                 key=info.key,
                 label=info.label,
@@ -217,41 +172,31 @@ def _measures(tally: _Tally, weighting: Reweighting | None) -> tuple[Metric, ...
                 accepted=info.accepted,
             )
         )
-    return tuple(measures)
+    return tuple(metrics)
 
 
-def _rows(tally: _Tally) -> NDArray[np.float64]:
-    """`(tasks, ratios, 2)`."""
-    return np.frombuffer(tally.rows).reshape(-1, len(_RATIOS), 2)
-
-
-def _estimates(tally: _Tally, weighting: Reweighting | None) -> dict[str, Estimate]:
-    """Values and bootstrap intervals by measure, without those of nothing."""
+def _estimates(tally: Tally, weighting: Reweighting | None) -> dict[str, Estimate]:
+    """Return values and bootstrap intervals by metric, without metrics of no data."""
     strata = None if weighting is None else weighting.task_strata
     houses = ClusterBootstrap(tally.houses, strata=strata, num_resamples=NUM_RESAMPLES)
-    weights = np.ones(len(tally.houses)) if weighting is None else weighting.weights
-    rows = _rows(tally) * weights[:, None, None]
+    weights = np.ones(tally.num_tasks) if weighting is None else weighting.weights
+    rows = tally.ratio_rows() * weights[:, None, None]
     found = {}
-    for i, info in enumerate(_RATIOS):
+    for i, info in enumerate(RATIOS):
         numerators, denominators = houses.sums(rows[:, i]).T
-        ratio = houses.ratio(numerators, denominators, len(tally.houses))
+        ratio = houses.ratio(numerators, denominators, tally.num_tasks)
         if ratio.value is not None:
             found[info.key] = Estimate(value=ratio.value, ci95=ratio.ci95)
-    for info in _MEDIANS:
-        values, tasks = _values(tally, info.key)
+    for info in MEDIANS:
+        values, tasks = tally.values_of(info.key)
         median = houses.weighted_median(values, weights[tasks], houses.cluster_of[tasks])
         if median.value is not None:
             found[info.key] = Estimate(value=median.value, ci95=median.ci95)
     return found
 
 
-def _values(tally: _Tally, key: str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """A quantity's values, and the task of each."""
-    return np.frombuffer(tally.values[key]), np.frombuffer(tally.tasks_of_values[key], dtype=np.int64)
-
-
-def _tests(tally: _Tally, weighting: Reweighting | None) -> tuple[Test, ...]:
-    """That evolutions and their modes are drawn as Θ says."""
+def _tests(tally: Tally, weighting: Reweighting | None) -> tuple[Test, ...]:
+    """Test the numbers of evolutions and their modes against the generation parameters."""
     num_cells = len(tally.expected_evolutions)
     cells = tuple(str(i) for i in range(num_cells))
     is_papers = num_cells == len(PAPER_EVOLUTIONS)
@@ -266,23 +211,23 @@ def _tests(tally: _Tally, weighting: Reweighting | None) -> tuple[Test, ...]:
 
 
 def _test(
-    tally: _Tally,
+    tally: Tally,
     weighting: Reweighting | None,
     key: str,
     cells: Sequence[str],
     expected: NDArray[np.float64],
     paper_shares: tuple[float, ...] | None,
 ) -> Test | None:
-    counts = _counts(tally, key)
+    counts = tally.counts_of(key)
     observed = [counts[cell] for cell in cells]
     result = chi_square(observed, expected.tolist())
     if result is None:
         return None
     reweighted_p = None
     if weighting is not None:
-        shares = np.array([_weighted_counts(tally, weighting, key)[cell] for cell in cells])
-        # As many as would tell as much: the tasks' effective number, and of each what they hold on average.
-        size = effective_size(weighting.weights) * sum(observed) / len(tally.houses)
+        shares = np.array([tally.weighted_counts_of(key, weighting)[cell] for cell in cells])
+        # The effective sample size: the effective number of tasks times the average number of counts in a task.
+        size = effective_size(weighting.weights) * sum(observed) / tally.num_tasks
         reweighted = chi_square((shares / shares.sum() * size).tolist(), expected.tolist()) if shares.sum() else None
         reweighted_p = None if reweighted is None else reweighted.p
     return Test(
@@ -299,25 +244,6 @@ def _test(
     )
 
 
-def _counts(tally: _Tally, key: str) -> Counter[str]:
-    total: Counter[str] = Counter()
-    for counts in tally.counts.get(key, {}).values():
-        total.update(counts)
-    return total
-
-
-def _weighted_counts(tally: _Tally, weighting: Reweighting, key: str) -> dict[str, float]:
-    weights = {
-        kind: float(weight)
-        for kind, weight in zip(zip(tally.num_rooms, tally.plans, strict=True), weighting.weights, strict=True)
-    }
-    total: dict[str, float] = defaultdict(float)
-    for kind, counts in tally.counts.get(key, {}).items():
-        for name, count in counts.items():
-            total[name] += weights.get(kind, 0.0) * count
-    return total
-
-
 _ORDERED = {
     "num_evolutions": None,
     "num_stages": None,
@@ -326,11 +252,11 @@ _ORDERED = {
     "modes": MODES,
     "modes_drawn": MODES,
 }
-"""Distributions with an order of their own, `None` for that of numbers; the others go by count."""
+"""Order of the names in a distribution, `None` for numeric order; other distributions are ordered by count."""
 
 
-def _distribution(tally: _Tally, weighting: Reweighting | None, key: str, label: str) -> Distribution:
-    counts = _counts(tally, key)
+def _distribution(tally: Tally, weighting: Reweighting | None, key: str, label: str) -> Distribution:
+    counts = tally.counts_of(key)
     if key not in _ORDERED:
         names = [name for name, _ in sorted(counts.items(), key=lambda item: (-item[1], item[0]))]
     elif key == "num_evolutions":
@@ -339,7 +265,7 @@ def _distribution(tally: _Tally, weighting: Reweighting | None, key: str, label:
         names = list(_ORDERED[key] or sorted(counts, key=int))
     shares = None
     if weighting is not None and key != "house_rejections":
-        weighted = _weighted_counts(tally, weighting, key)
+        weighted = tally.weighted_counts_of(key, weighting)
         total = sum(weighted.values())
         shares = tuple(weighted[name] / total for name in names) if total else None
     return Distribution(
@@ -347,8 +273,8 @@ def _distribution(tally: _Tally, weighting: Reweighting | None, key: str, label:
     )
 
 
-def _quantity(tally: _Tally, weighting: Reweighting | None, key: str, label: str, unit: str) -> Quantity:
-    values, tasks = _values(tally, key)
+def _quantity(tally: Tally, weighting: Reweighting | None, key: str, label: str, unit: str) -> Quantity:
+    values, tasks = tally.values_of(key)
     spread = np.quantile(values, [0, 0.05, 0.25, 0.5, 0.75, 0.95, 1]).tolist()
     mean = median = None
     if weighting is not None and (weights := weighting.weights[tasks]).sum() > 0:

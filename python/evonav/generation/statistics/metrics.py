@@ -1,4 +1,4 @@
-"""The figures over tasks: what each is called, and what the paper says of it."""
+"""List the metrics over tasks, with their labels and the paper's values."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -9,15 +9,15 @@ Unit = Literal["share", "m", "stages", "median share", "goals"]
 
 
 @dataclass(frozen=True, slots=True)
-class MeasureInfo:
-    """A measure; the fields are those of `evonav.tasks.statistics.Measure`."""
+class MetricInfo:
+    """A metric; the fields are those of `evonav.tasks.statistics.Metric`."""
 
     key: str
     label: str
     group: str
     unit: Unit = "share"
     is_of_tasks: bool = False
-    """One trial a task: Wilson's interval holds."""
+    """Whether each task is one trial, so that Wilson's interval is valid."""
     paper: float | None = None
     expected: float | None = None
     accepted: Range | None = None
@@ -25,40 +25,45 @@ class MeasureInfo:
 
 _EVOLUTION, _GOALS, _OBJECTS, _TASKS = "Evolution", "Goals of stages 2 and on", "Objects", "Tasks"
 
-# Published: Sec. 3.2 and its figure. Expected, evolutions: binomial, K uniform on {3, 4, 5}. Expected, others: a trial
-# of Algorithm 1 in ProcTHOR-10k's mix, without pictures and refusals (scripts/try_readings.py, docs/dataset.md).
-MEASURES = (
-    MeasureInfo("evolved_once", "tasks with an evolution", _EVOLUTION, is_of_tasks=True, paper=0.859, expected=0.8542),
-    MeasureInfo("evolved_twice", "tasks with two or more", _EVOLUTION, is_of_tasks=True, paper=0.484, expected=0.4792),
-    MeasureInfo("static", "static transitions", _EVOLUTION, paper=0.494, expected=0.5),
-    MeasureInfo("unchanged", "triggered, but nothing moved", _EVOLUTION),
-    MeasureInfo("mode_SALIENT_OBJECT", "by SALIENT_OBJECT", _EVOLUTION, paper=0.5),
-    MeasureInfo("mode_RETAIN_GROUP", "by RETAIN_GROUP", _EVOLUTION, paper=0.4),
-    MeasureInfo("mode_FULL_SHUFFLE", "by FULL_SHUFFLE", _EVOLUTION, paper=0.1),
-    MeasureInfo("room_again", "same room as just before", _EVOLUTION, expected=0.036, accepted=(0.03, 0.05)),
-    MeasureInfo("goal_relocated", "relocated before", _GOALS, paper=0.379, expected=0.39, accepted=(0.36, 0.41)),
-    MeasureInfo("goal_in_changed_room", "in the room just changed", _GOALS, expected=0.795),
-    MeasureInfo("goal_moved", "moved by the change", _GOALS, expected=0.685),
-    MeasureInfo("goal_moved_SALIENT_OBJECT", "  if SALIENT_OBJECT", _GOALS, expected=0.575),
-    MeasureInfo("goal_moved_RETAIN_GROUP", "  if RETAIN_GROUP", _GOALS, expected=0.795),
-    MeasureInfo("goal_moved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _GOALS, expected=0.8),
-    MeasureInfo("goal_is_salient", "the salient object itself", _GOALS),
-    MeasureInfo("goal_room_again", "in the previous goal's room", _GOALS),
-    MeasureInfo("goal_again", "an earlier goal of the task", _GOALS),
-    MeasureInfo("goal_relocated_all", "relocated before, all stages", _GOALS, expected=0.295),
-    MeasureInfo("relocated_ratio", "median relocated ratio", _OBJECTS, "median share", accepted=(0.1, 0.2)),
-    MeasureInfo("ratio_zero", "tasks with none relocated", _OBJECTS, is_of_tasks=True, expected=0.1458),
-    MeasureInfo("ratio_above_80", "tasks above 80%", _OBJECTS, is_of_tasks=True),
-    MeasureInfo("room_relocated", "of a changed room's objects", _OBJECTS),
-    MeasureInfo("room_relocated_SALIENT_OBJECT", "  if SALIENT_OBJECT", _OBJECTS),
-    MeasureInfo("room_relocated_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
-    MeasureInfo("room_relocated_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
-    MeasureInfo("unmoved", "found no other place", _OBJECTS),
-    MeasureInfo("unmoved_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
-    MeasureInfo("unmoved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
-    MeasureInfo("num_stages", "stages a task", _TASKS, "stages", paper=4.010, expected=4.0),
-    MeasureInfo("goals_refused", "goals refused a stage", _TASKS, "goals"),
+# `paper`: Sec. 3.2 and its plot. `expected` of evolutions: binomial, K uniform on {3, 4, 5}. Other `expected`: a trial
+# of Algorithm 1 in ProcTHOR-10k's mix, without images and rejected goals (scripts/try_readings.py, docs/dataset.md).
+METRICS = (
+    MetricInfo("evolved_once", "tasks with an evolution", _EVOLUTION, is_of_tasks=True, paper=0.859, expected=0.8542),
+    MetricInfo("evolved_twice", "tasks with two or more", _EVOLUTION, is_of_tasks=True, paper=0.484, expected=0.4792),
+    MetricInfo("static", "static transitions", _EVOLUTION, paper=0.494, expected=0.5),
+    MetricInfo("unchanged", "triggered, but nothing moved", _EVOLUTION),
+    MetricInfo("mode_SALIENT_OBJECT", "by SALIENT_OBJECT", _EVOLUTION, paper=0.5),
+    MetricInfo("mode_RETAIN_GROUP", "by RETAIN_GROUP", _EVOLUTION, paper=0.4),
+    MetricInfo("mode_FULL_SHUFFLE", "by FULL_SHUFFLE", _EVOLUTION, paper=0.1),
+    MetricInfo("room_again", "same room as just before", _EVOLUTION, expected=0.036, accepted=(0.03, 0.05)),
+    MetricInfo("goal_relocated", "relocated before", _GOALS, paper=0.379, expected=0.39, accepted=(0.36, 0.41)),
+    MetricInfo("goal_in_changed_room", "in the room just changed", _GOALS, expected=0.795),
+    MetricInfo("goal_moved", "moved by the change", _GOALS, expected=0.685),
+    MetricInfo("goal_moved_SALIENT_OBJECT", "  if SALIENT_OBJECT", _GOALS, expected=0.575),
+    MetricInfo("goal_moved_RETAIN_GROUP", "  if RETAIN_GROUP", _GOALS, expected=0.795),
+    MetricInfo("goal_moved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _GOALS, expected=0.8),
+    MetricInfo("goal_is_salient", "the salient object itself", _GOALS),
+    MetricInfo("goal_room_again", "in the previous goal's room", _GOALS),
+    MetricInfo("goal_again", "an earlier goal of the task", _GOALS),
+    MetricInfo("goal_relocated_all", "relocated before, all stages", _GOALS, expected=0.295),
+    MetricInfo("relocated_ratio", "median relocated ratio", _OBJECTS, "median share", accepted=(0.1, 0.2)),
+    MetricInfo("ratio_zero", "tasks with none relocated", _OBJECTS, is_of_tasks=True, expected=0.1458),
+    MetricInfo("ratio_above_80", "tasks above 80%", _OBJECTS, is_of_tasks=True),
+    MetricInfo("room_relocated", "of a changed room's objects", _OBJECTS),
+    MetricInfo("room_relocated_SALIENT_OBJECT", "  if SALIENT_OBJECT", _OBJECTS),
+    MetricInfo("room_relocated_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
+    MetricInfo("room_relocated_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
+    MetricInfo("unmoved", "found no other place", _OBJECTS),
+    MetricInfo("unmoved_RETAIN_GROUP", "  if RETAIN_GROUP", _OBJECTS),
+    MetricInfo("unmoved_FULL_SHUFFLE", "  if FULL_SHUFFLE", _OBJECTS),
+    MetricInfo("num_stages", "stages a task", _TASKS, "stages", paper=4.010, expected=4.0),
+    MetricInfo("goals_refused", "goals refused a stage", _TASKS, "goals"),
 )
+
+RATIOS = tuple(info for info in METRICS if info.unit != "median share")
+"""Metrics that are ratios of sums over tasks."""
+MEDIANS = tuple(info for info in METRICS if info.unit == "median share")
+"""Metrics that are medians of a quantity."""
 
 DISTRIBUTIONS = {
     "num_evolutions": "Evolutions a task",
@@ -92,5 +97,6 @@ QUANTITIES = {
 }
 
 PAPER_EVOLUTIONS = (0.1458, 0.3750, 0.3333, 0.1250, 0.0208)
-"""Of tasks with 0 to 4 evolutions, worked out; the paper's text gives 14.1% with none and 48.4% with two or more."""
+"""Computed shares of tasks with 0 to 4 evolutions; the paper gives 14.1% with none and 48.4% with two or more."""
 PAPER_MODES = (0.5, 0.4, 0.1)
+"""The paper's chances of the three modes."""

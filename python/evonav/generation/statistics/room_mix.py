@@ -1,4 +1,4 @@
-"""How many houses of each room plan ProcTHOR-10k is made of, and the weights that give other houses the same mix."""
+"""Reweight tasks to the mix of room plans in ProcTHOR-10k."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,66 +22,69 @@ PROCTHOR_10K_PLANS = {
     "12-room": (10, 1),
     "12-room-3-bed": (10, 1),
 }
-"""Rooms and weight of its room plans with two rooms or more, by `metadata.roomSpecId`. Source: `room_specs.py` of the
-published generator (procthor 0.0.1.dev2, Apache-2.0); the four plans of one room have weight 1 each."""
+"""Number of rooms and weight of the room plans with at least two rooms, by `metadata.roomSpecId`.
+
+Source: `room_specs.py` of the published generator (procthor 0.0.1.dev2, Apache-2.0); the four plans of one room have
+weight 1 each.
+"""
 
 ROOM_MIXES = {"procthor-10k": PROCTHOR_10K_PLANS}
 
 
 @dataclass(frozen=True)
 class Reweighting:
-    """Weights of tasks, by stratum."""
+    """Weights of tasks by stratum."""
 
     mix: str
     by: str
-    """`room plan`; `number of rooms` where a plan is unknown, or one is missing whose number of rooms is there."""
+    """The strata: `room plan`, or `number of rooms` if a plan is unknown or only its number of rooms occurs."""
     strata: tuple[str, ...]
-    """Of the mix, in its order."""
+    """Names of the mix's strata, in its order."""
     target_shares: tuple[float, ...]
     task_shares: tuple[float, ...]
-    """As the tasks are."""
+    """Shares of the tasks without weights."""
     covered_share: float
-    """Part of the mix that the tasks have at all; the rest is left out of both sides."""
+    """Share of the mix that has at least one task; the rest is left out of the target shares."""
     weights: NDArray[np.float64]
-    """`(N,)` per task, mean 1; 0 for houses that the mix has none of."""
+    """Weight of each task, `(N,)`, mean 1; 0 for houses that the mix does not contain."""
     task_strata: NDArray[np.int64]
-    """`(N,)` index of each task's stratum; -1 for none."""
+    """Index of each task's stratum, `(N,)`; -1 for none."""
 
 
 def check_mix(mix: str | None) -> None:
-    """Refuses names of no mix.
+    """Check the name of a mix.
 
     Raises:
-        InvalidArgumentError: It is neither `None` nor one of `ROOM_MIXES`.
+        InvalidArgumentError: The name is neither `None` nor one of `ROOM_MIXES`.
     """
     if mix is not None and mix not in ROOM_MIXES:
         raise InvalidArgumentError(f"argument `reweight` is {mix!r}, expected one of {', '.join(ROOM_MIXES)}")
 
 
 def reweight(mix: str, num_rooms: Sequence[int], plans: Sequence[str | None]) -> Reweighting:
-    """Weights that give tasks the rooms of a data set.
+    """Return the weights that give tasks the room plans of a data set.
 
     Args:
-        mix: One of `ROOM_MIXES`.
-        num_rooms: Of each task's house.
+        mix: A key of `ROOM_MIXES`.
+        num_rooms: Number of rooms of each task's house.
         plans: `metadata.roomSpecId` of each task's house, if it has one.
 
     Raises:
-        InvalidArgumentError: There is no such mix, or none of the houses is of it.
+        InvalidArgumentError: The mix is unknown, or contains none of the houses.
     """
     check_mix(mix)
     table = ROOM_MIXES[mix]
     rooms_of_tasks = [str(rooms) for rooms in num_rooms]
     by_rooms = _strata({plan: str(rooms) for plan, (rooms, _) in table.items()}, table, rooms_of_tasks)
     by_plan = _strata({plan: plan for plan in table}, table, [str(plan) for plan in plans])
-    # Houses of one room are in no mix; they do not make the others' plans unknown.
+    # Houses with one room are in no mix, so their plans may be unknown.
     num_known = int(sum(plan in table and table[plan][0] == n for plan, n in zip(plans, num_rooms, strict=True)))
     is_by_plan = num_known == int((by_rooms[2] >= 0).sum()) and _covered(by_plan) == _covered(by_rooms)
     names, target, strata = by_plan if is_by_plan else by_rooms
     counts = np.bincount(strata[strata >= 0], minlength=len(names)).astype(np.float64)
     covered = float(target[counts > 0].sum())
     if covered == 0.0:
-        raise InvalidArgumentError(f"argument `reweight` is {mix!r}, but no house has as many rooms as one of it")
+        raise InvalidArgumentError(f"argument `reweight` is {mix!r}, but no house has as many rooms as its plans")
     factors = np.divide(target, counts, out=np.zeros_like(target), where=counts > 0) / covered * counts.sum()
     return Reweighting(
         mix=mix,
@@ -96,7 +99,7 @@ def reweight(mix: str, num_rooms: Sequence[int], plans: Sequence[str | None]) ->
 
 
 _Strata = tuple[list[str], NDArray[np.float64], NDArray[np.int64]]
-"""Names, shares of the mix, and each task's index or -1."""
+"""Names of the strata, their shares of the mix, and each task's index or -1."""
 
 
 def _strata(name_of: Mapping[str, str], table: Mapping[str, tuple[int, int]], keys: Sequence[str]) -> _Strata:

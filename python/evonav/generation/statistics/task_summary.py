@@ -1,4 +1,4 @@
-"""What statistics need of one task, read without pictures, later houses and checksums."""
+"""Summarise tasks for statistics, without reading their images, later houses and checksums."""
 
 import json
 import re
@@ -19,58 +19,58 @@ from evonav.tasks.records import parse_record, read_file, read_gzip
 
 MODES = ("SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE")
 RATIO_CLASSES = ("0%", *(f"{10 * i}-{10 * i + 10}%" for i in range(10)))
-"""Of the relocated-object ratio, each up to and including its upper end."""
+"""Classes of the ratio of relocated objects; each includes its upper end."""
 CHUNK = 16
-"""Tasks a worker process reads at a time."""
+"""Number of tasks in one job of a worker process."""
 CHUNK_TIMEOUT_S = 300.0
-"""For one task of them."""
+"""Longest time for one task of a job."""
 WORK = "evonav.generation.statistics.task_summary:make_reader"
 
 _PLAN = re.compile(r'"roomSpecId"\s*:\s*"([^"\\]{1,80})"')
 
 
 @dataclass(slots=True)
-class TaskFacts:
-    """One task in numbers: of each measure its part above and below the line."""
+class TaskSummary:
+    """The numbers of one task: numerator and denominator of each metric, counts and values."""
 
     task_id: str
     house_sha256: str
     seed: int
     generator: str
     parameters: str
-    """Θ, JSON."""
+    """The generation parameters as JSON."""
     num_stages: int
     num_rooms: int
     plan: str | None
-    """`metadata.roomSpecId` of the house."""
+    """The house's room plan, `metadata.roomSpecId`."""
     expected_evolutions: tuple[float, ...]
-    """Chance of 0, 1, ... evolved transitions under Θ."""
+    """Chances of 0, 1, ... evolved transitions under the parameters."""
     expected_modes: tuple[float, float, float]
     sums: dict[str, list[float]] = field(default_factory=dict)
-    """Numerator and denominator by measure."""
+    """Numerator and denominator by metric."""
     counts: dict[str, Counter[str]] = field(default_factory=dict)
     values: dict[str, list[float]] = field(default_factory=dict)
 
     def add(self, key: str, numerator: float, denominator: float = 1) -> None:
-        """Adds to a measure."""
+        """Add to a metric."""
         sums = self.sums.setdefault(key, [0.0, 0.0])
         sums[0] += numerator
         sums[1] += denominator
 
     def count(self, key: str, name: str, times: int = 1) -> None:
-        """Counts one of a distribution."""
+        """Count a name of a distribution."""
         self.counts.setdefault(key, Counter())[name] += times
 
-    def note(self, key: str, value: float) -> None:
-        """Notes a quantity."""
+    def add_value(self, key: str, value: float) -> None:
+        """Add a value of a quantity."""
         self.values.setdefault(key, []).append(value)
 
 
-_FACTS = TypeAdapter(list[TaskFacts])
+_SUMMARIES = TypeAdapter(list[TaskSummary])
 
 
 def expected_evolutions(num_stages: Sequence[int], probability: float) -> tuple[float, ...]:
-    """Chance of 0, 1, ... evolved transitions, K being uniform on `num_stages`."""
+    """Return the chances of 0, 1, ... evolved transitions, with K uniform on `num_stages`."""
     shares = [0.0] * max(num_stages)
     for stages in num_stages:
         for evolved in range(stages):
@@ -79,16 +79,16 @@ def expected_evolutions(num_stages: Sequence[int], probability: float) -> tuple[
     return tuple(shares)
 
 
-def facts_of(
+def summary_of(
     header: TaskHeader, oracle: Sequence[OracleStage], public: Sequence[PublicStage], house_json: str
-) -> TaskFacts:
-    """Facts of a task.
+) -> TaskSummary:
+    """Summarise a task.
 
     Args:
-        header: Its header.
-        oracle: Oracle part of its stages, in order.
-        public: Public part.
-        house_json: First house.
+        header: The task's header.
+        oracle: Oracle parts of the task's stages, in order.
+        public: Public parts of the task's stages, in order.
+        house_json: The first house.
 
     Raises:
         HouseError: The house is malformed.
@@ -97,7 +97,7 @@ def facts_of(
     plan = _PLAN.search(house_json)
     modes = (theta.salient_object_probability, theta.retain_group_probability, theta.full_shuffle_probability)
     total = sum(modes) or 1.0
-    facts = TaskFacts(
+    summary = TaskSummary(
         task_id=header.task_id,
         house_sha256=header.house.sha256,
         seed=header.seed,
@@ -112,105 +112,105 @@ def facts_of(
     house = House(house_json, name=header.house.name)
     room_types = {room.id: room.room_type for room in house.rooms}
     objects_by_room = Counter(entry.room_id for entry in house.objects)
-    _note_task(facts, header, oracle, house)
+    _add_task(summary, header, oracle, house)
     previous: Evolution | None = None
     earlier: set[str] = set()
     for stage in oracle:
-        _note_goal(facts, stage, room_types, earlier)
+        _add_goal(summary, stage, room_types, earlier)
         earlier.add(stage.target.id)
         if stage.stage > 1:
-            _note_transition(facts, stage, previous, objects_by_room)
+            _add_transition(summary, stage, previous, objects_by_room)
             previous = stage.evolution
     for one in public:
         for name in ("basic", "appearance", "unified"):
-            facts.note(f"{name}_words", len(getattr(one, f"{name}_instruction").split()))
-    return facts
+            summary.add_value(f"{name}_words", len(getattr(one, f"{name}_instruction").split()))
+    return summary
 
 
-def _note_task(facts: TaskFacts, header: TaskHeader, oracle: Sequence[OracleStage], house: House) -> None:
+def _add_task(summary: TaskSummary, header: TaskHeader, oracle: Sequence[OracleStage], house: House) -> None:
     num_evolutions = sum(stage.evolution.outcome == "evolved" for stage in oracle)
     ratio = len(oracle[-1].ever_relocated_ids) / header.house.num_objects
-    facts.add("evolved_once", num_evolutions >= 1)
-    facts.add("evolved_twice", num_evolutions >= 2)
-    facts.add("num_stages", header.num_stages)
-    facts.add("ratio_zero", ratio == 0)
-    facts.add("ratio_above_80", ratio > 0.8)
-    facts.note("relocated_ratio", ratio)
-    facts.note("task_path_m", sum(stage.reference_path_length_m for stage in oracle))
-    facts.note("num_rooms", header.house.num_rooms)
-    facts.note("num_objects", header.house.num_objects)
-    facts.count("num_evolutions", str(num_evolutions))
-    facts.count("num_stages", str(header.num_stages))
-    facts.count("num_rooms", str(header.house.num_rooms))
-    facts.count("relocated_ratio", RATIO_CLASSES[ceil(round(10 * ratio, 9))])
+    summary.add("evolved_once", num_evolutions >= 1)
+    summary.add("evolved_twice", num_evolutions >= 2)
+    summary.add("num_stages", header.num_stages)
+    summary.add("ratio_zero", ratio == 0)
+    summary.add("ratio_above_80", ratio > 0.8)
+    summary.add_value("relocated_ratio", ratio)
+    summary.add_value("task_path_m", sum(stage.reference_path_length_m for stage in oracle))
+    summary.add_value("num_rooms", header.house.num_rooms)
+    summary.add_value("num_objects", header.house.num_objects)
+    summary.count("num_evolutions", str(num_evolutions))
+    summary.count("num_stages", str(header.num_stages))
+    summary.count("num_rooms", str(header.house.num_rooms))
+    summary.count("relocated_ratio", RATIO_CLASSES[ceil(round(10 * ratio, 9))])
     for entry in house.objects:
-        facts.count("house_categories", entry.category or "(unknown)")
+        summary.count("house_categories", entry.category or "(unknown)")
 
 
-def _note_goal(facts: TaskFacts, stage: OracleStage, room_types: Mapping[str, str], earlier: set[str]) -> None:
+def _add_goal(summary: TaskSummary, stage: OracleStage, room_types: Mapping[str, str], earlier: set[str]) -> None:
     target, state = stage.target, stage.state
-    facts.add("goal_relocated_all", target.is_relocated_ever)
-    facts.add("goals_refused", len(stage.rejections))
-    facts.count("goal_categories", target.category)
-    facts.count("goal_rooms", room_types.get(target.room_id, "(unknown)"))
-    facts.count("goal_scores", f"{target.score:g}")
+    summary.add("goal_relocated_all", target.is_relocated_ever)
+    summary.add("goals_refused", len(stage.rejections))
+    summary.count("goal_categories", target.category)
+    summary.count("goal_rooms", room_types.get(target.room_id, "(unknown)"))
+    summary.count("goal_scores", f"{target.score:g}")
     for rejection in stage.rejections:
-        facts.count("goal_rejections", rejection.reason)
-    facts.note("path_m", stage.reference_path_length_m)
+        summary.count("goal_rejections", rejection.reason)
+    summary.add_value("path_m", stage.reference_path_length_m)
     x_m, _, z_m = target.position_m
     place = stage.reference_pose.position_m
-    facts.note("reference_distance_m", dist((x_m, z_m), (place[0], place[2])))
-    facts.note("visible_px", stage.reference_visible_px)
+    summary.add_value("reference_distance_m", dist((x_m, z_m), (place[0], place[2])))
+    summary.add_value("visible_px", stage.reference_visible_px)
     if stage.stage > 1:
-        facts.add("goal_relocated", target.is_relocated_ever)
-        facts.add("goal_again", target.id in earlier)
-        # The state is as of before the goal was drawn: its last goal room is the previous stage's.
-        facts.add("goal_room_again", bool(state.goal_room_ids) and target.room_id == state.goal_room_ids[-1])
+        summary.add("goal_relocated", target.is_relocated_ever)
+        summary.add("goal_again", target.id in earlier)
+        # The state is from before the goal was drawn: its last goal room is that of the previous stage.
+        summary.add("goal_room_again", bool(state.goal_room_ids) and target.room_id == state.goal_room_ids[-1])
 
 
-def _note_transition(
-    facts: TaskFacts, stage: OracleStage, previous: Evolution | None, objects_by_room: Mapping[str | None, int]
+def _add_transition(
+    summary: TaskSummary, stage: OracleStage, previous: Evolution | None, objects_by_room: Mapping[str | None, int]
 ) -> None:
     evolution, target = stage.evolution, stage.target
     is_evolved = evolution.outcome == "evolved"
-    facts.add("static", not is_evolved)
-    facts.count("outcomes", evolution.outcome)
+    summary.add("static", not is_evolved)
+    summary.count("outcomes", evolution.outcome)
     if evolution.outcome != "not_triggered":
-        facts.add("unchanged", not is_evolved)
+        summary.add("unchanged", not is_evolved)
         failure = getattr(evolution, "failure", None)
         if not is_evolved:
-            facts.count("failures", str(failure or evolution.outcome))
+            summary.count("failures", str(failure or evolution.outcome))
         if evolution.mode is not None:
-            facts.count("modes_drawn", evolution.mode)
+            summary.count("modes_drawn", evolution.mode)
     mode = evolution.mode
     if not is_evolved or mode is None:
         return
     for one in MODES:
-        facts.add(f"mode_{one}", mode == one)
-    facts.count("modes", mode)
+        summary.add(f"mode_{one}", mode == one)
+    summary.count("modes", mode)
     relocated = set(evolution.relocated_ids)
     unmoved = set(evolution.unmoved_ids) - relocated
-    facts.add("goal_in_changed_room", target.room_id == evolution.room_id)
-    facts.add("goal_moved", target.is_relocated_now)
-    facts.add(f"goal_moved_{mode}", target.is_relocated_now)
+    summary.add("goal_in_changed_room", target.room_id == evolution.room_id)
+    summary.add("goal_moved", target.is_relocated_now)
+    summary.add(f"goal_moved_{mode}", target.is_relocated_now)
     if evolution.salient_id is not None:
-        facts.add("goal_is_salient", target.id == evolution.salient_id)
-    facts.add("room_relocated", len(relocated), max(1, objects_by_room[evolution.room_id]))
-    facts.add(f"room_relocated_{mode}", len(relocated), max(1, objects_by_room[evolution.room_id]))
-    facts.add("unmoved", len(unmoved), len(unmoved) + len(relocated))
-    facts.add(f"unmoved_{mode}", len(unmoved), len(unmoved) + len(relocated))
+        summary.add("goal_is_salient", target.id == evolution.salient_id)
+    summary.add("room_relocated", len(relocated), max(1, objects_by_room[evolution.room_id]))
+    summary.add(f"room_relocated_{mode}", len(relocated), max(1, objects_by_room[evolution.room_id]))
+    summary.add("unmoved", len(unmoved), len(unmoved) + len(relocated))
+    summary.add(f"unmoved_{mode}", len(unmoved), len(unmoved) + len(relocated))
     for change in evolution.changes:
         if change.is_relocated:
-            facts.note("displacement_m", change.displacement_m)
+            summary.add_value("displacement_m", change.displacement_m)
     if previous is not None and previous.outcome == "evolved":
-        facts.add("room_again", previous.room_id == evolution.room_id)
+        summary.add("room_again", previous.room_id == evolution.room_id)
 
 
-def read_facts(root: Path) -> TaskFacts:
-    """Facts of a task's folder; checksums, pictures and later houses are left alone.
+def read_summary(root: Path) -> TaskSummary:
+    """Summarise the task in a folder; checksums, images and later houses are not read.
 
     Raises:
-        TaskError: A file is malformed; it names file, field and value.
+        TaskError: A file is malformed; names file, field and value.
     """
     header = parse_record(TaskHeader, read_file(root / "task.json"), root / "task.json")
     numbers = range(1, header.num_stages + 1)
@@ -218,7 +218,7 @@ def read_facts(root: Path) -> TaskFacts:
     public = [root / f"public/stage_{number}.json" for number in numbers]
     house = root / "houses/stage_1.json.gz"
     try:
-        return facts_of(
+        return summary_of(
             header,
             [parse_record(OracleStage, read_file(path), path) for path in oracle],
             [parse_record(PublicStage, read_file(path), path) for path in public],
@@ -228,50 +228,50 @@ def read_facts(root: Path) -> TaskFacts:
         raise TaskError(f"{house}: {error}") from error
 
 
-def read_all_facts(roots: Sequence[Path], *, num_workers: int = 1) -> Iterator[TaskFacts]:
-    """Facts of many tasks, in order, in worker processes where more than one is wanted.
+def read_summaries(roots: Sequence[Path], *, num_workers: int = 1) -> Iterator[TaskSummary]:
+    """Summarise many tasks in order, with worker processes if `num_workers` is at least 2.
 
     Args:
         roots: Folders of tasks.
-        num_workers: Processes.
+        num_workers: Number of processes.
 
     Raises:
-        TaskError: As `read_facts`.
+        TaskError: A file is malformed; names file, field and value.
     """
     if num_workers <= 1 or len(roots) <= 2 * CHUNK:
-        yield from map(read_facts, roots)
+        yield from map(read_summary, roots)
         return
     chunks = [[str(root) for root in roots[first : first + CHUNK]] for first in range(0, len(roots), CHUNK)]
     jobs = (Job(number, json.dumps(chunk)) for number, chunk in enumerate(chunks))
-    waiting: dict[int, list[TaskFacts]] = {}
+    waiting: dict[int, list[TaskSummary]] = {}
     num_given = 0
     with open_pool(WORK, "", num_workers=num_workers, timeout_s=CHUNK_TIMEOUT_S) as pool:
         for answer in answers(pool, jobs):
-            waiting[answer.key] = _facts_in(answer, chunks[answer.key])
+            waiting[answer.key] = _summaries_of(answer, chunks[answer.key])
             while num_given in waiting:
                 yield from waiting.pop(num_given)
                 num_given += 1
 
 
 def make_reader(_settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
-    """Return the function from a JSON list of folders to their facts, or `{"error": ...}`."""
+    """Return the function from a JSON list of folders to their summaries or `{"error": ...}`, for the pool."""
 
     def read(text: str) -> str:
         found = []
         try:
             for root in json.loads(text):
-                found.append(read_facts(Path(root)))
+                found.append(read_summary(Path(root)))
                 alive()
         except (TaskError, OSError) as error:
             return json.dumps({"error": str(error)})
-        return _FACTS.dump_json(found).decode()
+        return _SUMMARIES.dump_json(found).decode()
 
     return read
 
 
-def _facts_in(answer: Answer, chunk: Sequence[str]) -> list[TaskFacts]:
+def _summaries_of(answer: Answer, chunk: Sequence[str]) -> list[TaskSummary]:
     if answer.failure is not None:
         raise TaskError(f"{chunk[0]} to {chunk[-1]}: {answer.detail.strip().splitlines()[-1]}")
     if answer.text.startswith("{"):
         raise TaskError(json.loads(answer.text)["error"])
-    return _FACTS.validate_json(answer.text)
+    return _SUMMARIES.validate_json(answer.text)
