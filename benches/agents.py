@@ -20,7 +20,8 @@ from evonav.decision.question import Question, Reply
 from evonav.decision.text.decision import TextMatch
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
-from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
+from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.perception import Perception, StageScene
 from evonav.report.run import PAPER_ORDER

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.report.run import Run
-from evonav.report.tables.causes import WORDS, Cause
+from evonav.report.tables.causes import WORDS, FailureCause
 from evonav.report.tables.table import NONE, Table, percent
 
 STRATA = {"stage_1": "stage 1", "relocated": "relocated", "not_relocated": "not relocated"}
@@ -82,11 +82,11 @@ def cause_share_table(run: Run, stratum: str) -> Table:
         run: With outcomes.
         stratum: A key of `STRATA`.
     """
-    counts: dict[str, Counter[Cause | None]] = {agent: Counter() for agent in run.agents}
+    counts: dict[str, Counter[FailureCause | None]] = {agent: Counter() for agent in run.agents}
     for (agent, _, _), outcome in run.outcomes.items():
         if outcome.record.is_scored and stratum_of(outcome.record) == stratum:
             counts[agent][outcome.cause] += 1
-    causes = [cause for cause in Cause if any(part[cause] for part in counts.values())]
+    causes = [cause for cause in FailureCause if any(part[cause] for part in counts.values())]
     totals = {agent: sum(part.values()) for agent, part in counts.items()}
     rows = [("n", *(str(total) for total in totals.values()))]
     for cause in (None, *causes):

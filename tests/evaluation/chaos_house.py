@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-from toy_house import ToySimulator, episode_case
+from toy_house import ToySimulator, episode_spec
 
 
 def load_case(path):
-    return replace(episode_case(path.name.rpartition("-")[0]), task_id=path.name)
+    return replace(episode_spec(path.name.rpartition("-")[0]), task_id=path.name)
 
 
 def make_simulator():

@@ -17,6 +17,7 @@ from toy_house import write_tasks
 
 from evonav.agents.registry import BUILT_IN
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.hosting.process import (
     LOG_NAME,
     AgentHosting,
@@ -25,7 +26,7 @@ from evonav.evaluation.hosting.process import (
     RemoteAgent,
     check_importable,
 )
-from evonav.evaluation.protocol import AgentFailedError, ProtocolConfig
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate

@@ -1,7 +1,7 @@
 import pytest
 from made_up_stage import entry, made_up_record, taken
 
-from evonav.evaluation.metrics.failure_causes import Cause, cause_of
+from evonav.evaluation.metrics.failure_causes import FailureCause, cause_of
 from evonav.evaluation.records.schema import EndState
 
 FAR_M = (0.0, 0.8, 4.0)
@@ -10,12 +10,12 @@ FAR_M = (0.0, 0.8, 4.0)
 @pytest.mark.parametrize(
     ("chosen", "expected"),
     [
-        (None, Cause.NO_OBJECT),
-        (entry(is_stale=True), Cause.STALE_ENTRY),
-        (entry("Cup", is_stale=True), Cause.STALE_ENTRY),
-        (entry("Cup"), Cause.WRONG_CATEGORY),
-        (entry(centre_m=FAR_M), Cause.WRONG_INSTANCE),
-        (entry(centre_m=(5.0, 3.0, 1.9)), Cause.STOPPED_SHORT),
+        (None, FailureCause.NO_OBJECT),
+        (entry(is_stale=True), FailureCause.STALE_ENTRY),
+        (entry("Cup", is_stale=True), FailureCause.STALE_ENTRY),
+        (entry("Cup"), FailureCause.WRONG_CATEGORY),
+        (entry(centre_m=FAR_M), FailureCause.WRONG_INSTANCE),
+        (entry(centre_m=(5.0, 3.0, 1.9)), FailureCause.STOPPED_SHORT),
     ],
 )
 def test_a_stop_is_judged_by_the_entry_it_was_made_at(chosen, expected):
@@ -27,14 +27,14 @@ def test_a_stop_is_judged_by_the_entry_it_was_made_at(chosen, expected):
 @pytest.mark.parametrize(
     ("is_visible", "entries", "chosen", "expected"),
     [
-        (False, [entry()], None, Cause.NEVER_IN_VIEW),
-        (True, [], None, Cause.NOT_REMEMBERED),
-        (True, [entry(centre_m=FAR_M)], None, Cause.NOT_REMEMBERED),
-        (True, [entry(is_stale=True)], entry(is_stale=True), Cause.NOT_REMEMBERED),
-        (True, [entry("Cup")], entry("Cup"), Cause.NOT_REMEMBERED),
-        (True, [entry()], None, Cause.NOT_APPROACHED),
-        (True, [entry()], entry(centre_m=FAR_M), Cause.NOT_APPROACHED),
-        (True, [entry()], entry(), Cause.NOT_REACHED),
+        (False, [entry()], None, FailureCause.NEVER_IN_VIEW),
+        (True, [], None, FailureCause.NOT_REMEMBERED),
+        (True, [entry(centre_m=FAR_M)], None, FailureCause.NOT_REMEMBERED),
+        (True, [entry(is_stale=True)], entry(is_stale=True), FailureCause.NOT_REMEMBERED),
+        (True, [entry("Cup")], entry("Cup"), FailureCause.NOT_REMEMBERED),
+        (True, [entry()], None, FailureCause.NOT_APPROACHED),
+        (True, [entry()], entry(centre_m=FAR_M), FailureCause.NOT_APPROACHED),
+        (True, [entry()], entry(), FailureCause.NOT_REACHED),
     ],
 )
 def test_a_spent_budget_is_judged_by_what_was_seen_known_and_chosen(is_visible, entries, chosen, expected):
@@ -45,19 +45,19 @@ def test_a_spent_budget_is_judged_by_what_was_seen_known_and_chosen(is_visible, 
 @pytest.mark.parametrize(
     ("kind", "expected"),
     [
-        ("reference", Cause.NO_PATH),
-        ("decision", Cause.DECISION_FAILURE),
-        ("agent", Cause.AGENT_ERROR),
-        ("crash", Cause.AGENT_ERROR),
-        ("timeout", Cause.AGENT_ERROR),
-        ("simulation", Cause.HARNESS_ERROR),
-        ("simulator_lost", Cause.HARNESS_ERROR),
-        ("harness", Cause.HARNESS_ERROR),
+        ("reference", FailureCause.NO_PATH),
+        ("decision", FailureCause.DECISION_FAILURE),
+        ("agent", FailureCause.AGENT_ERROR),
+        ("crash", FailureCause.AGENT_ERROR),
+        ("timeout", FailureCause.AGENT_ERROR),
+        ("simulation", FailureCause.HARNESS_ERROR),
+        ("simulator_lost", FailureCause.HARNESS_ERROR),
+        ("harness", FailureCause.HARNESS_ERROR),
     ],
 )
 def test_an_error_is_told_by_whose_it_is(kind, expected):
     assert cause_of(made_up_record(EndState.ERRORED, error=kind)) is expected
-    assert cause_of(made_up_record(EndState.NOT_RUN, error=kind)) is Cause.NOT_RUN
+    assert cause_of(made_up_record(EndState.NOT_RUN, error=kind)) is FailureCause.NOT_RUN
 
 
 def test_a_success_has_no_cause():

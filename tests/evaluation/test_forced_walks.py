@@ -12,9 +12,10 @@ from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 from evonav.agents.agent import NavigateTo, Sensing, Stop, ViewSchedule
 from evonav.evaluation.episode import motion
 from evonav.evaluation.episode.episode import Episode
+from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk
 from evonav.evaluation.metrics.navigation import summarise
-from evonav.evaluation.metrics.stage_metrics import measures_of
-from evonav.evaluation.protocol import EpisodeSpec, GuidedWalk, ProtocolConfig
+from evonav.evaluation.metrics.stage_metrics import metrics_of
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageRecord
 from evonav.evaluation.run.components import make_agent
 from evonav.perception.ground_truth import GroundTruthPerception
@@ -31,8 +32,8 @@ def pair_case(*, is_evolved):
     moves = CHAIR_AWAY if is_evolved else None
     last = stage_case(3, "Chair|1", moves=moves, mode="SALIENT_OBJECT" if is_evolved else None)
     stages = (
-        replace(stage_case(1, "Chair|1"), forced=TO_CHAIR),
-        replace(stage_case(2, "Bed|1"), forced=TO_BED),
+        replace(stage_case(1, "Chair|1"), guided=TO_CHAIR),
+        replace(stage_case(2, "Bed|1"), guided=TO_BED),
         last,
     )
     return EpisodeSpec("toy", "toy", START, stages)
@@ -75,9 +76,9 @@ def test_nothing_of_a_walk_is_scored(walked, name):
     assert (first.spl, first.soft_spl, first.reference_length_m, first.has_stopped) == (None, None, None, False)
     summary = summarise(name, walked[name], 3)
     assert (summary.n, summary.counts["forced"], summary.is_incomplete) == (1, 2, False)
-    assert measures_of(first).success is None
-    assert measures_of(first).cause is None
-    assert measures_of(third).success is not None
+    assert metrics_of(first).success is None
+    assert metrics_of(first).cause is None
+    assert metrics_of(third).success is not None
     assert StageRecord.model_validate_json(first.model_dump_json()) == first
 
 
@@ -98,7 +99,7 @@ def test_memory_leads_to_the_target_in_the_fixed_house_and_astray_in_the_evolved
     assert evolved.state is EndState.FAILURE
     last = evolved.trace[-1].chosen_entry
     assert (last.label, last.is_stale) == ("Chair", True)
-    assert measures_of(evolved).cause == "stale_entry"
+    assert metrics_of(evolved).cause == "stale_entry"
     assert run("ftu", pair_case(is_evolved=True))[2].state is EndState.SUCCESS
     assert run("stage-reset", pair_case(is_evolved=True))[2].state is EndState.SUCCESS
 
@@ -121,7 +122,7 @@ def test_a_walk_of_the_evaluators_blocks_nothing_on_the_agents_map():
     corners = [(1.0 + 0.05 * i, 3.0 - 0.1 * (i % 2)) for i in range(50)]  # a step of it is no step forward
     zigzag = GuidedWalk(tuple(corners), Pose(*(corners[-1][0], 0.9, corners[-1][1]), 0.0))
     case = pair_case(is_evolved=False)
-    case = replace(case, stages=(replace(case.stages[1], forced=zigzag), *case.stages[1:]))
+    case = replace(case, stages=(replace(case.stages[1], guided=zigzag), *case.stages[1:]))
     walk = run("unigoal", case, ProtocolConfig(max_rounds=1, max_actions=1))[0]
     steps = [taken.action.action for taken in walk.trace]
     assert walk.state is EndState.GUIDED
@@ -177,7 +178,7 @@ def test_an_agent_that_fails_in_a_walk_begins_the_evaluated_stage_where_it_ends(
 def test_a_walk_that_is_blocked_is_no_failure_of_the_agent():
     through_the_fridge = GuidedWalk(((1.0, 3.0), (0.5, 4.4)), Pose(0.5, 0.9, 4.4, 0.0))
     case = pair_case(is_evolved=False)
-    case = replace(case, stages=(replace(case.stages[0], forced=through_the_fridge), *case.stages[1:]))
+    case = replace(case, stages=(replace(case.stages[0], guided=through_the_fridge), *case.stages[1:]))
     records = run("fu", case)
     assert records[0].error.kind is ErrorKind.SIMULATION
     assert "blocked" in records[0].error.message

@@ -15,7 +15,8 @@ from evonav.agents.frontier_update.stage_reset import StageReset, StageResetConf
 from evonav.agents.navigator import Navigator, NavigatorConfig, Target
 from evonav.agents.viewpoint import widest_direction_rad
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
+from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
 from evonav.perception.ground_truth import GroundTruthPerception

@@ -5,7 +5,7 @@ from dataclasses import fields
 import pytest
 from made_up_stage import entry, made_up_record, taken
 
-from evonav.evaluation.metrics.stage_metrics import StageMetrics, measures_of, read_stage_metrics
+from evonav.evaluation.metrics.stage_metrics import StageMetrics, metrics_of, read_stage_metrics
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import EndState, MemoryRecord, MovedObjectRecord, StaleEntryRecord
 from evonav.evaluation.records.store import FILE_NAME, RunStore
@@ -32,7 +32,7 @@ def store_of(tmp_path, *records, costs=None):
 def test_visits_of_stale_entries_are_runs_of_rounds_with_one_chosen():
     old, older = entry(is_stale=True), entry(entry_id=8, is_stale=True)
     trace = [taken(i, chosen) for i, chosen in enumerate([None, old, old, older, entry(), old, None])]
-    row = measures_of(made_up_record(trace=tuple(trace)))
+    row = metrics_of(made_up_record(trace=tuple(trace)))
     assert (row.num_stale_visits, row.num_stale_rounds, row.stale_path_m) == (3, 4, 2.0)
 
 
@@ -49,7 +49,7 @@ def test_evidence_is_told_in_rounds_and_metres():
         ),
         moved_objects=(MovedObjectRecord(object_id="a", seen_round=1, found_round=5), MovedObjectRecord(object_id="b")),
     )
-    row = measures_of(record)
+    row = metrics_of(record)
     assert (row.num_stale_at_start, row.num_stale_evident, row.num_stale_cleared) == (4, 3, 2)
     assert (row.rounds_to_clear, row.metres_to_clear) == (1.0, pytest.approx((0.75 + 0.0) / 2))
     assert (row.num_moved, row.num_moved_seen, row.num_moved_found) == (2, 1, 1)
@@ -58,10 +58,10 @@ def test_evidence_is_told_in_rounds_and_metres():
 
 def test_memory_is_told_as_precision_and_recall():
     entries = (entry(), entry(is_stale=True), entry(), entry())
-    row = measures_of(made_up_record(entries=entries, memory_at_start=memory(5, 1), memory_at_end=memory()))
+    row = metrics_of(made_up_record(entries=entries, memory_at_start=memory(5, 1), memory_at_end=memory()))
     assert (row.precision, row.recall, row.num_duplicates, row.num_seen_objects) == (0.75, 0.25, 1, 4)
     assert (row.precision_at_start, row.recall_at_start, row.num_stale_entries) == (0.2, 0.25, 1)
-    blank = measures_of(made_up_record(memory_at_end=memory(0, 0, 0, 0, 0)))
+    blank = metrics_of(made_up_record(memory_at_end=memory(0, 0, 0, 0, 0)))
     assert (blank.precision, blank.recall, blank.num_entries) == (None, None, 0)
 
 
@@ -72,14 +72,14 @@ def test_memory_is_told_as_precision_and_recall():
 def test_strict_success_takes_a_stop_nearness_and_sight(has_stopped, is_visible, box_m, expected):
     trace = (taken(0, is_target_visible=True), taken(1, is_target_visible=is_visible))
     record = made_up_record(trace=trace, has_stopped=has_stopped, terminal_box_distance_m=box_m)
-    assert measures_of(record).is_strict_success is expected
+    assert metrics_of(record).is_strict_success is expected
 
 
 def test_ring_spl_leaves_out_stages_that_start_within_the_radius():
-    assert measures_of(made_up_record(EndState.SUCCESS, reference_ring_m=2.5)).ring_spl == 0.5
-    assert measures_of(made_up_record(EndState.SUCCESS, reference_ring_m=6.0)).ring_spl == 1.0
-    assert measures_of(made_up_record(reference_ring_m=2.5)).ring_spl == 0.0
-    assert measures_of(made_up_record(EndState.SUCCESS, reference_ring_m=0.0)).ring_spl is None
+    assert metrics_of(made_up_record(EndState.SUCCESS, reference_ring_m=2.5)).ring_spl == 0.5
+    assert metrics_of(made_up_record(EndState.SUCCESS, reference_ring_m=6.0)).ring_spl == 1.0
+    assert metrics_of(made_up_record(reference_ring_m=2.5)).ring_spl == 0.0
+    assert metrics_of(made_up_record(EndState.SUCCESS, reference_ring_m=0.0)).ring_spl is None
 
 
 def test_other_radii_are_read_off_the_terminal_distance(tmp_path):

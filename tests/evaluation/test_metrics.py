@@ -5,9 +5,10 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from toy_house import episode_case
+from toy_house import episode_spec
 
 from evonav.errors import StoreError
+from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.metrics.navigation import (
     agent_pairs,
     rates,
@@ -15,7 +16,6 @@ from evonav.evaluation.metrics.navigation import (
     summary_json,
 )
 from evonav.evaluation.metrics.scoring import score_stage, stage_soft_spl, stage_spl
-from evonav.evaluation.protocol import as_errored
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 
@@ -55,7 +55,7 @@ def test_a_stage_without_a_reference_path_has_no_spl() -> None:
 
 def made(agent, successes):
     """Records of `successes`: (task, stage, success, spl, is_relocated)."""
-    blank = episode_case("toy-moved").blank_record(agent, 1)
+    blank = episode_spec("toy-moved").blank_record(agent, 1)
     return [
         blank.model_copy(
             update={

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from toy_house import ToySimulator, episode_case
+from toy_house import ToySimulator, episode_spec
 
 from evonav.agents.agent import NavigateTo, Sensing, ViewSchedule
 from evonav.agents.viewpoint import observation_point
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.motion import Planner, length_outside_m, navigate, polyline_length_m, waypoints
 from evonav.evaluation.episode.sensors import view_yaws_rad
-from evonav.evaluation.episode.spec import _turned_corners, room_at, stage_map
+from evonav.evaluation.episode.spec import _turned_corners, floor_plan, room_at
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.sensors.observation import MapFrame
 from evonav.world.pose import Pose
@@ -50,7 +50,7 @@ def test_views_are_evenly_spaced_and_the_heading_is_last(count, spacing_deg, hea
 
 def test_navigation_stops_after_a_metre_and_turns_on_arrival():
     simulator = ToySimulator()
-    case = episode_case("toy-static")
+    case = episode_spec("toy-static")
     simulator.reset(case.stages[0].house_json, case.start)
     planner = Planner(simulator)
     action = NavigateTo((2.5, 4.0), face_m=(2.5, 5.0))
@@ -78,9 +78,9 @@ def test_the_protocol_caps_what_an_agent_may_sense():
 
 def test_the_floor_plan_holds_rooms_walls_and_footprints():
     simulator = ToySimulator()
-    case = episode_case("toy-static")
+    case = episode_spec("toy-static")
     simulator.reset(case.stages[0].house_json, case.start)
-    plan = stage_map(case, 1, simulator.objects)
+    plan = floor_plan(case, 1, simulator.objects)
     assert room_at(plan, (1.0, 1.0)) == "room|1"
     assert room_at(plan, (7.0, 1.0)) == "room|2"
     assert room_at(plan, (9.0, 1.0)) is None
@@ -130,11 +130,11 @@ def test_the_observation_point_is_free(seed, x_m, z_m):
 
 def test_a_pose_that_is_taken_is_snapped_and_recorded():
     from evonav.evaluation.episode.episode import Episode
-    from evonav.evaluation.protocol import EpisodeSpec
+    from evonav.evaluation.episode.spec import EpisodeSpec
     from evonav.evaluation.run.components import make_agent
     from evonav.perception.ground_truth import GroundTruthPerception
 
-    case = episode_case("toy-static")
+    case = episode_spec("toy-static")
     inside_table = EpisodeSpec("t", "toy", Pose(2.0, 0.9, 1.2, 1.25), case.stages)
     episode = Episode(
         inside_table, "a", make_agent("random-walk"), ToySimulator(), GroundTruthPerception(), ProtocolConfig(), 0

@@ -12,7 +12,8 @@ from evonav.agents.msgnav.questions import GraphQuestion
 from evonav.agents.msgnav.scene_graph import SceneGraph
 from evonav.agents.msgnav.viewpoint import visible_viewpoint
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
+from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
 from evonav.perception.ground_truth import GroundTruthPerception

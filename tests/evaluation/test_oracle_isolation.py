@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_case, write_tasks
+from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_spec, write_tasks
 
 from evonav.agents.agent import NavigateTo, Sensing
 from evonav.evaluation.episode.episode import Episode
@@ -62,7 +62,7 @@ class Hostile:
 def loot():
     agent = Hostile()
     episode = Episode(
-        episode_case("toy-moved"), "h", agent, ToySimulator(), GroundTruthPerception(), ProtocolConfig(max_rounds=4), 0
+        episode_spec("toy-moved"), "h", agent, ToySimulator(), GroundTruthPerception(), ProtocolConfig(max_rounds=4), 0
     )
     records = [outcome.record for outcome in episode.run()]
     assert all(record.is_scored for record in records)
@@ -106,7 +106,7 @@ def test_nothing_handed_over_can_reach_the_evaluator(loot):
 
 def test_the_whole_occupancy_is_not_there(loot):
     simulator = ToySimulator()
-    simulator.reset(episode_case("toy-moved").stages[0].house_json)
+    simulator.reset(episode_spec("toy-moved").stages[0].house_json)
     shape = simulator.occupancy().cells.shape
     assert not any(isinstance(thing, np.ndarray) and thing.shape == shape for thing in loot)
 
@@ -138,7 +138,7 @@ def test_no_oracle_data_is_in_an_agents_process(process_loot):
     assert process_loot["points"]
     assert not [point for point in process_loot["points"] if point in map(list, places) or point in flat]
     simulator = ToySimulator()
-    simulator.reset(episode_case("toy-moved").stages[0].house_json)
+    simulator.reset(episode_spec("toy-moved").stages[0].house_json)
     assert [48, 48, 3] in process_loot["shapes"]
     assert list(simulator.occupancy().cells.shape) not in process_loot["shapes"]
 
@@ -172,7 +172,7 @@ class Impostor(OracleBaseline):
 
 def test_inheriting_from_an_oracle_baseline_gives_nothing():
     episode = Episode(
-        episode_case("toy-moved"), "i", Impostor(), ToySimulator(), GroundTruthPerception(), ProtocolConfig(), 0
+        episode_spec("toy-moved"), "i", Impostor(), ToySimulator(), GroundTruthPerception(), ProtocolConfig(), 0
     )
     first = next(iter(episode.run())).record
     assert not Impostor.told

@@ -4,7 +4,7 @@ import math
 from itertools import pairwise
 
 import pytest
-from toy_house import ToySimulator, episode_case
+from toy_house import ToySimulator, episode_spec
 
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.protocol import ProtocolConfig
@@ -15,7 +15,7 @@ from evonav.perception.ground_truth import GroundTruthPerception
 
 def run_episode(task_id, agent, protocol=None, simulator=None):
     episode = Episode(
-        episode_case(task_id),
+        episode_spec(task_id),
         "agent",
         make_agent(agent) if isinstance(agent, str) else agent,
         simulator or ToySimulator(),

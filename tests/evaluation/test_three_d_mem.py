@@ -12,7 +12,8 @@ from evonav.agents.agent import NavigateTo
 from evonav.agents.three_d_mem.agent import NO_ANSWER, NOTHING_LEFT, ThreeDMem, ThreeDMemConfig
 from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
+from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.memory import ObjectMap
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN

@@ -15,7 +15,8 @@ from toy_house import CHAIR_AWAY, OBJECTS, make_simulator, write_tasks
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.nearest_frontier import NearestFrontier
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.protocol import ProtocolConfig, as_errored
+from evonav.evaluation.episode.outcome import as_errored
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend

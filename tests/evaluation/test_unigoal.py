@@ -22,7 +22,8 @@ from evonav.agents.unigoal.scene_questions import (
 )
 from evonav.decision.text.decision import TextMatch
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
+from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.world.pose import Pose

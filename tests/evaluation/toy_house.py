@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evonav.evaluation.protocol import EpisodeSpec, StageSpec
+from evonav.evaluation.episode.spec import EpisodeSpec, StageSpec
 from evonav.evaluation.records.schema import Relocation, TargetRecord, TransitionRecord
 from evonav.tasks.public import StageInput
 from evonav.world.pose import Pose
@@ -280,12 +280,12 @@ EPISODES = {
 }
 
 
-def episode_case(task_id):
+def episode_spec(task_id):
     return EpisodeSpec(task_id=task_id, house="toy", start=Pose(1.0, 0.9, 3.0, 0.0), stages=EPISODES[task_id]())
 
 
 def load_case(path: Path):
-    return episode_case(path.name)
+    return episode_spec(path.name)
 
 
 def write_tasks(directory: Path):

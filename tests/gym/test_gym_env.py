@@ -16,7 +16,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 from evonav.agents.agent import AgentAction, Move, NavigateTo, Sensing, Stop
 from evonav.errors import InvalidArgumentError, TaskError
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.episode.spec import episode_case
+from evonav.evaluation.episode.spec import episode_spec
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.gym import ACTIONS, ENV_ID, OBSERVATIONS, LifelongNavEnv, NavConfig, vocabulary
 from evonav.gym.spaces import waypoint_m
@@ -106,7 +106,7 @@ def test_the_same_actions_give_the_evaluators_metrics(mode):
             told.append(_as_told(env, action))
             _, _, is_over, _, info = env.step(action)
             results += [info["stage_result"]] if "stage_result" in info else []
-        case = episode_case(load_task(root))
+        case = episode_spec(load_task(root))
         protocol = ProtocolConfig(max_rounds=budget, max_actions=budget)
         simulator = EmbeddedSimulator(config.simulator)
         agent = _Replaying(told, mode)

@@ -11,7 +11,7 @@ from typing import Any
 
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.protocol import EpisodeSpec
+from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.run.components import Backend
 from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import Job, answers, open_pool

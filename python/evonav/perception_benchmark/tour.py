@@ -7,8 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from evonav.evaluation.episode.spec import room_at, stage_map
-from evonav.evaluation.protocol import EpisodeSpec
+from evonav.evaluation.episode.spec import EpisodeSpec, floor_plan, room_at
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator
 
@@ -29,7 +28,7 @@ def tour(case: EpisodeSpec, stage: int, simulator: Simulator, *, views_per_room:
         seed: Together with task and stage it decides what is drawn.
     """
     generator = np.random.Generator(np.random.PCG64(_seed_of(seed, case.task_id, stage)))
-    plan = stage_map(case, stage, simulator.objects)
+    plan = floor_plan(case, stage, simulator.objects)
     rooms: dict[str, list[tuple[float, float]]] = {}
     for x_m, _, z_m in simulator.reachable_positions().tolist():
         room = room_at(plan, (x_m, z_m))

@@ -16,7 +16,8 @@ from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.prompts import Picture
 from evonav.decision.query import QueryLogEntry
 from evonav.decision.question import Question
-from evonav.evaluation.protocol import AgentFailedError, StageOutcome
+from evonav.evaluation.episode.errors import AgentFailedError
+from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.records.convert import STALE_MARGIN_M, distance_to_box_m, entry_record, pose_record
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord
 from evonav.replay.types import (
@@ -141,7 +142,7 @@ class Tracer:
         if self._pending is not None:
             rounds = [*rounds, self._with_belief(self._pending)]
         self._rounds, self._pending = [], None
-        return TracedStage(outcome.record, outcome.stage_map, tuple(rounds), "", (), self._fov_rad)
+        return TracedStage(outcome.record, outcome.floor_plan, tuple(rounds), "", (), self._fov_rad)
 
     def _with_belief(self, seen: TracedRound) -> TracedRound:
         if not isinstance(self.agent, InspectableAgent):

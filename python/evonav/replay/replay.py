@@ -19,7 +19,8 @@ from evonav.decision.custom_model import load_custom_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
-from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
+from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.json_diff import record_differences
 from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore

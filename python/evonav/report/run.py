@@ -16,7 +16,7 @@ from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import FailureRow, RunStore
 from evonav.report.maps.stage_map import success_radius_of
-from evonav.report.tables.causes import Cause, cause_of
+from evonav.report.tables.causes import FailureCause, cause_of
 
 PAPER_ORDER = ("unigoal", "3d-mem", "msgnav", "fu", "stage-reset", "ftu")
 """Agents in the order of the paper's tables."""
@@ -30,7 +30,7 @@ class StageOutcome:
 
     record: StageRecord
     """Without trace and entries."""
-    cause: Cause | None
+    cause: FailureCause | None
     num_stale_entries: int
     """In memory at the end."""
     stale_path_m: float
@@ -102,9 +102,9 @@ class Run:
         """An agent's stages that count in rates."""
         return [outcome for key, outcome in self.outcomes.items() if key[0] == agent and outcome.record.is_scored]
 
-    def cause_counts(self) -> dict[str, Counter[Cause | None]]:
+    def cause_counts(self) -> dict[str, Counter[FailureCause | None]]:
         """Stages by cause, for each agent."""
-        counts: dict[str, Counter[Cause | None]] = {agent: Counter() for agent in self.agents}
+        counts: dict[str, Counter[FailureCause | None]] = {agent: Counter() for agent in self.agents}
         for (agent, _, _), outcome in self.outcomes.items():
             counts[agent][outcome.cause] += 1
         return counts

@@ -22,7 +22,8 @@ from evonav.agents.agent import (
 )
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.episode import Episode
-from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
+from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.json_diff import record_differences
 from evonav.evaluation.records.schema import ActionRecord, EntryRecord, StageRecord
 from evonav.evaluation.run.components import Backend

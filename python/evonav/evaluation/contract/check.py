@@ -16,8 +16,9 @@ from evonav.agents.registry import agent_factory, new_agent
 from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
+from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
-from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.tasks.bundled import bundled_tasks

@@ -10,8 +10,10 @@ from time import process_time
 
 from evonav.agents.agent import Agent
 from evonav.evaluation.episode.observer import LOSSES, EpisodeObserver, HasOwnProcess
-from evonav.evaluation.episode.stage import EpisodeContext, EpisodeState, StageRun
-from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig, StageOutcome, as_not_run
+from evonav.evaluation.episode.outcome import StageOutcome, as_not_run
+from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.episode.stage import EpisodeContext, EpisodeState, Stage
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.costs import LEVELS, Stopwatch
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
 from evonav.perception import Perception
@@ -72,7 +74,7 @@ class Episode:
                 memory_lost_at, is_lost = stage, False
             record = record.model_copy(update={"failed_before": failed, "memory_lost_at": memory_lost_at})
             stopwatch = Stopwatch(self._cpu_s)
-            run = StageRun(self._parts, self._state, record, pose, stopwatch)
+            run = Stage(self._parts, self._state, record, pose, stopwatch)
             record = run.run()
             costs = stopwatch.costs(self._new_costs(run.failure))
             wall_s, cpu_s = costs.wall_s or 0.0, costs.cpu_s or 0.0
@@ -89,7 +91,7 @@ class Episode:
 
     def _end_pose(self, stage: int) -> Pose:
         """Where a stage ends: where the agent stands, or where it would have been taken had it not failed."""
-        pose, forced = self._parts.simulator.pose, self._case.stages[stage - 1].forced
+        pose, forced = self._parts.simulator.pose, self._case.stages[stage - 1].guided
         return pose if forced is None else replace(forced.end, y_m=pose.y_m, horizon_rad=pose.horizon_rad)
 
     def _new_costs(self, failure: ErrorKind | None) -> Mapping[str, float]:

@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 
 from evonav.agents import wire
 from evonav.errors import DecisionError, SimulationError, SimulatorLostError
-from evonav.evaluation.protocol import AgentFailedError
+from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord
 from evonav.sensors.observation import Observation
 from evonav.world.simulator import Simulator

@@ -1,21 +1,96 @@
-"""From a task on disk to what the evaluator runs and records."""
+"""Describe a task as the evaluator runs it: its stages, targets and hidden changes."""
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
-from evonav.evaluation.protocol import EpisodeSpec, GuidedWalk, StageSpec
+import numpy as np
+
 from evonav.evaluation.records.floor_plan import house_map, image_uri, target_record, transition_record
-from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, Point2
+from evonav.evaluation.records.schema import (
+    EndState,
+    FloorPlan,
+    GoalRecord,
+    ObjectFootprint,
+    Point2,
+    StageRecord,
+    TargetRecord,
+    TransitionRecord,
+)
 from evonav.house import House
 from evonav.tasks import Task
 from evonav.tasks.oracle import OracleStage
+from evonav.tasks.public import StageInput
+from evonav.world.pose import Pose
 from evonav.world.simulator import SceneObject
 
 THUMBNAIL_PX = 160
 
 
-def episode_case(task: Task) -> EpisodeSpec:
-    """A task as the evaluator runs it.
+@dataclass(frozen=True, slots=True)
+class GuidedWalk:
+    """A reference trajectory along which the evaluator moves the agent."""
+
+    path_m: tuple[Point2, ...]
+    """Corners, the start first."""
+    end: Pose
+    """The last pose. Its horizon is not used: an agent's camera keeps the horizon of its house."""
+
+
+@dataclass(frozen=True, slots=True)
+class StageSpec:
+    """A stage as the evaluator knows it; only `public` ever reaches an agent."""
+
+    public: StageInput
+    house_json: str
+    target: TargetRecord
+    transition: TransitionRecord
+    guided: GuidedWalk | None = None
+    """The walk of a guided stage, which the agent does not control and which is not scored; `None` otherwise."""
+
+    @property
+    def goal(self) -> GoalRecord:
+        """The goal as the agent receives it, for the record."""
+        return GoalRecord(
+            category=self.public.category,
+            instruction=self.public.unified_instruction,
+            basic_instruction=self.public.basic_instruction,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeSpec:
+    """A task as the evaluator knows it."""
+
+    task_id: str
+    house: str
+    start: Pose
+    """The start pose of stage 1, from the manifest."""
+    stages: tuple[StageSpec, ...] = field(repr=False)
+
+    def blank_record(self, agent: str, stage: int) -> StageRecord:
+        """Return the record of a stage that was not run; all other records of the stage start from it.
+
+        Args:
+            agent: The name by which the agent was requested.
+            stage: 1-based.
+        """
+        spec = self.stages[stage - 1]
+        return StageRecord(
+            agent=agent,
+            task_id=self.task_id,
+            house=self.house,
+            stage=stage,
+            num_stages=len(self.stages),
+            state=EndState.NOT_RUN,
+            goal=spec.goal,
+            target=spec.target,
+            transition=spec.transition,
+        )
+
+
+def episode_spec(task: Task) -> EpisodeSpec:
+    """Describe a task for the evaluator.
 
     Raises:
         TaskError: A stage house is malformed.
@@ -31,18 +106,40 @@ def episode_case(task: Task) -> EpisodeSpec:
                 house_json=task.house_json(k),
                 target=target_record(task, k),
                 transition=transition_record(task.oracle(k)),
-                forced=_forced_walk(task.oracle(k)) if k in task.guided_stages else None,
+                guided=_guided_walk(task.oracle(k)) if k in task.guided_stages else None,
             )
             for k in numbers
         ),
     )
 
 
-def _forced_walk(oracle: OracleStage) -> GuidedWalk:
+def unreadable_task_spec(task_id: str, num_stages: int) -> EpisodeSpec:
+    """Stand in for a task that cannot be read, so that its stages have records; all its values are empty."""
+    no_image = np.zeros((0, 0, 3), dtype=np.uint8)
+    stages = tuple(
+        StageSpec(
+            public=StageInput(stage, "", "", "", "", no_image),
+            house_json="",
+            target=TargetRecord(
+                object_id="",
+                category="",
+                position_m=(0.0, 0.0, 0.0),
+                room_id="",
+                is_relocated=False,
+                is_relocated_now=False,
+            ),
+            transition=TransitionRecord(),
+        )
+        for stage in range(1, num_stages + 1)
+    )
+    return EpisodeSpec(task_id, "", Pose(0.0, 0.0, 0.0, 0.0), stages)
+
+
+def _guided_walk(oracle: OracleStage) -> GuidedWalk:
     return GuidedWalk(path_m=oracle.reference_path_m, end=oracle.reference_pose.pose())
 
 
-def stage_map(case: EpisodeSpec, stage: int, objects: Sequence[SceneObject]) -> FloorPlan:
+def floor_plan(case: EpisodeSpec, stage: int, objects: Sequence[SceneObject]) -> FloorPlan:
     """A stage's house from above.
 
     Args:

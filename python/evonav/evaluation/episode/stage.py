@@ -25,16 +25,12 @@ from evonav.evaluation.episode.observer import (
     traceback_of,
 )
 from evonav.evaluation.episode.oracle_baselines import Sighting, as_oracle_baseline
+from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.episode.sensors import Sensors, map_frame
-from evonav.evaluation.episode.spec import room_at, stage_map
+from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk, floor_plan, room_at
 from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState
-from evonav.evaluation.protocol import (
-    EpisodeSpec,
-    GuidedWalk,
-    ProtocolConfig,
-    as_errored,
-)
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.convert import action_record, entry_record, pose_record, sensing_record
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.schema import (
@@ -77,7 +73,7 @@ class EpisodeState:
     tracked: TrackedState = field(default_factory=TrackedState)
 
 
-class StageRun:
+class Stage:
     """One stage of an episode: start, rounds, measures."""
 
     def __init__(
@@ -122,8 +118,8 @@ class StageRun:
         try:
             with attribute_errors(ErrorKind.HARNESS):
                 self._start()
-                if self._stage.forced is not None:
-                    return self._forced(self._stage.forced)
+                if self._stage.guided is not None:
+                    return self._forced(self._stage.guided)
                 with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     reference_m = self._path_to_target_m()
                 progress = self._begin(self._protocol.budget(self._sensing), reference_m)
@@ -148,7 +144,7 @@ class StageRun:
             self._state.tracked,
             self._protocol.min_visible_px,
         )
-        self.plan = stage_map(self._case, stage, self._simulator.objects)
+        self.plan = floor_plan(self._case, stage, self._simulator.objects)
         room_id = room_at(self.plan, (self._requested.x_m, self._requested.z_m))
         evolved_room_id = self._record.transition.room_id
         self._record = self._record.model_copy(

@@ -27,8 +27,8 @@ from evonav.agents import wire
 from evonav.agents.agent import AgentAction, EntryBelief, RoundDiagnostics, Sensing
 from evonav.agents.serving import LENGTH
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
-from evonav.evaluation.protocol import AgentFailedError
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
 from evonav.sensors.observation import Observation

@@ -12,7 +12,7 @@ NEAR_TARGET_M = 1.0
 """Ground-plane distance within which an entry of the goal's category is taken for the target's."""
 
 
-class Cause(str, Enum):
+class FailureCause(str, Enum):
     """What to fix. The first nine are failures, the others stages without a score."""
 
     STALE_ENTRY = "stale_entry"
@@ -46,18 +46,18 @@ class Cause(str, Enum):
 
 
 _OF_ERRORS = {
-    ErrorKind.REFERENCE: Cause.NO_PATH,
-    ErrorKind.DECISION: Cause.DECISION_FAILURE,
-    ErrorKind.AGENT: Cause.AGENT_ERROR,
-    ErrorKind.CRASH: Cause.AGENT_ERROR,
-    ErrorKind.TIMEOUT: Cause.AGENT_ERROR,
-    ErrorKind.SIMULATION: Cause.HARNESS_ERROR,
-    ErrorKind.SIMULATOR_LOST: Cause.HARNESS_ERROR,
-    ErrorKind.HARNESS: Cause.HARNESS_ERROR,
+    ErrorKind.REFERENCE: FailureCause.NO_PATH,
+    ErrorKind.DECISION: FailureCause.DECISION_FAILURE,
+    ErrorKind.AGENT: FailureCause.AGENT_ERROR,
+    ErrorKind.CRASH: FailureCause.AGENT_ERROR,
+    ErrorKind.TIMEOUT: FailureCause.AGENT_ERROR,
+    ErrorKind.SIMULATION: FailureCause.HARNESS_ERROR,
+    ErrorKind.SIMULATOR_LOST: FailureCause.HARNESS_ERROR,
+    ErrorKind.HARNESS: FailureCause.HARNESS_ERROR,
 }
 
 
-def cause_of(record: StageRecord) -> Cause | None:
+def cause_of(record: StageRecord) -> FailureCause | None:
     """The cause of a stage that did not succeed; `None` for a success, and for a walk of the evaluator's.
 
     Args:
@@ -66,30 +66,30 @@ def cause_of(record: StageRecord) -> Cause | None:
     if record.state in (EndState.SUCCESS, EndState.GUIDED):
         return None
     if record.state is EndState.NOT_RUN:
-        return Cause.NOT_RUN
+        return FailureCause.NOT_RUN
     if record.state is EndState.ERRORED:
-        return _OF_ERRORS[record.error.kind] if record.error is not None else Cause.HARNESS_ERROR
+        return _OF_ERRORS[record.error.kind] if record.error is not None else FailureCause.HARNESS_ERROR
     if record.has_stopped:
         return _cause_of_stop(record)
     if record.num_target_visible_rounds == 0:
-        return Cause.NEVER_IN_VIEW
+        return FailureCause.NEVER_IN_VIEW
     if not any(_is_target(record, entry) for entry in record.entries):
-        return Cause.NOT_REMEMBERED
+        return FailureCause.NOT_REMEMBERED
     was_chosen = any(
         taken.chosen_entry is not None and _is_target(record, taken.chosen_entry) for taken in record.trace
     )
-    return Cause.NOT_REACHED if was_chosen else Cause.NOT_APPROACHED
+    return FailureCause.NOT_REACHED if was_chosen else FailureCause.NOT_APPROACHED
 
 
-def _cause_of_stop(record: StageRecord) -> Cause:
+def _cause_of_stop(record: StageRecord) -> FailureCause:
     entry = record.trace[-1].chosen_entry if record.trace else None
     if entry is None:
-        return Cause.NO_OBJECT
+        return FailureCause.NO_OBJECT
     if entry.is_stale:
-        return Cause.STALE_ENTRY
+        return FailureCause.STALE_ENTRY
     if entry.label != record.target.category:
-        return Cause.WRONG_CATEGORY
-    return Cause.STOPPED_SHORT if _is_target(record, entry) else Cause.WRONG_INSTANCE
+        return FailureCause.WRONG_CATEGORY
+    return FailureCause.STOPPED_SHORT if _is_target(record, entry) else FailureCause.WRONG_INSTANCE
 
 
 def _is_target(record: StageRecord, entry: EntryRecord) -> bool:

@@ -19,7 +19,7 @@ from evonav.evaluation.records.schema import EndState, MemoryRecord, RoundRecord
 if TYPE_CHECKING:
     from evonav.evaluation.records.store import RunStore
 
-MEASURES_VERSION = 3
+METRICS_VERSION = 3
 """Raised whenever a measure changes: measures kept under another version are derived again from their records."""
 STRICT_RADIUS_M = 1.0
 """Of `is_strict_success`."""
@@ -34,7 +34,7 @@ COUNTERS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecordMeasures:
+class RecordMetrics:
     """What one record tells by itself. Without a score (errored, not run), scores and distances are `None`."""
 
     agent: str
@@ -49,7 +49,7 @@ class RecordMeasures:
     state: str
     """`success`, `failure`, `errored` or `not_run`."""
     cause: str | None
-    """Why it is no success: a value of `Cause`."""
+    """Why it is no success: a value of `FailureCause`."""
     error_kind: str | None
     category: str
     """Of the target."""
@@ -139,7 +139,7 @@ class RecordMeasures:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StageMetrics(StageCosts, RecordMeasures):
+class StageMetrics(StageCosts, RecordMetrics):
     """A stage in a row: what its record tells, what those before it add, and what it cost."""
 
     precision_before: float | None
@@ -165,7 +165,7 @@ class StageMetrics(StageCosts, RecordMeasures):
 class _Kept:
     """What the store keeps of a record beside it."""
 
-    measures: RecordMeasures
+    measures: RecordMetrics
     counters: dict[str, int]
     """Cumulative, at the end of the stage."""
     is_fresh: bool
@@ -180,7 +180,7 @@ def encode_metrics(record: StageRecord) -> str:
     """
     last = record.trace[-1].counters if record.trace else {}
     kept = {
-        "measures": asdict(measures_of(record)),
+        "measures": asdict(metrics_of(record)),
         "counters": {name: last[name] for name in COUNTERS if name in last}
         # Agents count failures from the first one on.
         | ({"failed_decisions": last.get("failed_decisions", 0)} if "decisions" in last else {}),
@@ -227,7 +227,7 @@ def read_stage_metrics(store: "RunStore", agents: Sequence[str] | None = None) -
     return rows
 
 
-def measures_of(record: StageRecord) -> RecordMeasures:
+def metrics_of(record: StageRecord) -> RecordMetrics:
     """What one record tells.
 
     Args:
@@ -244,7 +244,7 @@ def measures_of(record: StageRecord) -> RecordMeasures:
     # Records of the first runs have no `memory_at_end`, but entries: stale or not is in them.
     has_entries = is_told or bool(record.entries)
     num_stale = sum(entry.is_stale for entry in record.entries)
-    return RecordMeasures(
+    return RecordMetrics(
         agent=record.agent,
         is_baseline=record.agent in BASELINES,
         task_id=record.task_id,
@@ -316,10 +316,10 @@ def stratum_of(record: StageRecord) -> str:
     return "relocated" if record.target.is_relocated else "not_relocated"
 
 
-_MEASURE_FIELDS = tuple(field.name for field in fields(RecordMeasures))
+_MEASURE_FIELDS = tuple(field.name for field in fields(RecordMetrics))
 
 
-def _values(measures: RecordMeasures) -> dict[str, Any]:
+def _values(measures: RecordMetrics) -> dict[str, Any]:
     return {name: getattr(measures, name) for name in _MEASURE_FIELDS}
 
 
@@ -329,10 +329,10 @@ def _kept(store: "RunStore", agents: Sequence[str] | None) -> Iterator[_Kept]:
     for (agent, task_id, stage), version, text in store.encode_metrics():
         if wanted is not None and agent not in wanted:
             continue
-        if version != MEASURES_VERSION or text is None:
+        if version != METRICS_VERSION or text is None:
             text = encode_metrics(store.record(agent, task_id, stage))
         kept = json.loads(text)
-        yield _Kept(RecordMeasures(**kept["measures"]), kept["counters"], kept["is_fresh"])
+        yield _Kept(RecordMetrics(**kept["measures"]), kept["counters"], kept["is_fresh"])
 
 
 def _chosen(taken: RoundRecord) -> tuple[int | None, bool]:

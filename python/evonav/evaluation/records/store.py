@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.stage_metrics import MEASURES_VERSION, encode_metrics
+from evonav.evaluation.metrics.stage_metrics import METRICS_VERSION, encode_metrics
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
@@ -184,7 +184,7 @@ class RunStore:
             text = record.model_dump_json()
             self._db.execute("INSERT INTO stages VALUES (?, ?, ?, ?, ?)", (*key, record.state.value, text))
             measures = encode_metrics(record)
-            self._db.execute("INSERT INTO measures VALUES (?, ?, ?, ?, ?)", (*key, MEASURES_VERSION, measures))
+            self._db.execute("INSERT INTO measures VALUES (?, ?, ?, ?, ?)", (*key, METRICS_VERSION, measures))
             self._db.execute("INSERT INTO timings VALUES (?, ?, ?, ?, ?)", (*key, wall_s, cpu_s))
             if costs is not None:
                 told = {name: value for name, value in asdict(costs).items() if value is not None}
@@ -198,9 +198,9 @@ class RunStore:
         what = (failure.kind.value, failure.message, failure.traceback, True)
         self._execute(_ADD_FAILURE, (agent, task_id, failure.stage, *what))
 
-    def add_map(self, stage_map: FloorPlan) -> None:
+    def add_map(self, floor_plan: FloorPlan) -> None:
         """Records a stage's house from above; the first writer wins, all of them would write the same."""
-        row = (stage_map.task_id, stage_map.stage, stage_map.model_dump_json())
+        row = (floor_plan.task_id, floor_plan.stage, floor_plan.model_dump_json())
         self._execute("INSERT OR IGNORE INTO stage_maps VALUES (?, ?, ?)", row)
 
     def forget_episode(self, agent: str, task_id: str, from_stage: int) -> None:

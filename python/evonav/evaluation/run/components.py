@@ -12,8 +12,8 @@ from evonav.agents.registry import BUILT_IN, agent_descriptions, agent_factory, 
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES, new_oracle_baseline
+from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.process import DecisionSpec, check_importable
-from evonav.evaluation.protocol import EpisodeSpec
 from evonav.perception import Perception
 from evonav.perception.words import GROUND_TRUTH
 from evonav.world.simulator import Simulator
@@ -161,10 +161,10 @@ def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
 
 def load_case(path: Path) -> EpisodeSpec:
     """A task on disk."""
-    from evonav.evaluation.episode.spec import episode_case
+    from evonav.evaluation.episode.spec import episode_spec
     from evonav.tasks import load_task
 
-    return episode_case(load_task(path))
+    return episode_spec(load_task(path))
 
 
 def embedded_simulator() -> Simulator:

@@ -6,13 +6,8 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
 
-from evonav.evaluation.protocol import (
-    EpisodeSpec,
-    StageOutcome,
-    as_errored,
-    as_not_run,
-    unknown_case,
-)
+from evonav.evaluation.episode.outcome import StageOutcome, as_errored, as_not_run
+from evonav.evaluation.episode.spec import EpisodeSpec, unreadable_task_spec
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageFailure, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.worker import RETRIED, EpisodeJob, Setup, decode_event
@@ -94,8 +89,8 @@ class Run:
         An agent that is not deterministic may do otherwise than recorded. Mixing two rollouts in one episode would join
         what never happened, so the newer rollout then replaces the older from that stage on.
         """
-        if outcome.stage_map is not None:
-            self.store.add_map(outcome.stage_map)
+        if outcome.floor_plan is not None:
+            self.store.add_map(outcome.floor_plan)
         record = outcome.record
         key = (record.agent, record.task_id, record.stage)
         if key in self._states:
@@ -123,7 +118,7 @@ class Run:
         except Exception as error:  # whatever a broken file does to whatever reads it
             message = f"the task cannot be read: {type(error).__name__}: {error}"
             failure = replace(failure, kind=ErrorKind.HARNESS, message=message)
-            case = unknown_case(task.task_id, task.num_stages)
+            case = unreadable_task_spec(task.task_id, task.num_stages)
         failed: StageRecord | None = None
         for stage in range(1, task.num_stages + 1):
             if (job.agent, job.task_id, stage) in self._states:

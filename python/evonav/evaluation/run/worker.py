@@ -22,8 +22,10 @@ from evonav.agents.agent import Agent, AgentAction, Sensing
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
+from evonav.evaluation.episode.outcome import StageOutcome
+from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
-from evonav.evaluation.protocol import EpisodeSpec, ProtocolConfig, StageOutcome
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.costs import StageCosts
 from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord, StageFailure, StageRecord
 from evonav.evaluation.run.components import Backend, make_agent
@@ -253,7 +255,7 @@ def decode_event(text: str) -> StageOutcome | StageFailure | None:
         plan, costs = values.pop("map"), values.pop("costs")
         return StageOutcome(
             record=StageRecord.model_validate_json(values.pop("record")),
-            stage_map=None if plan is None else FloorPlan.model_validate_json(plan),
+            floor_plan=None if plan is None else FloorPlan.model_validate_json(plan),
             costs=None if costs is None else StageCosts(**costs),
             **values,
         )
@@ -261,7 +263,7 @@ def decode_event(text: str) -> StageOutcome | StageFailure | None:
 
 
 def _outcome_text(outcome: StageOutcome) -> str:
-    plan = outcome.stage_map
+    plan = outcome.floor_plan
     return json.dumps(
         {
             "record": outcome.record.model_dump_json(),

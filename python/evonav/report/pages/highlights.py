@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState
 from evonav.report.run import Run, StageOutcome
-from evonav.report.tables.causes import Cause
+from evonav.report.tables.causes import FailureCause
 
 
 def most_telling(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[str, list[int]]:
@@ -69,7 +69,7 @@ def telling_episodes(run: Run) -> list[tuple[str, str]]:
 def _pair(found: dict[str, StageOutcome]) -> tuple[float, list[str]]:
     """How much a stage tells, and by which of its agents."""
     good = [agent for agent, outcome in found.items() if outcome.record.state is EndState.SUCCESS]
-    misled = [agent for agent, outcome in found.items() if outcome.cause is Cause.STALE_ENTRY]
+    misled = [agent for agent, outcome in found.items() if outcome.cause is FailureCause.STALE_ENTRY]
     bad = misled or [agent for agent, outcome in found.items() if outcome.record.state is EndState.FAILURE]
     pair = bad[:1] + good[:1]
     if not pair:
@@ -88,7 +88,7 @@ def _telling(run: Run, agents: Sequence[str], task_id: str, stages: Sequence[int
     last = [run.outcomes[agent, task_id, stages[-1]] for agent in agents]
     hero = last[-1]
     has_success = hero.record.state is EndState.SUCCESS
-    is_misled = any(outcome.cause is Cause.STALE_ENTRY for outcome in last)
+    is_misled = any(outcome.cause is FailureCause.STALE_ENTRY for outcome in last)
     score = 6.0 * (is_misled and has_success) + 4.0 * (hero.stale_path_m > 0 and has_success)
     score += 2.0 * hero.record.target.is_relocated_now + 2.0 * has_success + len(stages)
     window = [run.outcomes[agents[-1], task_id, k].record for k in stages]

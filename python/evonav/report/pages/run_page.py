@@ -22,7 +22,7 @@ from evonav.report.plots.run_plots import run_plots
 from evonav.report.plots.style import plot_css
 from evonav.report.run import Run, StageOutcome, Task, load_run
 from evonav.report.tables import table as tables
-from evonav.report.tables.causes import WORDS, Cause
+from evonav.report.tables.causes import WORDS, FailureCause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
 from evonav.report.tables.run_tables import latex_tables, markdown_tables, run_tables, statements
 from evonav.statistics import Interval
@@ -163,7 +163,7 @@ def _page_context(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
         "plots": list(zip(plot_elements([one.plot for one in plots]), [one.caption for one in plots], strict=False)),
         "statements": statements(run),
         "overview": overview,
-        "causes": [(cause.name, WORDS[cause]) for cause in Cause if cause in used],
+        "causes": [(cause.name, WORDS[cause]) for cause in FailureCause if cause in used],
         "facts": run_facts(run),
         "failures": failure_groups(run),
         "commands": reproduction(run),

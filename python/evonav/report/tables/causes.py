@@ -1,26 +1,26 @@
 """How a stage ended, in words. What is what is decided in `evonav.evaluation.metrics.failure_causes`."""
 
-from evonav.evaluation.metrics.failure_causes import Cause, cause_of
+from evonav.evaluation.metrics.failure_causes import FailureCause, cause_of
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.tasks.language import noun_of
 
-__all__ = ["WORDS", "Cause", "cause_of", "sentence"]
+__all__ = ["WORDS", "FailureCause", "cause_of", "sentence"]
 
-WORDS: dict[Cause, str] = {
-    Cause.NO_OBJECT: "stopped without an object",
-    Cause.STALE_ENTRY: "stopped at a stale entry",
-    Cause.WRONG_CATEGORY: "stopped at another kind of object",
-    Cause.STOPPED_SHORT: "stopped short of the target",
-    Cause.WRONG_INSTANCE: "stopped at another instance",
-    Cause.NEVER_IN_VIEW: "target never in view",
-    Cause.NOT_REMEMBERED: "target in view, not recognised",
-    Cause.NOT_APPROACHED: "target known, never chosen",
-    Cause.NOT_REACHED: "target known, not reached in time",
-    Cause.NO_PATH: "errored: no path to the target",
-    Cause.DECISION_FAILURE: "errored: no valid decision",
-    Cause.AGENT_ERROR: "errored: the agent failed",
-    Cause.HARNESS_ERROR: "errored: the simulator or evonav failed",
-    Cause.NOT_RUN: "not run",
+WORDS: dict[FailureCause, str] = {
+    FailureCause.NO_OBJECT: "stopped without an object",
+    FailureCause.STALE_ENTRY: "stopped at a stale entry",
+    FailureCause.WRONG_CATEGORY: "stopped at another kind of object",
+    FailureCause.STOPPED_SHORT: "stopped short of the target",
+    FailureCause.WRONG_INSTANCE: "stopped at another instance",
+    FailureCause.NEVER_IN_VIEW: "target never in view",
+    FailureCause.NOT_REMEMBERED: "target in view, not recognised",
+    FailureCause.NOT_APPROACHED: "target known, never chosen",
+    FailureCause.NOT_REACHED: "target known, not reached in time",
+    FailureCause.NO_PATH: "errored: no path to the target",
+    FailureCause.DECISION_FAILURE: "errored: no valid decision",
+    FailureCause.AGENT_ERROR: "errored: the agent failed",
+    FailureCause.HARNESS_ERROR: "errored: the simulator or evonav failed",
+    FailureCause.NOT_RUN: "not run",
 }
 """What reports call the causes."""
 

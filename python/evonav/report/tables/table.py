@@ -17,7 +17,7 @@ from rich.text import Text
 
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, rates
 from evonav.evaluation.records.schema import StageRecord
-from evonav.report.tables.causes import WORDS, Cause, cause_of
+from evonav.report.tables.causes import WORDS, FailureCause, cause_of
 from evonav.statistics import LEVEL, NUM_RESAMPLES, Interval, PairedEffect
 
 NONE = "–"
@@ -157,9 +157,9 @@ def cause_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:
     return cause_count_table(counts)
 
 
-def cause_count_table(counts: Mapping[str, Mapping[Cause | None, int]]) -> Table:
+def cause_count_table(counts: Mapping[str, Mapping[FailureCause | None, int]]) -> Table:
     """`cause_table` from counts."""
-    causes = [cause for cause in Cause if any(part.get(cause) for part in counts.values())]
+    causes = [cause for cause in FailureCause if any(part.get(cause) for part in counts.values())]
     rows = tuple((WORDS[cause], *(str(part.get(cause, 0)) for part in counts.values())) for cause in causes)
     note = "One cause a stage, the first that fits."
     return Table("Why stages failed", ("Cause", *counts), rows, (note,))
