@@ -10,7 +10,7 @@ from evonav.statistics import Interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase
+    from matplotlib.figure import SubFigure
 
 TOOLTIP = "tooltip:"
 """Begins the id of an element that has a tooltip: the rest of the id is its text."""
@@ -44,9 +44,9 @@ def size_in(plot: Plot) -> tuple[float, float]:
     return max(title, legend, 0.75 + slot * len(plot.groups)), 3.4
 
 
-def draw(panel: "FigureBase", plot: Plot) -> None:
-    """Draw a plot into a figure or a part of one."""
-    width_in, _ = size_in(plot)
+def draw(panel: "SubFigure", plot: Plot) -> None:
+    """Draw a plot into a part of a figure."""
+    width_in = panel.bbox.width / panel.get_figure(root=True).dpi
     panel.suptitle(clean(plot.title), x=0.12 / width_in, ha="left", fontsize=LARGE, fontweight="bold", color=INK)
     axes = panel.subplots()
     if isinstance(plot, GapPlot):
@@ -131,7 +131,7 @@ def _draw_bars(axes: "Axes", plot: BarPlot) -> None:
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}%")
     axes.set_ylim(bottom=0, top=plot.y_top)
     axes.grid(axis="y")
-    axes.set_xlabel("\n".join(map(clean, (plot.x_label, *plot.notes))), fontsize=SMALL)
+    axes.set_xlabel("\n".join(clean(line) for line in (plot.x_label, *plot.notes) if line), fontsize=SMALL)
 
 
 def _draw_bar(axes: "Axes", plot: BarPlot, series: Series, index: int, shift: float, colour: str) -> None:
@@ -220,7 +220,9 @@ def _whisker(
     axes: "Axes", x: float, interval: Interval | None, colour: str, *, alpha: float = 0.5, has_caps: bool = False
 ) -> None:
     if interval is not None:
-        caps: dict[str, Any] = {"marker": "_", "markersize": 4, "linewidth": 0.9} if has_caps else {}
+        caps: dict[str, Any] = (
+            {"marker": "_", "markersize": 4, "markeredgewidth": 0.9, "linewidth": 0.9} if has_caps else {}
+        )
         axes.plot((x, x), interval, color=colour, alpha=alpha, clip_on=False, **caps)
 
 
