@@ -64,8 +64,8 @@ def print_report(report: "FolderReport") -> None:
             which = "\n".join([KINDS[kind], *examples])
             table.add_row(kind, str(num), str(len({problem.task_id for problem in found})), which)
         console.print(table, markup=False)
-    if report.own:
-        counts = ", ".join(f"{num} {kind}" for kind, num in report.own.most_common())
+    if report.source_counts:
+        counts = ", ".join(f"{num} {kind}" for kind, num in report.source_counts.most_common())
         console.print(f"as in the source houses, and no problem: {counts}", markup=False)
     num_valid = len(report.reports) - report.num_invalid
     console.print(f"{num_valid} of {len(report.reports)} tasks valid, {num_stages} stages")
@@ -85,7 +85,7 @@ def write_json(report: "FolderReport", path: Path) -> None:
         "num_tasks": len(report.reports),
         "num_invalid": report.num_invalid,
         "problems": [problem.model_dump() for problem in report.problems],
-        "own": dict(sorted(report.own.items())),
+        "own": dict(sorted(report.source_counts.items())),
     }
     try:
         path.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")

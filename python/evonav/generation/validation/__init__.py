@@ -1,4 +1,4 @@
-"""Whether tasks are what they claim to be: files, records, physics, views and ways, all found anew."""
+"""Validate tasks: check their files, records, physics, reference views and paths again from the start."""
 
 from evonav.generation.validation.folder import FolderReport, validate_folder
 from evonav.generation.validation.problems import KINDS, Problem, ProblemKind, Report

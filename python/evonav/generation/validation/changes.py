@@ -1,4 +1,4 @@
-"""The change record against the houses' own JSON, and what follows from it."""
+"""Check a task's change records against the JSON of its houses."""
 
 import math
 from collections.abc import Iterator
@@ -13,10 +13,11 @@ MODES = frozenset(get_args(Mode))
 SAME_M = 1e-6
 
 Found = tuple[ProblemKind, str]
+"""A problem: its kind and its detail."""
 
 
 class Entry(NamedTuple):
-    """An object as a house file has it."""
+    """An object in a house file."""
 
     position_m: tuple[float, ...]
     rotation_deg: tuple[float, ...]
@@ -26,7 +27,7 @@ class Entry(NamedTuple):
 
 
 def entries_of(document: dict[str, Any]) -> dict[str, Entry]:
-    """Objects of a house by id."""
+    """Return the objects of a house by id."""
     found: dict[str, Entry] = {}
 
     def collect(objects: list[dict[str, Any]], support_id: str | None) -> None:
@@ -41,13 +42,13 @@ def entries_of(document: dict[str, Any]) -> dict[str, Entry]:
 
 
 def check_changes(before: dict[str, Any], after: dict[str, Any], oracle: OracleStage, rooms: House) -> Iterator[Found]:
-    """What of a stage's change record is not the difference of its house and the one before.
+    """Yield the differences between a stage's change record and the change between its house and the one before.
 
     Args:
         before: House of the stage before, JSON.
-        after: House of the stage.
-        oracle: With the record.
-        rooms: The house, for its rooms.
+        after: House of the stage, JSON.
+        oracle: The stage's record.
+        rooms: House of the stage, for its rooms.
     """
     evolution = oracle.evolution
     old, new = entries_of(before), entries_of(after)
@@ -71,7 +72,7 @@ def check_changes(before: dict[str, Any], after: dict[str, Any], oracle: OracleS
 
 
 def check_relocation(task: Task, stage: int) -> Iterator[Found]:
-    """Displacements, and what was relocated by now."""
+    """Check displacements and the objects relocated so far."""
     oracle = task.oracle(stage)
     for change in oracle.evolution.changes:
         distance_m = math.dist(change.from_position_m, change.to_position_m)
@@ -81,14 +82,14 @@ def check_relocation(task: Task, stage: int) -> Iterator[Found]:
         if change.is_relocated != (is_far or change.from_support_id != change.to_support_id):
             yield "relocation", f"{change.id}: is_relocated is {change.is_relocated}, moved {distance_m:.4f} m"
     ever = {i for earlier in task.oracle_stages[:stage] for i in earlier.evolution.relocated_ids}
-    gone = {one.id for earlier in task.oracle_stages[:stage] for one in earlier.evolution.removals}
+    removed = {one.id for earlier in task.oracle_stages[:stage] for one in earlier.evolution.removals}
     recorded = oracle.ever_relocated_ids
-    if set(recorded) - gone != ever - gone or list(recorded) != sorted(set(recorded)):
-        differing = sorted((set(recorded) ^ ever) - gone)
-        yield "relocation", f"ever_relocated_ids is not what the changes say, sorted: {differing[:5]}"
+    if set(recorded) - removed != ever - removed or list(recorded) != sorted(set(recorded)):
+        differing = sorted((set(recorded) ^ ever) - removed)
+        yield "relocation", f"ever_relocated_ids does not agree with the changes, sorted: {differing[:5]}"
     for name, expected in (("now", oracle.evolution.relocated_ids), ("ever", ever)):
         if getattr(oracle.target, f"is_relocated_{name}") != (oracle.target.id in expected):
-            yield "relocation", f"target.is_relocated_{name} is not what the changes say"
+            yield "relocation", f"target.is_relocated_{name} does not agree with the changes"
 
 
 def _same_ids(name: str, recorded: list[str], found: set[str]) -> Iterator[Found]:
@@ -97,7 +98,7 @@ def _same_ids(name: str, recorded: list[str], found: set[str]) -> Iterator[Found
     for one in sorted(found - set(recorded)):
         yield "change_record", f"evolution.{name} lacks {one}"
     for one in sorted(set(recorded) - found):
-        yield "change_record", f"evolution.{name} has {one}, which the houses do not show"
+        yield "change_record", f"evolution.{name} lists {one}, but the houses do not differ in it"
 
 
 def _check_poses(change: Change, old: Entry, new: Entry) -> Iterator[Found]:
@@ -131,7 +132,7 @@ def _check_states(
     new: dict[str, Entry],
     oracle: OracleStage,
 ) -> Iterator[Found]:
-    """Fields other than poses: those of the state record have changed, no others."""
+    """Check that exactly the fields of the state record have changed, apart from poses."""
     recorded = {(state.id, state.field): state for state in oracle.evolution.states}
     pairs = [(i, old[i].rest, new[i].rest) for i in old.keys() & new.keys()]
     doors_before, doors_after = (
@@ -144,11 +145,11 @@ def _check_states(
             state = recorded.get((one, field))  # type: ignore[arg-type]
             seen.add((one, field))
             if state is None:
-                yield "change_record", f"{one}: {field} differs, which evolution.states does not say"
+                yield "change_record", f"{one}: {field} differs, but evolution.states does not list it"
             elif float(now.get(field, 0.0)) != state.after or float(then.get(field, state.before)) != state.before:
-                yield "change_record", f"{one}: {field} is not as evolution.states says"
+                yield "change_record", f"{one}: {field} differs from evolution.states"
     for one, field in sorted(recorded.keys() - seen):
-        yield "change_record", f"evolution.states has {field} of {one}, which the houses do not show"
+        yield "change_record", f"evolution.states lists {field} of {one}, but the houses do not differ in it"
     for key in sorted(before.keys() | after.keys() - {"objects", "doors"}):
         if key not in ("objects", "doors") and before.get(key) != after.get(key):
             yield "change_record", f"`{key}` of the house differs"

@@ -1,4 +1,4 @@
-"""A folder of tasks, by any number of workers."""
+"""Validate a folder of tasks with any number of workers."""
 
 import json
 from collections import Counter
@@ -19,24 +19,24 @@ TASK_TIMEOUT_S = 300.0
 
 @dataclass(frozen=True, slots=True)
 class FolderReport:
-    """All about a folder."""
+    """The result of validating a folder."""
 
     reports: tuple[Report, ...]
-    """In order of task id."""
+    """Reports of the tasks in order of task id."""
     problems: tuple[Problem, ...]
-    """Of all tasks, and of `dataset.json`."""
+    """Problems of all tasks and of `dataset.json`."""
 
     @property
-    def own(self) -> Counter[str]:
-        """What source houses have of themselves, by kind."""
+    def source_counts(self) -> Counter[str]:
+        """Number of flaws in source houses, by kind; see `Report.source_counts`."""
         total: Counter[str] = Counter()
         for report in self.reports:
-            total.update(report.own)
+            total.update(report.source_counts)
         return total
 
     @property
     def num_invalid(self) -> int:
-        """Tasks with a problem."""
+        """Number of tasks with a problem."""
         return len({problem.task_id for problem in self.problems if problem.task_id})
 
 
@@ -48,18 +48,18 @@ def validate_folder(
     allow_unknown_assets: bool = False,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> FolderReport:
-    """Checks tasks, and `dataset.json` where there is one.
+    """Validate a folder's tasks, and its `dataset.json` if it exists.
 
     Args:
-        folder: Holds one folder a task.
-        limit: Only the first tasks by id.
-        num_workers: Processes; 0: this one.
-        allow_unknown_assets: Also where `dataset.json` does not say so.
-        on_progress: Called with tasks done and all tasks, when it begins and after every task.
+        folder: Folder with one folder a task.
+        limit: Number of tasks, from the first by id; default all.
+        num_workers: Number of processes; 0 for this process.
+        allow_unknown_assets: Accept unknown assets even if `dataset.json` does not.
+        on_progress: Called with the number of finished tasks and of all tasks, at the beginning and after every task.
 
     Raises:
-        TaskError: There is no task in the folder.
-        EngineError: Workers cannot be had.
+        TaskError: The folder holds no task.
+        EngineError: The workers cannot be started.
     """
     folder = Path(folder).resolve()
     roots = task_roots(folder)[:limit]
@@ -84,7 +84,7 @@ def validate_folder(
 
 
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
-    """The function from a task's folder to its `Report`, as `evonav.parallel.pool` calls it."""
+    """Return the function from a task's folder to its `Report`, for the pool of workers."""
     allow = bool(json.loads(settings)["allow_unknown_assets"])
     return lambda root: validate_files(root, allow_unknown_assets=allow).model_dump_json()
 
@@ -93,7 +93,7 @@ def _report_of(answer: Answer, task_id: str) -> Report:
     if answer.failure is None:
         return Report.model_validate_json(answer.text)
     problem = Problem(task_id=task_id, stage=0, kind="crash", detail=f"{answer.failure}: {answer.detail}")
-    return Report(task_id=task_id, num_stages=0, problems=(problem,), own={})
+    return Report(task_id=task_id, num_stages=0, problems=(problem,), source_counts={})
 
 
 def _dataset_problem(task_id: str, detail: str) -> Problem:

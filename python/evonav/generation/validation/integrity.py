@@ -1,4 +1,4 @@
-"""A task's files, each by itself and all together: every problem, where `load_task` stops at the first."""
+"""Check a task's files, alone and together, and find every problem; `load_task` stops at the first."""
 
 import re
 import struct
@@ -20,15 +20,15 @@ _Anything = TypeVar("_Anything")
 _Record = TypeVar("_Record", bound=Record)
 
 PNG_CHUNKS = (b"IHDR", b"IDAT", b"IEND")
-"""A reference image holds these; others may hold text."""
+"""Chunks of a reference image; others may contain text."""
 MAX_STAGES = 64
 
 
 def read_all(root: Path) -> tuple[Task | None, list[Problem]]:
-    """Reads a task's folder.
+    """Read a task's folder.
 
     Returns:
-        The task, if all its files can be read; and what is wrong with them.
+        The task, or `None` if one of its files cannot be read; and all problems.
     """
     reader = _Reader(root)
     header = reader.record(0, TaskHeader, root / "task.json")
@@ -44,7 +44,7 @@ def read_all(root: Path) -> tuple[Task | None, list[Problem]]:
         oracle.append(reader.record(number, OracleStage, root / f"oracle/stage_{number}.json"))
         images.append(reader.image(number, root / f"public/stage_{number}.png", side_px))
         houses.append(reader.read(number, read_house, root / f"houses/stage_{number}.json.gz"))
-    reader.find_strangers(header)
+    reader.find_unexpected_files(header)
     task = Task(
         header=header,
         public_stages=tuple(stage for stage in public if stage is not None),
@@ -61,7 +61,7 @@ def read_all(root: Path) -> tuple[Task | None, list[Problem]]:
 
 
 class _Reader:
-    """Reads files and notes what is wrong."""
+    """Reader of files that collects their problems."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -94,7 +94,7 @@ class _Reader:
                 self.add(stage, "leak", f"public/{path.name}: holds {chunk}, which may hold text")
         return image
 
-    def find_strangers(self, header: TaskHeader) -> None:
+    def find_unexpected_files(self, header: TaskHeader) -> None:
         expected = {"task.json"}
         for number in range(1, header.num_stages + 1):
             expected |= {f"public/stage_{number}.json", f"public/stage_{number}.png"}
@@ -107,21 +107,21 @@ class _Reader:
 
 
 def foreign_chunks(png: bytes) -> Iterator[str]:
-    """What a whole PNG file holds besides its pixels."""
-    at = 8
-    while at + 8 <= len(png):
-        (length,), kind = struct.unpack(">I", png[at : at + 4]), png[at + 4 : at + 8]
-        at += 12 + length
+    """Yield the parts of a complete PNG file other than its pixels."""
+    offset = 8
+    while offset + 8 <= len(png):
+        (length,), kind = struct.unpack(">I", png[offset : offset + 4]), png[offset + 4 : offset + 8]
+        offset += 12 + length
         if kind not in PNG_CHUNKS:
             yield f"a chunk {kind.decode('latin-1')}"
         if kind == b"IEND":
             break
-    if at < len(png):
-        yield f"{len(png) - at} bytes after its end"
+    if offset < len(png):
+        yield f"{len(png) - offset} bytes after its end"
 
 
 def leaks(task: Task, stage: int, document: dict[str, Any]) -> Iterator[str]:
-    """What the words of a public stage give away; its keys are closed, and held to the schema."""
+    """Yield the texts of a public stage that reveal ids or coordinates; the schema allows no other keys."""
     public = task.public_stages[stage - 1]
     ids = [str(room.get("id")) for room in document.get("rooms", [])] + list(_object_ids(document.get("objects", [])))
     for name in PublicStage.model_fields:
@@ -135,7 +135,7 @@ def leaks(task: Task, stage: int, document: dict[str, Any]) -> Iterator[str]:
 
 
 def _is_in(text: str, one: str) -> bool:
-    """Whether an id stands in a text as a word of its own (ids that are plain numbers stand in many)."""
+    """Return whether an id is a word of its own in a text; an id may be a number that is a part of other words."""
     return one in text and re.search(rf"(?<!\w){re.escape(one)}(?!\w)", text) is not None
 
 

@@ -1,4 +1,4 @@
-"""What can be wrong with a task."""
+"""Define the kinds of problems of a task, and the report of its validation."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -41,9 +41,9 @@ KINDS: Mapping[ProblemKind, str] = MappingProxyType(
         "schema": "not as the JSON Schema says",
         "checksum": "contents do not match the header's checksum",
         "contradiction": "files contradict each other",
-        "stranger": "a file that belongs to no task",
+        "stranger": "a file that belongs to no stage of the task",
         "dataset": "dataset.json and the folder differ",
-        "leak": "something of the oracle in a public file",
+        "leak": "oracle data in a public file",
         "house": "a stage's house cannot be built",
         "change_record": "the change record is not the difference of two houses",
         "relocation": "displacement or `relocated` flags are wrong",
@@ -58,29 +58,31 @@ KINDS: Mapping[ProblemKind, str] = MappingProxyType(
         "start_cut_off": "the house's own start cannot be reached, which simulators begin at",
         "reference_pose": "not at the reference distance, not facing the target, or not free",
         "visibility": "the target's pixels are not those recorded",
-        "reference_image": "not what is seen from the reference pose",
-        "path": "no way, or of another length than recorded",
+        "reference_image": "not the view from the reference pose",
+        "path": "no path, or a path of another length than recorded",
         "crash": "the check itself failed",
     }
 )
 
 
 class Problem(Record):
-    """One thing that is wrong."""
+    """One problem of a task."""
 
     task_id: str
     stage: NonNegativeInt
-    """0: of the task as a whole."""
+    """The stage's number; 0 for the task as a whole."""
     kind: ProblemKind
     detail: str
 
 
 class Report(Record):
-    """All about one task."""
+    """The result of validating one task."""
 
     task_id: str
     num_stages: NonNegativeInt
     problems: tuple[Problem, ...]
-    own: dict[str, NonNegativeInt]
-    """What the source house itself has of `penetration`, `in_wall` and the like, which nobody moved there: no
-    problems. Counted over changed stages and the first."""
+    source_counts: dict[str, NonNegativeInt]
+    """Number of flaws that the source house itself has, by kind, over the first and all changed stages.
+
+    A flaw such as `penetration` is no problem of the task if its objects were not moved there by the generator.
+    """

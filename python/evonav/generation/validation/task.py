@@ -1,4 +1,4 @@
-"""One task, from all sides."""
+"""Validate one task completely."""
 
 import json
 from collections import Counter
@@ -24,76 +24,78 @@ from evonav.tasks.manifest import Task
 
 
 def validate_files(root: Path | str, *, allow_unknown_assets: bool = False) -> Report:
-    """Reads a task's folder and says all that is wrong with it.
+    """Read a task's folder and report all its problems.
 
     Args:
         root: The task's own folder.
-        allow_unknown_assets: As the task was generated.
+        allow_unknown_assets: The option with which the task was generated.
     """
     root = Path(root)
     task, problems = read_all(root)
     if task is None:
-        return Report(task_id=root.name, num_stages=0, problems=tuple(problems), own={})
+        return Report(task_id=root.name, num_stages=0, problems=tuple(problems), source_counts={})
     report = validate_task(task, allow_unknown_assets=allow_unknown_assets)
     return report.model_copy(update={"task_id": root.name, "problems": (*problems, *report.problems)})
 
 
 def validate_task(task: Task, *, allow_unknown_assets: bool = False) -> Report:
-    """Checks what a task's records say against its houses.
+    """Check a task's records against its houses.
 
     Args:
-        task: Made or loaded.
-        allow_unknown_assets: As the task was generated.
+        task: A generated or loaded task.
+        allow_unknown_assets: The option with which the task was generated.
     """
-    check = _Check(task, allow_unknown_assets)
+    check = _TaskCheck(task, allow_unknown_assets)
     for stage in range(1, task.num_stages + 1):
         try:
             check.check_stage(stage)
         except EvonavError as error:
-            check.note(stage, [("house", str(error))])
+            check.add(stage, [("house", str(error))])
         except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
-            check.note(stage, [("house", f"not a ProcTHOR house: {type(error).__name__}: {error}")])
-    own = dict(sorted(check.own.items()))
-    return Report(task_id=task.task_id, num_stages=task.num_stages, problems=tuple(check.problems), own=own)
+            check.add(stage, [("house", f"not a ProcTHOR house: {type(error).__name__}: {error}")])
+    source_counts = dict(sorted(check.source_counts.items()))
+    return Report(
+        task_id=task.task_id, num_stages=task.num_stages, problems=tuple(check.problems), source_counts=source_counts
+    )
 
 
-class _Check:
-    """What the checks of a task's stages share."""
+class _TaskCheck:
+    """The checks of a task's stages, and their problems."""
 
     def __init__(self, task: Task, allow_unknown_assets: bool) -> None:
         self.task = task
         self.problems: list[Problem] = []
-        self.own: Counter[str] = Counter()
+        self.source_counts: Counter[str] = Counter()
         self._allow = allow_unknown_assets
         self._simulator = simulator_of(task, allow_unknown_assets=allow_unknown_assets)
         self._houses: dict[int, House] = {}
         self._documents: dict[int, dict[str, Any]] = {}
 
-    def note(self, stage: int, found: Iterable[Found]) -> None:
+    def add(self, stage: int, found: Iterable[Found]) -> None:
         for kind, detail in found:
             self.problems.append(Problem(task_id=self.task.task_id, stage=stage, kind=kind, detail=detail))
 
     def check_stage(self, stage: int) -> None:
         task, oracle, simulator = self.task, self.task.oracle(stage), self._simulator
         document = self._document(stage)
-        self.note(stage, (("leak", detail) for detail in leaks(task, stage, document)))
+        self.add(stage, (("leak", detail) for detail in leaks(task, stage, document)))
         house = self._house(stage)
         is_changed = stage > 1 and task.house_json(stage) != task.house_json(stage - 1)
         before = self._document(stage - 1) if stage > 1 else document
-        self.note(stage, check_changes(before, document, oracle, house))
-        self.note(stage, check_relocation(task, stage))
-        self.note(stage, check_state(task, stage, house))
+        self.add(stage, check_changes(before, document, oracle, house))
+        self.add(stage, check_relocation(task, stage))
+        self.add(stage, check_state(task, stage, house))
         rooms_before = rooms_reached(house, simulator, oracle) if is_changed else set()
         if is_changed or stage == 1:
             simulator.reset(task.house_json(stage), name=f"stage {stage}")
-            found = check_physics(self._house(1), house, self.own, allow_unknown_assets=self._allow)
-            self.note(stage, found)
-        self.note(stage, check_target(task, house, simulator, oracle))
-        self.note(stage, check_reference(task, stage, house, simulator))
-        self.note(stage, check_path(oracle, simulator))
+            found = check_physics(self._house(1), house, self.source_counts, allow_unknown_assets=self._allow)
+            self.add(stage, found)
+        self.add(stage, check_target(task, house, simulator, oracle))
+        self.add(stage, check_reference(task, stage, house, simulator))
+        self.add(stage, check_path(oracle, simulator))
         if is_changed:
             cut_off = sorted(rooms_before - rooms_reached(house, simulator, oracle))
-            self.note(stage, (("room_cut_off", f"{room} can no longer be reached") for room in cut_off))
+            self.add(stage, (("room_cut_off", f"{room} can no longer be reached") for room in cut_off))
 
     def _house(self, stage: int) -> House:
         if stage not in self._houses:

@@ -1,4 +1,4 @@
-"""A stage's house as a world: physics, goal, reference view, ways; everything is found anew."""
+"""Check the physics, target, reference view and path of a stage in the simulator."""
 
 import json
 import math
@@ -19,28 +19,30 @@ from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.simulator import SceneObject, SimulatorConfig
 
 TOUCH_M = 0.0025
-"""Depth up to which bodies touch: generation lets them by 2 mm, and writes places in tenths of a millimetre."""
+"""Largest depth of touching bodies; generation allows 2 mm and rounds positions to 0.1 mm."""
 REST_M = 0.02
-"""Height over its support up to which a thing rests: recorded things hover by up to 50 mm."""
+"""Largest height over its support at which an object rests; recorded objects hover by up to 50 mm."""
 FLOOR_M = 0.05
-"""What stands on nothing and has its bottom higher hangs on a wall."""
+"""Height of an object's bottom from which an object without support counts as hanging on a wall."""
 SAME_M = 1e-6
 REACH_M = 0.3
-"""How far a house's own start may be from the nearest free place, where the path begins."""
+"""Largest distance of a house's own start from the nearest free place, where the path begins."""
 PATH_STEP_M = 0.05
-"""Between points of a path that are asked for their room."""
+"""Distance between points of a path whose room is determined."""
 FIELD_OF_VIEW_DEG = 90.0
 HORIZON_DEG = 30.0
 
 
-def check_physics(source: House, house: House, own: Counter[str], *, allow_unknown_assets: bool) -> Iterator[Found]:
-    """Bodies that share space, leave their room or stand on nothing.
+def check_physics(
+    source: House, house: House, source_counts: Counter[str], *, allow_unknown_assets: bool
+) -> Iterator[Found]:
+    """Yield bodies that overlap, leave their room or have no support.
 
     Args:
         source: House of stage 1.
         house: House of the stage.
-        own: Counts what the source house has just so, by kind.
-        allow_unknown_assets: As for generation.
+        source_counts: Counts of the flaws that the source house has, too, by kind; updated.
+        allow_unknown_assets: The option with which the task was generated.
     """
     found = json.loads(
         _core.inspect_house(source, house, touch_m=TOUCH_M, rest_m=REST_M, allow_unknown_assets=allow_unknown_assets)
@@ -48,20 +50,23 @@ def check_physics(source: House, house: House, own: Counter[str], *, allow_unkno
     for one in found:
         kind: ProblemKind = one["kind"]
         if one["is_own"]:
-            own[kind] += 1
+            source_counts[kind] += 1
         else:
             yield kind, f"{one['id']} and {one['other_id']}: {1000.0 * one['amount_m']:.1f} mm"
 
 
 def simulator_of(task: Task, *, allow_unknown_assets: bool) -> EmbeddedSimulator:
-    """What reference images are taken with."""
+    """Return a simulator with the camera of reference images."""
     side_px = task.header.parameters.reference_image_px
     config = SimulatorConfig(width_px=side_px, height_px=side_px, vertical_fov_deg=FIELD_OF_VIEW_DEG)
     return EmbeddedSimulator(config, allow_unknown_assets=allow_unknown_assets)
 
 
 def check_target(task: Task, house: House, simulator: EmbeddedSimulator, oracle: OracleStage) -> Iterator[Found]:
-    """The target's record against the house. Scores count what may be a goal, `same_category_ids` everything."""
+    """Check the target's record against the house.
+
+    Scores count objects that may be goals, `same_category_ids` all objects.
+    """
     target = oracle.target
     objects = {one.id: one for one in house.objects}
     bodies = {one.id: one for one in simulator.objects if one.kind == "object"}
@@ -74,7 +79,7 @@ def check_target(task: Task, house: House, simulator: EmbeddedSimulator, oracle:
     in_room = [i for i in rivals if objects[i].room_id == entry.room_id]
     score = 2.0 if not rivals else 1.5 if not in_room else 1.0
     x_m, _, z_m = entry.position_m
-    facts = {
+    fields = {
         "category": (target.category, category),
         "room_id": (target.room_id, house.room_of(x_m, z_m)),
         "position_m": (target.position_m, entry.position_m),
@@ -82,7 +87,7 @@ def check_target(task: Task, house: House, simulator: EmbeddedSimulator, oracle:
         "same_category_ids": (sorted(target.same_category_ids), sorted(alike)),
         "score": (target.score, score),
     }
-    for field, (recorded, found) in facts.items():
+    for field, (recorded, found) in fields.items():
         if recorded != found:
             yield "target", f"{field} is {recorded}, in the house {found}"
 
@@ -92,7 +97,7 @@ def _hangs(entry: HouseObject, body: SceneObject) -> bool:
 
 
 def check_reference(task: Task, stage: int, house: House, simulator: EmbeddedSimulator) -> Iterator[Found]:
-    """The reference pose and what is seen from it; the simulator holds the stage's house."""
+    """Check the reference pose and the view from it; the simulator holds the stage's house."""
     oracle, parameters = task.oracle(stage), task.header.parameters
     pose = oracle.reference_pose
     x_m, _, z_m = pose.position_m
@@ -108,7 +113,7 @@ def check_reference(task: Task, stage: int, house: House, simulator: EmbeddedSim
     if not simulator.can_move((x_m, z_m), (x_m, z_m)):
         yield "reference_pose", "the agent does not fit there"
     if not simulator.is_free(oracle.start_pose.position_m):
-        yield "start_cut_off", "no way between the stage's start and the house's own, where simulators begin"
+        yield "start_cut_off", "no path between the stage's start and the house's own, where simulators begin"
     frame = simulator.render(pose.pose())
     ids = [one.id if one.kind == "object" else None for one in simulator.objects]
     if frame.instances is None or frame.rgb is None or oracle.target.id not in ids:
@@ -118,14 +123,14 @@ def check_reference(task: Task, stage: int, house: House, simulator: EmbeddedSim
         yield "visibility", f"{visible_px} pixels of the target, recorded {oracle.reference_visible_px}"
     control = task.header.control
     if control is not None and stage <= len(control.shown_goals) and control.shown_goals[stage - 1] != stage:
-        return  # the agent is shown the image of an earlier stage: that they are equal is checked with the files
+        return  # the agent is shown the image of an earlier stage, which is compared with the files
     differing = int(np.count_nonzero((frame.rgb != task.reference_images[stage - 1]).any(axis=2)))
     if differing:
-        yield "reference_image", f"{differing} pixels differ from what is seen there"
+        yield "reference_image", f"{differing} pixels differ from the view there"
 
 
 def check_path(oracle: OracleStage, simulator: EmbeddedSimulator) -> Iterator[Found]:
-    """The reference path: its ends, its length, and that there is no shorter one."""
+    """Check the reference path's ends and length, and that no path is shorter."""
     ends = (oracle.start_pose.position_m, oracle.reference_pose.position_m)
     corners = oracle.reference_path_m
     length_m = sum(math.dist(a, b) for a, b in pairwise(corners))
@@ -137,13 +142,13 @@ def check_path(oracle: OracleStage, simulator: EmbeddedSimulator) -> Iterator[Fo
             yield "path", f"its {name} is {math.dist((x_m, z_m), corner):.6f} m from the pose"
     found_m = float(simulator.path_lengths_m(ends[0], np.array([ends[1]]))[0])
     if not math.isfinite(found_m):
-        yield "path", "there is no way from start to reference pose"
+        yield "path", "there is no path from start to reference pose"
     elif abs(found_m - recorded_m) > 2.0 * SAME_M:
-        yield "path", f"the shortest way is {found_m} m long, recorded {recorded_m}"
+        yield "path", f"the shortest path is {found_m} m long, recorded {recorded_m}"
 
 
 def rooms_reached(house: House, simulator: EmbeddedSimulator, oracle: OracleStage) -> set[str]:
-    """Rooms with a position that the agent can reach from a stage's start."""
+    """Return the rooms with a position that the agent can reach from a stage's start."""
     if not simulator.teleport(oracle.start_pose.pose()):
         return set()
     positions = simulator.reachable_positions()
@@ -151,11 +156,11 @@ def rooms_reached(house: House, simulator: EmbeddedSimulator, oracle: OracleStag
 
 
 def check_state(task: Task, stage: int, house: House) -> Iterator[Found]:
-    """The snapshot of S, and the starts, from all that went before."""
+    """Check the record of S and the start pose against all earlier stages."""
     oracle, earlier = task.oracle(stage), task.oracle_stages[: stage - 1]
     expected_pose = earlier[-1].reference_pose if earlier else task.header.start_pose
     if oracle.start_pose != expected_pose:
-        yield "state", "start_pose is not where the stage before ended"
+        yield "state", "start_pose is not the end of the stage before"
     first = task.oracle(1).start_pose.position_m
     visited = {house.room_of(first[0], first[2])}
     for before in earlier:
@@ -164,15 +169,15 @@ def check_state(task: Task, stage: int, house: House) -> Iterator[Found]:
     changed = [one.room_id if one.outcome == "evolved" else None for one in transitions]
     start = oracle.start_pose.position_m
     state = oracle.state
-    facts = {
+    fields = {
         "visited_room_ids": (sorted(state.visited_room_ids), sorted(visited - {None}, key=str)),
         "changed_room_ids": (list(state.changed_room_ids), changed[-2:]),
         "goal_room_ids": (list(state.goal_room_ids), [before.target.room_id for before in earlier][-2:]),
         "transition_room_id": (state.transition_room_id, house.room_of(start[0], start[2])),
     }
-    for field, (recorded, found) in facts.items():
+    for field, (recorded, found) in fields.items():
         if recorded != found:
-            yield "state", f"{field} is {recorded}, by what went before {found}"
+            yield "state", f"{field} is {recorded}, from the earlier stages {found}"
 
 
 def _points_along(corners: tuple[Point2, ...]) -> Iterator[Point2]:
