@@ -18,7 +18,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.submission.pack import MAX_RATIO, About, SubmissionError, SubmissionFile, pack
-from evonav.submission.rescore import reenact
+from evonav.submission.rescore import rescore
 from evonav.submission.verify import verify
 from evonav.tasks.listing import TaskFile, task_files
 
@@ -66,7 +66,7 @@ def rejected(path: Path, tasks: list[TaskFile], *, scores_only: bool = True) -> 
 def test_true_submission_is_accepted_and_has_the_runs_scores(packed: Path, run: Path, tasks: list[TaskFile]) -> None:
     verdict = verify(packed, tasks)
     assert verdict.is_accepted, verdict.checks
-    assert verdict.is_reenacted
+    assert verdict.is_rescored
     assert verdict.submission is not None
     assert verdict.submission.about.title == "A title"
     summary = json.loads((run / "summary.json").read_text())
@@ -132,7 +132,7 @@ def test_any_altered_field_of_a_record_is_found_by_carrying_the_actions_out(run:
             continue  # not a record at all: the file is refused
         if forged == records[1]:
             continue
-        _, differences = next(iter(reenact(case, {**records, 1: forged}, simulator, ProtocolConfig())))
+        _, differences = next(iter(rescore(case, {**records, 1: forged}, simulator, ProtocolConfig())))
         if path[0] == "sensing" or "face_m" in path:  # counts by what came of it, which may be nothing
             continue
         is_own_words = any(re.fullmatch(pattern, name) for pattern in SELF_REPORTED)
@@ -149,10 +149,10 @@ def test_record_in_another_place_is_found(run: Path, tasks: list[TaskFile]) -> N
         records = {record.stage: record for record in store.records("ftu")}
     first = records[1]
     short = first.model_copy(update={"trace": first.trace[:-1], "num_rounds": first.num_rounds - 1})
-    _, differences = next(iter(reenact(case, {**records, 1: short}, simulator, ProtocolConfig())))
+    _, differences = next(iter(rescore(case, {**records, 1: short}, simulator, ProtocolConfig())))
     assert any("state" in text for text in differences)
     swapped = {**records, 1: records[2].model_copy(update={"stage": 1})}
-    _, differences = next(iter(reenact(case, swapped, simulator, ProtocolConfig())))
+    _, differences = next(iter(rescore(case, swapped, simulator, ProtocolConfig())))
     assert differences
     simulator.close()
 
@@ -381,7 +381,7 @@ def test_run_of_another_protocol_packs_but_is_rejected(tasks: list[TaskFile], tm
     verdict = verify(tmp_path / "short.zip", tasks)
     failed = [check for check in verdict.checks if not check.is_passed]
     assert [check.name for check in failed] == ["protocol"]
-    assert failed[0].said == "max_rounds is 3, the benchmark's is 50"
+    assert failed[0].detail == "max_rounds is 3, the benchmark's is 50"
     assert asdict(ProtocolConfig())["max_rounds"] == 50
 
 

@@ -88,7 +88,7 @@ def _print(file: Path, verdict: "Verdict") -> None:
         table.add_column(column, no_wrap=column != "what was found")
     for check in verdict.checks:
         mark = Text("ok", style="green") if check.is_passed else Text("fail", style="bold red")
-        table.add_row(check.name, mark, Text(check.said))
+        table.add_row(check.name, mark, Text(check.detail))
     console.print(table)
     if verdict.is_accepted and verdict.submission is not None:
         scores = Table(title="SR and SPL in %, of the records")
@@ -97,5 +97,5 @@ def _print(file: Path, verdict: "Verdict") -> None:
         for agent, row in verdict.submission.summary["agents"].items():
             scores.add_row(agent, str(row["n"]), f"{100 * row['sr']:.1f}", f"{100 * row['spl']:.1f}")
         console.print(scores)
-        if not verdict.is_reenacted:
+        if not verdict.is_rescored:
             console.print("The actions were not carried out again: the recorded paths were taken as they are.")

@@ -1,4 +1,4 @@
-"""A run as one file to hand in: a zip of every record, the configuration, the tasks' checksums and the claimed scores.
+"""Pack a run into one file: a zip of every record, the configuration, the tasks' checksums and the claimed scores.
 
 The same run gives the same bytes. Reading trusts nothing: names, sizes and checksums are checked before a member is
 parsed, nothing is extracted to disk, and nothing that the file names is imported.
@@ -25,11 +25,11 @@ SUFFIX = ".evonav.zip"
 HEADER_NAME = "submission.json"
 MAX_TOTAL_BYTES = 2 << 30
 MAX_RATIO = 100
-"""Uncompressed to compressed, of a member: records are at 10 to 30."""
+"""Largest ratio of uncompressed to compressed size of a member; records have 10 to 30."""
 MAX_HEADER_BYTES = 64 << 20
 MAX_LINE_BYTES = 64 << 20
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-"""Of all members: when a file was packed is no part of what it says."""
+"""Time stamp of every member, so that equal runs give equal bytes."""
 
 
 class SubmissionError(StoreError):
@@ -55,13 +55,13 @@ class PackedRecords(_Part):
     agent: str
     member: str
     num_bytes: int
-    """Uncompressed."""
+    """Size before compression."""
     sha256: str
-    """Of the uncompressed bytes."""
+    """Checksum of the uncompressed bytes."""
 
 
 class About(_Part):
-    """What those who hand in say of it; nothing of it can be checked."""
+    """Statements of the submitters, which cannot be checked."""
 
     title: str = ""
     authors: str = ""
@@ -75,10 +75,10 @@ class Submission(_Part):
 
     format_version: Literal[1] = 1
     evonav: str
-    """The version that made it."""
+    """Version of evonav that packed the file."""
     about: About
     config: dict[str, Any]
-    """Of the run: seed, protocol, simulator, perception, decision model. Only protocol and simulator can be checked."""
+    """The run's protocol, seed, simulator, perception and decision model; only protocol and simulator are checked."""
     tasks: tuple[PackedTask, ...]
     records: tuple[PackedRecords, ...]
     summary: dict[str, Any]
@@ -86,13 +86,13 @@ class Submission(_Part):
 
 
 def pack(run_dir: Path, out: Path, *, agents: Sequence[str] | None = None, about: About | None = None) -> Submission:
-    """Writes a submission.
+    """Write a submission.
 
     Args:
         run_dir: A complete run.
         out: The file to write, whole or not at all.
-        agents: Of the run; default: all but baselines.
-        about: Who and what.
+        agents: Names of agents of the run; default: all but baselines.
+        about: Title, authors and other statements.
 
     Raises:
         InvalidArgumentError: An agent is not of the run, is a baseline, or has stages without a score.
@@ -114,11 +114,11 @@ def pack(run_dir: Path, out: Path, *, agents: Sequence[str] | None = None, about
 
 
 def packed_summary(records: dict[str, list[StageRecord]], num_stages: int) -> dict[str, Any]:
-    """The scores of agents from their records, as a submission claims them.
+    """Compute the scores that a submission claims from the records.
 
     Args:
-        records: By agent.
-        num_stages: That each should have.
+        records: The records of each agent.
+        num_stages: Number of stages that each agent should have.
     """
     summaries = [summarise(agent, mine, num_stages) for agent, mine in records.items()]
     summary: dict[str, Any] = json.loads(json.dumps(summary_json(summaries, agent_pairs(records))))
@@ -129,7 +129,7 @@ class SubmissionFile:
     """An archive that claims to be a submission."""
 
     def __init__(self, path: Path) -> None:
-        """Opens it and reads its header.
+        """Open the archive and read its header.
 
         Raises:
             SubmissionError: It is not a zip, its members are not those of a submission, or the header is malformed.
@@ -149,7 +149,7 @@ class SubmissionFile:
         self._archive.close()
 
     def texts(self, part: PackedRecords) -> Iterator[str]:
-        """The lines of a member, each a record.
+        """Yield the lines of a member, one record each.
 
         Raises:
             SubmissionError: The member is not what the header says.
@@ -160,7 +160,9 @@ class SubmissionFile:
                 while line := file.readline(MAX_LINE_BYTES):
                     size += len(line)
                     if size > part.num_bytes:
-                        raise SubmissionError(f"{self.path}: {part.member}: longer than the {part.num_bytes} B told")
+                        raise SubmissionError(
+                            f"{self.path}: {part.member}: longer than the {part.num_bytes} B in the header"
+                        )
                     digest.update(line)
                     yield line.decode()[:-1]
         except (OSError, zipfile.BadZipFile, zlib.error, EOFError, UnicodeDecodeError, NotImplementedError) as error:

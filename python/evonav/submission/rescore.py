@@ -1,7 +1,7 @@
-"""Carries recorded actions out again: what a run's records say must come of them, byte for byte.
+"""Score recorded actions again: executed anew, they must give the same records, byte for byte.
 
-No agent runs: one that holds the records answers what they say was answered, and says of itself what they say it said.
-Poses, paths, what was in view, what is stale, distances, SPL and success are the evaluator's, and made anew.
+No agent runs. A stand-in answers with the recorded actions, diagnostics and entries. The evaluator computes poses,
+paths, visibility, staleness, distances, SPL and success anew.
 """
 
 import json
@@ -34,13 +34,13 @@ from evonav.world.simulator import Action, Frame, Simulator
 
 
 class RecordedAgent:
-    """Answers what the records of an episode say that an agent answered."""
+    """Answers with the recorded actions of an episode."""
 
     def __init__(self, records: Mapping[int, StageRecord]) -> None:
-        """An agent for one episode.
+        """Replay one episode.
 
         Args:
-            records: Its stages', by number.
+            records: The episode's stages, by number.
         """
         self.sensing = Sensing()
         self._records = records
@@ -48,16 +48,16 @@ class RecordedAgent:
         self._num_acted = 0
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Nothing to be done."""
+        """Do nothing."""
 
     def begin_stage(self, stage: StageInput) -> None:
-        """Turns to the stage's record."""
+        """Turn to the stage's record."""
         self._record = self._records[stage.stage]
         self._num_acted = 0
         self.sensing = _sensing_of(self._record)
 
     def act(self, observation: Observation) -> AgentAction:
-        """The recorded action of this round."""
+        """Return the recorded action of this round."""
         trace = self._here.trace
         if self._num_acted == len(trace):
             raise InvalidArgumentError(f"the record ends after {len(trace)} rounds, without a stop or the budget's end")
@@ -71,39 +71,39 @@ class RecordedAgent:
 
 
 class ExplainingRecordedAgent(RecordedAgent):
-    """Says of itself, too, what the records say that the agent said."""
+    """Also answers with the recorded diagnostics and entries."""
 
     def diagnostics(self) -> RoundDiagnostics:
-        """What the agent said of the round."""
-        told = self._here.trace[self._num_acted - 1]
+        """Return the recorded diagnostics of the round."""
+        recorded = self._here.trace[self._num_acted - 1]
         return RoundDiagnostics(
-            choice=told.choice,
-            chosen_entry=None if told.chosen_entry is None else _belief_of(told.chosen_entry),
-            num_entries=told.num_entries,
-            num_frontiers=told.num_frontiers,
-            counters=told.counters,
-            details=told.details,
+            choice=recorded.choice,
+            chosen_entry=None if recorded.chosen_entry is None else _belief_of(recorded.chosen_entry),
+            num_entries=recorded.num_entries,
+            num_frontiers=recorded.num_frontiers,
+            counters=recorded.counters,
+            details=recorded.details,
         )
 
     def entries(self) -> Sequence[EntryBelief]:
-        """What the agent remembered at the end."""
+        """Return the recorded entries at the end."""
         return [_belief_of(entry) for entry in self._here.entries]
 
 
 class _Blind:
-    """Perception for one who does not look."""
+    """A perception that detects nothing."""
 
     needs_rgb = False
 
     def begin_stage(self, scene: StageScene) -> None:
-        """Nothing to prepare."""
+        """Do nothing."""
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
-        """Nothing in any of them."""
+        """Return frames without detections."""
         return [Percept(_nothing(frame), frame.depth_m, frame.pose) for frame in frames]
 
     def text_feature(self, text: str) -> None:
-        """Has none."""
+        """Return no feature."""
 
 
 def _nothing(frame: Frame) -> Detections:
@@ -111,22 +111,22 @@ def _nothing(frame: Frame) -> Detections:
     return Detections(masks=masks, labels=(), confidences=np.zeros(0, np.float32))
 
 
-def reenact(
+def rescore(
     case: EpisodeSpec, records: Mapping[int, StageRecord], simulator: Simulator, protocol: ProtocolConfig
 ) -> Iterator[tuple[int, tuple[str, ...]]]:
-    """Carries out the actions of one episode again.
+    """Execute the actions of one episode again.
 
     Args:
         case: The task.
-        records: All its stages', by number, of one agent.
-        simulator: Of the kind that the run used.
+        records: All its stages of one agent, by number.
+        simulator: A simulator of the kind that the run used.
         protocol: The run's.
 
     Yields:
-        A stage, and where its record differs from what came of its actions: nothing, for a true record.
+        A stage, and how its record differs from the result of its actions; no differences for a true record.
     """
-    says_nothing = all(record.memory_at_end is None for record in records.values())
-    agent = RecordedAgent(records) if says_nothing else ExplainingRecordedAgent(records)
+    has_no_entries = all(record.memory_at_end is None for record in records.values())
+    agent = RecordedAgent(records) if has_no_entries else ExplainingRecordedAgent(records)
     for outcome in Episode(case, records[1].agent, agent, simulator, _Blind(), protocol, seed=0).run():
         stage = outcome.record.stage
         yield (
@@ -136,52 +136,52 @@ def reenact(
 
 
 def _checkable(record: StageRecord) -> str:
-    """A record without what depends on what its agent held between stages and rounds, which records do not tell."""
+    """Return a record without the fields that depend on the agent's memory between rounds, which is not recorded."""
     return record.model_copy(
         update={"memory_at_start": None, "num_forgotten": None, "stale_entries": (), "moved_objects": ()}
     ).model_dump_json()
 
 
 def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
-    """What a worker of `evonav.parallel.pool` does: a job is a task's folder and records, its answer the differences.
+    """Return the work of a worker: a job holds a task's folder and records, its answer the differences.
 
     Args:
         settings: `protocol`, `simulator` and `simulator_options`, as JSON.
     """
-    told = json.loads(settings)
-    backend = Backend(simulator=told["simulator"], simulator_options=told["simulator_options"])
-    protocol = ProtocolConfig(**told["protocol"])
+    values = json.loads(settings)
+    backend = Backend(simulator=values["simulator"], simulator_options=values["simulator_options"])
+    protocol = ProtocolConfig(**values["protocol"])
     simulator = backend.make_simulator()
 
     def answer(text: str) -> str:
         job = json.loads(text)
         records = [StageRecord.model_validate_json(record) for record in job["records"]]
         case = backend.load_case(Path(job["path"]))
-        found = reenact(case, {record.stage: record for record in records}, simulator, protocol)
+        found = rescore(case, {record.stage: record for record in records}, simulator, protocol)
         return json.dumps([[stage, list(differences)] for stage, differences in found if differences])
 
     return answer
 
 
 def _sensing_of(record: StageRecord) -> Sensing:
-    told = record.sensing
-    if told is None:
-        raise InvalidArgumentError(f"{record.task_id} stage {record.stage}: the record does not tell `sensing`")
+    granted = record.sensing
+    if granted is None:
+        raise InvalidArgumentError(f"{record.task_id} stage {record.stage}: the record has no `sensing`")
     return Sensing(
-        first_round=ViewSchedule(*told.first_round),
-        later_rounds=ViewSchedule(*told.later_rounds),
-        motion=told.motion,
-        max_travel_m=told.max_travel_m,
-        occupancy_range_m=told.occupancy_range_m,
+        first_round=ViewSchedule(*granted.first_round),
+        later_rounds=ViewSchedule(*granted.later_rounds),
+        motion=granted.motion,
+        max_travel_m=granted.max_travel_m,
+        occupancy_range_m=granted.occupancy_range_m,
     )
 
 
-def _action_of(told: ActionRecord) -> AgentAction:
-    if told.kind == "navigate_to" and told.position_m is not None:
-        return NavigateTo(told.position_m, told.face_m)
-    if told.kind == "move" and told.action is not None:
-        return Move(Action(told.action))
-    return Stop(told.reason or "")
+def _action_of(recorded: ActionRecord) -> AgentAction:
+    if recorded.kind == "navigate_to" and recorded.position_m is not None:
+        return NavigateTo(recorded.position_m, recorded.face_m)
+    if recorded.kind == "move" and recorded.action is not None:
+        return Move(Action(recorded.action))
+    return Stop(recorded.reason or "")
 
 
 def _belief_of(entry: EntryRecord) -> EntryBelief:

@@ -1,6 +1,6 @@
-"""Is a submission what it claims? Whole, of the benchmark's protocol and tasks, and each score what its actions give.
+"""Verify a submission: it is whole, of the benchmark's protocol and tasks, and its actions give its scores.
 
-What no file can show is that an agent chose its actions by itself: for that, it has to be run again.
+No file can show that an agent chose its actions by itself: for that, the agent has to be run again.
 """
 
 import json
@@ -24,37 +24,37 @@ from evonav.submission.pack import PackedRecords, Submission, SubmissionError, S
 from evonav.tasks.listing import TaskFile
 
 MAX_WORDS = 5
-"""Findings told of one check; the others are counted."""
+"""Findings that one check lists; the others are counted."""
 TOLERANCE = 1e-9
-"""Of claimed scores: sums may be rounded otherwise on other machines."""
+"""Allowed difference of a claimed score, since other machines may round sums differently."""
 EPISODE_TIMEOUT_S = 1800.0
 _OUR_SIMULATORS = ("embedded_simulator", "lenient_simulator")
-"""That actions can be carried out in again; only these names are taken from a file."""
+"""Simulators in which actions can be executed again; no other name is taken from a file."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One thing that was looked at."""
+    """Result of one check."""
 
     name: str
     is_passed: bool
-    said: str
-    """What was found, or how much was looked at."""
+    detail: str
+    """The findings, or how much was checked."""
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Of a file."""
+    """Result of verifying a file."""
 
     checks: tuple[Check, ...]
     submission: Submission | None
-    """The header, if it could be read."""
-    is_reenacted: bool
-    """Whether actions were carried out again; without that, scores only agree with the traces."""
+    """The header; `None` if it is not readable."""
+    is_rescored: bool
+    """True if the actions were executed again; otherwise scores only agree with the traces."""
 
     @property
     def is_accepted(self) -> bool:
-        """Whether every check was passed."""
+        """True if every check passed."""
         return all(check.is_passed for check in self.checks)
 
 
@@ -66,14 +66,14 @@ def verify(
     num_workers: int = 0,
     on_progress: Callable[[int, int], None] = lambda _done, _all: None,
 ) -> Verdict:
-    """Looks at everything in a submission.
+    """Verify a submission.
 
     Args:
         path: The file.
-        tasks: That it should be of, all of them.
-        scores_only: Do not carry the actions out again; scores are computed from the recorded paths.
-        num_workers: Processes; 0 for this one.
-        on_progress: Told how many episodes were carried out again, of how many.
+        tasks: All tasks that the submission has to contain.
+        scores_only: Compute scores from the recorded paths instead of executing the actions again.
+        num_workers: Number of processes; 0 runs in this one.
+        on_progress: Called with the number of episodes executed again, and of all.
     """
     checks: list[Check] = []
     try:
@@ -92,17 +92,17 @@ def verify(
         checks.append(_check("paths", scored, "lengths, distances, success and SPL follow from the recorded paths"))
         checks.append(_check("scores", _claims(header, records), "the claimed summary is that of the records"))
         if not scores_only:
-            found = _reenact(header, records, known, num_workers, on_progress)
+            found = _rescore(header, records, known, num_workers, on_progress)
             checks.append(_check("actions", found, "carried out again, they give the same records, byte for byte"))
     return Verdict(tuple(checks), header, checks[-1].name == "actions")
 
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
-    """A verdict for other programs."""
+    """Return a verdict as JSON values."""
     header = verdict.submission
     return {
         "is_accepted": verdict.is_accepted,
-        "is_reenacted": verdict.is_reenacted,
+        "is_rescored": verdict.is_rescored,
         "checks": [asdict(check) for check in verdict.checks],
         "about": None if header is None else header.about.model_dump(),
         "summary": None if header is None else header.summary,
@@ -110,12 +110,12 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
 
 
 def score_findings(record: StageRecord, header: Submission) -> Iterator[str]:
-    """What in a scored record contradicts its own path.
+    """Yield the contradictions between a scored record and its own path.
 
     The formulas are those of the protocol (paper, Sec. C.2), from rounds, target and reference length.
     """
     if record.state is EndState.GUIDED:
-        return  # the evaluator walked: nothing was scored
+        return  # a guided stage has no score
     where = f"{record.agent} {record.task_id} stage {record.stage}"
     start, end, trace = record.effective_start, record.terminal, record.trace
     if start is None or end is None or record.reference_length_m is None or record.path_length_m is None or not trace:
@@ -151,10 +151,10 @@ def score_findings(record: StageRecord, header: Submission) -> Iterator[str]:
         "soft_spl": score.soft_spl,
     }
     for field, value in made.items():
-        told = getattr(record, field)
-        same = math.isclose(told, value, abs_tol=TOLERANCE) if isinstance(value, float) and told is not None else None
-        if not (told == value if same is None else same):
-            yield f"{where}: {field} is {told}, its path gives {value}"
+        claimed = getattr(record, field)
+        is_close = isinstance(value, float) and claimed is not None and math.isclose(claimed, value, abs_tol=TOLERANCE)
+        if not is_close and claimed != value:
+            yield f"{where}: {field} is {claimed}, its path gives {value}"
 
 
 def _records(file: SubmissionFile, part: PackedRecords) -> list[StageRecord]:
@@ -173,13 +173,13 @@ def _records(file: SubmissionFile, part: PackedRecords) -> list[StageRecord]:
 
 
 def _protocol_findings(header: Submission) -> Iterator[str]:
-    expected, told = asdict(ProtocolConfig()), header.config.get("protocol")
-    if not isinstance(told, dict):
-        yield "not told"
+    expected, claimed = asdict(ProtocolConfig()), header.config.get("protocol")
+    if not isinstance(claimed, dict):
+        yield "the header has no protocol"
         return
-    for name in expected.keys() | told.keys():
-        if told.get(name) != expected.get(name):
-            yield f"{name} is {told.get(name)}, the benchmark's is {expected.get(name)}"
+    for name in expected.keys() | claimed.keys():
+        if claimed.get(name) != expected.get(name):
+            yield f"{name} is {claimed.get(name)}, the benchmark's is {expected.get(name)}"
 
 
 def _task_findings(header: Submission, known: Mapping[str, TaskFile]) -> Iterator[str]:
@@ -208,17 +208,17 @@ def _gaps(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> I
         for record in mine:
             if record.agent != part.agent:
                 yield f"{part.agent}: a record of {record.agent}"
-            # That a forced stage is one its task says: carried out again, the record would differ.
+            # Whether the task has this guided stage shows when the actions are executed again.
             if not record.is_scored and record.state is not EndState.GUIDED:
                 yield f"{part.agent} {record.task_id} stage {record.stage} is {record.state.value}"
 
 
 def _claims(header: Submission, records: Mapping[str, Sequence[StageRecord]]) -> Iterator[str]:
     num_stages = sum(task.num_stages for task in header.tasks)
-    told, made = header.summary, packed_summary({a: list(r) for a, r in records.items()}, num_stages)
-    if told.get("schema_version") == 1:
-        told, made = _without_intervals(told), _without_intervals(made)
-    yield from _unequal(told, made, "")
+    claimed, computed = header.summary, packed_summary({a: list(r) for a, r in records.items()}, num_stages)
+    if claimed.get("schema_version") == 1:
+        claimed, computed = _without_intervals(claimed), _without_intervals(computed)
+    yield from _unequal(claimed, computed, "")
 
 
 def _without_intervals(summary: Any) -> Any:  # noqa: ANN401 - JSON
@@ -234,21 +234,21 @@ def _without_intervals(summary: Any) -> Any:  # noqa: ANN401 - JSON
     }
 
 
-def _unequal(told: Any, made: Any, where: str) -> Iterator[str]:  # noqa: ANN401 - JSON
-    if isinstance(told, dict) and isinstance(made, dict):
-        for key in told.keys() | made.keys():
-            yield from _unequal(told.get(key), made.get(key), f"{where}.{key}" if where else key)
-    elif isinstance(told, list) and isinstance(made, list) and len(told) == len(made):
-        for index, (a, b) in enumerate(zip(told, made, strict=True)):
+def _unequal(claimed: Any, computed: Any, where: str) -> Iterator[str]:  # noqa: ANN401 - JSON
+    if isinstance(claimed, dict) and isinstance(computed, dict):
+        for key in claimed.keys() | computed.keys():
+            yield from _unequal(claimed.get(key), computed.get(key), f"{where}.{key}" if where else key)
+    elif isinstance(claimed, list) and isinstance(computed, list) and len(claimed) == len(computed):
+        for index, (a, b) in enumerate(zip(claimed, computed, strict=True)):
             yield from _unequal(a, b, f"{where}[{index}]")
-    elif isinstance(told, float) and isinstance(made, float):
-        if not math.isclose(told, made, abs_tol=TOLERANCE):
-            yield f"{where} is {told}, the records give {made}"
-    elif told != made or type(told) is not type(made):
-        yield f"{where} is {told}, the records give {made}"
+    elif isinstance(claimed, float) and isinstance(computed, float):
+        if not math.isclose(claimed, computed, abs_tol=TOLERANCE):
+            yield f"{where} is {claimed}, the records give {computed}"
+    elif claimed != computed or type(claimed) is not type(computed):
+        yield f"{where} is {claimed}, the records give {computed}"
 
 
-def _reenact(
+def _rescore(
     header: Submission,
     records: Mapping[str, Sequence[StageRecord]],
     known: Mapping[str, TaskFile],
