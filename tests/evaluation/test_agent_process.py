@@ -231,7 +231,7 @@ def test_nothing_of_an_agent_outlives_the_run(tasks, tmp_path, kill):
     child = subprocess.Popen(
         [sys.executable, str(script), str(tmp_path), str(tasks[0].path.parent)],
         stderr=subprocess.DEVNULL,
-        env={"PYTHONPATH": str(Path(__file__).parent), "PATH": "", "TOY_PIDS": str(pids)},
+        env={"PYTHONPATH": os.pathsep.join(sys.path), "PATH": "", "TOY_PIDS": str(pids)},
     )
     while not pids.exists():
         assert child.poll() is None

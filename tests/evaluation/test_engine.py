@@ -1,12 +1,12 @@
 """Runs on disk: determinism, resumption, containment, refusal."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
 import time
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 from toy_house import write_tasks
@@ -281,7 +281,7 @@ def test_a_run_that_was_ended_can_be_resumed(tasks, tmp_path, kill):
         [sys.executable, str(script), str(tmp_path)],
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-        env={"PYTHONPATH": str(Path(__file__).parent), "PATH": ""},
+        env={"PYTHONPATH": os.pathsep.join(sys.path), "PATH": ""},
         text=True,
     )
     while child.stdout.readline().strip() in ("", "0", "1"):

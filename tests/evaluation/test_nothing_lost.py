@@ -39,7 +39,7 @@ def faults(tmp_path_factory):
     def run(call):
         done = subprocess.run(
             [sys.executable, "-c", f"import fault_driver; fault_driver.{call}"],
-            env={**os.environ, **ONE_THREAD, "LD_PRELOAD": str(library), "PYTHONPATH": str(HERE)},
+            env={**os.environ, **ONE_THREAD, "LD_PRELOAD": str(library), "PYTHONPATH": os.pathsep.join(sys.path)},
             capture_output=True,
             text=True,
             check=False,
@@ -172,7 +172,7 @@ def test_random_kills_change_nothing_and_a_long_run_grows_nothing(tmp_path):
     script = tmp_path / "driver.py"
     script.write_text(DRIVER)
     command = [sys.executable, str(script), str(tmp_path / "tasks"), str(run)]
-    kills = disturb(command, run, 210, 10, seed=1, environment={**os.environ, "PYTHONPATH": str(HERE)})
+    kills = disturb(command, run, 210, 10, seed=1, environment={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
     assert kills.total() == 10
     assert len(kills) >= 2
     assert num_recorded(run) == 210

@@ -2,9 +2,9 @@
 
 import os
 import signal
+import sys
 import threading
 import time
-from pathlib import Path
 
 import pytest
 from chaos import children
@@ -20,7 +20,6 @@ from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate, evaluate_
 from evonav.parallel.pool import Resources
 from evonav.tasks.listing import task_files
 
-HERE = Path(__file__).parent
 AGENT = "nearest-frontier"
 
 
@@ -98,7 +97,7 @@ def test_a_task_that_cannot_be_read_is_the_harness_failure_of_every_stage(tasks,
 @pytest.mark.filterwarnings("ignore")  # Ray's own
 def test_ray_records_the_same_though_an_actor_is_killed(tasks, tmp_path, monkeypatch):
     ray = pytest.importorskip("ray")
-    monkeypatch.setenv("PYTHONPATH", str(HERE))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
     monkeypatch.setenv("RAY_TMPDIR", "/tmp")  # paths of sockets have a greatest length
     monkeypatch.setenv("TOY_PACE_S", "0.2")  # or all would be over before the kill
     killed = []
