@@ -49,7 +49,7 @@ CONTAINED = {
     "unruly_agents:Verbose": (ErrorKind.AGENT, "must be at most 1000000"),
     "unruly_agents:Deep": (ErrorKind.AGENT, "deeper than 32"),
     "unruly_agents:Secretive": (ErrorKind.AGENT, "diagnostics: not JSON-ready"),
-    "unruly_agents:Mistaken": (ErrorKind.AGENT, "'many' is no whole number"),
+    "unruly_agents:Mistaken": (ErrorKind.AGENT, "diagnostics.num_entries = 'many': Input should be a valid integer"),
 }
 """In any process: the agent goes on with the next stage."""
 
@@ -58,8 +58,8 @@ LOST = {
     "unruly_agents:Exiting": (ErrorKind.CRASH, "exit code 5"),
     "unruly_agents:Segfaulting": (ErrorKind.CRASH, "killed by signal 11"),
     "unruly_agents:LeavingChildren": (ErrorKind.CRASH, "exit code 3"),
-    "unruly_agents:Babbling": (ErrorKind.CRASH, "what is no answer"),
-    "unruly_agents:Boasting": (ErrorKind.CRASH, "what is no answer"),
+    "unruly_agents:Babbling": (ErrorKind.CRASH, "malformed response: "),
+    "unruly_agents:Boasting": (ErrorKind.CRASH, "malformed response: 1152921504606846984 bytes: must be at most"),
     "unruly_agents:Deaf": (ErrorKind.CRASH, "the agent's process"),
     "unruly_agents:Hanging": (ErrorKind.TIMEOUT, "no answer to `act` within 4 s"),
     "unruly_agents:Promising": (ErrorKind.TIMEOUT, "no answer to `act` within 4 s"),

@@ -4,6 +4,7 @@ from evonav.agents import wire
 from evonav.decision.metered import Metered
 from evonav.decision.question import Reply
 from evonav.decision.vlm.account import Account, Price, Usage
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.store import RunStore
@@ -57,10 +58,13 @@ def test_tokens_and_money_are_the_accounts_even_of_a_wrapped_model():
     assert costs["cost_usd"] == pytest.approx(7.0)
 
 
-def test_costs_that_are_no_numbers_are_dropped():
-    said = {"num_questions": 3, "cost_usd": float("nan"), "input_tokens": -1, "output_tokens": "9", "success": 1.0}
-    assert wire.costs_of({**said, "num_replayed": True}) == {"num_questions": 3}
-    assert wire.costs_of("much") == {}
+@pytest.mark.parametrize(
+    "wrong", ['"cost_usd": NaN', '"input_tokens": -1', '"output_tokens": "9"', '"success": 1.0', '"num_replayed": true']
+)
+def test_costs_that_are_no_numbers_are_refused(wrong):
+    assert wire.COSTS.read(b'{"num_questions": 3, "cost_usd": 0.5}') == {"num_questions": 3, "cost_usd": 0.5}
+    with pytest.raises(InvalidArgumentError, match=wrong.partition(":")[0].strip('"')):
+        wire.COSTS.read(f'{{"num_questions": 3, {wrong}}}'.encode())
 
 
 def test_a_stopwatch_books_by_component_and_leaves_the_rest_to_the_evaluator():

@@ -7,7 +7,6 @@ are JSON. The process is given no path of a task and imports nothing that reads 
 
 import ctypes
 import faulthandler
-import json
 import mmap
 import os
 import pickle
@@ -19,10 +18,11 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from typing import Any
+from typing import Any, Literal
 
 from evonav.agents import wire
-from evonav.agents.agent import Agent, ExplainingAgent, RoundDiagnostics
+from evonav.agents.agent import Agent, ExplainingAgent
+from evonav.agents.error_text import clean, describe, traceback_of
 from evonav.agents.registry import agent_factory, imported, new_agent
 from evonav.decision.metered import Metered
 from evonav.errors import DecisionError
@@ -105,9 +105,7 @@ def _serve(connection: socket.socket, block: _Block) -> None:
         for stream in (sys.stdout, sys.stderr):
             with suppress(Exception):  # an agent may have closed or replaced it
                 stream.flush()
-        parts.update(number=str(number), cpu_s=json.dumps(time.process_time()))
-        text = "{" + ",".join(f'"{name}":{part}' for name, part in parts.items()) + "}"
-        data = text.encode()
+        data = wire.write_answer(number, time.process_time(), parts)
         connection.sendall(LENGTH.pack(len(data)) + data)
 
 
@@ -130,21 +128,21 @@ def _exactly(connection: socket.socket, size: int) -> bytearray | None:
 
 
 class _Server:
-    """The agent at work; answers are parts of a JSON object, each already a text."""
+    """The agent at work; answers are parts of a message, each already JSON."""
 
     def __init__(self) -> None:
         self._factory: Callable[..., Agent] | None = None
         self._agent: Agent | None = None
         self._decision: Metered | None = None
 
-    def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, str]:
+    def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, bytes]:
         """Does as asked; what the agent raises is an answer too."""
         try:
-            parts: dict[str, str] = getattr(self, f"do_{operation}")(*arguments)
+            parts: dict[str, bytes] = getattr(self, f"do_{operation}")(*arguments)
         except DecisionError as error:
-            return {"failed": _failed("decision", wire.clean(str(error)), error)}
+            return {"failure": _failed("decision", clean(str(error)), error)}
         except Exception as error:
-            return {"failed": _failed("agent", wire.describe(error), error)}
+            return {"failure": _failed("agent", describe(error), error)}
         return parts
 
     @property
@@ -153,14 +151,14 @@ class _Server:
         assert self._agent is not None, "`make` comes first"
         return self._agent
 
-    def do_load(self, name: str, memory_mb: int | None) -> dict[str, str]:
+    def do_load(self, name: str, memory_mb: int | None) -> dict[str, bytes]:
         """Imports what makes agents."""
         if memory_mb is not None:
             _limit_memory(memory_mb)
         self._factory = agent_factory(name)
         return {}
 
-    def do_make(self, decision: str, seed: int, options: Mapping[str, Any]) -> dict[str, str]:
+    def do_make(self, decision: str, seed: int, options: Mapping[str, Any]) -> dict[str, bytes]:
         """Makes a decision model, and a fresh agent with it; whatever was there before is dropped."""
         assert self._factory is not None, "`load` comes first"
         self._agent = None
@@ -168,49 +166,45 @@ class _Server:
         self._agent = new_agent(self._factory, self._decision)
         return self._sensing()
 
-    def do_begin_task(self, task: Any) -> dict[str, str]:  # noqa: ANN401 - `TaskInfo`
+    def do_begin_task(self, task: Any) -> dict[str, bytes]:  # noqa: ANN401 - `TaskInfo`
         """A new house."""
         self.agent.begin_task(task)
         return self._sensing()
 
-    def do_begin_stage(self, stage: Any) -> dict[str, str]:  # noqa: ANN401 - `StageInput`
+    def do_begin_stage(self, stage: Any) -> dict[str, bytes]:  # noqa: ANN401 - `StageInput`
         """A new goal."""
         self.agent.begin_stage(stage)
         return self._sensing()
 
-    def do_act(self, observation: Any) -> dict[str, str]:  # noqa: ANN401 - `Observation`
-        """A decision round, and what the agent says of it."""
+    def do_act(self, observation: Any) -> dict[str, bytes]:  # noqa: ANN401 - `Observation`
+        """A decision round, and the agent's diagnostics of it."""
         agent = self.agent
-        parts = {"action": wire.action_json(wire.checked_action(agent.act(observation), agent.sensing))}
+        parts = {"action": wire.write_action(agent.act(observation))}
         if isinstance(agent, ExplainingAgent):
             try:
-                told = agent.diagnostics()
-                # What it said before belongs to that round's record.
-                parts["told"] = wire.diagnostics_json(told)
+                parts["diagnostics"] = wire.DIAGNOSTICS.write(agent.diagnostics())
             except DecisionError as error:
-                parts["told_failed"] = _failed("decision", wire.clean(str(error)), error)
+                parts["diagnostics_failure"] = _failed("decision", clean(str(error)), error)
             except Exception as error:
-                parts["told_failed"] = _failed("agent", wire.describe(error), error)
-        else:
-            parts["told"] = wire.diagnostics_json(RoundDiagnostics())
+                parts["diagnostics_failure"] = _failed("agent", describe(error), error)
         return parts
 
-    def do_entries(self) -> dict[str, str]:
-        """The object memory; of an agent that tells none, `null`."""
+    def do_entries(self) -> dict[str, bytes]:
+        """The object memory, if the agent is an `ExplainingAgent`."""
         agent = self.agent
-        return {"entries": wire.entries_json(agent.entries()) if isinstance(agent, ExplainingAgent) else "null"}
+        return {"entries": wire.ENTRIES.write(list(agent.entries()))} if isinstance(agent, ExplainingAgent) else {}
 
-    def do_costs(self) -> dict[str, str]:
+    def do_costs(self) -> dict[str, bytes]:
         """What the decision model has cost since it was made, and the memory that this process has taken."""
         assert self._decision is not None, "`make` comes first"
-        return {"costs": json.dumps({**self._decision.costs(), **_peak_rss()})}
+        return {"costs": wire.COSTS.write({**self._decision.costs(), **_peak_rss()})}
 
-    def _sensing(self) -> dict[str, str]:
-        return {"sensing": wire.sensing_json(self.agent.sensing)}
+    def _sensing(self) -> dict[str, bytes]:
+        return {"sensing": wire.SENSING.write(self.agent.sensing)}
 
 
-def _failed(kind: str, message: str, error: Exception) -> str:
-    return json.dumps([kind, message, wire.traceback_of(error)])
+def _failed(kind: Literal["agent", "decision"], message: str, error: Exception) -> bytes:
+    return wire.FAILURE.write(wire.Failure(kind, message, traceback_of(error)))
 
 
 def _peak_rss() -> dict[str, float]:

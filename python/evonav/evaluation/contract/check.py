@@ -10,13 +10,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from evonav.agents import wire
 from evonav.agents.agent import Agent, Sensing
+from evonav.agents.error_text import describe
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
@@ -139,7 +140,7 @@ class _Examination:
             self._say(
                 "made",
                 "fail",
-                f"making it raises {wire.describe(error, caller=_PACKAGE)}; it must do without arguments",
+                f"making it raises {describe(error, caller=_PACKAGE)}; it must do without arguments",
             )
             return
         self._look(first)
@@ -177,7 +178,7 @@ class _Examination:
             run.records += self._episode(probe, case)
         return run
 
-    def _episode(self, agent: Agent, case: EpisodeSpec) -> Iterator[StageRecord]:
+    def _episode(self, agent: Agent | HostedAgent, case: EpisodeSpec) -> Iterator[StageRecord]:
         with closing(self._backend.make_simulator()) as simulator:
             perception = self._backend.make_perception()
             episode = Episode(case, self._name, agent, simulator, perception, PROTOCOL, self._seed)
@@ -197,7 +198,7 @@ class _Examination:
         ):
             error = probe.errors.get(name)
             if error is not None:
-                self._say(name, "fail", f"raises {wire.describe(error, caller=_PACKAGE)}")
+                self._say(name, "fail", f"raises {describe(error, caller=_PACKAGE)}")
             elif probe.calls[name]:
                 self._say(name, "pass", f"called {probe.calls[name]} times: {what}")
             else:
@@ -212,7 +213,7 @@ class _Examination:
 
     def _check_sensing(self, probe: "Probe") -> None:
         try:
-            sensing = wire.sensing_of(wire.read_json(wire.sensing_json(probe.sensing).encode()))
+            sensing = LocalAgent(probe).sensing
             PROTOCOL.check(sensing)
         except Exception as error:
             self._say("sensing", "fail", f"{error}; see `evonav.evaluation.protocol.ProtocolConfig` for the caps")
@@ -255,7 +256,7 @@ class _Examination:
         if not probe.explains:
             self._say("diagnostics", "warn", "no `diagnostics()` and `entries()`: reports cannot show what it believes")
         elif (error := probe.errors.get("diagnostics")) is not None:
-            self._say("diagnostics", "fail", f"{wire.describe(error, caller=_PACKAGE)}; see `RoundDiagnostics`")
+            self._say("diagnostics", "fail", f"{describe(error, caller=_PACKAGE)}; see `RoundDiagnostics`")
         else:
             self._say("diagnostics", "pass", f"JSON-ready, {probe.largest_diagnostics} bytes a round at most")
 
@@ -263,7 +264,7 @@ class _Examination:
         if not probe.explains:
             return
         if (error := probe.errors.get("entries")) is not None:
-            self._say("entries", "fail", f"{wire.describe(error, caller=_PACKAGE)}; see `EntryBelief`")
+            self._say("entries", "fail", f"{describe(error, caller=_PACKAGE)}; see `EntryBelief`")
         elif probe.outside:
             self._say("entries", "fail", f"{probe.outside[0]}; centres are (x, y, z) in metres, in the world's frame")
         else:

@@ -73,9 +73,9 @@ class Probe:
         agent = self.agent
 
         def ask() -> RoundDiagnostics:
-            text = wire.diagnostics_json(agent.diagnostics())
+            text = wire.DIAGNOSTICS.write(agent.diagnostics())
             self.largest_diagnostics = max(self.largest_diagnostics, len(text))
-            return wire.diagnostics_of(wire.read_json(text.encode()))
+            return wire.DIAGNOSTICS.read(text)
 
         told: RoundDiagnostics = self._call("diagnostics", ask)
         return told
@@ -87,7 +87,7 @@ class Probe:
         agent = self.agent
 
         def ask() -> list[EntryBelief]:
-            return wire.entries_of(wire.read_json(wire.entries_json(agent.entries()).encode()))
+            return wire.ENTRIES.read(wire.ENTRIES.write(list(agent.entries())))
 
         found: list[EntryBelief] = self._call("entries", ask)
         self.num_entries += len(found)

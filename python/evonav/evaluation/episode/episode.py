@@ -9,10 +9,12 @@ from dataclasses import replace
 from time import process_time
 
 from evonav.agents.agent import Agent
-from evonav.evaluation.episode.observer import LOSSES, EpisodeObserver, HasOwnProcess
+from evonav.evaluation.episode.observer import LOSSES, EpisodeObserver
+from evonav.evaluation.episode.oracle_baselines import OracleBaseline, as_oracle_baseline
 from evonav.evaluation.episode.outcome import StageOutcome, as_not_run
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.episode.stage import EpisodeContext, EpisodeState, Stage
+from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.costs import LEVELS, Stopwatch
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
@@ -28,7 +30,7 @@ class Episode:
         self,
         case: EpisodeSpec,
         agent_name: str,
-        agent: Agent,
+        agent: Agent | HostedAgent,
         simulator: Simulator,
         perception: Perception,
         protocol: ProtocolConfig,
@@ -41,7 +43,7 @@ class Episode:
         self._agent_name = agent_name
         self._parts = EpisodeContext(
             case,
-            agent,
+            *_hosted(agent),
             simulator,
             perception,
             protocol,
@@ -50,7 +52,6 @@ class Episode:
             observer,
         )
         self._state = EpisodeState()
-        self.replace_agent(agent)
         self._told_costs: Mapping[str, float] = {}
 
     def run(self) -> Iterator[StageOutcome]:
@@ -95,22 +96,26 @@ class Episode:
         return pose if forced is None else replace(forced.end, y_m=pose.y_m, horizon_rad=pose.horizon_rad)
 
     def _new_costs(self, failure: ErrorKind | None) -> Mapping[str, float]:
-        """What the agent's decision model has cost in the stage; empty where its process tells nothing."""
-        if self._process is None:
-            return {}
+        """What the agent's decision model has cost in the stage; empty where that is not known."""
         if failure in LOSSES:
             self._told_costs = {}
             return {}
-        told, before = self._process.costs(), self._told_costs
+        told, before = self._parts.agent.costs(), self._told_costs
         self._told_costs = told
         return {name: value if name in LEVELS else value - before.get(name, 0) for name, value in told.items()}
 
     def replace_agent(self, agent: Agent) -> None:
         """Another agent from the next stage on, as after the loss of a process; for replays in one process."""
-        self._parts = replace(self._parts, agent=agent)
-        # Asked once: the question costs ten times what looking at the clock does.
-        self._process = agent if isinstance(agent, HasOwnProcess) else None
+        hosted, baseline = _hosted(agent)
+        self._parts = replace(self._parts, agent=hosted, baseline=baseline)
 
     def _cpu_s(self) -> float:
         """Of this process, and of the agent's where it has one."""
-        return process_time() + (0.0 if self._process is None else self._process.cpu_s)
+        return process_time() + self._parts.agent.cpu_s
+
+
+def _hosted(agent: Agent | HostedAgent) -> tuple[HostedAgent, OracleBaseline | None]:
+    """Return the agent as a stage asks it, and itself if it is an oracle baseline."""
+    if isinstance(agent, HostedAgent):
+        return agent, None
+    return LocalAgent(agent), as_oracle_baseline(agent)

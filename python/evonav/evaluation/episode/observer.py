@@ -1,10 +1,10 @@
 """Who looks on at an episode, what hosts its agent, and whose fault it is when a stage cannot go on."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
-from evonav.agents import wire
+from evonav.agents import error_text
 from evonav.errors import DecisionError, SimulationError, SimulatorLostError
 from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord
@@ -35,25 +35,6 @@ LOSSES = (ErrorKind.CRASH, ErrorKind.TIMEOUT)
 """Failures that end the agent's process, and its memory with it."""
 
 
-@runtime_checkable
-class HasOwnProcess(Protocol):
-    """An agent in a process of its own: what it says has crossed the border as JSON already."""
-
-    @property
-    def cpu_s(self) -> float:
-        """CPU time that its processes have used."""
-        ...
-
-    @property
-    def tells_entries(self) -> bool:
-        """Whether it is an `ExplainingAgent`; known once it was asked for entries."""
-        ...
-
-    def costs(self) -> Mapping[str, float]:
-        """What its decision model has cost so far, by field of `StageCosts`; empty where that is not known."""
-        ...
-
-
 class StageFailedError(Exception):
     """A stage that cannot go on; carries whose fault it is."""
 
@@ -72,10 +53,10 @@ def attribute_errors(kind: ErrorKind) -> Iterator[None]:
     except AgentFailedError as error:
         raise StageFailedError(error.kind, str(error)) from error
     except DecisionError as error:
-        raise StageFailedError(ErrorKind.DECISION, wire.clean(str(error))) from error
+        raise StageFailedError(ErrorKind.DECISION, error_text.clean(str(error))) from error
     except Exception as error:
         if kind is ErrorKind.AGENT:
-            raise StageFailedError(kind, wire.describe(error, caller="evonav.evaluation")) from error
+            raise StageFailedError(kind, error_text.describe(error, caller="evonav.evaluation")) from error
         if isinstance(error, SimulationError):
             is_lost = isinstance(error, SimulatorLostError)
             kind = ErrorKind.SIMULATOR_LOST if is_lost else ErrorKind.SIMULATION
@@ -86,4 +67,4 @@ def attribute_errors(kind: ErrorKind) -> Iterator[None]:
 def traceback_of(failure: StageFailedError) -> str:
     """Where it came from; of an agent in a process of its own, in that."""
     cause = failure.__cause__ or failure
-    return (isinstance(cause, AgentFailedError) and cause.traceback) or wire.traceback_of(cause)
+    return (isinstance(cause, AgentFailedError) and cause.traceback) or error_text.traceback_of(cause)

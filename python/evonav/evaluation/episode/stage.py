@@ -4,32 +4,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from evonav.agents import wire
-from evonav.agents.agent import (
-    Agent,
-    AgentAction,
-    EntryBelief,
-    ExplainingAgent,
-    Move,
-    NavigateTo,
-    RoundDiagnostics,
-    Sensing,
-    Stop,
-)
+from evonav.agents.agent import AgentAction, EntryBelief, Move, NavigateTo, Sensing, Stop
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode import motion
-from evonav.evaluation.episode.observer import (
-    EpisodeObserver,
-    HasOwnProcess,
-    StageFailedError,
-    attribute_errors,
-    traceback_of,
-)
-from evonav.evaluation.episode.oracle_baselines import Sighting, as_oracle_baseline
+from evonav.evaluation.episode.observer import EpisodeObserver, StageFailedError, attribute_errors, traceback_of
+from evonav.evaluation.episode.oracle_baselines import OracleBaseline, Sighting
 from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.episode.sensors import Sensors, map_frame
 from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk, floor_plan, room_at
 from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState
+from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.convert import action_record, entry_record, pose_record, sensing_record
 from evonav.evaluation.records.costs import Stopwatch
@@ -54,7 +39,9 @@ class EpisodeContext:
     """Who and what takes part in an episode."""
 
     case: EpisodeSpec
-    agent: Agent
+    agent: HostedAgent
+    baseline: OracleBaseline | None
+    """The agent, if it is one."""
     simulator: Simulator
     perception: Perception
     protocol: ProtocolConfig
@@ -91,6 +78,7 @@ class Stage:
         self._state = carried
         self._case = parts.case
         self._agent = parts.agent
+        self._baseline = parts.baseline
         self._simulator = parts.simulator
         self._perception = parts.perception
         self._protocol = parts.protocol
@@ -162,10 +150,10 @@ class Stage:
         with attribute_errors(ErrorKind.AGENT):
             with self._stopwatch.timing("agent"):
                 self._tell_goal()
-            beliefs = self._told_entries()
-            if beliefs and (baseline := as_oracle_baseline(self._agent)) is not None:
-                baseline.reveal_stale(self._staleness.stale_ids(beliefs))
-                beliefs = self._told_entries()
+            beliefs = self._entries()
+            if beliefs and self._baseline is not None:
+                self._baseline.reveal_stale(self._staleness.stale_ids(beliefs))
+                beliefs = self._entries()
         self._memory_at_start = None if beliefs is None else self._staleness.begin(beliefs)
         self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensing)})
 
@@ -185,12 +173,12 @@ class Stage:
             self._state.has_begun = True
         self._agent.begin_stage(self._stage.public)
         self._sensing = self._granted()
-        if (baseline := as_oracle_baseline(self._agent)) is not None:
-            baseline.reveal_target(self._stage.target.position_m)
+        if self._baseline is not None:
+            self._baseline.reveal_target(self._stage.target.position_m)
 
     def _granted(self) -> Sensing:
         """What the agent asks of its sensors, within the protocol."""
-        sensing = wire.sensing_of(wire.read_json(wire.sensing_json(self._agent.sensing).encode()))
+        sensing = self._agent.sensing
         self._protocol.check(sensing)
         return sensing
 
@@ -281,16 +269,23 @@ class Stage:
         if self._observer is not None:
             self._observer.round_begins(observation)
         with attribute_errors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
-            if (baseline := as_oracle_baseline(self._agent)) is not None:
-                baseline.reveal_sighting(Sighting(self._staleness.is_target_visible, self._staleness.is_target_seen))
-            return wire.checked_action(self._agent.act(observation), self._sensing)
+            if self._baseline is not None:
+                self._baseline.reveal_sighting(
+                    Sighting(self._staleness.is_target_visible, self._staleness.is_target_seen)
+                )
+            action = self._agent.act(observation)
+            if isinstance(action, NavigateTo) and self._sensing.motion == "actions":
+                raise InvalidArgumentError(
+                    "NavigateTo: an agent whose `sensing.motion` is `actions` answers Move or Stop"
+                )
+            return action
 
     def _end_round(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> None:
         self._trace.append(self._round_record(number, pose, action, done))
         self._beliefs = None
         if self._memory_at_start is not None and self._staleness.wants_entries:
             with attribute_errors(ErrorKind.AGENT):
-                self._beliefs = self._told_entries()
+                self._beliefs = self._entries()
             self._staleness.take_entries(self._beliefs or ())
         if self._observer is not None:
             self._observer.round_ends(self._trace[-1])
@@ -311,7 +306,7 @@ class Stage:
 
     def _round_record(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> RoundRecord:
         with attribute_errors(ErrorKind.AGENT):
-            told = self._told()
+            told = self._agent.diagnostics()
             return RoundRecord(
                 round=number,
                 pose=pose_record(pose),
@@ -326,15 +321,6 @@ class Stage:
                 counters=dict(told.counters),
                 details=dict(told.details),
             )
-
-    def _told(self) -> RoundDiagnostics:
-        """The round in the agent's words, as JSON has them whatever process it is in."""
-        if not isinstance(self._agent, ExplainingAgent):
-            return RoundDiagnostics()
-        told = self._agent.diagnostics()
-        if isinstance(self._agent, HasOwnProcess):
-            return told
-        return wire.diagnostics_of(wire.read_json(wire.diagnostics_json(told).encode()))
 
     def _measured(
         self, progress: StageProgress, reference_m: Sequence[motion.Point2], stop_reason: str | None
@@ -373,7 +359,7 @@ class Stage:
     def _with_memory(self, record: StageRecord) -> StageRecord:
         """The record with what the agent holds at the end, judged."""
         with attribute_errors(ErrorKind.AGENT):
-            beliefs = self._told_entries() if self._beliefs is None else self._beliefs
+            beliefs = self._entries() if self._beliefs is None else self._beliefs
         if beliefs is None:
             self._staleness.close(())
             return record
@@ -398,15 +384,10 @@ class Stage:
             }
         )
 
-    def _told_entries(self) -> Sequence[EntryBelief] | None:
-        """The agent's object memory, the same whatever process it is in; `None` if it tells none."""
-        if not isinstance(self._agent, ExplainingAgent):
-            return None
+    def _entries(self) -> Sequence[EntryBelief] | None:
+        """Return the agent's object memory; None if it is no `ExplainingAgent`."""
         with self._stopwatch.timing("agent"):
-            entries = self._agent.entries()
-            if isinstance(self._agent, HasOwnProcess):
-                return entries if self._agent.tells_entries else None
-            return wire.entries_of(wire.read_json(wire.entries_json(entries).encode()))
+            return self._agent.entries()
 
     def _entry_record(self, belief: EntryBelief) -> EntryRecord:
         return entry_record(belief, self._staleness.bodies)

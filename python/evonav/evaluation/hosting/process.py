@@ -1,10 +1,10 @@
 """Agents in processes of their own: they cannot reach oracle data, and what they break is theirs.
 
 A process serves agents of one name, a fresh object an episode (`evonav.agents.serving` is its side). Observations go
-there pickled, their arrays through one block of shared memory; answers come back as JSON, and nothing that an agent
-says is unpickled or believed to be well-formed. The process inherits no descriptor but three and its output, is given
-no path but those of its decision model's files, and leads a process group, so that what an agent has started ends with
-it.
+there pickled, their arrays through one block of shared memory; answers come back as JSON (`evonav.agents.wire`), and
+nothing that an agent says is unpickled or believed to be well-formed. The process inherits no descriptor but three and
+its output, is given no path but those of its decision model's files, and leads a process group, so that what an agent
+has started ends with it.
 
 This is no sandbox: an agent that goes looking can read what this user can read. For that, run evonav in a container.
 """
@@ -25,9 +25,11 @@ from typing import Any
 
 from evonav.agents import wire
 from evonav.agents.agent import AgentAction, EntryBelief, RoundDiagnostics, Sensing
+from evonav.agents.error_text import clean
 from evonav.agents.serving import LENGTH
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.errors import AgentFailedError
+from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
@@ -143,8 +145,8 @@ class AgentProcess:
         if self._log is not None:
             self._log.begin_part(label)
 
-    def ask(self, operation: str, *arguments: object, timeout_s: float | None = None) -> dict[str, Any]:
-        """A request and its answer.
+    def ask(self, operation: str, *arguments: object, timeout_s: float | None = None) -> dict[str, bytes]:
+        """A request and the parts of its answer, still as JSON.
 
         Raises:
             AgentFailedError: The agent raised (`agent`, `decision`); or it died or hung (`crash`, `timeout`), and its
@@ -155,21 +157,21 @@ class AgentProcess:
         self._is_asking = True
         try:
             self._send(operation, arguments, deadline_s)
-            said = self._answer(deadline_s)
+            cpu_s, parts = wire.read_answer(self._message(deadline_s), self._num_asked)
         except TimeoutError:
             self.close(is_at_once=True)
             message = f"no answer to `{operation}` within {timeout_s:g} s"
             raise AgentFailedError(ErrorKind.TIMEOUT, message) from None
-        except (OSError, ValueError) as error:
+        except (OSError, InvalidArgumentError) as error:
             died = self._cause_of_death() if isinstance(error, OSError) else None
             self.close(is_at_once=True)
-            message = died or f"the agent's process answered with what is no answer: {wire.clean(str(error))}"
+            message = died or f"malformed response: {clean(str(error))}"
             raise AgentFailedError(ErrorKind.CRASH, message) from None
         self._is_asking = False
-        self.cpu_s = said["cpu_s"]
-        if (failed := said.get("failed")) is not None:
-            raise _failure(failed)
-        return said
+        self.cpu_s = cpu_s
+        if (failure := parts.get("failure")) is not None:
+            raise _failure(failure)
+        return parts
 
     def _send(self, operation: str, arguments: tuple[object, ...], deadline_s: float) -> None:
         buffers: list[pickle.PickleBuffer] = []
@@ -178,14 +180,6 @@ class AgentProcess:
         request = pickle.dumps((self._num_asked, self._block.write(buffers), message), protocol=5)
         self._connection.settimeout(max(1e-3, deadline_s - time.monotonic()))
         self._connection.sendall(LENGTH.pack(len(request)) + request)
-
-    def _answer(self, deadline_s: float) -> dict[str, Any]:
-        said = wire.read_json(self._message(deadline_s))
-        if not isinstance(said, dict) or not isinstance(said.get("cpu_s"), float):
-            raise ValueError("it has none of our form")
-        if said.get("number") != self._num_asked:
-            raise ValueError("it answers something else")
-        return said
 
     def _message(self, deadline_s: float) -> bytes:
         """One message, and nothing after it."""
@@ -199,9 +193,9 @@ class AgentProcess:
             if size == LENGTH.size <= len(data):
                 size += LENGTH.unpack_from(data)[0]
                 if size > MAX_ANSWER_BYTES:
-                    raise ValueError(f"it has {size} bytes")
+                    raise InvalidArgumentError(f"{size} bytes: must be at most {MAX_ANSWER_BYTES}")
         if len(data) > size:
-            raise ValueError("there is more than one")
+            raise InvalidArgumentError("more than one answer")
         return bytes(data[LENGTH.size :])
 
     def _wait(self, deadline_s: float) -> None:
@@ -279,8 +273,8 @@ class AgentProcesses:
             self._processes.popitem()[1].close()
 
 
-class RemoteAgent:
-    """An agent in another process: `Agent` and `ExplainingAgent`.
+class RemoteAgent(HostedAgent):
+    """An agent in another process.
 
     After the loss of its process it is a fresh agent in a fresh one, that knows no task yet.
     """
@@ -300,11 +294,10 @@ class RemoteAgent:
         self._seed = seed
         self._process: AgentProcess | None = None
         self._sensing: Sensing | None = None
-        self._told: Mapping[str, Any] = {}
+        self._last_parts: Mapping[str, bytes] = {}
+        """Of the answer to the last `act`."""
         self._label = name
         self._cpu_s = 0.0
-        self.tells_entries = True
-        """Whether it is an `ExplainingAgent`; known once it was asked for entries."""
 
     @property
     def cpu_s(self) -> float:
@@ -319,10 +312,6 @@ class RemoteAgent:
         assert self._sensing is not None
         return self._sensing
 
-    @sensing.setter
-    def sensing(self, _: Sensing) -> None:
-        raise AttributeError("sensing: the agent's own to say")
-
     def begin_task(self, task: TaskInfo) -> None:
         """A new house."""
         self._label = f"{self._name} {task.task_id}"
@@ -336,39 +325,44 @@ class RemoteAgent:
 
     def act(self, observation: Observation) -> AgentAction:
         """A decision round."""
-        said = self._ask("act", observation)
-        self._told = said
-        return wire.action_of(said.get("action"), self.sensing)
+        self._last_parts = self._ask("act", observation)
+        return wire.read_action(_part(self._last_parts, "action"))
 
     def diagnostics(self) -> RoundDiagnostics:
         """What it said of the last round, right after it."""
-        if (failed := self._told.get("told_failed")) is not None:
-            raise _failure(failed)
-        return wire.diagnostics_of(self._told.get("told"))
+        if (failure := self._last_parts.get("diagnostics_failure")) is not None:
+            raise _failure(failure)
+        text = self._last_parts.get("diagnostics")
+        return RoundDiagnostics() if text is None else wire.DIAGNOSTICS.read(text)
 
-    def entries(self) -> Sequence[EntryBelief]:
-        """Its object memory."""
-        said = self._ask("entries").get("entries")
-        self.tells_entries = said is not None
-        return () if said is None else wire.entries_of(said)
+    def entries(self) -> Sequence[EntryBelief] | None:
+        """Its object memory; None if it is no `ExplainingAgent`."""
+        text = self._ask("entries").get("entries")
+        return None if text is None else wire.ENTRIES.read(text)
 
     def costs(self) -> Mapping[str, float]:
         """What its decision model has cost since it was made; empty if its process is gone."""
-        return {} if self._process is None else wire.costs_of(self._ask("costs").get("costs"))
+        if self._process is None:
+            return {}
+        try:
+            costs = wire.COSTS.read(_part(self._ask("costs"), "costs"))
+        except InvalidArgumentError:  # they decide nothing
+            return {}
+        return {str(name): amount for name, amount in costs.items()}
 
     def _make(self) -> None:
         self._process = self._processes.process(self._name)
         self._describe(self._label)
         self._sense(self._ask("make", self._decision.path, self._seed, dict(self._decision.options)))
 
-    def _sense(self, said: Mapping[str, Any]) -> None:
-        self._sensing = wire.sensing_of(said.get("sensing"))
+    def _sense(self, parts: Mapping[str, bytes]) -> None:
+        self._sensing = wire.SENSING.read(_part(parts, "sensing"))
 
     def _describe(self, label: str) -> None:
         if self._process is not None:
             self._process.describe(label)
 
-    def _ask(self, operation: str, *arguments: object) -> dict[str, Any]:
+    def _ask(self, operation: str, *arguments: object) -> dict[str, bytes]:
         if self._process is None:
             self._make()
         process = self._process
@@ -397,10 +391,13 @@ def check_importable(name: str) -> None:
         raise InvalidArgumentError(message) from None
 
 
-def _failure(said: object) -> AgentFailedError:
+def _part(parts: Mapping[str, bytes], name: str) -> bytes:
+    if name not in parts:
+        raise InvalidArgumentError(f'malformed response: missing "{name}"')
+    return parts[name]
+
+
+def _failure(text: bytes) -> AgentFailedError:
     """The failure that a process says its agent had."""
-    if isinstance(said, list) and len(said) == 3 and all(isinstance(part, str) for part in said):
-        kind, message, traceback = said
-        if kind in ("agent", "decision"):
-            return AgentFailedError(ErrorKind(kind), message, traceback[-wire.MAX_TRACEBACK :])
-    return AgentFailedError(ErrorKind.AGENT, "it failed and did not say how")
+    failure = wire.FAILURE.read(text)
+    return AgentFailedError(ErrorKind(failure.kind), failure.message, failure.traceback)

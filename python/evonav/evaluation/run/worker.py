@@ -17,13 +17,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from evonav.agents import wire
+from evonav.agents import error_text
 from evonav.agents.agent import Agent, AgentAction, Sensing
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec
+from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.costs import StageCosts
@@ -99,7 +100,7 @@ class WorkerContext:
         self._simulator: Simulator | None = None
         self._processes = None if hosting.is_in_process else AgentProcesses(hosting)
 
-    def agent(self, job: EpisodeJob) -> Agent:
+    def agent(self, job: EpisodeJob) -> Agent | HostedAgent:
         """A fresh agent. Oracle baselines are given oracle data: they stay here."""
         if self._processes is not None and job.agent not in ORACLE_BASELINES:
             return RemoteAgent(self._processes, job.agent, self.setup.backend.decision_spec(), job.seed)
@@ -230,7 +231,7 @@ class EpisodeWork:
                     yield _outcome_text(news) if isinstance(news, StageOutcome) else _failure_text(news)
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
-            return _failure_text(StageFailure(0, ErrorKind.HARNESS, message, wire.traceback_of(error)))
+            return _failure_text(StageFailure(0, ErrorKind.HARNESS, message, error_text.traceback_of(error)))
         return "{}"
 
     def _context(self, setup_text: str) -> WorkerContext:

@@ -1,0 +1,57 @@
+"""Describe an agent's exceptions, the same way in whatever process they were raised."""
+
+import re
+import traceback
+from types import TracebackType
+
+MAX_MESSAGE = 2000
+"""Longest message of an error, in characters."""
+MAX_TRACEBACK = 20_000
+"""Longest traceback, in characters; its end is what remains."""
+NUM_FRAMES = 3
+"""Number of places of a traceback, the innermost ones."""
+
+_OURS = ("evonav.agents.error_text", "evonav.agents.wire", "evonav.agents.serving")
+_ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")
+
+
+def describe(error: BaseException, *, caller: str | None = None) -> str:
+    """Describe an agent's exception in a line or few: type, message and places, the innermost place last.
+
+    The text is the same in whatever process and at whatever address the exception was raised.
+
+    Args:
+        error: The exception.
+        caller: Package that called the agent in this process; its own places are left out.
+    """
+    try:
+        text = str(error)
+    except Exception:
+        text = "(its message cannot be read)"
+    text = _ADDRESS.sub("0x...", f"{type(error).__name__}: {text}")
+    text = clean(text if len(text) <= MAX_MESSAGE else text[:MAX_MESSAGE] + " ...")
+    places = _places(error.__traceback__, _OURS if caller is None else (*_OURS, f"{caller}."))
+    return f"{text} [{' > '.join(places)}]" if places else text
+
+
+def traceback_of(error: BaseException) -> str:
+    """Return the whole traceback, for people who look for the cause; it differs from process to process."""
+    try:
+        return clean("".join(traceback.format_exception(error)))[-MAX_TRACEBACK:]
+    except Exception:  # its message cannot be read
+        return f"{type(error).__name__}"
+
+
+def clean(text: str) -> str:
+    """Return text that every file can hold: halves of surrogate pairs become question marks."""
+    return text.encode("utf-8", "replace").decode()
+
+
+def _places(trace: TracebackType | None, outside: tuple[str, ...]) -> list[str]:
+    places: list[str] = []
+    while trace is not None:
+        module = str(trace.tb_frame.f_globals.get("__name__", "?"))
+        if places or not module.startswith(outside):
+            places.append(clean(f"{module}:{trace.tb_lineno} in {trace.tb_frame.f_code.co_name}"))
+        trace = trace.tb_next
+    return places[-NUM_FRAMES:]

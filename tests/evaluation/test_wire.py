@@ -1,0 +1,138 @@
+"""What agents answer, as JSON: what is written is read back, and whatever is wrong is named with field and value."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evonav.agents import wire
+from evonav.agents.agent import EntryBelief, Move, NavigateTo, RoundDiagnostics, Sensing, Stop, ViewSchedule
+from evonav.errors import InvalidArgumentError
+from evonav.world.simulator import Action
+
+COORDINATES = st.floats(allow_nan=False, allow_infinity=False)
+POINTS = st.tuples(COORDINATES, COORDINATES)
+TEXTS = st.text(st.characters(exclude_categories=("Cs",)), max_size=20)
+ENTRIES = st.builds(
+    EntryBelief,
+    st.integers(),
+    TEXTS,
+    st.tuples(COORDINATES, COORDINATES, COORDINATES),
+    st.tuples(COORDINATES, COORDINATES, COORDINATES),
+    st.integers(),
+)
+ACTIONS = st.one_of(
+    st.builds(Move, st.sampled_from([action for action in Action if action is not Action.STOP])),
+    st.builds(NavigateTo, POINTS, st.none() | POINTS),
+    st.builds(Stop, TEXTS),
+)
+
+
+@given(ACTIONS)
+def test_actions_are_read_as_written(action) -> None:
+    assert wire.read_action(wire.write_action(action)) == action
+
+
+@given(st.lists(ENTRIES, max_size=3), st.dictionaries(TEXTS, st.integers() | TEXTS | st.lists(COORDINATES), max_size=3))
+def test_beliefs_are_read_as_written(entries, details) -> None:
+    assert wire.ENTRIES.read(wire.ENTRIES.write(entries)) == entries
+    told = RoundDiagnostics("object 1", next(iter(entries), None), 3, 4, {"conflicts": 2}, details)
+    assert wire.DIAGNOSTICS.read(wire.DIAGNOSTICS.write(told)) == told
+
+
+def test_numbers_of_numpy_and_halves_of_pairs_are_written() -> None:
+    action = NavigateTo(np.array([1.0, 2.0], np.float32), (np.int64(3), 4))
+    assert wire.read_action(wire.write_action(action)) == NavigateTo((1.0, 2.0), (3.0, 4.0))
+    assert wire.read_action(wire.write_action(Move(Action.STOP))) == Stop()
+    assert wire.read_action(wire.write_action(Stop("half: \ud800"))) == Stop("half: ?")
+    assert wire.read_action(wire.write_action(Stop("x" * 5000))).reason == "x" * 2000
+    details = {"nan": math.nan, "large": 10**30, 3: (1, 2), "half": "\udfff", "lines": "a\nb"}
+    text = wire.DIAGNOSTICS.write(RoundDiagnostics(details=details))
+    assert b"\n" not in text
+    found = wire.DIAGNOSTICS.read(text).details
+    assert math.isnan(found.pop("nan"))
+    assert found == {"large": 10**30, "3": [1, 2], "half": "?", "lines": "a\nb"}
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        ("forward", "'forward' is no action: answer Move"),
+        (NavigateTo((math.nan, 0.0)), r"action\.navigate_to = .*coordinates must be finite"),
+        (NavigateTo((1.0, 2.0), (math.inf, 0.0)), "must be finite"),
+        (NavigateTo((1.0, 2.0, 3.0)), r"action\.navigate_to\.position_m = \[1\.0, 2\.0, 3\.0\]"),
+        (NavigateTo("ab"), r"action\.navigate_to\.position_m = 'ab'"),
+        (Move("MoveAhead!"), r"action\.move\.action = 'MoveAhead!'"),
+        (Stop(object()), "action: not JSON-ready: .*object is no JSON"),
+    ],
+)
+def test_what_is_no_action_is_named(action, message) -> None:
+    with pytest.raises(InvalidArgumentError, match=message):
+        wire.read_action(wire.write_action(action))
+
+
+def test_actions_of_another_kind_are_refused() -> None:
+    for text in (b'{"kind": "fly"}', b"{}", b"null", b"[1]"):
+        with pytest.raises(InvalidArgumentError, match=r"^action"):
+            wire.read_action(text)
+
+
+@pytest.mark.parametrize(
+    ("part", "value", "message"),
+    [
+        (wire.SENSING, None, "sensing = None"),
+        (wire.SENSING, Sensing(first_round=ViewSchedule(2.5, 1.0)), r"sensing\.first_round\.count = 2\.5"),
+        (wire.SENSING, Sensing(motion="flight"), r"sensing\.motion = 'flight'"),
+        (wire.SENSING, Sensing(needs_rgb=1), r"sensing\.needs_rgb = 1"),
+        (wire.DIAGNOSTICS, RoundDiagnostics(num_entries=True), r"diagnostics\.num_entries = True"),
+        (wire.DIAGNOSTICS, RoundDiagnostics(counters={"a": 0.5}), r"diagnostics\.counters\.a = 0\.5"),
+        (wire.ENTRIES, [EntryBelief(1, "Mug", (0.0, 0.0), (1.0, 1.0, 1.0), 1)], r'missing "entries\.0\.centre_m\.2"'),
+        (wire.ENTRIES, [EntryBelief("1", "Mug", (0.0,) * 3, (1.0,) * 3, 1)], r"entries\.0\.entry_id = '1'"),
+    ],
+)
+def test_malformed_parts_are_named(part, value, message) -> None:
+    with pytest.raises(InvalidArgumentError, match=message):
+        part.read(part.write(value))
+
+
+def test_large_and_deep_diagnostics_are_refused() -> None:
+    with pytest.raises(InvalidArgumentError, match="diagnostics: 1000095 bytes of JSON: must be at most 1000000"):
+        wire.DIAGNOSTICS.write(RoundDiagnostics(details={"a": "x" * 999_995}))
+    nested: list[object] = []
+    for depth in range(1, 2000):
+        told = RoundDiagnostics(details={"a": nested})
+        if depth < 31:
+            wire.DIAGNOSTICS.read(wire.DIAGNOSTICS.write(told))
+        nested = [nested]
+    for depth in (40, 150, 300, 100_000):
+        text = b'{"details": {"a": ' + b"[" * depth + b"]" * depth + b"}}"
+        with pytest.raises(InvalidArgumentError, match=r"deeper than 32|recursion limit"):
+            wire.DIAGNOSTICS.read(text)
+    with pytest.raises(InvalidArgumentError, match=r"not JSON-ready: .*depth"):
+        wire.DIAGNOSTICS.write(RoundDiagnostics(details={"a": nested}))
+
+
+@given(st.integers(0), st.floats(0, 1e9), st.dictionaries(TEXTS, TEXTS.map(lambda text: json.dumps(text).encode())))
+def test_answers_are_read_as_written(number, cpu_s, parts) -> None:
+    assert wire.read_answer(wire.write_answer(number, cpu_s, parts), number) == (cpu_s, parts)
+
+
+@pytest.mark.parametrize(
+    ("message", "error"),
+    [
+        (b'{"number": 1, "parts": []}', 'missing "cpu_s"'),
+        (b'{"number": 1, "cpu_s": "2", "parts": []}', "cpu_s = '2'"),
+        (b'{"number": 1, "cpu_s": NaN, "parts": []}', "cpu_s = nan"),
+        (b'{"number": 2, "cpu_s": 0.5, "parts": []}', "number = 2: expected 1"),
+        (b'{"number": 1, "cpu_s": 0.5, "parts": ["action"]}', r"parts = \('action',\): 0 follow"),
+        (b'{"number": 1, "cpu_s": 0.5, "parts": []}\n{}', r"parts = \(\): 1 follow"),
+        (b"cos\nsystem\n(S'true'\nt", "Invalid JSON: expected value"),
+        (b"", "Invalid JSON"),
+    ],
+)
+def test_what_is_no_answer_is_named(message, error) -> None:
+    with pytest.raises(InvalidArgumentError, match=error):
+        wire.read_answer(message, 1)
