@@ -7,23 +7,19 @@ that it is still running. If a worker dies, another one repeats its job; if a jo
 killed.
 """
 
-import importlib
 import time
-import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing
-from dataclasses import dataclass, field
+from collections.abc import Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import islice
 from types import TracebackType
 from typing import Literal, Protocol
 
 from evonav.errors import EvonavError, InvalidArgumentError
+from evonav.parallel.work import end_work, load_work, steps
 
 EngineName = Literal["local", "ray"]
 FailureKind = Literal["crash", "timeout", "error"]
-Work = Callable[[str], str | Generator[str, None, str]]
-"""Turns the text of a job into its answer. It may have a method `close`, which is called when its worker ends."""
 
 MAX_LOSSES = 2
 """Default number of workers that a job may lose before it fails."""
@@ -31,8 +27,6 @@ MAX_FAILED_STARTS = 5
 """Failed starts in a row after which no worker is started; if none is running, the pool fails."""
 START_TIMEOUT_S = 300.0
 """Longest time until a worker is ready."""
-HEARTBEAT_S = 5.0
-"""Shortest time between two heartbeats of a worker."""
 
 
 class EngineError(EvonavError):
@@ -353,60 +347,7 @@ class WorkerPool:
         self._host.close()
 
 
-def load_work(work: str, settings: str, alive: Callable[[], None]) -> Work:
-    """Import `module:factory` and return the work that it makes."""
-    module, _, factory = work.partition(":")
-    function: Work = getattr(importlib.import_module(module), factory)(settings, alive)
-    return function
-
-
-def end_work(work: Work) -> None:
-    """Call the work's `close`, if it has one."""
-    close = getattr(work, "close", None)
-    if close is not None:
-        close()
-
-
-def steps(work: Work, text: str) -> Generator[tuple[str, str]]:
-    """Run a job and yield its messages: progress, then its answer or the traceback of its exception."""
-    try:
-        result = work(text)
-        if isinstance(result, str):
-            answer = result
-        else:
-            with closing(result):
-                answer = yield from _progress(result)
-    except Exception:
-        yield "error", traceback.format_exc()
-    else:
-        yield "done", answer
-
-
-def _progress(job: Generator[str, None, str]) -> Generator[tuple[str, str], None, str]:
-    while True:
-        try:
-            text = next(job)
-        except StopIteration as end:
-            answer: str = end.value
-            return answer
-        yield "progress", text
-
-
 def _answer(key: int, kind: str, text: str) -> Answer:
     if kind == "error":
         return Answer(key, failure="error", detail=text)
     return Answer(key, text, is_end=kind == "done")
-
-
-@dataclass(slots=True)
-class Heartbeat:
-    """A worker's `alive`: sends at most one heartbeat every `HEARTBEAT_S`."""
-
-    send: Callable[[], None]
-    last_s: float = field(default_factory=time.monotonic)
-
-    def __call__(self) -> None:
-        """Send a heartbeat, if it is time."""
-        if time.monotonic() - self.last_s >= HEARTBEAT_S:
-            self.last_s = time.monotonic()
-            self.send()

@@ -13,14 +13,11 @@ from evonav.errors import InvalidArgumentError
 from evonav.parallel.pool import (
     START_TIMEOUT_S,
     EngineError,
-    Heartbeat,
     Resources,
     Worker,
     WorkerLostError,
-    end_work,
-    load_work,
-    steps,
 )
+from evonav.parallel.work import Heartbeat, end_work, load_work, steps
 
 _END_TIMEOUT_S = 5.0
 

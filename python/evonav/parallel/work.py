@@ -1,0 +1,67 @@
+"""Run the jobs of a worker: load its work, yield the messages of a job, and send heartbeats."""
+
+import importlib
+import time
+import traceback
+from collections.abc import Callable, Generator
+from contextlib import closing
+from dataclasses import dataclass, field
+
+Work = Callable[[str], str | Generator[str, None, str]]
+"""Turns the text of a job into its answer. It may have a method `close`, which is called when its worker ends."""
+
+HEARTBEAT_S = 5.0
+"""Shortest time between two heartbeats of a worker."""
+
+
+def load_work(work: str, settings: str, alive: Callable[[], None]) -> Work:
+    """Import `module:factory` and return the work that it makes."""
+    module, _, factory = work.partition(":")
+    function: Work = getattr(importlib.import_module(module), factory)(settings, alive)
+    return function
+
+
+def end_work(work: Work) -> None:
+    """Call the work's `close`, if it has one."""
+    close = getattr(work, "close", None)
+    if close is not None:
+        close()
+
+
+def steps(work: Work, text: str) -> Generator[tuple[str, str]]:
+    """Run a job and yield its messages: progress, then its answer or the traceback of its exception."""
+    try:
+        result = work(text)
+        if isinstance(result, str):
+            answer = result
+        else:
+            with closing(result):
+                answer = yield from _progress(result)
+    except Exception:
+        yield "error", traceback.format_exc()
+    else:
+        yield "done", answer
+
+
+def _progress(job: Generator[str, None, str]) -> Generator[tuple[str, str], None, str]:
+    while True:
+        try:
+            text = next(job)
+        except StopIteration as end:
+            answer: str = end.value
+            return answer
+        yield "progress", text
+
+
+@dataclass(slots=True)
+class Heartbeat:
+    """A worker's `alive`: sends at most one heartbeat every `HEARTBEAT_S`."""
+
+    send: Callable[[], None]
+    last_s: float = field(default_factory=time.monotonic)
+
+    def __call__(self) -> None:
+        """Send a heartbeat, if it is time."""
+        if time.monotonic() - self.last_s >= HEARTBEAT_S:
+            self.last_s = time.monotonic()
+            self.send()
