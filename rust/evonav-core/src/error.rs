@@ -2,7 +2,7 @@
 
 use thiserror::Error as ThisError;
 
-/// Everything that can go wrong on data a user supplies. Bindings map each variant to one
+/// Everything that can go wrong on data that a user supplies. The bindings map each variant to one
 /// Python exception.
 #[derive(Debug, Clone, PartialEq, ThisError)]
 pub enum Error {
@@ -11,33 +11,33 @@ pub enum Error {
     House {
         /// Name of the file, or the name the caller gave.
         house: String,
-        /// Id of the object, wall, room ... or its place in the file, such as `objects[3]`.
+        /// Id of the object, wall, room ..., or its place in the file, for example `objects[3]`.
         object: String,
-        /// JSON field, dotted.
+        /// JSON field; nested names are joined by dots.
         field: String,
-        /// What is wrong, with the value found.
+        /// Description of the error, with the value found.
         message: String,
     },
     /// The simulator cannot do what was asked in this house.
     #[error("simulation: {message}")]
     Simulation {
-        /// What was asked, and why it cannot be done.
+        /// The request, and why it cannot be carried out.
         message: String,
     },
     /// An argument is outside its domain.
     #[error("argument `{name}` is {value}, expected {expected}")]
     InvalidArgument {
-        /// Parameter's name, as in the public signature.
+        /// Name of the parameter, as in the public signature.
         name: String,
         /// Value found.
         value: String,
-        /// Domain, in words.
+        /// Allowed values.
         expected: String,
     },
 }
 
 impl Error {
-    /// Checks one scalar argument.
+    /// Check one scalar argument.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming the argument, its value and `expected` if `is_valid` is false for it.
@@ -53,7 +53,7 @@ impl Error {
         Err(Self::invalid(name, value, expected))
     }
 
-    /// An [`Error::InvalidArgument`].
+    /// Create an [`Error::InvalidArgument`].
     pub fn invalid(name: &str, value: impl ToString, expected: &str) -> Self {
         Self::InvalidArgument {
             name: name.to_owned(),

@@ -1,8 +1,9 @@
-//! Houses, simulator, mapping and evolution of evonav, in pure Rust.
+//! The algorithms of evonav in pure Rust: houses, the simulator, mapping and task generation.
 //!
-//! One way through: [`house`] -> [`assets`] -> [`world`] -> [`sensors`] -> [`memory`] -> [`unigoal`],
-//! with [`generation`] beside it. Metres and radians; AI2-THOR's frame (left-handed, y up, yaw
-//! clockwise from +z seen from above).
+//! Modules import each other in one direction: [`house`] -> [`assets`] -> [`world`] -> [`sensors`]
+//! -> [`memory`], with [`simulator`], [`generation`], [`perception`] and [`unigoal`] on top.
+//! Lengths are in metres and angles in radians, in AI2-THOR's frame: left-handed, y up, yaw
+//! clockwise from +z seen from above.
 
 pub mod assets;
 pub mod error;

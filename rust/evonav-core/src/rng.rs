@@ -1,5 +1,5 @@
-//! Named random streams: what is drawn depends on a seed and on labels, never on the order in
-//! which streams are used or on the number of workers.
+//! Named random streams: a draw depends on a seed and on labels, never on the order in which
+//! streams are used or on the number of workers.
 
 /// A counter-based stream: the `n`-th draw is a function of (seed, labels, n).
 #[derive(Debug, Clone)]
@@ -8,7 +8,7 @@ pub struct Stream {
     counter: u64,
 }
 
-/// Finaliser of SplitMix64 (Steele, Lea & Flood, OOPSLA 2014).
+/// Mix the bits of a number: the finaliser of SplitMix64 (Steele, Lea & Flood, OOPSLA 2014).
 fn mix(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -18,7 +18,8 @@ fn mix(mut z: u64) -> u64 {
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
 impl Stream {
-    /// The stream of `seed` and `labels`; labels are told apart by content and by position.
+    /// Create the stream of `seed` and `labels`. Labels are distinguished by content and by
+    /// position.
     pub fn new(seed: u64, labels: &[&str]) -> Self {
         let mut key = mix(seed.wrapping_add(GOLDEN));
         for label in labels {
@@ -29,8 +30,8 @@ impl Stream {
         Self { key, counter: 0 }
     }
 
-    /// The stream of a place within this one, whatever has been drawn from it; places are told
-    /// apart by their numbers and by how many there are.
+    /// Return the stream of a place within this one; it does not depend on what has been drawn from
+    /// this one. Places are distinguished by their numbers and by how many numbers there are.
     pub fn at(&self, place: &[i64]) -> Self {
         // Labels mix bytes and 256; the sign bit keeps numbers apart from both.
         let step = |key: u64, number: u64| {
@@ -40,31 +41,32 @@ impl Stream {
         Self { key: numbers.fold(self.key, step), counter: 0 }
     }
 
-    /// The next 64 bits.
+    /// Draw 64 bits.
     pub fn next_u64(&mut self) -> u64 {
         self.counter = self.counter.wrapping_add(1);
         mix(self.key.wrapping_add(self.counter.wrapping_mul(GOLDEN)))
     }
 
-    /// Uniform in [0, 1).
+    /// Draw a uniform number in [0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 * 2.0_f64.powi(-53)
     }
 
-    /// Standard normal (Box & Muller 1958); two draws.
+    /// Draw a standard normal number (Box & Muller 1958); takes two uniform draws.
     pub fn normal(&mut self) -> f64 {
         // 1 - u is never 0.
         let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
     }
 
-    /// Uniform in `0..bound`; 0 for an empty range.
+    /// Draw a uniform integer in `0..bound`; 0 for an empty range.
     pub fn below(&mut self, bound: usize) -> usize {
         // Multiply-shift; the bias is below bound / 2^64.
         ((u128::from(self.next_u64()) * bound as u128) >> 64) as usize
     }
 
-    /// An index drawn in proportion to `weights` (negative and non-finite count as 0); `None` if all are 0.
+    /// Draw an index in proportion to `weights`; negative and non-finite weights count as 0. `None`
+    /// if all are 0.
     pub fn choose_weighted(&mut self, weights: &[f64]) -> Option<usize> {
         let usable = |w: f64| if w.is_finite() && w > 0.0 { w } else { 0.0 };
         let total: f64 = weights.iter().map(|&w| usable(w)).sum();
@@ -86,7 +88,7 @@ impl Stream {
         last
     }
 
-    /// Fisher-Yates.
+    /// Shuffle `items` uniformly (Fisher-Yates).
     pub fn shuffle<T>(&mut self, items: &mut [T]) {
         for last in (1..items.len()).rev() {
             items.swap(last, self.below(last + 1));

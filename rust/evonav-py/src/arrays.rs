@@ -10,8 +10,8 @@ use pyo3::prelude::*;
 
 use crate::error;
 
-/// Elements and shape of a C-contiguous array; rust-numpy's own `as_slice` also takes Fortran
-/// order, which would arrive transposed.
+/// Return the elements and shape of a C-contiguous array; rust-numpy's own `as_slice` also takes
+/// Fortran order, which would arrive transposed.
 pub fn row_major<'a, T: Element>(
     name: &str,
     array: &'a PyReadonlyArray2<'_, T>,
@@ -23,7 +23,7 @@ pub fn row_major<'a, T: Element>(
     Ok((array.as_slice()?, [shape[0], shape[1]]))
 }
 
-/// Elements of a C-contiguous array to be written, of any shape.
+/// Return the elements of a C-contiguous array to be written, of any shape.
 pub fn whole_mut<'a, T: Element, D: Dimension>(
     name: &str,
     array: &'a mut PyReadwriteArray<'_, T, D>,
@@ -34,12 +34,12 @@ pub fn whole_mut<'a, T: Element, D: Dimension>(
     Ok(array.as_slice_mut()?)
 }
 
-/// The `(N, 2)` `[row, col]` rows of an array.
+/// Return the `(N, 2)` `[row, col]` rows of an array.
 pub fn cells(name: &str, array: &PyReadonlyArray2<'_, i32>) -> PyResult<Vec<[i32; 2]>> {
     Ok(rows(name, array)?.to_vec())
 }
 
-/// The `N` rows of an `(N, M)` array.
+/// Return the `N` rows of an `(N, M)` array.
 pub fn rows<'a, T: Element, const M: usize>(
     name: &str,
     array: &'a PyReadonlyArray2<'_, T>,
@@ -53,7 +53,7 @@ pub fn rows<'a, T: Element, const M: usize>(
     Ok(values.as_chunks().0)
 }
 
-/// `(N, M)` array of `N` rows; the memory moves, nothing is copied.
+/// Return `(N, M)` array of `N` rows; the memory moves, nothing is copied.
 pub fn rows_of<T: Element, const M: usize>(
     py: Python<'_>,
     rows: Vec<[T; M]>,
@@ -62,7 +62,8 @@ pub fn rows_of<T: Element, const M: usize>(
     image_of(py, rows.into_flattened(), shape)
 }
 
-/// Array of a shape, of elements in row-major order; the memory moves, nothing is copied.
+/// Return the array of a shape, of elements in row-major order; the memory moves, nothing is
+/// copied.
 pub fn image_of<T: Element, D: IntoDimension>(
     py: Python<'_>,
     elements: Vec<T>,

@@ -78,7 +78,7 @@ fn project_points<'py>(
     arrays::rows_of(py, projected)
 }
 
-/// Adds the functions to the module.
+/// Add the functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(unproject_image, module)?)?;
     module.add_function(wrap_pyfunction!(unproject_masks, module)?)?;

@@ -16,7 +16,7 @@ create_exception!(
     "An argument is outside its domain."
 );
 
-/// The Python exception for a core error.
+/// Return the Python exception for a core error.
 pub fn to_py(error: Error) -> PyErr {
     let message = error.to_string();
     match error {
@@ -26,7 +26,7 @@ pub fn to_py(error: Error) -> PyErr {
     }
 }
 
-/// Adds the exceptions to the module.
+/// Add the exceptions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
     module.add("EvonavError", py.get_type::<EvonavError>())?;

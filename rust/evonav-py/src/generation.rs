@@ -2,7 +2,7 @@
 
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
-    generation::{Generation, Given, Parameters, generate_given},
+    generation::{Generation, Overrides, Parameters, generate_with_overrides},
 };
 use pyo3::{prelude::*, types::PyBytes};
 
@@ -11,7 +11,7 @@ use crate::{error, house::House};
 /// JSON of the record, stage houses, and reference images (RGB, row by row).
 type Generated<'py> = (String, Vec<String>, Vec<Bound<'py, PyBytes>>);
 
-/// Units and errors: `_core.pyi` and `evonav_core::generation::generate_given`.
+/// Return the units and errors: `_core.pyi` and `evonav_core::generation::generate_with_overrides`.
 #[pyfunction]
 #[pyo3(signature = (house, *, seed, label, parameters_json, allow_unknown_assets, given_json="{}"))]
 fn generate_task<'py>(
@@ -28,9 +28,9 @@ fn generate_task<'py>(
     let (json, generated) = py
         .detach(|| {
             let parameters = Parameters::from_json(parameters_json)?;
-            let given = Given::from_json(given_json)?;
+            let given = Overrides::from_json(given_json)?;
             let (house, catalogue) = (&house.inner, Catalogue::bundled());
-            generate_given(house, catalogue, unknown, seed, label, &parameters, &given)
+            generate_with_overrides(house, catalogue, unknown, seed, label, &parameters, &given)
                 .map(|generated| (generated.to_json(), generated))
         })
         .map_err(error::to_py)?;
@@ -41,7 +41,7 @@ fn generate_task<'py>(
     Ok((json, houses, images.iter().map(|image| PyBytes::new(py, image)).collect()))
 }
 
-/// Adds the function to the module.
+/// Add the function to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(generate_task, module)?)
 }

@@ -138,7 +138,7 @@ impl House {
             .collect())
     }
 
-    /// Position `(x, y, z)`, yaw and horizon of `metadata.agent`.
+    /// Return the position `(x, y, z)`, yaw and horizon of `metadata.agent`.
     #[getter]
     fn start(&self) -> Option<((f64, f64, f64), f64, f64)> {
         let start = self.inner.start?;
@@ -218,7 +218,7 @@ fn object(house: &house::House, object: &house::Object) -> HouseObject {
     }
 }
 
-/// Id, category and size of every asset of the catalogue, by id.
+/// Return the id, category and size of every asset of the catalogue, by id.
 #[pyfunction]
 fn assets() -> Vec<(String, String, Vec3)> {
     let catalogue = Catalogue::bundled();
@@ -226,7 +226,7 @@ fn assets() -> Vec<(String, String, Vec3)> {
     known.map(|asset| (asset.id.clone(), asset.category.clone(), asset.size_m)).collect()
 }
 
-/// Adds the classes to the module.
+/// Add the classes to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<House>()?;
     module.add_class::<Room>()?;

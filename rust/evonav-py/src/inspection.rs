@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::{error, house::House};
 
-/// Units and errors: `_core.pyi` and `evonav_core::world::inspection`.
+/// Return the units and errors: `_core.pyi` and `evonav_core::world::inspection`.
 #[pyfunction]
 #[pyo3(signature = (source, stage, *, touch_m, rest_m, allow_unknown_assets))]
 fn inspect_house(
@@ -27,7 +27,7 @@ fn inspect_house(
     Ok(serde_json::json!(found.map_err(error::to_py)?).to_string())
 }
 
-/// Adds the function to the module.
+/// Add the function to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(inspect_house, module)?)
 }

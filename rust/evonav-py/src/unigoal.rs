@@ -263,7 +263,7 @@ fn camera(
     Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad }
 }
 
-/// Pixels of an image that must be of a given size.
+/// Return the pixels of an image that must be of a given size.
 fn image<'a, T: numpy::Element>(
     name: &str,
     array: &'a PyReadonlyArray2<'_, T>,
@@ -290,7 +290,7 @@ fn mask<'py>(py: Python<'py>, grid: &BitGrid) -> PyResult<Mask<'py>> {
     arrays::image_of(py, cells, [grid.rows(), grid.cols()])
 }
 
-/// Adds the class to the module.
+/// Add the class to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<BevMap>()
 }

@@ -11,25 +11,28 @@ pub struct Asset {
     pub id: String,
     /// ProcTHOR's object type, for example `DiningTable`.
     pub category: String,
-    /// Size of its box at zero yaw, `[x, y, z]`.
+    /// Size of the asset's box at zero yaw, `[x, y, z]`.
     pub size_m: Vec3,
-    /// Heights above its bottom at which things stand, rising; empty if nothing was seen on it.
+    /// Heights above the box's bottom at which objects were recorded to stand, ascending; empty if
+    /// there are none.
     pub surfaces_m: Vec<f64>,
-    /// Colours (sRGB) of its materials, most important first; may be empty.
+    /// Colours (sRGB) of the asset's materials, most important first; may be empty.
     pub colours: Vec<[u8; 3]>,
-    /// Names of its materials, as ProcTHOR lists them; see [`crate::assets::Catalogue::material_colour`].
+    /// Names of the asset's materials, as ProcTHOR lists them; see
+    /// [`crate::assets::Catalogue::material_colour`].
     pub materials: Vec<String>,
-    /// What it is made of (`wood`, `metal`, `fabric` ...), the most important first; may be empty.
+    /// Substances (`wood`, `metal`, `fabric` ...) of the asset, most important first; may be empty.
     pub made_of: Vec<String>,
-    /// Split of ProcTHOR's dataset that it belongs to; `None` for those used in all.
+    /// Split of ProcTHOR's dataset to which the asset belongs; `None` for assets that all splits
+    /// use.
     pub split: Option<Split>,
-    /// Can be carried by a robot (AI2-THOR's `CanPickup`).
+    /// Whether a robot can carry it (AI2-THOR's `CanPickup`).
     pub is_pickupable: bool,
-    /// Can be pushed (AI2-THOR's `Moveable`).
+    /// Whether it can be pushed (AI2-THOR's `Moveable`).
     pub is_moveable: bool,
-    /// Holds other objects (AI2-THOR's `Receptacle`).
+    /// Whether it can hold other objects (AI2-THOR's `Receptacle`).
     pub is_receptacle: bool,
-    /// Has doors, drawers or a lid (AI2-THOR's `CanOpen`).
+    /// Whether it has doors, drawers or a lid (AI2-THOR's `CanOpen`).
     pub is_openable: bool,
 }
 
@@ -37,10 +40,10 @@ pub struct Asset {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Split {
-    /// Training houses.
+    /// Assets of training houses.
     Train,
-    /// Validation houses.
+    /// Assets of validation houses.
     Val,
-    /// Test houses.
+    /// Assets of test houses.
     Test,
 }

@@ -1,4 +1,4 @@
-//! The asset catalogue that ships with evonav; `scripts/build_asset_catalogue.py` makes its data.
+//! The asset catalogue that ships with evonav; `scripts/build_asset_catalogue.py` builds its data.
 
 use std::{collections::HashMap, sync::OnceLock};
 
@@ -18,13 +18,13 @@ pub struct Catalogue {
     groups: Vec<GroupDefinition>,
 }
 
-/// What is known of a category beyond its assets.
+/// Facts about a category.
 #[derive(Debug, Default)]
 struct Category {
     rule: Option<PlacementRule>,
-    /// Share of a receptacle category's instances on which one was seen.
+    /// Share of each receptacle category's instances on which this category was recorded.
     supports: HashMap<String, f64>,
-    /// Its assets, sorted.
+    /// Ids of the category's assets, sorted.
     asset_ids: Vec<String>,
     median_size_m: Vec3,
 }
@@ -84,7 +84,7 @@ struct MaterialFile {
 }
 
 impl Catalogue {
-    /// The catalogue in this build; read once, on first use.
+    /// Return the catalogue that is part of this build. It is read once, on first use.
     pub fn bundled() -> &'static Self {
         static BUNDLED: OnceLock<Catalogue> = OnceLock::new();
         BUNDLED.get_or_init(|| {
@@ -92,7 +92,7 @@ impl Catalogue {
             let categories = include_str!("../../data/categories.json");
             let materials = include_str!("../../data/materials.json");
             let groups = include_str!("../../data/groups.json");
-            // Part of the build, and a test reads it: no input of a user can make this fail.
+            // The data is part of the build and read by a test: no user input can make this fail.
             #[allow(clippy::expect_used)]
             Self::from_json(assets, categories, materials, groups)
                 .expect("bundled catalogue is valid")
@@ -135,63 +135,64 @@ impl Catalogue {
         })
     }
 
-    /// Facts about an asset; `None` if the catalogue does not hold it.
+    /// Return the facts about an asset; `None` if the catalogue does not hold it.
     pub fn get(&self, asset_id: &str) -> Option<&Asset> {
         self.assets.get(asset_id)
     }
 
-    /// Ids of all assets, sorted.
+    /// Return the ids of all assets, sorted.
     pub fn asset_ids(&self) -> Vec<&str> {
         let mut ids: Vec<&str> = self.assets.keys().map(String::as_str).collect();
         ids.sort_unstable();
         ids
     }
 
-    /// Names of all categories, sorted.
+    /// Return the names of all categories, sorted.
     pub fn categories(&self) -> Vec<&str> {
         let mut names: Vec<&str> = self.categories.keys().map(String::as_str).collect();
         names.sort_unstable();
         names
     }
 
-    /// Ids of the assets of a category, sorted; empty if the category is unknown.
+    /// Return the ids of the assets of a category, sorted; empty if the category is unknown.
     pub fn assets_in(&self, category: &str) -> &[String] {
         self.categories.get(category).map_or(&[], |category| &category.asset_ids)
     }
 
-    /// Median edge lengths of a category's assets.
+    /// Return the median edge lengths of a category's assets.
     pub fn median_size_m(&self, category: &str) -> Option<Vec3> {
         self.categories.get(category).map(|category| category.median_size_m)
     }
 
-    /// Where a category stands; `None` if it was never annotated.
+    /// Return ProcTHOR's placement annotations of a category; `None` if it was never annotated.
     pub fn placement(&self, category: &str) -> Option<&PlacementRule> {
         self.categories.get(category)?.rule.as_ref()
     }
 
-    /// ProcTHOR's asset groups, by name.
+    /// Return ProcTHOR's asset groups, ordered by name.
     pub fn groups(&self) -> &[GroupDefinition] {
         &self.groups
     }
 
-    /// Share of `parent_category`'s instances on which a `child_category` was seen, 0..1.
+    /// Return the share, 0..1, of `parent_category`'s instances on which a `child_category` was
+    /// recorded.
     pub fn rest_probability(&self, child_category: &str, parent_category: &str) -> f64 {
         let supports = self.categories.get(child_category).map(|category| &category.supports);
         supports.and_then(|supports| supports.get(parent_category)).copied().unwrap_or(0.0)
     }
 
-    /// Whether a category was ever seen on or in another.
+    /// Return whether a category was ever recorded on or in another.
     pub fn can_rest_on(&self, child_category: &str, parent_category: &str) -> bool {
         self.rest_probability(child_category, parent_category) > 0.0
     }
 
-    /// Heights above the box's bottom at which things stand on an asset, rising; empty if it is
-    /// unknown or holds nothing.
+    /// Return the heights above the box's bottom at which objects stand on an asset, ascending;
+    /// empty if the asset is unknown or holds nothing.
     pub fn surface_heights(&self, asset_id: &str) -> &[f64] {
         self.get(asset_id).map_or(&[], |asset| &asset.surfaces_m)
     }
 
-    /// Mean albedo of a material, sRGB.
+    /// Return the mean albedo of a material, sRGB.
     pub fn material_colour(&self, name: &str) -> Option<[u8; 3]> {
         self.materials.get(name).copied()
     }
@@ -216,13 +217,13 @@ impl From<AssetRow> for Asset {
     }
 }
 
-/// `rrggbb`; black where it is malformed.
+/// Parse a colour `rrggbb`; black if it is malformed.
 fn rgb(hex: &str) -> [u8; 3] {
     let [_, red, green, blue] = u32::from_str_radix(hex, 16).unwrap_or(0).to_be_bytes();
     [red, green, blue]
 }
 
-/// Median of each edge; zeros for no assets.
+/// Return the median of each edge length; zeros for no assets.
 fn median_size<'a>(assets: impl Iterator<Item = &'a Asset> + Clone) -> Vec3 {
     std::array::from_fn(|axis| {
         let mut edges: Vec<f64> = assets.clone().map(|asset| asset.size_m[axis]).collect();

@@ -1,4 +1,4 @@
-//! ProcTHOR's asset groups: what belongs together, and how it is put together.
+//! ProcTHOR's asset groups: their members, and how the members are arranged.
 
 use serde::Deserialize;
 
@@ -10,60 +10,61 @@ use crate::{
 /// One of ProcTHOR's 18 asset groups, in the frame of its first member, which looks along +z.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct GroupDefinition {
-    /// For example `chair-diningtable-2`.
+    /// Name, for example `chair-diningtable-2`.
     pub name: String,
-    /// Where in a room it is placed.
+    /// Places in a room where the group may stand.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
-    /// Parents before what is put to them; the first has no parent.
+    /// Members; each comes after its parent. The first has no parent.
     pub members: Vec<GroupMember>,
 }
 
-/// A member of a group, and how it is put to another.
+/// A member of a group, and its place relative to another member.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct GroupMember {
-    /// What it is.
+    /// Category of the member.
     pub category: String,
-    /// Index of the member that it is put to; `None` for the first.
+    /// Index of the member to which its place is relative; `None` for the first.
     #[serde(default)]
     pub parent: Option<usize>,
-    /// On top of it, not next to it.
+    /// Whether it stands on its parent instead of next to it.
     #[serde(default)]
     pub is_above: bool,
     /// Side of the parent's box, along x and z: -1, 0 or 1.
     #[serde(default)]
     anchor: Vec2,
-    /// Side of that line on which its own box lies: -1, 0 (centred) or 1.
+    /// Side of that edge on which the member's own box lies: -1, 0 (centred) or 1.
     #[serde(default)]
     align: Vec2,
-    /// Added.
+    /// Offset that is added.
     #[serde(default)]
     offset_m: Vec2,
-    /// Its yaw ...
+    /// Yaw relative to the group.
     #[serde(default)]
     pub turn_deg: f64,
-    /// ... give or take as much.
+    /// Largest deviation from that yaw, either way.
     pub spread_deg: f64,
 }
 
-/// Where a member is in the frame of the group's first.
+/// Pose of a member in the frame of the group's first member.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MemberPose {
     /// Centre, `[x, z]`.
     pub centre_m: Vec2,
     /// Yaw.
     pub yaw_deg: f64,
-    /// Edges of the box around its turned box.
+    /// Edge lengths of the axis-aligned box around the member's turned box.
     extent_m: Vec2,
 }
 
 impl GroupDefinition {
-    /// Places the members next to each other, as `AssetGroupGenerator.sample_object_placement` of
-    /// the package `procthor` does: side to side, by the boxes of what has been turned.
+    /// Place the members next to each other, side to side by their turned boxes, as
+    /// `AssetGroupGenerator.sample_object_placement` of the package `procthor` does.
     ///
     /// # Arguments
-    /// * `sizes_m` - box per member; `None` leaves it out, and what is put to it.
-    /// * `turns_deg` - per member, how far it is turned from its yaw.
+    /// * `sizes_m` - box per member; `None` leaves out the member and all members placed relative
+    ///   to it.
+    /// * `turns_deg` - per member, its deviation from its yaw.
     ///
     /// # Returns
     /// One pose per member; `None` for those left out.
@@ -94,13 +95,13 @@ impl GroupDefinition {
         poses
     }
 
-    /// Categories of the members that stand on the floor, the first member's first.
+    /// Return the categories of the members that stand on the floor, in the members' order.
     pub fn floor_categories(&self) -> impl Iterator<Item = &str> {
         self.members.iter().filter(|m| !m.is_above).map(|m| m.category.as_str())
     }
 }
 
-/// Edges of the box around a box that is turned about the vertical.
+/// Return the edge lengths of the axis-aligned box around a box that is turned about the vertical.
 fn turned_extent([x_m, _, z_m]: Vec3, yaw_deg: f64) -> Vec2 {
     let (sin, cos) = yaw_deg.to_radians().sin_cos();
     [x_m * cos.abs() + z_m * sin.abs(), x_m * sin.abs() + z_m * cos.abs()]

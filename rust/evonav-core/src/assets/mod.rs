@@ -1,4 +1,4 @@
-//! What is known of ProcTHOR's assets, and the compound shapes that stand for them.
+//! Facts about ProcTHOR's assets, and the compound shapes that represent them.
 
 mod asset;
 mod catalogue;

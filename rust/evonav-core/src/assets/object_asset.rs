@@ -1,4 +1,4 @@
-//! Sizes for assets that the catalogue does not hold, from where the house puts them.
+//! The asset of an object: from the catalogue, or guessed from the object's place in the house.
 
 use crate::{
     Error,
@@ -7,17 +7,18 @@ use crate::{
     house::{House, Object},
 };
 
-/// What to do about an asset id that the catalogue does not hold (Objaverse assets).
+/// Treatment of asset ids that the catalogue does not contain (Objaverse assets).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum UnknownAssets {
     /// Refuse the house, naming the object.
     #[default]
     Error,
-    /// Take a size from the object's place and its category, as [`Catalogue::asset_of`] says.
+    /// Guess a size from the object's place and category, as [`Catalogue::asset_of`] describes.
     CategoryDefault,
 }
 
-/// Objaverse words and the ProcTHOR category of about the same proportions; first match counts.
+/// Words in names of Objaverse categories, and ProcTHOR categories of about the same proportions;
+/// the longest match counts.
 const ALIKE: [(&str, &str); 40] = [
     ("Painting", "Painting"),
     ("Poster", "Painting"),
@@ -60,22 +61,22 @@ const ALIKE: [(&str, &str); 40] = [
     ("Flower", "Vase"),
     ("Figure", "Statue"),
 ];
-/// Proportions of what nothing is known of.
+/// Proportions of assets of unknown kind.
 const BLOCK: Vec3 = [0.8, 1.0, 0.8];
-/// Widest footprint that is guessed, so that a guess does not fill a corridor.
+/// Largest edge of a guessed footprint, so that a guess does not fill a corridor.
 const MAX_EDGE_M: f64 = 1.2;
 const MIN_EDGE_M: f64 = 0.02;
 const MAX_HEIGHT_M: f64 = 2.4;
-/// Tallest that a child is guessed to be: above that, it stands on a shelf nobody was seen on.
+/// Largest guessed height of a child: a higher one stands on a shelf that was never recorded.
 const MAX_CHILD_HEIGHT_M: f64 = 0.4;
-/// Wall objects of the recorded houses hang within 0.2 m of their wall.
+/// Largest distance from its wall of an object that hangs on it; recorded ones hang within 0.2 m.
 const MAX_WALL_DISTANCE_M: f64 = 0.25;
 
 impl Catalogue {
-    /// Asset of an object of `house`.
+    /// Return the asset of an object of `house`.
     ///
-    /// With [`UnknownAssets::CategoryDefault`] an asset that the catalogue does not hold gets
-    /// * as category its `objectType`, without Objaverse's prefix `Obja`;
+    /// With [`UnknownAssets::CategoryDefault`] an asset that the catalogue does not contain gets
+    /// * its `objectType`, without Objaverse's prefix `Obja`, as its category;
     /// * the proportions of the nearest catalogue category (by name), or of a block;
     /// * the height that its place implies: twice the height of its centre above the floor or
     ///   the surface under it, since positions are box centres;
@@ -106,14 +107,15 @@ impl Catalogue {
     }
 }
 
-/// The asset that [`Catalogue::asset_of`] describes.
+/// Guess the asset of an object, as [`Catalogue::asset_of`] describes.
 fn category_default(catalogue: &Catalogue, house: &House, object: &Object) -> Asset {
     let object_type = object.object_type.as_deref().unwrap_or("Unknown");
     let category =
         object_type.strip_prefix("Obja").filter(|rest| !rest.is_empty()).unwrap_or(object_type);
     let alike = like(catalogue, category);
     let model = alike.and_then(|name| catalogue.median_size_m(name)).unwrap_or(BLOCK);
-    // What stands on something is no picture, whatever its name and the next wall.
+    // An object that stands on another is not a picture, whatever its name and its distance from a
+    // wall.
     let is_like_picture = alike == Some("Painting") && object.parent.is_none();
     let is_on_wall = object.id.contains("|wall|") || is_like_picture;
     let size_m = match wall_distance_m(house, object)
@@ -136,32 +138,32 @@ fn category_default(catalogue: &Catalogue, house: &House, object: &Object) -> As
     }
 }
 
-/// Catalogue category of the same name, or of about the same proportions.
+/// Return the catalogue category of the same name, or of about the same proportions.
 fn like<'a>(catalogue: &Catalogue, category: &'a str) -> Option<&'a str> {
     if catalogue.median_size_m(category).is_some() {
         return Some(category);
     }
-    // Longest word first: a bookcase is no book.
+    // The longest word counts: a bookcase is not a book.
     let matches = ALIKE.iter().filter(|(word, _)| category.contains(word));
     matches.max_by_key(|(word, _)| word.len()).map(|&(_, name)| name)
 }
 
-/// `model` scaled to `height_m`, its footprint within sane bounds.
+/// Scale `model` to `height_m`, its footprint within sane bounds.
 fn scaled(model: Vec3, height_m: f64) -> Vec3 {
     let scale = height_m / model[1].max(MIN_EDGE_M);
     let edge = |length_m: f64| (length_m * scale).clamp(MIN_EDGE_M, MAX_EDGE_M);
     [edge(model[0]), height_m, edge(model[2])]
 }
 
-/// Height of the object's centre above the floor, or above the highest surface of its parent
-/// that lies below the centre.
+/// Return the height of the object's centre above the floor, or above the highest surface of its
+/// parent that lies below the centre.
 fn height_above_support_m(catalogue: &Catalogue, house: &House, object: &Object) -> f64 {
     let y = object.position_m[1];
     let Some(parent) = object.parent.and_then(|index| house.objects.get(index)) else {
         return y;
     };
     let Some(asset) = catalogue.get(&parent.asset_id) else {
-        // On another unknown asset, whose own centre lies below: half of what is left.
+        // The parent is unknown too, and its centre lies below: take half of the distance.
         return 0.5 * (y - parent.position_m[1]).abs();
     };
     let bottom_m = parent.position_m[1] - 0.5 * asset.size_m[1];
@@ -169,7 +171,7 @@ fn height_above_support_m(catalogue: &Catalogue, house: &House, object: &Object)
     y - below.fold(bottom_m.min(y), f64::max)
 }
 
-/// Distance to the nearest wall that is there.
+/// Return the distance to the nearest wall that is not open plan.
 fn wall_distance_m(house: &House, object: &Object) -> Option<f64> {
     let point_m = [object.position_m[0], object.position_m[2]];
     let walls = house.walls.iter().filter(|wall| !wall.is_empty);
@@ -184,7 +186,8 @@ fn segment_distance_m(from_m: Vec2, to_m: Vec2, point_m: Vec2) -> f64 {
     distance_2d_m([from_m[0] + part * along[0], from_m[1] + part * along[1]], point_m)
 }
 
-/// Colours of an asset of the like category, or of a vase, chosen by the id's checksum.
+/// Return the colours of an asset of the similar category, or of a vase, chosen by the id's
+/// checksum.
 fn palette(catalogue: &Catalogue, alike: Option<&str>, asset_id: &str) -> Vec<[u8; 3]> {
     let ids = catalogue.assets_in(alike.unwrap_or("Vase"));
     let sum =

@@ -1,4 +1,4 @@
-//! Convex primitives: what every body in the world is made of.
+//! Convex primitives, of which every body in the world consists.
 
 use crate::geometry::{Aabb, Mat3, Vec3, add, compose, rotate};
 
@@ -32,7 +32,7 @@ pub enum Primitive {
 }
 
 impl Primitive {
-    /// Corners of one face of a frustum, at height `y_m`, from +x towards +z.
+    /// Return the corners of one face of a frustum, at height `y_m`, from +x towards +z.
     pub fn ring_m(half_axes_m: [f64; 2], y_m: f64, sides: u8) -> impl Iterator<Item = Vec3> {
         (0..sides).map(move |k| {
             let [x, z] = unit_corner(k, sides);
@@ -41,7 +41,7 @@ impl Primitive {
     }
 }
 
-/// Corner `k` of a regular polygon, exact where it lies on an axis.
+/// Return the corner `k` of a regular polygon, exact where it lies on an axis.
 fn unit_corner(k: u8, sides: u8) -> [f64; 2] {
     let (k, sides) = (u32::from(k), u32::from(sides.max(1)));
     if 4 * k % sides == 0 {
@@ -56,16 +56,16 @@ fn unit_corner(k: u8, sides: u8) -> [f64; 2] {
 pub struct Part {
     /// The solid.
     pub primitive: Primitive,
-    /// Its origin.
+    /// Origin of the solid.
     pub centre_m: Vec3,
-    /// Its rotation.
+    /// Rotation of the solid.
     pub rotation: Mat3,
     /// Surface colour, sRGB.
     pub colour: [u8; 3],
 }
 
 impl Part {
-    /// Smallest box around the part, in the frame the part is in.
+    /// Return the smallest box around the part, in the part's frame of reference.
     pub fn aabb(&self) -> Aabb {
         let row = |i: usize| self.rotation[i];
         let reach = match self.primitive {
@@ -89,7 +89,8 @@ impl Part {
         }
     }
 
-    /// The part seen from a frame in which its own frame stands at `origin_m`, turned by `rotation`.
+    /// Transform the part into a frame in which its own frame stands at `origin_m`, turned by
+    /// `rotation`.
     #[must_use]
     pub fn placed(&self, origin_m: Vec3, rotation: &Mat3) -> Self {
         Self {
@@ -100,7 +101,7 @@ impl Part {
     }
 }
 
-/// Smallest box around all `parts`; [`Aabb::EMPTY`] if there are none.
+/// Return the smallest box around all `parts`; [`Aabb::EMPTY`] if there are none.
 pub fn aabb_of(parts: &[Part]) -> Aabb {
     parts.iter().fold(Aabb::EMPTY, |bounds, part| bounds.union(part.aabb()))
 }

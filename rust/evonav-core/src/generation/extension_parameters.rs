@@ -1,57 +1,57 @@
-//! What goes beyond the paper: things that come and go, doors and furniture that open and close,
-//! lights, and days of people. All off by default.
+//! Parameters of the extensions beyond the paper: objects that appear and vanish, doors and
+//! furniture that open and close, lights, and people with daily schedules. All are off by default.
 
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// Θ beyond the paper; what is `None` is off.
+/// The extensions' part of Θ; an extension that is `None` is off.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Extensions {
-    /// Small things that appear.
+    /// Small objects that appear.
     pub insertion: Option<Occurrence>,
-    /// Small things that vanish.
+    /// Small objects that vanish.
     pub removal: Option<Occurrence>,
     /// Doors that open or close.
     pub doors: Option<Occurrence>,
-    /// Furniture and things that open or close.
+    /// Furniture and other objects that open or close.
     pub openables: Option<Occurrence>,
-    /// Lamps and screens that go on or off.
+    /// Lamps and screens that are switched on or off.
     pub switches: Option<Occurrence>,
-    /// People who use things, instead of the paper's independent draws of rooms.
+    /// People who use objects; they replace the paper's independent draws of rooms.
     pub schedule: Option<Schedule>,
 }
 
-/// How often something happens at a transition, and to how much.
+/// The frequency and extent of a process at transitions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Occurrence {
-    /// Chance that it happens at a transition.
+    /// Probability that it happens at a transition.
     pub probability: f64,
-    /// If it does, to how many: uniform from 1 to this.
+    /// Largest number of objects that it changes; the number is uniform from 1 to this.
     pub max_count: usize,
 }
 
-/// Who lives in the house, and how.
+/// The people who live in the house, and the time between stages.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Schedule {
-    /// People.
+    /// Number of people.
     pub num_persons: usize,
-    /// Clock time from one stage to the next.
+    /// Minutes from one stage to the next.
     pub minutes_between_stages: usize,
-    /// Chance that a used thing is brought back when its activity ends.
+    /// Probability that a used object is brought back when its activity ends.
     pub tidiness: f64,
 }
 
 impl Extensions {
-    /// Whether the process is the paper's alone.
+    /// Return whether all extensions are off.
     pub fn is_off(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Checks every value.
+    /// Check every value.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming the field.

@@ -1,5 +1,5 @@
-//! Task generation: which room evolves, what moves where, and which object is the goal
-//! (paper, Sec. 3.2 and A.1-A.4).
+//! Task generation (paper, Sec. 3.2 and A.1-A.4): sample the room that evolves, the moves in it,
+//! and the goal of each stage.
 
 mod algorithm;
 mod extension_parameters;
@@ -18,7 +18,7 @@ pub use algorithm::{
 };
 pub use extension_parameters::{Extensions, Occurrence, Schedule};
 pub use mode::Mode;
-pub use overrides::{Given, GivenStage};
+pub use overrides::{Overrides, StageOverrides};
 pub use parameters::Parameters;
-pub use placement::asset_groups::{Group, asset_groups};
-pub use task::{Generation, generate_given, generate_task};
+pub use placement::asset_groups::{AssetGroup, asset_groups};
+pub use task::{Generation, generate_task, generate_with_overrides};

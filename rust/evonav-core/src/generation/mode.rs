@@ -1,14 +1,14 @@
-//! How a room is modified.
+//! The modes in which a room is modified.
 
 use serde::{Deserialize, Serialize};
 
 use crate::{generation::Parameters, rng::Stream};
 
-/// How a room is modified.
+/// A mode in which a room is modified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "SCREAMING_SNAKE_CASE")]
 pub enum Mode {
-    /// One large object moves, with what stands on it.
+    /// One large object moves, with the objects on it.
     SalientObject,
     /// All objects move; asset groups and supported objects stay together.
     RetainGroup,
@@ -17,10 +17,10 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// In the order of [`Parameters::mode_weights`].
+    /// All modes, in the order of [`Parameters::mode_weights`].
     pub const ALL: [Self; 3] = [Self::SalientObject, Self::RetainGroup, Self::FullShuffle];
 
-    /// As records name it.
+    /// Return the mode's name in records.
     pub fn name(self) -> &'static str {
         match self {
             Self::SalientObject => "SALIENT_OBJECT",
@@ -29,7 +29,7 @@ impl Mode {
         }
     }
 
-    /// Draws a mode (paper, Sec. A.2).
+    /// Draw a mode (paper, Sec. A.2).
     pub fn sample(parameters: &Parameters, stream: &mut Stream) -> Option<Self> {
         stream.choose_weighted(&parameters.mode_weights()).map(|index| Self::ALL[index])
     }

@@ -1,36 +1,36 @@
-//! Draws that are given instead of made: tasks that differ in one thing alone.
+//! Values that replace random draws, for tasks that differ in a single respect.
 
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
-/// Most stages of a task.
+/// Largest number of stages of a task.
 const MAX_STAGES: usize = 64;
 
-/// What is not drawn; by default everything is.
+/// Values that replace draws of a task; by default everything is drawn.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Given {
-    /// Of each stage from the first; their count is K. Empty: K is drawn, too.
+pub struct Overrides {
+    /// Overrides of each stage, from the first; their number is K. If empty, K is drawn too.
     #[serde(default)]
-    pub stages: Vec<GivenStage>,
+    pub stages: Vec<StageOverrides>,
 }
 
-/// What is not drawn of a stage.
+/// Values that replace draws of one stage.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GivenStage {
-    /// Id of the object that is the goal.
+pub struct StageOverrides {
+    /// Id of the goal object.
     #[serde(default)]
     pub goal_id: Option<String>,
-    /// Whether the transition before it evolves the house, instead of the draw against
+    /// Whether the transition before the stage evolves the house; replaces the draw against
     /// `evolve_probability`.
     #[serde(default)]
     pub is_evolved: Option<bool>,
 }
 
-impl Given {
-    /// Reads the JSON that Python writes, and checks it.
+impl Overrides {
+    /// Read the JSON that Python writes, and check it.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming the field.
@@ -41,7 +41,7 @@ impl Given {
         Ok(given)
     }
 
-    /// Checks the number of stages.
+    /// Check the number of stages.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there are too many.
@@ -50,12 +50,12 @@ impl Given {
         Error::require("given.stages", self.stages.len(), "at most 64 stages", is_count)
     }
 
-    /// The goal of a stage, from 1.
+    /// Return the goal of a stage, counted from 1, if it is given.
     pub(crate) fn goal(&self, stage: usize) -> Option<&str> {
         self.stages.get(stage - 1)?.goal_id.as_deref()
     }
 
-    /// Whether the house evolves before a stage, from 1.
+    /// Return whether the house evolves before a stage, counted from 1, if that is given.
     pub(crate) fn is_evolved(&self, stage: usize) -> Option<bool> {
         self.stages.get(stage - 1)?.is_evolved
     }

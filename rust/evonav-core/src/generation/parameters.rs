@@ -1,56 +1,56 @@
-//! The generator's fixed hyperparameters.
+//! The hyperparameters of generation.
 
 use serde::{Deserialize, Serialize};
 
 use crate::{Error, generation::Extensions};
 
-/// Θ (paper, Sec. A.2), and the numbers that the paper leaves open.
+/// Θ (paper, Sec. A.2), and the values that the paper leaves open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameters {
-    /// K is drawn uniformly from these.
+    /// Numbers of stages from which K is drawn uniformly.
     pub num_stages: Vec<usize>,
-    /// Chance that a transition evolves the house.
+    /// Probability that a transition evolves the house.
     pub evolve_probability: f64,
-    /// Factor of rooms that the reference trajectory has visited.
+    /// Factor on the weight of rooms that the reference trajectory has visited.
     pub visited_factor: f64,
-    /// Factor of rooms that changed within `changed_room_window`.
+    /// Factor on the weight of rooms that changed within `changed_room_window`.
     pub recently_changed_factor: f64,
-    /// Transitions back in which a change counts as recent.
+    /// Number of past transitions within which a change is recent.
     pub changed_room_window: usize,
-    /// Chance of [`crate::generation::Mode::SalientObject`], relative to the two others.
+    /// Probability of [`crate::generation::Mode::SalientObject`], relative to the two others.
     pub salient_object_probability: f64,
-    /// Chance of [`crate::generation::Mode::RetainGroup`].
+    /// Probability of [`crate::generation::Mode::RetainGroup`], relative to the two others.
     pub retain_group_probability: f64,
-    /// Chance of [`crate::generation::Mode::FullShuffle`].
+    /// Probability of [`crate::generation::Mode::FullShuffle`], relative to the two others.
     pub full_shuffle_probability: f64,
     /// Factor on the goal weight of the room that just changed.
     pub changed_room_multiplier: f64,
     /// Factor on the goal weight of the previous stage's goal room.
     pub previous_goal_room_multiplier: f64,
-    /// Weight of the salient object that just moved among its room's objects, which weigh 1.
+    /// Weight of the salient object that just moved; other objects of its room have weight 1.
     pub moved_object_multiplier: f64,
-    /// Weight of each object that stood on it and moved with it.
+    /// Weight of each object that stood on the salient object and moved with it.
     pub moved_children_multiplier: f64,
-    /// Whether what hangs on walls, which no modification moves, may be a goal. The paper uses it
-    /// as an anchor of instructions; leaving it out of the goals brings the share of relocated
-    /// goals to the published one.
+    /// Whether objects that hang on walls, which no modification moves, may be goals. The paper
+    /// uses them as anchors of instructions; excluding them from the goals gives the published
+    /// share of relocated goals.
     pub goals_on_walls: bool,
-    /// Least distance of the reference pose from the target, ground plane.
+    /// Smallest distance of the reference pose from the target on the ground plane.
     pub reference_min_m: f64,
-    /// Largest distance of the reference pose from the target, ground plane.
+    /// Largest distance of the reference pose from the target on the ground plane.
     pub reference_max_m: f64,
-    /// Edge of the reference image.
+    /// Edge length of the reference image.
     pub reference_image_px: usize,
-    /// Fewest pixels of a target that counts as visible.
+    /// Smallest number of pixels of a visible target.
     pub reference_min_visible_px: usize,
-    /// An object that moved farther than this is relocated.
+    /// Distance beyond which a moved object is relocated.
     pub relocated_min_m: f64,
-    /// Places tried for an object before it stays where it is.
+    /// Number of places tried for an object before it stays where it is.
     pub placement_tries: usize,
-    /// Times that a room's modification is tried, with fresh places, before it is given up.
+    /// Number of times that a room's modification is tried with newly drawn places.
     pub modification_tries: usize,
-    /// What goes beyond the paper.
+    /// Parameters of the extensions beyond the paper.
     #[serde(default)]
     pub extensions: Extensions,
 }
@@ -84,7 +84,7 @@ impl Default for Parameters {
 }
 
 impl Parameters {
-    /// Reads the JSON that Python's `GenerationParameters` writes, and checks every value.
+    /// Read the JSON that Python's `GenerationParameters` writes, and check every value.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming the field.
@@ -95,7 +95,7 @@ impl Parameters {
         Ok(parameters)
     }
 
-    /// Checks every value.
+    /// Check every value.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming the field.
@@ -140,7 +140,7 @@ impl Parameters {
         self.extensions.check()
     }
 
-    /// Weights of the three modes, in the order of [`crate::generation::Mode::ALL`].
+    /// Return the weights of the three modes, in the order of [`crate::generation::Mode::ALL`].
     pub fn mode_weights(&self) -> [f64; 3] {
         [
             self.salient_object_probability,

@@ -1,4 +1,4 @@
-//! Algorithm 1 of the paper (Sec. A.1): a task from a house, stage by stage.
+//! Algorithm 1 of the paper (Sec. A.1): generate a task from a house, stage by stage.
 
 use std::cell::RefCell;
 
@@ -8,7 +8,8 @@ use crate::{
     Error,
     assets::{Catalogue, UnknownAssets},
     generation::{
-        Extensions, Given, Parameters,
+        Extensions, Overrides, Parameters,
+        algorithm::{scene_evolution::sample_scene_evolution, stage_task::sample_stage_task},
         extensions::{schedule::Household, transition::Transition},
         record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason, Rejected},
         stage::{
@@ -20,37 +21,37 @@ use crate::{
     house::{House, HouseDelta},
 };
 
-/// What became of a house.
+/// The result of generation for one house.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Generation {
-    /// A task.
+    /// The generated task.
     Task(GeneratedTask),
-    /// No task, and why.
+    /// The reason why no task was generated.
     Rejected(Rejected),
 }
 
 impl Generation {
-    /// `{"task": ...}` without houses and images, or `{"rejected": ...}`.
+    /// Write `{"task": ...}` without houses and images, or `{"rejected": ...}`.
     pub fn to_json(&self) -> String {
-        // Only maps with keys that are no strings can fail, and there are none.
+        // Only maps whose keys are not strings could fail, and there are none.
         serde_json::to_string(self).unwrap_or_default()
     }
 }
 
-/// Makes a task of a house.
+/// Generate a task from a house.
 ///
 /// # Arguments
-/// * `seed`, `label` - name the random streams; `label` should tell houses apart, so that one
-///   seed does not draw alike in all of them.
+/// * `seed`, `label` - names of the random streams; `label` should differ between houses, so that
+///   one seed does not give the same draws in all of them.
 /// * `parameters` - Θ.
 ///
 /// # Returns
-/// The same for the same arguments, on any number of threads.
+/// The same result for the same arguments, on any number of threads.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] for bad parameters; [`Error::House`] for unknown assets, if
-/// `unknown` says so; [`Error::Simulation`] for houses whose geometry makes no scene.
+/// [`Error::InvalidArgument`] for bad parameters; [`Error::House`] for unknown assets, unless
+/// `unknown` allows them; [`Error::Simulation`] for houses whose geometry makes no scene.
 pub fn generate_task(
     house: &House,
     catalogue: &Catalogue,
@@ -59,43 +60,52 @@ pub fn generate_task(
     label: &str,
     parameters: &Parameters,
 ) -> Result<Generation, Error> {
-    generate_given(house, catalogue, unknown, seed, label, parameters, &Given::default())
+    generate_with_overrides(
+        house,
+        catalogue,
+        unknown,
+        seed,
+        label,
+        parameters,
+        &Overrides::default(),
+    )
 }
 
-/// Makes a task of a house, some of whose draws are given.
+/// Generate a task from a house with values that replace some of the draws.
 ///
 /// # Arguments
-/// As for [`generate_task`], and:
-/// * `given` - what is not drawn. All else is drawn from the same streams, so that tasks that
-///   differ in `given` or in `evolve_probability` alone share what they can.
+/// The arguments of [`generate_task`], and:
+/// * `overrides` - values that replace draws. Everything else is drawn from the same streams, so
+///   that tasks that differ only in `overrides` or in `evolve_probability` share as much as
+///   possible.
 ///
 /// # Returns
-/// A goal that is not in the house, or has no reference pose there, is
-/// [`RejectReason::NoValidGoal`].
+/// The same as [`generate_task`]. A given goal that is not in the house, or has no reference pose
+/// there, gives [`RejectReason::NoValidGoal`].
 ///
 /// # Errors
 /// Those of [`generate_task`]; [`Error::InvalidArgument`] for more stages than a task may have.
-pub fn generate_given(
+pub fn generate_with_overrides(
     house: &House,
     catalogue: &Catalogue,
     unknown: UnknownAssets,
     seed: u64,
     label: &str,
     parameters: &Parameters,
-    given: &Given,
+    overrides: &Overrides,
 ) -> Result<Generation, Error> {
     parameters.check()?;
-    given.check()?;
+    overrides.check()?;
     let num_rooms = house.rooms.len();
     if num_rooms < 2 {
         let detail = format!("{num_rooms} room(s)");
         return Ok(reject(RejectReason::TooFewRooms, 0, detail));
     }
     let frame = RefCell::default();
-    let generator = Generator { catalogue, seed, label, parameters, given, frame };
+    let generator = Generator { catalogue, seed, label, parameters, overrides, frame };
     let choices = &parameters.num_stages;
     let drawn = generator.stream(0, "num_stages").below(choices.len());
-    let num_stages = match given.stages.len() {
+    let num_stages = match overrides.stages.len() {
         0 => choices.get(drawn).copied().unwrap_or(1),
         num_given => num_given,
     };
@@ -105,15 +115,15 @@ pub fn generate_given(
         Err(rejected) => return Ok(Generation::Rejected(rejected)),
     };
     let mut task = GeneratedTask { stages: vec![], houses: vec![], images: vec![] };
-    let of_schedule = |name: &str| generator.stream(0, &format!("schedule {name}"));
+    let schedule_stream = |name: &str| generator.stream(0, &format!("schedule {name}"));
     let schedule = parameters.extensions.schedule;
-    let mut household = schedule.map(|people| Household::new(people, house, of_schedule));
+    let mut household = schedule.map(|people| Household::new(people, house, schedule_stream));
     for stage in 1..=num_stages {
         let transition = Transition { generator: &generator, unknown, state: &state, stage };
         let (mut evolution, delta) = match &mut household {
             _ if stage == 1 => (no_evolution(EvolutionOutcome::FirstStage), HouseDelta::default()),
             Some(household) => transition.follow_schedule(&world, household)?,
-            None => generator.sample_scene_evolution(&world, &state, stage)?,
+            None => sample_scene_evolution(&generator, &world, &state, stage)?,
         };
         let is_changed = !delta.is_empty() || parameters.extensions != Extensions::default();
         if !delta.is_empty() {
@@ -124,7 +134,7 @@ pub fn generate_given(
             world = transition.extend(world, &mut evolution)?;
         }
         state.note_evolution(&evolution, &world.house, stage);
-        let made = match generator.sample_stage_task(&world, &state, &evolution, stage)? {
+        let made = match sample_stage_task(&generator, &world, &state, &evolution, stage)? {
             Ok(made) => made,
             Err(rejected) => return Ok(Generation::Rejected(rejected)),
         };

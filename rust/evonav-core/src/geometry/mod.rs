@@ -14,18 +14,18 @@ pub type Mat3 = [[f64; 3]; 3];
 /// No rotation.
 pub const IDENTITY: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Where an agent stands and looks.
+/// Position and viewing direction of an agent.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
-    /// Of the agent's body (AI2-THOR's agent position).
+    /// Position of the agent's body (AI2-THOR's agent position).
     pub position_m: Vec3,
-    /// 0 along +z, growing towards +x.
+    /// Heading: 0 along +z, growing towards +x.
     pub yaw_rad: f64,
     /// Camera pitch; positive looks down.
     pub horizon_rad: f64,
 }
 
-/// Axis-aligned box.
+/// An axis-aligned box.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Aabb {
     /// Smallest corner.
@@ -38,12 +38,12 @@ impl Aabb {
     /// The box that contains nothing; extending it by a point gives that point.
     pub const EMPTY: Self = Self { min_m: [f64::INFINITY; 3], max_m: [f64::NEG_INFINITY; 3] };
 
-    /// Smallest box around points.
+    /// Return the smallest box around points.
     pub fn of_points(points_m: impl IntoIterator<Item = Vec3>) -> Self {
         points_m.into_iter().fold(Self::EMPTY, Self::extended)
     }
 
-    /// This box grown to contain `point_m`.
+    /// Return this box grown to contain `point_m`.
     #[must_use]
     pub fn extended(mut self, point_m: Vec3) -> Self {
         for (axis, &value) in point_m.iter().enumerate() {
@@ -53,60 +53,60 @@ impl Aabb {
         self
     }
 
-    /// Smallest box around both.
+    /// Return the smallest box around both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         self.extended(other.min_m).extended(other.max_m)
     }
 
-    /// Whether the closed boxes share a point.
+    /// Return whether the closed boxes share a point.
     pub fn intersects(&self, other: &Self) -> bool {
         (0..3).all(|i| self.min_m[i] <= other.max_m[i] && other.min_m[i] <= self.max_m[i])
     }
 
-    /// Middle of the box.
+    /// Return the middle of the box.
     pub fn centre_m(&self) -> Vec3 {
         std::array::from_fn(|i| 0.5 * (self.min_m[i] + self.max_m[i]))
     }
 
-    /// Edge lengths.
+    /// Return the edge lengths.
     pub fn size_m(&self) -> Vec3 {
         std::array::from_fn(|i| self.max_m[i] - self.min_m[i])
     }
 }
 
-/// Sum of two vectors.
+/// Add two vectors.
 pub fn add(a: Vec3, b: Vec3) -> Vec3 {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
-/// Difference `a - b`.
+/// Subtract `b` from `a`.
 pub fn sub(a: Vec3, b: Vec3) -> Vec3 {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
-/// The inverse of a rotation.
+/// Transpose a rotation, which inverts it.
 pub fn transposed(matrix: &Mat3) -> Mat3 {
     std::array::from_fn(|i| std::array::from_fn(|j| matrix[j][i]))
 }
 
-/// `rotation * vector`.
+/// Rotate a vector: `rotation * vector`.
 pub fn rotate(rotation: &Mat3, vector: Vec3) -> Vec3 {
     std::array::from_fn(|i| (0..3).map(|j| rotation[i][j] * vector[j]).sum())
 }
 
-/// `a * b`: first `b`, then `a`.
+/// Compose two rotations: `a * b` applies `b` first, then `a`.
 pub fn compose(a: &Mat3, b: &Mat3) -> Mat3 {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// Rotation about y by `yaw_rad`, clockwise seen from above: +z turns towards +x.
+/// Return the rotation about y by `yaw_rad`, clockwise seen from above: +z turns towards +x.
 pub fn yaw_rotation(yaw_rad: f64) -> Mat3 {
     let (sin, cos) = yaw_rad.sin_cos();
     [[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]]
 }
 
-/// Unity's Euler angles, degrees `[x, y, z]`: turns about z first, then x, then y.
+/// Return the rotation of Unity's Euler angles, degrees `[x, y, z]`: about z first, then x, then y.
 pub fn euler_rotation_deg(angles_deg: Vec3) -> Mat3 {
     let [x, y, z] = angles_deg.map(f64::to_radians);
     let (sin_x, cos_x) = x.sin_cos();
@@ -116,18 +116,18 @@ pub fn euler_rotation_deg(angles_deg: Vec3) -> Mat3 {
     compose(&yaw_rotation(y), &compose(&about_x, &about_z))
 }
 
-/// Ground-plane distance between `[x, z]` points.
+/// Return the ground-plane distance between `[x, z]` points.
 pub fn distance_2d_m(a_m: Vec2, b_m: Vec2) -> f64 {
     (a_m[0] - b_m[0]).hypot(a_m[1] - b_m[1])
 }
 
-/// Signed area of a polygon in the x-z plane (positive when x turns towards z).
+/// Return the signed area of a polygon in the x-z plane (positive when x turns towards z).
 pub fn polygon_area_m2(polygon_m: &[Vec2]) -> f64 {
     let next = polygon_m.iter().cycle().skip(1);
     0.5 * polygon_m.iter().zip(next).map(|(a, b)| a[0] * b[1] - b[0] * a[1]).sum::<f64>()
 }
 
-/// Whether `point_m` lies in the polygon (even-odd rule; the border may fall either way).
+/// Return whether `point_m` lies in the polygon (even-odd rule; the border may fall either way).
 pub fn polygon_contains(polygon_m: &[Vec2], point_m: Vec2) -> bool {
     let mut is_inside = false;
     let next = polygon_m.iter().cycle().skip(1);

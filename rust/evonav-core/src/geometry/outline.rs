@@ -1,9 +1,9 @@
-//! Convex outlines on the floor plan: overlap, distance, containment in a room.
+//! Convex outlines on the ground plane: overlap, distance, containment in a room.
 
 use crate::geometry::{Vec2, polygon_contains};
 
-/// Length by which convex outlines overlap along the axis in which they overlap least; negative
-/// when they are apart along one of their edges' normals.
+/// Return the depth by which two convex outlines overlap, along the axis in which they overlap
+/// least; negative where they are apart along the normal of an edge.
 ///
 /// Two convex polygons are disjoint if and only if an edge normal of one of them separates them
 /// (separating axis theorem), so the sign is exact; the value is the depth of penetration.
@@ -15,7 +15,7 @@ pub fn overlap_m(a: &[Vec2], b: &[Vec2]) -> f64 {
         return f64::NEG_INFINITY;
     }
     let mut least_m = f64::INFINITY;
-    // Outlines of one or two points have no or one normal: the axes make up for it.
+    // Outlines of one or two points have no or one normal, so the two axes are tested as well.
     for normal in normals(a).chain(normals(b)).chain([[1.0, 0.0], [0.0, 1.0]]) {
         let ([a_low, a_high], [b_low, b_high]) = (extent(a, normal), extent(b, normal));
         least_m = least_m.min((a_high - b_low).min(b_high - a_low));
@@ -23,7 +23,7 @@ pub fn overlap_m(a: &[Vec2], b: &[Vec2]) -> f64 {
     least_m
 }
 
-/// Unit normals of a polygon's edges; edges shorter than a nanometre have none.
+/// Return the unit normals of a polygon's edges; edges shorter than a nanometre have none.
 fn normals(outline: &[Vec2]) -> impl Iterator<Item = Vec2> + '_ {
     let next = outline.iter().cycle().skip(1);
     outline.iter().zip(next).filter_map(|(p, q)| {
@@ -33,7 +33,7 @@ fn normals(outline: &[Vec2]) -> impl Iterator<Item = Vec2> + '_ {
     })
 }
 
-/// Smallest and largest coordinate along a direction.
+/// Return the smallest and largest coordinate along a direction.
 fn extent(outline: &[Vec2], direction: Vec2) -> [f64; 2] {
     outline
         .iter()
@@ -43,7 +43,7 @@ fn extent(outline: &[Vec2], direction: Vec2) -> [f64; 2] {
         })
 }
 
-/// Distance between two segments, 0 if they cross.
+/// Return the distance between two segments, 0 if they cross.
 fn segment_distance_m(a: [Vec2; 2], b: [Vec2; 2]) -> f64 {
     let side = |s: [Vec2; 2], p: Vec2| {
         (s[1][0] - s[0][0]) * (p[1] - s[0][1]) - (s[1][1] - s[0][1]) * (p[0] - s[0][0])
@@ -55,7 +55,7 @@ fn segment_distance_m(a: [Vec2; 2], b: [Vec2; 2]) -> f64 {
     ends.iter().map(|&(s, p)| point_segment_m(p, s)).fold(f64::INFINITY, f64::min)
 }
 
-/// Distance of a point from a segment.
+/// Return the distance of a point from a segment.
 pub fn point_segment_m(point: Vec2, segment: [Vec2; 2]) -> f64 {
     let [a, b] = segment;
     let along = [b[0] - a[0], b[1] - a[1]];
@@ -69,12 +69,12 @@ pub fn point_segment_m(point: Vec2, segment: [Vec2; 2]) -> f64 {
     (point[0] - a[0] - t * along[0]).hypot(point[1] - a[1] - t * along[1])
 }
 
-/// Edges of a closed polygon.
+/// Return the edges of a closed polygon.
 pub fn edges(polygon: &[Vec2]) -> impl Iterator<Item = [Vec2; 2]> + '_ {
     polygon.iter().zip(polygon.iter().cycle().skip(1)).map(|(&a, &b)| [a, b])
 }
 
-/// Whether a convex outline lies in a simple polygon, off its border by `margin_m` at least.
+/// Return whether a convex outline lies in a simple polygon, at least `margin_m` from its border.
 pub fn is_within(outline: &[Vec2], polygon: &[Vec2], margin_m: f64) -> bool {
     let is_off = |side: [Vec2; 2], wall: [Vec2; 2]| {
         let distance_m = segment_distance_m(side, wall);
@@ -84,7 +84,7 @@ pub fn is_within(outline: &[Vec2], polygon: &[Vec2], margin_m: f64) -> bool {
         && edges(outline).all(|side| edges(polygon).all(|wall| is_off(side, wall)))
 }
 
-/// Smallest distance between the outlines' points; 0 if they overlap.
+/// Return the smallest distance between the outlines' points; 0 if they overlap.
 pub fn gap_m(a: &[Vec2], b: &[Vec2]) -> f64 {
     if a.is_empty() || b.is_empty() {
         return f64::INFINITY;
@@ -97,7 +97,7 @@ pub fn gap_m(a: &[Vec2], b: &[Vec2]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Squared distance of a point from a convex polygon (0 inside), a segment or a point.
+/// Return the squared distance of a point from a convex polygon (0 inside), a segment or a point.
 pub fn distance_squared(outline_m: &[Vec2], point_m: Vec2) -> f64 {
     let mut best = f64::INFINITY;
     let mut is_inside = outline_m.len() > 2;

@@ -1,89 +1,90 @@
-//! One bit a cell, 64 cells a word: a 400 x 400 map is 22 kB and stays in cache.
+//! Grids with one bit per cell and 64 cells per word: a 400 x 400 map takes 22 kB and stays in
+//! cache.
 
 /// A grid of bits, `[row, col]`. Bits outside the grid read as 0.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct BitGrid {
     rows: usize,
     cols: usize,
-    /// Words a row; the bits beyond `cols` stay 0.
+    /// Words per row; the bits beyond `cols` stay 0.
     stride: usize,
     words: Vec<u64>,
 }
 
 impl BitGrid {
-    /// All bits 0.
+    /// Create a grid whose bits are all 0.
     pub fn new(rows: usize, cols: usize) -> Self {
         let stride = cols.div_ceil(64);
         Self { rows, cols, stride, words: vec![0; rows * stride] }
     }
 
-    /// Number of rows.
+    /// Return the number of rows.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Number of columns.
+    /// Return the number of columns.
     pub fn cols(&self) -> usize {
         self.cols
     }
 
-    /// The bit of a cell; 0 outside.
+    /// Return the bit of a cell; 0 outside.
     pub fn get(&self, row: usize, col: usize) -> bool {
         row < self.rows
             && col < self.cols
             && self.words[row * self.stride + col / 64] >> (col % 64) & 1 != 0
     }
 
-    /// Sets the bit of a cell to 1; nothing outside.
+    /// Set the bit of a cell to 1; cells outside the grid are ignored.
     pub fn insert(&mut self, row: usize, col: usize) {
         if row < self.rows && col < self.cols {
             self.words[row * self.stride + col / 64] |= 1 << (col % 64);
         }
     }
 
-    /// Sets the bit of a cell to 0.
+    /// Set the bit of a cell to 0.
     pub fn remove(&mut self, row: usize, col: usize) {
         if row < self.rows && col < self.cols {
             self.words[row * self.stride + col / 64] &= !(1 << (col % 64));
         }
     }
 
-    /// Sets the bits `start..end` of a row to 1.
+    /// Set the bits `start..end` of a row to 1.
     pub fn insert_run(&mut self, row: usize, start: usize, end: usize) {
         let end = end.min(self.cols);
         if row >= self.rows || start >= end {
             return;
         }
-        let words = &mut self.words[row * self.stride..][..self.stride];
+        let row_words = &mut self.words[row * self.stride..][..self.stride];
         let (first, last) = (start / 64, (end - 1) / 64);
-        for (index, word) in words.iter_mut().enumerate().take(last + 1).skip(first) {
+        for (index, word) in row_words.iter_mut().enumerate().take(last + 1).skip(first) {
             let low = if index == first { start % 64 } else { 0 };
             let high = if index == last { (end - 1) % 64 } else { 63 };
             *word |= (u64::MAX >> (63 - (high - low))) << low;
         }
     }
 
-    /// Sets all bits to 0.
+    /// Set all bits to 0.
     pub fn clear(&mut self) {
         self.words.fill(0);
     }
 
-    /// Sets the bits that are 1 in `other`, a grid of the same shape.
+    /// Set the bits that are 1 in `other`, a grid of the same shape.
     pub fn unite(&mut self, other: &Self) {
         self.words.iter_mut().zip(&other.words).for_each(|(word, other)| *word |= other);
     }
 
-    /// Clears the bits that are 0 in `other`, a grid of the same shape.
+    /// Clear the bits that are 0 in `other`, a grid of the same shape.
     pub fn intersect(&mut self, other: &Self) {
         self.words.iter_mut().zip(&other.words).for_each(|(word, other)| *word &= other);
     }
 
-    /// Clears the bits that are 1 in `other`, a grid of the same shape.
+    /// Clear the bits that are 1 in `other`, a grid of the same shape.
     pub fn subtract(&mut self, other: &Self) {
         self.words.iter_mut().zip(&other.words).for_each(|(word, other)| *word &= !other);
     }
 
-    /// Turns every bit over.
+    /// Invert every bit.
     pub fn invert(&mut self) {
         for row in 0..self.rows {
             for word in 0..self.stride {
@@ -94,28 +95,29 @@ impl BitGrid {
         }
     }
 
-    /// Number of bits that are 1.
+    /// Return the number of bits that are 1.
     pub fn count(&self) -> usize {
         self.words.iter().map(|word| word.count_ones() as usize).sum()
     }
 
-    /// The words of a row, bit `col % 64` of word `col / 64`; empty for a row outside.
+    /// Return the words of a row: column `col` is bit `col % 64` of word `col / 64`. Empty for a
+    /// row outside the grid.
     pub fn row(&self, row: usize) -> &[u64] {
         if row < self.rows { &self.words[row * self.stride..][..self.stride] } else { &[] }
     }
 
-    /// The words of a row, to write; bits beyond the last column must stay 0.
+    /// Return the words of a row for writing; bits beyond the last column must stay 0.
     pub(crate) fn row_mut(&mut self, row: usize) -> &mut [u64] {
         &mut self.words[row * self.stride..][..self.stride]
     }
 
-    /// The bits of a word that lie on the grid.
+    /// Return the bits of a word that lie on the grid.
     pub(crate) fn word_mask(&self, word: usize) -> u64 {
         let cols = self.cols - (word * 64).min(self.cols);
         if cols >= 64 { u64::MAX } else { (1 << cols) - 1 }
     }
 
-    /// `[row, col]` of the bits that are 1, row-major.
+    /// Return `[row, col]` of the bits that are 1, row-major.
     pub fn cells(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         (0..self.rows).flat_map(move |row| {
             self.row(row)
@@ -125,23 +127,24 @@ impl BitGrid {
         })
     }
 
-    /// The 64 bits of a row from column `first` (which may be negative) on, 0 outside.
+    /// Return 64 bits of a row, starting at column `first`, which may be negative; bits outside are
+    /// 0.
     pub(crate) fn window(&self, row: usize, first: i64) -> u64 {
-        let words = self.row(row);
+        let row_words = self.row(row);
         let word = first.div_euclid(64);
-        let at = |word: i64| usize::try_from(word).ok().and_then(|w| words.get(w)).copied();
+        let at = |word: i64| usize::try_from(word).ok().and_then(|w| row_words.get(w)).copied();
         let pair = u128::from(at(word).unwrap_or(0)) | u128::from(at(word + 1).unwrap_or(0)) << 64;
         (pair >> first.rem_euclid(64)) as u64
     }
 
-    /// Number of 1 bits among the 5 x 5 cells around a cell.
+    /// Return the number of 1 bits among the 5 x 5 cells around a cell.
     pub(crate) fn count_5x5(&self, row: usize, col: usize) -> u32 {
         let rows = row.saturating_sub(2)..=row + 2;
         rows.map(|r| (self.window(r, col as i64 - 2) & 0b11111).count_ones()).sum()
     }
 }
 
-/// Positions of the 1 bits of a word, ascending.
+/// Return the positions of the 1 bits of a word, ascending.
 pub(crate) fn ones(mut word: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let bit = (word != 0).then(|| word.trailing_zeros() as usize)?;

@@ -1,8 +1,8 @@
-//! Connected components of a bit grid, by runs.
+//! Connected components of a bit grid, found by joining runs of cells.
 
 use crate::grid::bits::BitGrid;
 
-/// Cells `start..end` of one row, all 1.
+/// A run of cells with bit 1: `start..end` of one row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Run {
     /// Row of the run.
@@ -14,17 +14,17 @@ pub struct Run {
 }
 
 impl Run {
-    /// Number of cells.
+    /// Return the number of cells.
     pub fn len(&self) -> usize {
         (self.end - self.start) as usize
     }
 
-    /// Whether the run has no cell.
+    /// Return whether the run has no cell.
     pub fn is_empty(&self) -> bool {
         self.start == self.end
     }
 
-    /// `[row, col]` of its cells.
+    /// Return `[row, col]` of its cells.
     pub fn cells(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
         let row = self.row as usize;
         (self.start..self.end).map(move |col| [row, col as usize])
@@ -33,19 +33,19 @@ impl Run {
 
 /// The 4-connected components of a bit grid.
 ///
-/// Runs of a row are joined with the runs of the row before that they touch (Wu, Otoo & Suzuki,
-/// "Optimizing two-pass connected-component labeling", 2009), so the cost is that of the runs and
-/// words, not of the cells.
+/// Each run is joined with the runs of the previous row that it touches (Wu, Otoo & Suzuki,
+/// "Optimizing two-pass connected-component labeling", 2009), so the cost depends on the number of
+/// runs and words, not on the number of cells.
 #[derive(Debug, Clone, Default)]
 pub struct Components {
     runs: Vec<Run>,
-    /// Component of each run; components count up in the order of their first cell, row-major.
+    /// Component of each run; components are numbered in the order of their first cell, row-major.
     labels: Vec<u32>,
     num: usize,
 }
 
 impl Components {
-    /// Labels the 1 cells of `grid`.
+    /// Label the cells of `grid` whose bit is 1.
     pub fn new(grid: &BitGrid) -> Self {
         let mut runs: Vec<Run> = Vec::new();
         let mut parents: Vec<u32> = Vec::new();
@@ -72,17 +72,17 @@ impl Components {
         Self { runs, labels, num: num as usize }
     }
 
-    /// Number of components.
+    /// Return the number of components.
     pub fn num(&self) -> usize {
         self.num
     }
 
-    /// Runs with their component, row-major.
+    /// Run with their component, row-major.
     pub fn runs(&self) -> impl Iterator<Item = (Run, usize)> + '_ {
         self.runs.iter().zip(&self.labels).map(|(&run, &label)| (run, label as usize))
     }
 
-    /// The component of a cell, `None` for a 0 cell.
+    /// Return the component of a cell, `None` for a 0 cell.
     pub fn of_cell(&self, row: usize, col: usize) -> Option<usize> {
         let after =
             self.runs.partition_point(|run| (run.row as usize, run.start as usize) <= (row, col));
@@ -91,7 +91,7 @@ impl Components {
         (run.row as usize == row && col < run.end as usize).then(|| self.labels[index] as usize)
     }
 
-    /// The runs of each component, in the order of the components.
+    /// Return the runs of each component, in the order of the components.
     pub fn by_component(&self) -> Vec<Vec<Run>> {
         let mut lists = vec![Vec::new(); self.num];
         for (run, label) in self.runs() {
@@ -131,7 +131,7 @@ fn push_runs(words: &[u64], row: u32, runs: &mut Vec<Run>) {
     }
 }
 
-/// Joins the runs of two neighbouring rows that share a column.
+/// Join the runs of two neighbouring rows that share a column.
 fn join_rows(
     runs: &[Run],
     mut above: std::ops::Range<usize>,

@@ -5,12 +5,14 @@ use crate::grid::bits::BitGrid;
 /// Largest radius of [`dilate_disk`], in cells.
 pub const MAX_RADIUS: usize = 64;
 
-/// Cells whose centre is within `radius` cells of a set one: scikit-image's `disk(radius)`.
+/// Dilate the set cells by a disk: set the cells whose centre is within `radius` cells of a set
+/// one, as scikit-image's `disk(radius)`.
 ///
-/// A row is widened a cell at a time; each width is added to the rows that the disk is so wide in.
+/// Each row is widened one cell at a time; each width is added to the rows in which the disk has
+/// that width.
 ///
 /// # Arguments
-/// * `radius` - in cells, at most [`MAX_RADIUS`] (larger ones count as that).
+/// * `radius` - in cells, at most [`MAX_RADIUS`] (larger values are reduced to it).
 ///
 /// # Complexity
 /// O(words * radius); rows without a set cell cost nothing.
@@ -28,7 +30,7 @@ pub fn dilate_disk(cells: &BitGrid, radius: usize) -> BitGrid {
     let mut dilated = BitGrid::new(cells.rows(), cells.cols());
     let stride = cells.row(0).len();
     let last_mask = if stride == 0 { 0 } else { cells.word_mask(stride - 1) };
-    // Half the width of the disk in the row `dy` off its middle.
+    // Half the width of the disk, `dy` rows from its middle.
     let half_width =
         |dy: usize| (0..=radius).rev().find(|w| w * w + dy * dy <= radius * radius).unwrap_or(0);
     let half_widths: Vec<usize> = (0..=radius).map(half_width).collect();
@@ -46,8 +48,8 @@ pub fn dilate_disk(cells: &BitGrid, radius: usize) -> BitGrid {
                 let above = row.checked_sub(dy);
                 let below = (row + dy < cells.rows() && dy > 0).then_some(row + dy);
                 for target in above.into_iter().chain(below) {
-                    let words = dilated.row_mut(target);
-                    words.iter_mut().zip(&wide).for_each(|(word, add)| *word |= add);
+                    let row_words = dilated.row_mut(target);
+                    row_words.iter_mut().zip(&wide).for_each(|(word, add)| *word |= add);
                 }
             }
         }
@@ -55,7 +57,7 @@ pub fn dilate_disk(cells: &BitGrid, radius: usize) -> BitGrid {
     dilated
 }
 
-/// Adds the left and right neighbours of the set bits of a row.
+/// Add the left and right neighbours of the set bits of a row.
 fn widen(words: &mut [u64], last_mask: u64) {
     let mut carry = 0;
     for index in 0..words.len() {

@@ -2,24 +2,24 @@
 
 use crate::{Error, geometry::Vec2};
 
-/// Shape and place of a grid; cells are squares.
+/// Shape and position of a grid of square cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridSpec {
-    /// Number of rows (z) .
+    /// Number of rows (z).
     pub rows: usize,
     /// Number of columns (x).
     pub cols: usize,
-    /// Edge of a cell.
+    /// Edge length of a cell.
     pub cell_m: f64,
     /// `[x, z]` of the corner of cell (0, 0) with the smallest coordinates.
     pub corner_m: Vec2,
 }
 
-/// Most cells a grid may have: 64 Mi, an 800 m square at 0.1 m.
+/// Largest number of cells of a grid: 64 Mi, an 800 m square at 0.1 m.
 pub const MAX_CELLS: usize = 1 << 26;
 
 impl GridSpec {
-    /// Smallest grid whose cells, aligned to multiples of `cell_m`, cover the rectangle.
+    /// Create the smallest grid whose cells, aligned to multiples of `cell_m`, cover the rectangle.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a number is not finite, `cell_m` not positive, or the grid too large.
@@ -39,17 +39,17 @@ impl GridSpec {
         })
     }
 
-    /// Number of cells.
+    /// Return the number of cells.
     pub fn len(&self) -> usize {
         self.rows * self.cols
     }
 
-    /// Whether the grid has no cell.
+    /// Return whether the grid has no cell.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// `[row, col]` of the cell that contains the point, `None` outside.
+    /// Return `[row, col]` of the cell that contains the point, `None` outside.
     pub fn cell_of(&self, point_m: Vec2) -> Option<[usize; 2]> {
         let col = ((point_m[0] - self.corner_m[0]) / self.cell_m).floor();
         let row = ((point_m[1] - self.corner_m[1]) / self.cell_m).floor();
@@ -58,7 +58,7 @@ impl GridSpec {
         is_inside.then_some([row as usize, col as usize])
     }
 
-    /// `[x, z]` of a cell's centre.
+    /// Return `[x, z]` of a cell's centre.
     pub fn centre_m(&self, cell: [usize; 2]) -> Vec2 {
         [
             self.corner_m[0] + (cell[1] as f64 + 0.5) * self.cell_m,
@@ -66,7 +66,7 @@ impl GridSpec {
         ]
     }
 
-    /// Place of a cell in row-major storage.
+    /// Return the index of a cell in row-major storage.
     pub fn index(&self, cell: [usize; 2]) -> usize {
         cell[0] * self.cols + cell[1]
     }

@@ -7,37 +7,37 @@ use serde_json::{Map, Value, json};
 
 use crate::{Error, geometry::Vec3, house::House};
 
-/// What an evolution changes: the paper's ΔH, and what goes beyond it.
+/// All changes of one evolution: the paper's ΔH, and the extensions' changes.
 ///
-/// Applied in the order of the fields; each list in its own order.
+/// The lists are applied in the order of the fields, each in its own order.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HouseDelta {
-    /// Moves. What stands on a moved object keeps its own position unless it is listed too.
+    /// Moves. An object that stands on a moved one keeps its own position unless it is listed too.
     #[serde(default)]
     pub moves: Vec<ObjectMove>,
-    /// Ids of objects that vanish; what still stands on one must be listed too.
+    /// Ids of objects that vanish; objects that still stand on one must be listed too.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub removed: Vec<String>,
     /// New objects.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub added: Vec<AddedObject>,
-    /// Doors and objects that open, close, go on or off.
+    /// Doors and objects that are opened, closed, switched on or switched off.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub states: Vec<StateChange>,
 }
 
-/// A new place for one object.
+/// The new place of one object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectMove {
-    /// Object that moves.
+    /// Id of the moved object.
     pub id: String,
     /// New centre of its box.
     pub position_m: Vec3,
     /// New Unity Euler angles, degrees.
     pub rotation_deg: Vec3,
-    /// What it stands on or in afterwards; `None` for the floor or a wall.
+    /// Id of the object that it stands on or in afterwards; `None` for the floor or a wall.
     pub parent: Option<String>,
 }
 
@@ -45,7 +45,7 @@ pub struct ObjectMove {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AddedObject {
-    /// Its id, which nothing else in the house has.
+    /// Id, unique in the house.
     pub id: String,
     /// Key of the asset catalogue.
     pub asset_id: String,
@@ -53,27 +53,27 @@ pub struct AddedObject {
     pub position_m: Vec3,
     /// Unity Euler angles, degrees.
     pub rotation_deg: Vec3,
-    /// What it stands on or in: an object of the house, or one added before.
+    /// Id of the object that it stands on or in: an object of the house, or one added before.
     pub parent: Option<String>,
 }
 
-/// New states of one door or object; what is `None` stays.
+/// The new state of one door or object; a field that is `None` stays as it is.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StateChange {
-    /// Door or object.
+    /// Id of the door or object.
     pub id: String,
-    /// 0 closed, 1 open.
+    /// Openness: 0 closed, 1 open.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub openness: Option<f64>,
-    /// `isOn`: lamps, screens. Objects only.
+    /// `isOn` of a lamp or screen; not for doors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub is_on: Option<bool>,
 }
 
 impl HouseDelta {
-    /// Reads a delta: `{"moves": [{"id", "position_m", "rotation_deg", "parent"}], "added": [...],
-    /// "removed": [id], "states": [...]}`, each of which may be left out.
+    /// Read a delta: `{"moves": [{"id", "position_m", "rotation_deg", "parent"}], "added": [...],
+    /// "removed": [id], "states": [...]}`. Each key may be left out.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] saying what is malformed, and where.
@@ -84,20 +84,20 @@ impl HouseDelta {
         serde_json::from_str(json).map_err(malformed)
     }
 
-    /// The delta as [`Self::from_json`] reads it.
+    /// Write the delta as [`Self::from_json`] reads it.
     pub fn to_json(&self) -> String {
-        // Numbers and strings alone: writing them cannot fail.
+        // Numbers and strings are all that is written, which cannot fail.
         serde_json::to_string(self).unwrap_or_default()
     }
 
-    /// Whether it changes nothing.
+    /// Return whether the delta changes nothing.
     pub fn is_empty(&self) -> bool {
         let Self { moves, removed, added, states } = self;
         moves.is_empty() && removed.is_empty() && added.is_empty() && states.is_empty()
     }
 }
 
-/// The objects of a document, taken out of their tree.
+/// The objects of a document, taken out of their tree so that they can be moved.
 struct Tree<'a> {
     house: &'a House,
     nodes: Vec<Loose>,
@@ -105,7 +105,7 @@ struct Tree<'a> {
     index: HashMap<&'a str, usize>,
 }
 
-/// One of them.
+/// One object without its children.
 struct Loose {
     fields: Map<String, Value>,
     parent: Option<usize>,
@@ -113,17 +113,17 @@ struct Loose {
 }
 
 impl House {
-    /// This house after `delta`.
+    /// Apply a delta: return the house after it.
     ///
-    /// The document changes only in what the delta says: an object that is new, or has a new
-    /// parent, becomes the last of its children. Since [`House::objects`] follows the document,
-    /// that changes indices; ids stay.
+    /// The document changes only as the delta states. An object that is new or has a new parent
+    /// becomes the last child of its parent. Since [`House::objects`] follows the document, indices
+    /// change; ids stay.
     ///
     /// # Errors
-    /// [`Error::House`] naming object and field: for an object or parent that is not there, an
-    /// added id that is, an object moved or removed twice, one that would stand on itself, a
-    /// removed one on which something still stands, a state outside its domain, or if the result
-    /// is no valid house.
+    /// [`Error::House`] naming object and field: for an object or parent that does not exist, an
+    /// added id that exists already, an object that is moved or removed twice, that would stand on
+    /// itself, or that is removed while something still stands on it, a state outside its domain,
+    /// or a result that is not a valid house.
     pub fn apply(&self, delta: &HouseDelta) -> Result<Self, Error> {
         let mut tree = Tree::of(self);
         let mut is_moved = vec![false; tree.nodes.len()];
@@ -145,7 +145,7 @@ impl House {
         Self::from_document(&self.name, Value::Object(document))
     }
 
-    /// A copy of the document with `objects` (kept in place) set to null.
+    /// Return a copy of the document with `objects` (kept in place) set to null.
     fn document_without_objects(&self) -> Map<String, Value> {
         let fields = self.document.as_object().into_iter().flatten();
         fields
@@ -158,7 +158,7 @@ impl House {
 }
 
 impl<'a> Tree<'a> {
-    /// Objects in the order of [`House::objects`].
+    /// Take the objects out of a house's document, in the order of [`House::objects`].
     fn of(house: &'a House) -> Self {
         let mut nodes = Vec::with_capacity(house.objects.len());
         collect(house.document.get("objects"), &mut nodes);
@@ -172,7 +172,7 @@ impl<'a> Tree<'a> {
         Self { house, nodes, roots, index }
     }
 
-    /// Index of the object `wanted`, which `field` of `id` names.
+    /// Return the index of the object `wanted`, named by `field` of object `id`.
     fn find(&self, wanted: &str, id: &str, field: &str) -> Result<usize, Error> {
         self.index.get(wanted).copied().ok_or_else(|| {
             let message = format!("is {wanted:?}, which is no object of the house");
@@ -295,7 +295,7 @@ impl<'a> Tree<'a> {
     }
 }
 
-/// Depth first, as the view lists them; `children` keys stay, emptied.
+/// Collect the objects depth first, as the view lists them; `children` keys stay, emptied.
 fn collect(list: Option<&Value>, loose: &mut Vec<Loose>) {
     for entry in list.and_then(Value::as_array).into_iter().flatten() {
         let children = entry.get("children");
@@ -308,7 +308,7 @@ fn collect(list: Option<&Value>, loose: &mut Vec<Loose>) {
     }
 }
 
-/// The list of the objects at `indices`, each with what stands on it.
+/// Rebuild the list of the objects at `indices`, each with the objects that stand on it.
 fn assemble(loose: &mut [Loose], indices: &[usize]) -> Value {
     let entry = |&index: &usize| {
         let mut fields = std::mem::take(&mut loose[index].fields);

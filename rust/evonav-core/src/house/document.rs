@@ -1,4 +1,4 @@
-//! JSON text to a document, with nothing lost on the way.
+//! Parse JSON text into a document without losing anything.
 
 use std::fmt;
 
@@ -9,14 +9,14 @@ use serde_json::{Map, Number, Value};
 
 use crate::Error;
 
-/// Longest house that is read: a hundred times the largest recorded one.
+/// Length of the longest house that is read: a hundred times the largest recorded one.
 const MAX_BYTES: usize = 32 << 20;
 
-/// Parses one JSON value. Nesting is limited by `serde_json` (128 levels).
+/// Parse one JSON value. Nesting is limited by `serde_json` (128 levels).
 ///
 /// # Errors
-/// [`Error::House`] with line and column, also for a key given twice: keeping either value would
-/// lose the other.
+/// [`Error::House`] with line and column. A key that is given twice is an error too: using either
+/// value would lose the other.
 pub(super) fn parse(name: &str, json: &str) -> Result<Value, Error> {
     let fail = |message: String| Error::House {
         house: name.to_owned(),
@@ -31,7 +31,7 @@ pub(super) fn parse(name: &str, json: &str) -> Result<Value, Error> {
     Ok(strict.0)
 }
 
-/// A [`Value`] read without dropping repeated keys in silence.
+/// A [`Value`] whose reading reports repeated keys instead of silently dropping one.
 struct Strict(Value);
 
 impl<'de> Deserialize<'de> for Strict {

@@ -1,20 +1,21 @@
-//! Reading JSON values so that every error names the object and the field.
+//! Read JSON values so that every error names the object and the field.
 
 use serde_json::{Map, Value};
 
 use crate::{Error, geometry::Vec3};
 
-/// How a value was reached from the one that holds it.
+/// The step from a value to one that it contains.
 #[derive(Clone, Copy)]
 enum Step<'a> {
     Key(&'a str),
     Index(usize),
 }
 
-/// Field of an error about an entry as such.
+/// Field name in errors about a whole entry.
 const WHOLE: &str = "(whole)";
 
-/// A JSON value that knows where it stands. Costs nothing until an error is made.
+/// A JSON value that knows its place in the document. The place costs nothing until an error is
+/// created.
 #[derive(Clone, Copy)]
 pub(super) struct Node<'a> {
     house: &'a str,
@@ -26,18 +27,18 @@ pub(super) struct Node<'a> {
 pub(super) const MAX_COORDINATE_M: f64 = 200.0;
 
 impl<'a> Node<'a> {
-    /// The document itself.
+    /// Create the node of the whole document.
     pub(super) fn root(house: &'a str, value: &'a Value) -> Self {
         Self { house, value, from: None }
     }
 
-    /// A typed error about this value.
+    /// Create an error about this value.
     pub(super) fn error(&self, message: impl Into<String>) -> Error {
         let (object, field) = self.place();
         Error::House { house: self.house.to_owned(), object, field, message: message.into() }
     }
 
-    /// An error that shows the value found.
+    /// Create an error that shows the value found.
     pub(super) fn expected(&self, what: &str) -> Error {
         let mut found = self.value.to_string();
         if found.chars().count() > 80 {
@@ -46,7 +47,8 @@ impl<'a> Node<'a> {
         self.error(format!("is {found}, expected {what}"))
     }
 
-    /// Object (the nearest holder with an id, or its place in the file) and dotted field in it.
+    /// Return the object (the nearest enclosing entry with an id, or its place in the file) and the
+    /// dotted field in it.
     fn place(&self) -> (String, String) {
         let mut path = Vec::new();
         let mut node = *self;
@@ -76,7 +78,7 @@ impl<'a> Node<'a> {
         if let Some(id) = id {
             return (id, if path.is_empty() { WHOLE.to_owned() } else { text(&path) });
         }
-        // Without an id, an entry of a list at the top is named by its place.
+        // An entry of a top-level list that has no id is named by its place.
         let is_entry = matches!(path.as_slice(), [Step::Key(_), Step::Index(_), ..]);
         let (object, field) = path.split_at(if is_entry { 2 } else { 0 });
         let object = if object.is_empty() { "house".to_owned() } else { text(object) };
@@ -87,13 +89,13 @@ impl<'a> Node<'a> {
         self.value.as_object().ok_or_else(|| self.expected("an object"))
     }
 
-    /// The value under `key`; `None` if it is absent or null.
+    /// Return the value under `key`; `None` if it is absent or null.
     pub(super) fn maybe<'n>(&'n self, key: &'n str) -> Result<Option<Node<'n>>, Error> {
         let value = self.map()?.get(key).filter(|value| !value.is_null());
         Ok(value.map(|value| Node { house: self.house, value, from: Some((self, Step::Key(key))) }))
     }
 
-    /// The value under `key`, null included.
+    /// Return the value under `key`, null included.
     pub(super) fn get<'n>(&'n self, key: &'n str) -> Result<Node<'n>, Error> {
         match self.map()?.get(key) {
             Some(value) => {
@@ -110,7 +112,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// The entries of a list of at most `limit`.
+    /// Return the entries of a list that has at most `limit` of them.
     pub(super) fn list(&self, limit: usize) -> Result<impl Iterator<Item = Node<'_>>, Error> {
         let values = self.value.as_array().ok_or_else(|| self.expected("a list"))?;
         if values.len() > limit {
@@ -125,17 +127,17 @@ impl<'a> Node<'a> {
         }))
     }
 
-    /// Whether the value is null.
+    /// Return whether the value is null.
     pub(super) fn is_null(&self) -> bool {
         self.value.is_null()
     }
 
-    /// A string.
+    /// Return the value as a string.
     pub(super) fn text(&self) -> Result<&'a str, Error> {
         self.value.as_str().ok_or_else(|| self.expected("a string"))
     }
 
-    /// A string that names something.
+    /// Return the value as a non-empty string.
     pub(super) fn name(&self) -> Result<&'a str, Error> {
         match self.text()? {
             "" => Err(self.expected("a name")),
@@ -144,12 +146,12 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// True or false.
+    /// Return the value as a boolean.
     pub(super) fn boolean(&self) -> Result<bool, Error> {
         self.value.as_bool().ok_or_else(|| self.expected("true or false"))
     }
 
-    /// A finite number within `low..=high`.
+    /// Return the value as a finite number within `low..=high`.
     pub(super) fn number(&self, low: f64, high: f64) -> Result<f64, Error> {
         let value = self.value.as_f64().ok_or_else(|| self.expected("a number"))?;
         if (low..=high).contains(&value) {
@@ -158,19 +160,19 @@ impl<'a> Node<'a> {
         Err(self.expected(&format!("a number from {low} to {high}")))
     }
 
-    /// `{x, y, z}`, each within `±limit`.
+    /// Return the value `{x, y, z}` as a vector, each number within `±limit`.
     pub(super) fn vector(&self, limit: f64) -> Result<Vec3, Error> {
         let axis = |key| self.get(key).and_then(|node| node.number(-limit, limit));
         Ok([axis("x")?, axis("y")?, axis("z")?])
     }
 
-    /// `{r, g, b}`, each 0..1.
+    /// Return the value `{r, g, b}` as a colour, each number in 0..1.
     pub(super) fn colour(&self) -> Result<[f64; 3], Error> {
         let channel = |key| self.get(key).and_then(|node| node.number(0.0, 1.0));
         Ok([channel("r")?, channel("g")?, channel("b")?])
     }
 
-    /// `{x, y, z}` of a point.
+    /// Return the value `{x, y, z}` as a point.
     pub(super) fn point(&self) -> Result<Vec3, Error> {
         self.vector(MAX_COORDINATE_M)
     }

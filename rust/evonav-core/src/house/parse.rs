@@ -1,5 +1,5 @@
-//! The typed view of a house document. Schemas 0.0.1 (openings with `boundingBox`, materials as
-//! strings) and 1.0.0 (`holePolygon`, materials as objects) are read alike.
+//! Build the typed view of a house document. Both schemas are read: 0.0.1 (openings with
+//! `boundingBox`, materials as strings) and 1.0.0 (`holePolygon`, materials as objects).
 
 use serde_json::Value;
 
@@ -12,8 +12,8 @@ use crate::{
     },
 };
 
-/// Most rooms, walls (both sides), openings and objects of one house: some 20 times the largest
-/// recorded one.
+/// Largest numbers of rooms, walls (both sides), openings and objects of one house: about 20 times
+/// those of the largest recorded house.
 const MAX_ROOMS: usize = 256;
 const MAX_WALLS: usize = 4096;
 const MAX_OPENINGS: usize = 2048;
@@ -22,11 +22,12 @@ const MAX_CORNERS: usize = 256;
 const MIN_HEIGHT_M: f64 = 0.1;
 const MAX_HEIGHT_M: f64 = 30.0;
 const MAX_FOOT_M: f64 = 0.01;
-/// Euler angles come within a turn or two of zero.
+/// Largest Euler angle; recorded ones are within two turns of zero.
 const MAX_ANGLE_DEG: f64 = 3600.0;
 const SCHEMAS: [&str; 2] = ["0.0.1", "1.0.0"];
 
-/// Builds the view; fields are checked one by one, what they say together in [`super::validate`].
+/// Build the view. Each field is checked here on its own; [`super::validate`] checks whether the
+/// fields agree.
 pub(super) fn view(name: &str, document: Value) -> Result<House, Error> {
     let root = Node::root(name, &document);
     let metadata = root.get("metadata")?;
@@ -80,7 +81,7 @@ fn start(agent: &Node<'_>) -> Result<Start, Error> {
     })
 }
 
-/// `"Name"` or `{name, color}`; an own `color` beside it wins.
+/// Read a material: `"Name"` or `{name, color}`. A separate colour key beside it takes precedence.
 fn surface(holder: &Node<'_>, material_key: &str, colour_key: &str) -> Result<Surface, Error> {
     let mut found = Surface::default();
     if let Some(material) = holder.maybe(material_key)? {
@@ -125,7 +126,7 @@ fn wall(node: &Node<'_>) -> Result<Wall, Error> {
         return Err(polygon.error(format!("has {} corners, expected 4", corners.len())));
     };
     // ProcTHOR lists inner sides foot first and outer sides top first, both pairs in the same
-    // order; other tools go round.
+    // order; other tools list the corners in a circle.
     let ([from, to], mut top) = if a[1] <= c[1] { ([a, b], [c, d]) } else { ([c, d], [a, b]) };
     if flat(top[0]) == flat(to) {
         top.reverse();
@@ -143,7 +144,7 @@ fn wall(node: &Node<'_>) -> Result<Wall, Error> {
         return Err(polygon.error(format!("wall is {height_m} m high, {expected}")));
     }
     let Surface { material, colour } = surface(node, "material", "color")?;
-    // Outer sides carry the room that they enclose; it is their id that tells them apart.
+    // Outer sides name the room that they enclose; only their id distinguishes them.
     let room_id = node.get("roomId")?.name()?;
     let is_outer = id.starts_with("wall|exterior");
     Ok(Wall {
@@ -187,7 +188,7 @@ fn opening(node: &Node<'_>) -> Result<Opening, Error> {
     })
 }
 
-/// `[along, up]` of the hole's smallest and largest corner, in the wall's frame.
+/// Return `[along, up]` of the hole's smallest and largest corner, in the wall's frame.
 fn hole(node: &Node<'_>) -> Result<[Vec2; 2], Error> {
     let along_up = |corner: Node<'_>| corner.point().map(|[x, y, _]| [x, y]);
     let corners = if let Some(polygon) = node.maybe("holePolygon")? {
@@ -221,7 +222,7 @@ fn object_list(
         if let Some(parent) = parent {
             objects[parent].children.push(index);
         }
-        // As deep as serde_json lets a document be (128 levels).
+        // The recursion is as deep as serde_json lets a document be (128 levels).
         if let Some(children) = node.maybe("children")? {
             object_list(&children, Some(index), objects)?;
         }
@@ -251,7 +252,8 @@ fn object(node: &Node<'_>, parent: Option<usize>) -> Result<Object, Error> {
     })
 }
 
-/// The room of a root is where it stands; what stands on it is in the same room.
+/// Assign rooms: an object without a parent is in the room that contains its position, every other
+/// one in the room of its parent.
 fn assign_rooms(house: &mut House) {
     for index in 0..house.objects.len() {
         let object = &house.objects[index];

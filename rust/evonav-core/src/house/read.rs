@@ -1,4 +1,4 @@
-//! Reading and checking a house file.
+//! Read and check a house file.
 
 use crate::{
     Error,
@@ -6,10 +6,10 @@ use crate::{
 };
 
 impl House {
-    /// Reads and checks a house.
+    /// Read and checks a house.
     ///
     /// # Arguments
-    /// * `name` - what errors call the house; usually the file and line.
+    /// * `name` - name of the house in errors; usually the file and line.
     /// * `json` - one house, schema 0.0.1 or 1.0.0.
     ///
     /// # Errors

@@ -7,38 +7,38 @@ use crate::{
     geometry::{Vec2, Vec3, polygon_contains},
 };
 
-/// [`Wall::room_id`] of outer sides.
+/// Value of [`Wall::room_id`] of outer sides.
 pub const EXTERIOR: &str = "exterior";
 
-/// A house: the document as it was read, and what evonav understands of it.
+/// A house: the document as it was read, and a typed view of it.
 ///
-/// The document is kept whole, in order, with every key that evonav does not know; the view is
+/// The document keeps its order and every key, also those that evonav does not know. The view is
 /// derived from it and never changed on its own.
 #[derive(Debug, Clone, PartialEq)]
 pub struct House {
-    /// File name or the caller's name, for errors.
+    /// Name of the house in errors: the file name, or the caller's name.
     pub name: String,
     /// Rooms, in file order.
     pub rooms: Vec<Room>,
-    /// Walls, in file order (each inner wall once a room, outer ones also as `wall|exterior`).
+    /// Walls, in file order: each inner wall once per room, outer ones also as `wall|exterior`.
     pub walls: Vec<Wall>,
     /// Doors and doorways, in file order.
     pub doors: Vec<Opening>,
     /// Windows, in file order.
     pub windows: Vec<Opening>,
-    /// Objects, in depth-first file order: a parent stands before its children.
+    /// Objects, in depth-first file order: a parent comes before its children.
     pub objects: Vec<Object>,
     /// Material of the ceilings.
     pub ceiling: Surface,
-    /// `metadata.agent`: the house's default start; absent in a few houses.
+    /// The house's default start (`metadata.agent`); absent in a few houses.
     pub start: Option<Start>,
-    /// [`House::objects`] by id.
+    /// Indices in [`House::objects`] by id.
     pub(super) index: HashMap<String, usize>,
-    /// Lossless source.
+    /// The document as it was read.
     pub(crate) document: serde_json::Value,
 }
 
-/// What a floor, wall or ceiling is made of.
+/// Material and tint of a floor, wall or ceiling.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Surface {
     /// Name of the material, empty if none is given.
@@ -50,9 +50,9 @@ pub struct Surface {
 /// A room.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Room {
-    /// For example `room|4`.
+    /// Id, for example `room|4`.
     pub id: String,
-    /// `Kitchen`, `LivingRoom`, `Bedroom`, `Bathroom` ...
+    /// Room type: `Kitchen`, `LivingRoom`, `Bedroom`, `Bathroom` ...
     pub room_type: String,
     /// Floor outline `[x, z]`.
     pub polygon_m: Vec<Vec2>,
@@ -63,51 +63,53 @@ pub struct Room {
 /// One side of a wall.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wall {
-    /// For example `wall|4|0.00|1.95|1.95|1.95`.
+    /// Id, for example `wall|4|0.00|1.95|1.95|1.95`.
     pub id: String,
     /// Room it faces; `exterior` for outer sides.
     pub room_id: String,
-    /// Foot of the wall, `[x, z]`, origin of the wall's own frame: the first foot corner listed.
+    /// Start of the wall's foot, `[x, z]`: the first foot corner listed, and the origin of the
+    /// wall's own frame.
     pub from_m: Vec2,
     /// Other end of the foot.
     pub to_m: Vec2,
     /// Height above the floor.
     pub height_m: f64,
-    /// Open plan: passable and see-through.
+    /// Whether the border is open plan: passable and see-through.
     pub is_empty: bool,
     /// Name of the material, empty if none is given.
     pub material: String,
-    /// `color`, 0..1, if given.
+    /// Colour (`color`), 0..1, if given.
     pub colour: Option<[f64; 3]>,
 }
 
-/// A door, doorway or window: a hole in one or two walls and what fills it.
+/// A door, doorway or window: a hole in one or two walls, and the asset in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Opening {
-    /// For example `door|4|5`.
+    /// Id, for example `door|4|5`.
     pub id: String,
-    /// Asset that fills the hole.
+    /// Key of the asset that fills the hole.
     pub asset_id: String,
-    /// Wall whose frame the hole is given in.
+    /// Id of the wall in whose frame the hole is given.
     pub wall0: String,
-    /// The wall's other side.
+    /// Id of the wall's other side.
     pub wall1: String,
-    /// Rooms on both sides (equal for windows and outer doors).
+    /// Ids of the rooms on both sides; equal for windows and outer doors.
     pub room_ids: [String; 2],
-    /// Hole in the frame of `wall0`: `[along, up]` of its smallest corner ...
+    /// Smallest corner of the hole in the frame of `wall0`, `[along, up]`.
     pub hole_min_m: Vec2,
-    /// ... and of its largest.
+    /// Largest corner of the hole in the frame of `wall0`, `[along, up]`.
     pub hole_max_m: Vec2,
-    /// 0 closed, 1 open; where the file is silent, 1 for a `Doorframe_*` and 0 otherwise.
+    /// Openness: 0 closed, 1 open. If the file does not give it, 1 for a `Doorframe_*` and 0
+    /// otherwise.
     pub openness: f64,
-    /// Whether it can open at all (`Doorframe_*` have no leaf).
+    /// Whether the opening can open at all; a `Doorframe_*` has no leaf.
     pub is_openable: bool,
 }
 
 /// An object as the file places it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Object {
-    /// For example `4|0|0`, `small|4|5`, `window|4|0`.
+    /// Id, for example `4|0|0`, `small|4|5`, `window|4|0`.
     pub id: String,
     /// Key of the asset catalogue.
     pub asset_id: String,
@@ -115,15 +117,15 @@ pub struct Object {
     pub position_m: Vec3,
     /// Unity Euler angles, degrees.
     pub rotation_deg: Vec3,
-    /// Index of the object it stands on or in, in [`House::objects`].
+    /// Index in [`House::objects`] of the object that it stands on or in.
     pub parent: Option<usize>,
-    /// Indices of what stands on it.
+    /// Indices of the objects that stand on it.
     pub children: Vec<usize>,
     /// Index of the room whose floor polygon holds its position (its root's, for children), if any.
     pub room: Option<usize>,
     /// `objectType` where the file gives one (Objaverse assets).
     pub object_type: Option<String>,
-    /// Fixed by the file.
+    /// Whether the file fixes it in place.
     pub is_kinematic: bool,
     /// `openness` of the object, if given: 0 closed, 1 open.
     pub openness: Option<f64>,
@@ -131,7 +133,7 @@ pub struct Object {
     pub is_on: Option<bool>,
 }
 
-/// Where the house file puts the agent.
+/// The agent's start as the house file gives it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
     /// `metadata.agent.position`.
@@ -142,34 +144,34 @@ pub struct Start {
     pub horizon_deg: f64,
 }
 
-/// What is known of a thing's state.
+/// The known state of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Condition {
-    /// 0 closed, 1 open; `None` where the file is silent.
+    /// Openness: 0 closed, 1 open; `None` if the file does not give it.
     pub openness: Option<f64>,
-    /// Whether a lamp or screen is lit; `None` where the file is silent.
+    /// Whether a lamp or screen is lit; `None` if the file does not give it.
     pub is_on: Option<bool>,
 }
 
 impl Object {
-    /// What the file says of its state.
+    /// Return the state that the file gives.
     pub fn condition(&self) -> Condition {
         Condition { openness: self.openness, is_on: self.is_on }
     }
 }
 
 impl House {
-    /// The document: every key and value as it was read, in order; compact.
+    /// Write the document compactly: every key and value as it was read, in order.
     pub fn to_json(&self) -> String {
         self.document.to_string()
     }
 
-    /// Index of the first room whose floor holds `point_m`.
+    /// Return the index of the first room whose floor contains `point_m`.
     pub fn room_of(&self, point_m: Vec2) -> Option<usize> {
         self.rooms.iter().position(|room| polygon_contains(&room.polygon_m, point_m))
     }
 
-    /// Index in [`House::objects`].
+    /// Return the index in [`House::objects`] of the object with an id.
     pub fn object_index(&self, id: &str) -> Option<usize> {
         self.index.get(id).copied()
     }

@@ -1,4 +1,4 @@
-//! What the fields of a house must say together.
+//! Check that the fields of a house agree with each other.
 
 use std::collections::{HashMap, HashSet};
 
@@ -8,13 +8,13 @@ use crate::{
     house::{House, Opening, Room, Wall},
 };
 
-/// Openings may stick out of their wall by this much (rounding of wall ends to millimetres).
+/// Length by which openings may extend beyond their wall: wall ends are rounded to millimetres.
 const HOLE_TOLERANCE_M: f64 = 0.01;
-/// Smallest floor that counts as one.
+/// Smallest area of a floor.
 const MIN_AREA_M2: f64 = 0.01;
 const MIN_WALL_M: f64 = 0.001;
 
-/// Checks ids, references, polygons and openings.
+/// Check ids, references, polygons and openings.
 pub(super) fn check(house: &House) -> Result<(), Error> {
     if house.rooms.is_empty() {
         return Err(house.error("house", "rooms", "is empty, expected at least one room"));
@@ -29,7 +29,7 @@ pub(super) fn check(house: &House) -> Result<(), Error> {
     openings.try_for_each(|opening| check_opening(house, opening, &rooms, &walls))
 }
 
-/// Ids are unique over everything that can become a body of the scene.
+/// Check that ids are unique among everything that can become a body of the scene.
 fn check_ids(house: &House) -> Result<(), Error> {
     let mut seen = HashSet::new();
     let rooms = house.rooms.iter().map(|room| &room.id);
@@ -66,7 +66,7 @@ fn check_room(house: &House, room: &Room) -> Result<(), Error> {
     Ok(())
 }
 
-/// Whether two segments cross in their insides.
+/// Return whether two segments cross between their ends.
 fn cross(a: [Vec2; 2], b: [Vec2; 2]) -> bool {
     let side = |[p, q]: [Vec2; 2], r: Vec2| polygon_area_m2(&[p, q, r]);
     side(a, b[0]) * side(a, b[1]) < 0.0 && side(b, a[0]) * side(b, a[1]) < 0.0
@@ -121,7 +121,7 @@ fn check_opening(
 }
 
 impl Wall {
-    /// Length of the foot.
+    /// Return the length of the foot.
     pub fn length_m(&self) -> f64 {
         distance_2d_m(self.from_m, self.to_m)
     }

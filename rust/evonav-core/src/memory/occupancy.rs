@@ -24,12 +24,12 @@ pub struct Conflicts {
 }
 
 impl Conflicts {
-    /// Number of contradicting cells.
+    /// Return the number of contradicting cells.
     pub fn len(&self) -> usize {
         self.freed.len() + self.obstructed.len()
     }
 
-    /// Whether nothing contradicts.
+    /// Return whether nothing contradicts.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -50,7 +50,7 @@ pub struct OccupancyMap {
 }
 
 impl OccupancyMap {
-    /// A map of unknown cells.
+    /// Return a map of unknown cells.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the grid has no cell, too many, or its place is not finite.
@@ -73,27 +73,27 @@ impl OccupancyMap {
         })
     }
 
-    /// Shape and place.
+    /// Return the shape and place.
     pub fn spec(&self) -> &GridSpec {
         &self.spec
     }
 
-    /// Cells known or assumed to be free.
+    /// Return the cells known or assumed to be free.
     pub fn free(&self) -> &BitGrid {
         &self.free
     }
 
-    /// Cells known to be blocked.
+    /// Return the cells known to be blocked.
     pub fn blocked(&self) -> &BitGrid {
         &self.blocked
     }
 
-    /// Cells seen from close by.
+    /// Return the cells seen from close by.
     pub fn explored(&self) -> &BitGrid {
         &self.explored
     }
 
-    /// Seen cells that contradict the map; the map stays as it is.
+    /// Return the seen cells that contradict the map; the map stays as it is.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a cell is off the grid.
@@ -113,7 +113,7 @@ impl OccupancyMap {
         })
     }
 
-    /// Takes over what one view saw, and says what of it contradicted the map.
+    /// Take over what one view saw, and says what of it contradicted the map.
     ///
     /// # Arguments
     /// * `origin_m` - `[x, z]` from where the cells were seen.
@@ -150,7 +150,8 @@ impl OccupancyMap {
         Ok(conflicts)
     }
 
-    /// Marks the free cells around a place explored (3D-Mem: 0.7 m around the agent after each move).
+    /// Mark the free cells around a place explored (3D-Mem: 0.7 m around the agent after each
+    /// move).
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a number is not finite.
@@ -164,7 +165,7 @@ impl OccupancyMap {
         Ok(())
     }
 
-    /// Takes the unknown cells around a place for free and explored until they are seen (3D-Mem:
+    /// Take the unknown cells around a place for free and explored until they are seen (3D-Mem:
     /// 0.6 m around the agent's start, which no camera sees).
     ///
     /// # Errors
@@ -183,14 +184,14 @@ impl OccupancyMap {
         Ok(())
     }
 
-    /// Forgets everything.
+    /// Forget everything.
     pub fn clear(&mut self) {
         for plane in [&mut self.free, &mut self.blocked, &mut self.explored, &mut self.assumed] {
             plane.clear();
         }
     }
 
-    /// Forgets the given cells; they become unknown and unexplored.
+    /// Forget the given cells; they become unknown and unexplored.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a cell is off the grid; the map is then unchanged.
@@ -206,7 +207,7 @@ impl OccupancyMap {
         Ok(())
     }
 
-    /// A value a cell, row-major: [`UNKNOWN`], [`FREE`] or [`BLOCKED`].
+    /// Return a value a cell, row-major: [`UNKNOWN`], [`FREE`] or [`BLOCKED`].
     pub fn cells(&self) -> Vec<u8> {
         let mut cells = vec![UNKNOWN; self.spec.len()];
         for (plane, value) in [(&self.free, FREE), (&self.blocked, BLOCKED)] {
@@ -217,7 +218,7 @@ impl OccupancyMap {
         cells
     }
 
-    /// Whether each cell is explored, row-major.
+    /// Return whether each cell is explored, row-major.
     pub fn explored_cells(&self) -> Vec<bool> {
         let mut cells = vec![false; self.spec.len()];
         for cell in self.explored.cells() {
@@ -243,7 +244,7 @@ impl OccupancyMap {
         (centre_m[0] - point_m[0]).powi(2) + (centre_m[1] - point_m[1]).powi(2)
     }
 
-    /// Cells whose centre is nearer than `radius_m`.
+    /// Return the cells whose centre is nearer than `radius_m`.
     fn disc(&self, centre_m: Vec2, radius_m: f64) -> Vec<[usize; 2]> {
         let index = |value_m: f64, axis: usize, num: usize| {
             ((value_m - self.spec.corner_m[axis]) / self.spec.cell_m).clamp(0.0, num as f64)

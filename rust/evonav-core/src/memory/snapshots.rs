@@ -45,7 +45,7 @@ pub struct Snapshot {
     pub objects: Vec<u64>,
 }
 
-/// Brings snapshots up to date with what was seen since: co-visibility clustering.
+/// Bring snapshots up to date with what was seen since: co-visibility clustering.
 ///
 /// Objects in no snapshot, those near the agent, and all that share a snapshot with one of them are clustered anew;
 /// other snapshots stay. Clusters are found by bisection: the group with the most objects (the older one of two as
@@ -134,7 +134,7 @@ fn check(
     Ok(centres)
 }
 
-/// Groups of objects, each with a frame that shows all of it. What no frame shows is left out.
+/// Group of objects, each with a frame that shows all of it. What no frame shows is left out.
 fn clusters(objects: &[Located], frames: &[Frame]) -> Vec<(usize, Vec<u64>)> {
     let sets = FrameSets::new(objects, frames);
     let mut is_chosen = vec![false; frames.len()];
@@ -189,7 +189,7 @@ impl FrameSets {
         Self { num_words, frames: sets, ranks: frames.iter().map(rank).collect() }
     }
 
-    /// The frame to stand for a group, if one shows all of it.
+    /// Return the frame to stand for a group, if one shows all of it.
     fn best(&self, group: &[usize], is_chosen: &[bool]) -> Option<usize> {
         let mut wanted = vec![0_u64; self.num_words];
         group.iter().for_each(|bit| wanted[bit / 64] |= 1 << (bit % 64));
@@ -208,7 +208,7 @@ impl FrameSets {
     }
 }
 
-/// Splits points in two by 2-means: the tightest of ten results of Lloyd's algorithm.
+/// Split points in two by 2-means: the tightest of ten results of Lloyd's algorithm.
 ///
 /// Starts are drawn as k-means++ does (Arthur & Vassilvitskii, SODA 2007), with a seed of their own, so that the same
 /// points are split alike wherever they come up.
@@ -238,7 +238,7 @@ pub fn two_means(points_m: &[[f64; 2]]) -> Vec<bool> {
     )
 }
 
-/// Sum of squared distances to the means, and whether each point belongs to the second.
+/// Return the sum of squared distances to the means, and whether each point belongs to the second.
 fn lloyd(points_m: &[[f64; 2]], mut means_m: [[f64; 2]; 2]) -> (f64, Vec<bool>) {
     let mut is_second = Vec::new();
     for _ in 0..MAX_ROUNDS {

@@ -25,7 +25,7 @@ const EDGE_SHARE: f64 = 0.1;
 const MIN_DEPTH_M: f64 = 0.01;
 
 impl DepthNoise {
-    /// Checks the parameters.
+    /// Check the parameters.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming the one outside its domain.
@@ -45,7 +45,7 @@ impl DepthNoise {
     }
 }
 
-/// A depth image as a camera that errs would give it.
+/// Return a depth image as a camera that errs would give it.
 ///
 /// Each pixel errs on its own: axial noise, then rounding to the nearest step. The noise is a sum
 /// of four uniform numbers (Irwin-Hall), which has no tail beyond 3.5 standard deviations.
@@ -111,7 +111,7 @@ pub fn noisy_depth(
     Ok(found)
 }
 
-/// Four 12-bit uniform numbers, added and brought to mean 0 and deviation 1.
+/// Return the four 12-bit uniform numbers, added and brought to mean 0 and deviation 1.
 fn irwin_hall(bits: u64) -> f64 {
     let sum: u64 = (0..4).map(|part| (bits >> (12 * part)) & 0xfff).sum();
     let uniform_sum = (sum as f64 + 2.0) / 4096.0; // each taken at the middle of its step

@@ -32,7 +32,7 @@ pub struct SiteNoise {
     pub passing: Stream,
 }
 
-/// Places on the surfaces in view, with what is random of each: it depends on streams and place
+/// Place on the surfaces in view, with what is random of each: it depends on streams and place
 /// alone, so that what is seen by mistake is seen there again.
 ///
 /// # Arguments
@@ -101,7 +101,7 @@ pub struct Blob {
     pub number: i32,
 }
 
-/// Paints blobs, one after another, each over the pixels of its surface alone: those with the same
+/// Paint blobs, one after another, each over the pixels of its surface alone: those with the same
 /// value in `surfaces` as its middle.
 ///
 /// # Arguments

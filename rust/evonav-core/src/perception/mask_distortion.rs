@@ -23,7 +23,7 @@ pub struct MaskChange {
 }
 
 impl MaskChange {
-    /// No change, but for the number.
+    /// Return no change, but for the number.
     pub fn renamed(number: i32) -> Self {
         Self {
             becomes: number,
@@ -36,7 +36,7 @@ impl MaskChange {
     }
 }
 
-/// Masks as a detector that errs would give them.
+/// Return the masks as a detector that errs would give them.
 ///
 /// A pixel is lost to a mask that shrinks if a pixel outside of the mask (the image's border is
 /// none) is within its margin, centre to centre. A pixel is gained by the mask that grows and has
@@ -122,7 +122,7 @@ pub fn distort_masks(
     Ok(found)
 }
 
-/// Pixels with a pixel of something else beside them, above or below.
+/// Return the pixels with a pixel of something else beside them, above or below.
 fn outline_px(masks: &[i32], width_px: usize) -> impl Iterator<Item = usize> {
     (0..masks.len()).step_by(width_px).flat_map(move |start| {
         let row = &masks[start..start + width_px];

@@ -21,7 +21,7 @@ impl MaskImage {
         Ok(Self { width_px, height_px: masks.len() / width_px })
     }
 
-    /// The four pixels beside one; `None` past the image's border.
+    /// Return the four pixels beside one; `None` past the image's border.
     pub fn beside(&self, index: usize) -> [Option<usize>; 4] {
         let (row, col) = (index / self.width_px, index % self.width_px);
         [
@@ -32,7 +32,7 @@ impl MaskImage {
         ]
     }
 
-    /// Calls back with each pixel within a radius, and its squared distance.
+    /// Call back with each pixel within a radius, and its squared distance.
     pub fn around(&self, index: usize, radius_px: f64, mut call: impl FnMut(usize, u32)) {
         let (row, col) = (index / self.width_px, index % self.width_px);
         let reach = radius_px as usize;

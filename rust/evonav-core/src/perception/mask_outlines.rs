@@ -13,8 +13,8 @@ pub struct Outline {
     pub mean_depth_m: f64,
 }
 
-/// Outline of each mask, and how much of it is cut by something nearer or by the image's border:
-/// a cheap sign of occlusion that needs no second rendering and no box.
+/// Return the outline of each mask, and how much of it is cut by something nearer or by the image's
+/// border: a cheap sign of occlusion that needs no second rendering and no box.
 ///
 /// Something is nearer if its depth is less by more than 5 cm and 5% of the mask's own; what an
 /// object stands on, and meets at its foot, is not.

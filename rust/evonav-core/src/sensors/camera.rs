@@ -45,8 +45,9 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The camera of an agent: above `pose`, `height_m` over the floor (houses have one floor, at
-    /// y = 0, so the pose's own height, 0.9 m in AI2-THOR and 0 elsewhere, does not matter).
+    /// Return the camera of an agent: above `pose`, `height_m` over the floor (houses have one
+    /// floor, at y = 0, so the pose's own height, 0.9 m in AI2-THOR and 0 elsewhere, does not
+    /// matter).
     pub fn at(pose: &Pose, image_px: [usize; 2], vertical_fov_rad: f64, height_m: f64) -> Self {
         let [x, _, z] = pose.position_m;
         Self {
@@ -59,7 +60,7 @@ impl Camera {
         }
     }
 
-    /// Checks that an image can be formed.
+    /// Check that an image can be formed.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a side is 0 or above [`MAX_SIDE_PX`], the field of view not
@@ -78,17 +79,17 @@ impl Camera {
         Error::require("horizon_rad", self.horizon_rad, "finite", f64::is_finite)
     }
 
-    /// Focal length in pixels, the same along both axes.
+    /// Return the focal length in pixels, the same along both axes.
     pub fn focal_px(&self) -> f64 {
         self.height_px as f64 / 2.0 / (self.vertical_fov_rad / 2.0).tan()
     }
 
-    /// Principal point `[u, v]`: the middle of the image.
+    /// Return the principal point `[u, v]`: the middle of the image.
     pub fn centre_px(&self) -> Vec2 {
         [self.width_px as f64 / 2.0, self.height_px as f64 / 2.0]
     }
 
-    /// Rows are the camera's right, down and forward axes in the world frame.
+    /// Return the rows are the camera's right, down and forward axes in the world frame.
     pub fn camera_from_world(&self) -> Mat3 {
         let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
         let (sin_pitch, cos_pitch) = self.horizon_rad.sin_cos();
@@ -99,7 +100,7 @@ impl Camera {
         ]
     }
 
-    /// `[u, v, depth_m]` of a world point: image coordinates in pixels and planar depth.
+    /// Return `[u, v, depth_m]` of a world point: image coordinates in pixels and planar depth.
     ///
     /// # Returns
     /// `None` for points that are not in front of the camera; the image's borders are not checked.
@@ -110,13 +111,14 @@ impl Camera {
         (z > 0.0).then_some([centre_u + scale * x, centre_v + scale * y, z])
     }
 
-    /// World point at planar depth `depth_m` behind image coordinates `[u, v]`; a pixel's own
-    /// are `[col + 0.5, row + 0.5]`. The inverse of [`Self::project`].
+    /// Return the world point at planar depth `depth_m` behind image coordinates `[u, v]`; a
+    /// pixel's own are `[col + 0.5, row + 0.5]`. The inverse of [`Self::project`].
     pub fn unproject(&self, image_px: Vec2, depth_m: f64) -> Vec3 {
         add(self.position_m, self.ray(image_px).map(|d| d * depth_m))
     }
 
-    /// World points behind a whole depth image, row-major; not finite where its depth is not.
+    /// Return the world points behind a whole depth image, row-major; not finite where its depth is
+    /// not.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the image's size is not the camera's, and as [`Self::check`].
@@ -130,7 +132,7 @@ impl Camera {
         Ok(points.map(|(i, &depth)| self.unproject(centre(i), f64::from(depth))).collect())
     }
 
-    /// [`Self::project`] of many points; NaN for those that are not in front of the camera.
+    /// Return [`Self::project`] of many points; NaN for those that are not in front of the camera.
     ///
     /// # Errors
     /// As [`Self::check`].
@@ -139,7 +141,8 @@ impl Camera {
         Ok(points_m.iter().map(|&p| self.project(p).unwrap_or([f64::NAN; 3])).collect())
     }
 
-    /// World direction through image coordinates `[u, v]`, of length 1 along the optical axis.
+    /// Return the world direction through image coordinates `[u, v]`, of length 1 along the optical
+    /// axis.
     pub fn ray(&self, image_px: Vec2) -> Vec3 {
         let ([centre_u, centre_v], focal_px) = (self.centre_px(), self.focal_px());
         let local = [(image_px[0] - centre_u) / focal_px, (image_px[1] - centre_v) / focal_px, 1.0];
@@ -173,7 +176,7 @@ impl From<Camera> for View {
 }
 
 impl View {
-    /// Checks that an image can be formed.
+    /// Check that an image can be formed.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] as [`Camera::check`], or if the clip planes are not finite,
@@ -195,7 +198,7 @@ impl View {
         )
     }
 
-    /// Rows are the image's right, down and forward axes in the world frame.
+    /// Return the rows are the image's right, down and forward axes in the world frame.
     pub fn axes(&self) -> Mat3 {
         let [right, down, forward] = self.camera.camera_from_world();
         let (sin, cos) = self.roll_rad.sin_cos();
@@ -205,8 +208,8 @@ impl View {
             forward,
         ]
     }
-    /// Whether a point is in front of the camera and inside the image's borders; the clip planes
-    /// do not count.
+    /// Return whether a point is in front of the camera and inside the image's borders; the clip
+    /// planes do not count.
     pub fn frames(&self, point_m: Vec3) -> bool {
         let [x, y, z] = rotate(&self.axes(), sub(point_m, self.camera.position_m));
         let [half_width_px, half_height_px] = self.camera.centre_px();

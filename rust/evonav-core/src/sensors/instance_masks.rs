@@ -20,7 +20,7 @@ pub struct Masks {
     pub instances: Vec<usize>,
 }
 
-/// Renumbers an instance image: detections count up in the order of their first pixel, so their
+/// Renumber an instance image: detections count up in the order of their first pixel, so their
 /// numbers say nothing about which instance they are.
 ///
 /// # Arguments
@@ -82,7 +82,7 @@ pub fn number_instances(
     Ok(Masks { labels, instances: order })
 }
 
-/// How many pixels each instance has: what an evaluator takes for in view.
+/// Return how many pixels each instance has: what an evaluator takes for in view.
 ///
 /// # Arguments
 /// * `image` - 0 where nothing is, else 1 + index of the instance.
@@ -109,7 +109,7 @@ pub fn instance_areas(image: &[i32], num_instances: usize) -> Result<Vec<i64>, E
     Ok(areas)
 }
 
-/// Area and bounding box of each mask.
+/// Return the area and bounding box of each mask.
 ///
 /// # Arguments
 /// * `masks` - row-major, `width_px` a row; negative where nothing is.
@@ -141,7 +141,7 @@ pub fn mask_extents(
     Ok(extents)
 }
 
-/// Stretches of equal pixels, each with the place of its first and one past its last.
+/// Return the stretches of equal pixels, each with the place of its first and one past its last.
 pub(crate) fn runs(pixels: &[i32]) -> impl Iterator<Item = (i32, [usize; 2])> {
     let mut end = 0;
     pixels.chunk_by(|a, b| a == b).map(move |run| {
@@ -165,7 +165,7 @@ pub struct Extent {
 impl Extent {
     const EMPTY: Self = Self { area_px: 0, rows: [0; 2], cols: [0; 2] };
 
-    /// Adds part of a row that is no higher than those before.
+    /// Add part of a row that is no higher than those before.
     fn add(&mut self, row: usize, cols: [usize; 2]) {
         *self = if self.area_px == 0 {
             Self { area_px: cols[1] - cols[0], rows: [row, row + 1], cols }

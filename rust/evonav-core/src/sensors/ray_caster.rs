@@ -31,7 +31,7 @@ pub struct Hit {
 }
 
 impl RayCaster {
-    /// Builds the hierarchy; `mesh` must be passed to the queries as well.
+    /// Build the hierarchy; `mesh` must be passed to the queries as well.
     pub fn build(mesh: &SceneMesh) -> Self {
         let vector = |v: Vec3| Vector::new(v[0], v[1], v[2]);
         let boxes: Vec<Aabb> = mesh
@@ -42,7 +42,7 @@ impl RayCaster {
         Self { bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes) }
     }
 
-    /// First surface that a ray meets, within `max_distance` multiples of `direction`.
+    /// Return the first surface that a ray meets, within `max_distance` multiples of `direction`.
     ///
     /// As in images, faces are seen from outside only: a ray that starts inside a part leaves it
     /// unhindered.
@@ -73,8 +73,9 @@ impl RayCaster {
         Some(Hit { distance, body: mesh.parts[part as usize].body as usize })
     }
 
-    /// Whether nothing stands between two points, bodies for which `ignores` holds left aside
-    /// (an object is not in the way of a look at itself). Points that are not finite see nothing.
+    /// Return whether nothing stands between two points, bodies for which `ignores` holds left
+    /// aside (an object is not in the way of a look at itself). Points that are not finite see
+    /// nothing.
     pub fn is_visible(
         &self,
         mesh: &SceneMesh,
@@ -97,7 +98,7 @@ impl RayCaster {
     }
 }
 
-/// Where a ray enters a part, if nearer than `nearest`.
+/// Return where a ray enters a part, if nearer than `nearest`.
 fn enter(
     mesh: &SceneMesh,
     part: usize,
@@ -119,7 +120,7 @@ fn enter(
     mesh.faces[part.faces.clone()].iter().filter_map(distance_to).min_by(f64::total_cmp)
 }
 
-/// Whether a point of a face's plane lies within its edges.
+/// Return whether a point of a face's plane lies within its edges.
 fn contains(corners: &[u32], vertices_m: &[Vec3], normal: Vec3, point_m: Vec3) -> bool {
     let next = corners.iter().cycle().skip(1);
     corners.iter().zip(next).all(|(&a, &b)| {

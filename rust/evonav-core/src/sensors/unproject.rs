@@ -19,7 +19,7 @@ pub struct MaskedDepth<'a> {
     pub masks: &'a [i32],
 }
 
-/// The points behind the pixels of each detection.
+/// Return the points behind the pixels of each detection.
 ///
 /// # Arguments
 /// * `num_detections` - masks count from 0 to one less.

@@ -22,9 +22,9 @@ const MAX_POINTS: usize = 200;
 /// AI2-THOR casts its rays this far beyond the point.
 const BEYOND_M: f64 = 0.5;
 
-/// Bodies that an agent sees by AI2-THOR's rule (`visibilityScheme` "Collider", its default):
-/// something of the body is within `max_distance_m` of the agent's axis on the ground plane, and
-/// one of its visibility points is inside the picture with nothing else before it.
+/// Return the bodies that an agent sees by AI2-THOR's rule (`visibilityScheme` "Collider", its
+/// default): something of the body is within `max_distance_m` of the agent's axis on the ground
+/// plane, and one of its visibility points is inside the picture with nothing else before it.
 ///
 /// The points themselves may be farther away than `max_distance_m`, as AI2-THOR's may. Ceilings
 /// are left out: AI2-THOR knows no objects there.
@@ -79,7 +79,7 @@ pub fn visible_bodies(
     Ok((0..scene.bodies.len()).filter(is_seen).collect())
 }
 
-/// Whether some part of a body is within reach of an upright axis.
+/// Return whether some part of a body is within reach of an upright axis.
 fn is_near(scene: &Scene, index: usize, axis_m: Vec2, reach_m: f64) -> bool {
     let body = &scene.bodies[index];
     let gap_m = |axis: usize, at: f64| {
@@ -93,9 +93,9 @@ fn is_near(scene: &Scene, index: usize, axis_m: Vec2, reach_m: f64) -> bool {
         })
 }
 
-/// Points by which a body is seen: on a grid of about 0.3 m over its four-sided faces, in the
-/// middle of all others, and just inside the corners of all. Of more than 200 every second, third
-/// ... is taken.
+/// Return the points by which a body is seen: on a grid of about 0.3 m over its four-sided faces,
+/// in the middle of all others, and just inside the corners of all. Of more than 200 every second,
+/// third ... is taken.
 ///
 /// The corners matter for what the border of the picture or a body before it cuts: 4 of 14 objects
 /// that AI2-THOR is recorded to call visible show no middle of a face.
@@ -120,14 +120,14 @@ pub fn visibility_points(mesh: &SceneMesh, body: usize) -> Vec<Vec3> {
     points_m.into_iter().step_by(step).collect()
 }
 
-/// Points of a face just inside its corners.
+/// Return the points of a face just inside its corners.
 fn push_corners(points_m: &mut Vec<Vec3>, count: usize, at: impl Fn(usize) -> Vec3) {
     let middle_m = weighted((0..count).map(|i| (1.0 / count as f64, at(i))));
     let inside = |i| weighted([(INSIDE, at(i)), (1.0 - INSIDE, middle_m)].into_iter());
     points_m.extend((0..count).map(inside));
 }
 
-/// Centres of the cells of a grid over a face with four corners.
+/// Return the centres of the cells of a grid over a face with four corners.
 fn push_grid(points_m: &mut Vec<Vec3>, [a, b, c, d]: [Vec3; 4]) {
     let count = |from: Vec3, to: Vec3| {
         let length_m = sub(to, from).map(|v| v * v).iter().sum::<f64>().sqrt();

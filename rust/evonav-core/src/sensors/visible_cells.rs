@@ -18,7 +18,7 @@ const MIN_BEAM: f64 = 1e-9;
 /// An origin on the border of its cell is moved this far inside, in cells.
 const BORDER: f64 = 1e-6;
 
-/// Cells that the rays of a planar field of view reach.
+/// Return the cells that the rays of a planar field of view reach.
 ///
 /// Every direction is cast, not a sample of them: a cell is visible if a beam of non-zero width
 /// enters it within `range_m` and crosses no blocked cell before. The cell of the origin is
@@ -75,7 +75,7 @@ pub fn visible_cells(
 /// A closed range of directions inside one quadrant, as `v / (u + v)`: 0 along u, 1 along v.
 type Beam = [f64; 2];
 
-/// The part of the field of view inside quadrant `quadrant` (directions from `quadrant` to
+/// Return the part of the field of view inside quadrant `quadrant` (directions from `quadrant` to
 /// `quadrant + 1` quarter turns); two parts if the field begins and ends there.
 fn beams_in_quadrant(quadrant: u8, first_rad: f64, fov_rad: f64) -> Vec<Beam> {
     let low = f64::from(quadrant) * FRAC_PI_2;
@@ -105,7 +105,7 @@ struct Quadrant {
 }
 
 impl Quadrant {
-    /// `offset`: the origin in its cell along rows and columns, in cells.
+    /// Return `offset`: the origin in its cell along rows and columns, in cells.
     fn new(quadrant: u8, offset: [f64; 2]) -> Self {
         let (up, right, down, left) = ([1, 0], [0, 1], [-1, 0], [0, -1]);
         let steps = match quadrant {
@@ -121,12 +121,13 @@ impl Quadrant {
         Self { steps, inside }
     }
 
-    /// Distance in cells, along one axis, from the origin to the near side of the `index`-th cell.
+    /// Return the distance in cells, along one axis, from the origin to the near side of the
+    /// `index`-th cell.
     fn near(&self, axis: usize, index: usize) -> f64 {
         (index as f64 - self.inside[axis]).max(0.0)
     }
 
-    /// Whether a ray of `beam` enters cell `[i, j]` of (u, v) within `range` cells.
+    /// Return whether a ray of `beam` enters cell `[i, j]` of (u, v) within `range` cells.
     fn is_within(&self, cell: [usize; 2], beam: Beam, range: f64) -> bool {
         let [u, v] = [self.near(0, cell[0]), self.near(1, cell[1])];
         let range2 = range * range;
@@ -177,7 +178,8 @@ impl<'a> View<'a> {
         view
     }
 
-    /// Whether a cell lets no ray pass; what lies outside the window lies off the grid or out of range.
+    /// Return whether a cell lets no ray pass; what lies outside the window lies off the grid or
+    /// out of range.
     fn is_opaque(&self, cell: [i64; 2]) -> bool {
         match self.window_index(cell) {
             Some(_) => self.blocked[cell[0] as usize * self.spec.cols + cell[1] as usize] != 0,
@@ -238,7 +240,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Marks the cell seen if it lies within range; whether it stops the beam.
+    /// Mark the cell seen if it lies within range; whether it stops the beam.
     fn reach(&mut self, quadrant: &Quadrant, at: [usize; 2], beam: Beam) -> bool {
         let cell = [0, 1].map(|axis| {
             self.own[axis] as i64

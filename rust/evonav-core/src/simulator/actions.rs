@@ -19,7 +19,7 @@ pub enum Action {
 }
 
 impl Action {
-    /// The action of a number: 0 to 3, in the order of the variants.
+    /// Return the action of a number: 0 to 3, in the order of the variants.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] for any other number.
@@ -43,7 +43,7 @@ pub struct Strides {
     pub turn_rad: f64,
 }
 
-/// Where an action takes an agent; `None` when it collides.
+/// Return where an action takes an agent; `None` when it collides.
 pub fn act(
     world: &EmbeddedSimulator,
     pose: &Pose,
@@ -67,7 +67,8 @@ pub fn act(
     }
 }
 
-/// The pose of an agent set down at `[x, z]`, looking along `yaw_rad`; `None` where it does not fit.
+/// Return the pose of an agent set down at `[x, z]`, looking along `yaw_rad`; `None` where it does
+/// not fit.
 pub fn set_down(
     world: &EmbeddedSimulator,
     pose: &Pose,
@@ -82,13 +83,13 @@ pub fn set_down(
     })
 }
 
-/// A yaw in `[0, 2 pi)`, rounded to 1e-4 degrees: `evonav.world.pose.canonical_yaw_rad`.
+/// Return a yaw in `[0, 2 pi)`, rounded to 1e-4 degrees: `evonav.world.pose.canonical_yaw_rad`.
 pub fn canonical_yaw_rad(yaw_rad: f64) -> f64 {
     rounded_deg(yaw_rad.to_degrees().rem_euclid(360.0)).rem_euclid(360.0).to_radians()
 }
 
-/// The double nearest to a decimal of four places, which is the one nearest to `angle_deg`: what
-/// Python's `round(angle_deg, 4)` gives.
+/// Return the double nearest to a decimal of four places, which is the one nearest to `angle_deg`:
+/// what Python's `round(angle_deg, 4)` gives.
 fn rounded_deg(angle_deg: f64) -> f64 {
     let parts = angle_deg * PARTS_PER_DEG;
     let whole = parts.round_ties_even();

@@ -73,7 +73,7 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// A batch of `num_slots` agents that are nowhere yet: [`Self::place`] is next.
+    /// Return a batch of `num_slots` agents that are nowhere yet: [`Self::place`] is next.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there are no agents or no threads, or too many;
@@ -96,17 +96,17 @@ impl Batch {
         Ok(Self { config, slots: vec![None; num_slots], pool, frames })
     }
 
-    /// Number of agents.
+    /// Return the number of agents.
     pub fn num_slots(&self) -> usize {
         self.slots.len()
     }
 
-    /// What all agents have in common.
+    /// Return what all agents have in common.
     pub fn config(&self) -> &BatchConfig {
         &self.config
     }
 
-    /// Puts an agent into a house; its pose is taken as it is.
+    /// Put an agent into a house; its pose is taken as it is.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there is no such agent, or the house has another image size or
@@ -125,7 +125,7 @@ impl Batch {
         Ok(())
     }
 
-    /// Gives an agent a goal, or takes it away.
+    /// Give an agent a goal, or takes it away.
     ///
     /// # Errors
     /// As [`Self::slot`].
@@ -135,7 +135,7 @@ impl Batch {
         Ok(())
     }
 
-    /// An agent.
+    /// Return an agent.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there is no such agent; [`Error::Simulation`] if it is nowhere.
@@ -144,7 +144,7 @@ impl Batch {
         slot.as_ref().ok_or_else(|| nowhere(index))
     }
 
-    /// Carries out one action an agent; one that collides leaves its agent where it is.
+    /// Carry out one action an agent; one that collides leaves its agent where it is.
     ///
     /// # Arguments
     /// * `actions` - by agent, a number of [`Action::of`].
@@ -172,8 +172,8 @@ impl Batch {
         Ok(each(pool, slots.into_iter().zip(actions).collect(), one))
     }
 
-    /// Shortest paths to one target an agent, and where a target is cut off, to the position
-    /// nearest to it that the agent could reach along a grid when one first was.
+    /// Return the shortest paths to one target an agent, and where a target is cut off, to the
+    /// position nearest to it that the agent could reach along a grid when one first was.
     ///
     /// # Returns
     /// By agent, corners, both ends included; empty where there is no way, or `target_m` is `None`.
@@ -194,7 +194,7 @@ impl Batch {
             .collect()
     }
 
-    /// [`Self::plan`] of one agent.
+    /// Return [`Self::plan`] of one agent.
     ///
     /// # Errors
     /// As [`Self::slot`].
@@ -203,7 +203,7 @@ impl Batch {
         self.placed_mut(index)?.plan(target_m, grid_m)
     }
 
-    /// Sets an agent down at points in turn, as far as it fits.
+    /// Set an agent down at points in turn, as far as it fits.
     ///
     /// # Arguments
     /// * `stops` - `[x, z]` and yaw of each.
@@ -224,7 +224,7 @@ impl Batch {
         Ok(stops.len())
     }
 
-    /// What every agent sees.
+    /// Return what every agent sees.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if an array is not of the batch's size, or a house's labels or
@@ -292,13 +292,13 @@ impl Batch {
     }
 }
 
-/// All agents, if none is nowhere.
+/// Return all agents, if none is nowhere.
 fn placed(slots: &mut [Option<Slot>]) -> Result<Vec<&mut Slot>, Error> {
     let slots = slots.iter_mut().enumerate();
     slots.map(|(index, slot)| slot.as_mut().ok_or_else(|| nowhere(index))).collect()
 }
 
-/// An image's share of an array for each agent.
+/// Return an image's share of an array for each agent.
 fn parts<'a, T>(
     name: &str,
     array: Option<&'a mut [T]>,
@@ -313,7 +313,7 @@ fn parts<'a, T>(
     Ok(array.chunks_exact_mut(num_elements).map(Some).collect())
 }
 
-/// Does every job, in the pool's threads if there is one; results are in the jobs' order.
+/// Do every job, in the pool's threads if there is one; results are in the jobs' order.
 fn each<T: Send, U: Send>(
     pool: Option<&ThreadPool>,
     jobs: Vec<T>,

@@ -34,12 +34,12 @@ pub struct Slot {
 }
 
 impl Slot {
-    /// An agent in a house, without a goal.
+    /// Return an agent in a house, without a goal.
     pub fn new(world: Arc<EmbeddedSimulator>, pose: Pose, labels: Arc<[u8]>) -> Self {
         Self { world, pose, labels, field: None, known_m: None, reachable_m: None }
     }
 
-    /// Where it stands and looks.
+    /// Return where it stands and looks.
     pub fn pose(&self) -> Pose {
         self.pose
     }
@@ -49,7 +49,7 @@ impl Slot {
         [x_m, z_m]
     }
 
-    /// Length of the shortest path to the goal, infinite if there is none or no field.
+    /// Return the length of the shortest path to the goal, infinite if there is none or no field.
     pub fn distance_m(&self) -> f64 {
         if let Some(known_m) = self.known_m {
             return known_m;
@@ -57,7 +57,7 @@ impl Slot {
         self.field.as_ref().map_or(f64::INFINITY, |field| field.distance_m(self.point_m()))
     }
 
-    /// Moves the agent.
+    /// Move the agent.
     pub(super) fn go(&mut self, pose: Pose) {
         if pose.position_m != self.pose.position_m {
             self.known_m = None;
@@ -65,9 +65,9 @@ impl Slot {
         self.pose = pose;
     }
 
-    /// Corners of the shortest path to a point, or to the reachable position nearest to it where it
-    /// is cut off; empty if there is none. Where steps of the grid reach nothing near, free cells
-    /// of the house's occupancy are tried, nearest first.
+    /// Return the corners of the shortest path to a point, or to the reachable position nearest to
+    /// it where it is cut off; empty if there is none. Where steps of the grid reach nothing near,
+    /// free cells of the house's occupancy are tried, nearest first.
     pub(super) fn plan(&mut self, target_m: Vec2, grid_m: f64) -> Result<Vec<Vec2>, Error> {
         let (navigation, here_m) = (self.world.navigation(), self.point_m());
         if let Some(path_m) = navigation.shortest_path(here_m, target_m) {
@@ -96,7 +96,8 @@ impl Slot {
         Ok(path_m.unwrap_or_default())
     }
 
-    /// Middles of the cells that the agent's body reaches from the house's start, row-major.
+    /// Return the middles of the cells that the agent's body reaches from the house's start,
+    /// row-major.
     fn free_centres_m(&self) -> Result<Vec<Vec2>, Error> {
         let (spec, cells) = self.world.occupancy(OCCUPANCY_CELL_M)?;
         let middle_m = |index: usize, axis: usize| {

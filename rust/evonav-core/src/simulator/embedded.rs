@@ -59,7 +59,7 @@ pub struct EmbeddedSimulator {
 }
 
 impl EmbeddedSimulator {
-    /// Instantiates a house.
+    /// Instantiate a house.
     ///
     /// # Errors
     /// [`Error::House`] for unknown assets, [`Error::InvalidArgument`] for the camera or the body,
@@ -70,7 +70,7 @@ impl EmbeddedSimulator {
         Self::assemble(house, config, scene, navigation)
     }
 
-    /// This house after a change, as a new simulator; only what moved is built again.
+    /// Return this house after a change, as a new simulator; only what moved is built again.
     ///
     /// # Errors
     /// Those of [`House::apply`] and [`Self::new`].
@@ -103,61 +103,61 @@ impl EmbeddedSimulator {
         Ok(simulator)
     }
 
-    /// The house file.
+    /// Return the house file.
     pub fn house(&self) -> &House {
         &self.house
     }
 
-    /// Columns and rows of images.
+    /// Return the columns and rows of images.
     pub fn image_px(&self) -> [usize; 2] {
         self.config.image_px
     }
 
-    /// Everything in the house, in instance order.
+    /// Return the everything in the house, in instance order.
     pub fn bodies(&self) -> &[Body] {
         &self.scene.bodies
     }
 
-    /// The bodies and their bounds.
+    /// Return the bodies and their bounds.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// All surfaces.
+    /// Return all surfaces.
     pub fn mesh(&self) -> &SceneMesh {
         &self.mesh
     }
 
-    /// Free space.
+    /// Return the free space.
     pub fn navigation(&self) -> &Navigation {
         &self.navigation
     }
 
-    /// The house's own start pose, moved to the nearest place where the agent fits; the middle of
-    /// a house that names none.
+    /// Return the house's own start pose, moved to the nearest place where the agent fits; the
+    /// middle of a house that names none.
     pub fn start(&self) -> Pose {
         let given = self.house.start.map(|start| [start.yaw_deg, start.horizon_deg]);
         let [yaw_rad, horizon_rad] = given.unwrap_or(DEFAULT_LOOK_DEG).map(f64::to_radians);
         Pose { position_m: self.body_position_m(self.start_m), yaw_rad, horizon_rad }
     }
 
-    /// AI2-THOR's agent position over a point of the floor: the middle of the body.
+    /// Return AI2-THOR's agent position over a point of the floor: the middle of the body.
     pub fn body_position_m(&self, point_m: Vec2) -> Vec3 {
         [point_m[0], self.config.agent.height_m / 2.0, point_m[1]]
     }
 
-    /// The camera of an agent at `pose`, whose own height does not matter.
+    /// Return the camera of an agent at `pose`, whose own height does not matter.
     pub fn camera(&self, pose: &Pose) -> Camera {
         let SimulatorConfig { image_px, vertical_fov_rad, camera_height_m, .. } = self.config;
         Camera::at(pose, image_px, vertical_fov_rad, camera_height_m)
     }
 
-    /// What the camera of an agent at `pose` draws.
+    /// Return what the camera of an agent at `pose` draws.
     pub fn view(&self, pose: &Pose) -> View {
         View { clip_m: self.config.clip_m, ..View::from(self.camera(pose)) }
     }
 
-    /// What any camera sees, the agent's ([`Self::view`]) or another.
+    /// Return what any camera sees, the agent's ([`Self::view`]) or another.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] as [`View::check`].
@@ -165,13 +165,13 @@ impl EmbeddedSimulator {
         render_view(&self.mesh, view, want, out)
     }
 
-    /// Whether an agent fits at `[x, z]` and can walk there from the house's start.
+    /// Return whether an agent fits at `[x, z]` and can walk there from the house's start.
     pub fn is_reachable(&self, point_m: Vec2) -> bool {
         self.navigation.is_connected(self.start_m, point_m)
     }
 
-    /// The oracle occupancy: a grid over the house, and its cells ([`Navigation::occupancy`] from
-    /// the house's start).
+    /// Return the oracle occupancy: a grid over the house, and its cells ([`Navigation::occupancy`]
+    /// from the house's start).
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if `cell_m` is below 0.01, not finite, or needs too large a grid.
@@ -180,12 +180,12 @@ impl EmbeddedSimulator {
         Ok((spec, self.navigation.occupancy(&spec, self.start_m)?))
     }
 
-    /// Whether nothing is between two points but the bodies in `ignored` (indices).
+    /// Return whether nothing is between two points but the bodies in `ignored` (indices).
     pub fn is_visible(&self, from_m: Vec3, to_m: Vec3, ignored: &[usize]) -> bool {
         self.rays().is_visible(&self.mesh, from_m, to_m, |body| ignored.contains(&body))
     }
 
-    /// Indices of the bodies that AI2-THOR would call visible to an agent at `agent_m`.
+    /// Return the indices of the bodies that AI2-THOR would call visible to an agent at `agent_m`.
     ///
     /// # Errors
     /// As [`visible_bodies`].
@@ -203,7 +203,7 @@ impl EmbeddedSimulator {
     }
 }
 
-/// The house's start, or the free place nearest to it.
+/// Return the house's start, or the free place nearest to it.
 fn start_of(house: &House, scene: &Scene, navigation: &Navigation) -> Result<Vec2, Error> {
     let [x, _, z] = house.start.map_or_else(|| scene.bounds.centre_m(), |start| start.position_m);
     let anywhere = || {

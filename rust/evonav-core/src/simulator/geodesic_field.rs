@@ -26,7 +26,7 @@ pub struct GeodesicField {
 }
 
 impl GeodesicField {
-    /// Distances to `source_m`, or to the free point nearest to it.
+    /// Return the distances to `source_m`, or to the free point nearest to it.
     ///
     /// # Errors
     /// [`Error::Simulation`] if no free point is near.
@@ -37,7 +37,7 @@ impl GeodesicField {
         Ok(Self { world, field })
     }
 
-    /// Length of the shortest path from a point, infinite where there is none.
+    /// Return the length of the shortest path from a point, infinite where there is none.
     pub fn distance_m(&self, point_m: Vec2) -> f64 {
         self.world.navigation().field_distance_m(&self.field, point_m)
     }

@@ -42,7 +42,7 @@ impl Default for BevConfig {
 }
 
 impl BevConfig {
-    /// Checks the values.
+    /// Check the values.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming the first field outside its domain.

@@ -26,7 +26,7 @@ pub struct BevMap {
 }
 
 impl BevMap {
-    /// A map of nothing, centred on `centre_m`.
+    /// Return a map of nothing, centred on `centre_m`.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] as [`BevConfig::check`], if the centre is not finite, or for more
@@ -54,32 +54,32 @@ impl BevMap {
         })
     }
 
-    /// Shape and place.
+    /// Return the shape and place.
     pub fn spec(&self) -> &GridSpec {
         &self.spec
     }
 
-    /// Cells where something was once seen that stands in the way.
+    /// Return the cells where something was once seen that stands in the way.
     pub fn obstacles(&self) -> &BitGrid {
         &self.obstacles
     }
 
-    /// Cells where something was seen at any height.
+    /// Return the cells where something was seen at any height.
     pub fn explored(&self) -> &BitGrid {
         &self.explored
     }
 
-    /// Cells where the agent has been.
+    /// Return the cells where the agent has been.
     pub fn visited(&self) -> &BitGrid {
         &self.visited
     }
 
-    /// Cells that moves have failed at.
+    /// Return the cells that moves have failed at.
     pub fn collisions(&self) -> &BitGrid {
         &self.collisions
     }
 
-    /// Certainty of a category in each cell, row-major, 0 to 1.
+    /// Return the certainty of a category in each cell, row-major, 0 to 1.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there is no such category.
@@ -95,7 +95,7 @@ impl BevMap {
         Ok(counts.iter().map(|&count| f32::from(count) / most).collect())
     }
 
-    /// Adds what one view shows.
+    /// Add what one view shows.
     ///
     /// A point spreads over the eight voxels around it. A cell is explored if its column of voxels
     /// has a point at any height, an obstacle if it has one between `obstacle_min_m` and the
@@ -138,7 +138,7 @@ impl BevMap {
         Ok(())
     }
 
-    /// Marks the cells of a straight way visited; what lies off the map is left out.
+    /// Mark the cells of a straight way visited; what lies off the map is left out.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a number is not finite.
@@ -159,7 +159,7 @@ impl BevMap {
         Ok(())
     }
 
-    /// Marks cells that a move failed at; those off the map are left out.
+    /// Mark cells that a move failed at; those off the map are left out.
     pub fn collide(&mut self, cells: &[[usize; 2]]) {
         cells.iter().for_each(|cell| self.collisions.insert(cell[0], cell[1]));
     }
@@ -172,7 +172,7 @@ impl BevMap {
         }
     }
 
-    /// The cell of a place.
+    /// Return the cell of a place.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if it is off the map.
@@ -181,8 +181,9 @@ impl BevMap {
         self.spec.cell_of(point_m).ok_or_else(off)
     }
 
-    /// Cells that a path may cross: all but obstacles grown by `radius` cells; where the agent has
-    /// been is free, where a move failed is not, and the 3 x 3 cells around the agent are.
+    /// Return the cells that a path may cross: all but obstacles grown by `radius` cells; where the
+    /// agent has been is free, where a move failed is not, and the 3 x 3 cells around the agent
+    /// are.
     pub fn traversable(&self, agent: [usize; 2], radius: usize) -> BitGrid {
         let mut blocked = dilate_disk(&self.obstacles, radius);
         blocked.subtract(&self.visited);
@@ -196,7 +197,7 @@ impl BevMap {
         blocked
     }
 
-    /// The rectangle around everything known and `cells`, grown by `margin` cells.
+    /// Return the rectangle around everything known and `cells`, grown by `margin` cells.
     pub fn window(&self, cells: &[[usize; 2]], margin: usize) -> Window {
         let known = self.known.iter().flatten().chain(cells);
         let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
@@ -212,7 +213,8 @@ impl BevMap {
         Window { first, shape: [0, 1].map(|i| end[i].saturating_sub(first[i])) }
     }
 
-    /// Cells that the marked pixels of a view lie in, each once, row-major; off-map ones left out.
+    /// Return the cells that the marked pixels of a view lie in, each once, row-major; off-map ones
+    /// left out.
     ///
     /// # Errors
     /// As [`Self::integrate`], for a mask of another size.

@@ -16,7 +16,7 @@ pub struct Strip {
     pub width: usize,
 }
 
-/// Cells of the map that a strip covers (UniGoal marks them blocked when a move fails).
+/// Return the cells of the map that a strip covers (UniGoal marks them blocked when a move fails).
 ///
 /// # Returns
 /// `[row, col]`, nearest first, some perhaps twice; what lies off the map is left out.

@@ -51,7 +51,8 @@ pub struct ScoredCell {
     pub score: f64,
 }
 
-/// Explored cells off obstacles that touch unknown ones, in 8-connected groups of some size.
+/// Return the explored cells off obstacles that touch unknown ones, in 8-connected groups of some
+/// size.
 pub fn frontier_cells(map: &BevMap, config: &ExploreConfig) -> BitGrid {
     let near_obstacles = dilate_disk(map.obstacles(), config.frontier_obstacle_radius);
     let mut free = map.explored().clone();
@@ -64,7 +65,7 @@ pub fn frontier_cells(map: &BevMap, config: &ExploreConfig) -> BitGrid {
     keep_large(frontier, config.min_cells)
 }
 
-/// The 8-connected groups of at least `min_cells` cells.
+/// Return the 8-connected groups of at least `min_cells` cells.
 pub fn keep_large(mut cells: BitGrid, min_cells: usize) -> BitGrid {
     let mut kept = BitGrid::new(cells.rows(), cells.cols());
     let all: Vec<[usize; 2]> = cells.cells().collect();
@@ -93,8 +94,8 @@ pub fn keep_large(mut cells: BitGrid, min_cells: usize) -> BitGrid {
     kept
 }
 
-/// The frontier cell to explore from `agent`, mostly the nearest; `goal` decides among those about
-/// as near.
+/// Return the frontier cell to explore from `agent`, mostly the nearest; `goal` decides among those
+/// about as near.
 ///
 /// # Returns
 /// `None` if no frontier can be reached that is far enough away; of equals the first in row-major

@@ -14,7 +14,7 @@ pub struct Window {
 }
 
 impl Window {
-    /// Place of a cell in row-major storage of the window; `None` outside.
+    /// Return the place of a cell in row-major storage of the window; `None` outside.
     pub fn index(&self, cell: [usize; 2]) -> Option<usize> {
         let row = cell[0].checked_sub(self.first[0])?;
         let col = cell[1].checked_sub(self.first[1])?;
@@ -34,7 +34,8 @@ pub struct Field {
 }
 
 impl Field {
-    /// Distance of a cell in cells; infinite outside the window and where the front did not come.
+    /// Return the distance of a cell in cells; infinite outside the window and where the front did
+    /// not come.
     pub fn at(&self, cell: [usize; 2]) -> f32 {
         self.window.index(cell).map_or(f32::INFINITY, |index| self.distances[index])
     }
@@ -55,8 +56,8 @@ const WALL: u8 = 0;
 const FAR: u8 = 1;
 const ACCEPTED: u8 = 2;
 
-/// Distances from the nearest seed over passable cells: the eikonal equation by second-order
-/// upwind differences, cells accepted in the order of their distance.
+/// Return the distances from the nearest seed over passable cells: the eikonal equation by
+/// second-order upwind differences, cells accepted in the order of their distance.
 ///
 /// # Arguments
 /// * `passable` - cells that the front may cross.
@@ -112,7 +113,7 @@ pub fn march(passable: &BitGrid, seeds: &BitGrid, window: Window, until: Until<'
     front.into_field(last)
 }
 
-/// Passable cells 4-connected with `start`, which counts as passable.
+/// Return the passable cells 4-connected with `start`, which counts as passable.
 pub fn flood(passable: &BitGrid, start: [usize; 2], window: Window) -> BitGrid {
     let mut reached = BitGrid::new(passable.rows(), passable.cols());
     let mut stack = vec![start];
@@ -181,7 +182,7 @@ impl Front {
         [0, 1].map(|i| cell[i] - PAD + self.window.first[i])
     }
 
-    /// Marks the cells to stop at, and says how many of them have to be reached.
+    /// Mark the cells to stop at, and says how many of them have to be reached.
     fn aim(&mut self, until: Until<'_>) -> Option<usize> {
         let ends: Vec<usize> = match until {
             Until::Never => return None,
@@ -203,8 +204,8 @@ impl Front {
         self.queue.push(Reverse(u64::from(distance.to_bits()) << 32 | index as u64));
     }
 
-    /// Seeds at 0, and their diagonal neighbours at their true distance: upwind differences alone
-    /// would put them at 1.71.
+    /// Return the seeds at 0, and their diagonal neighbours at their true distance: upwind
+    /// differences alone would put them at 1.71.
     fn seed(&mut self, seeds: &BitGrid) {
         let indices: Vec<usize> = seeds.cells().filter_map(|cell| self.padded(cell)).collect();
         for &index in &indices {
@@ -224,7 +225,7 @@ impl Front {
         }
     }
 
-    /// Brings a cell's distance up to date with its accepted neighbours.
+    /// Bring a cell's distance up to date with its accepted neighbours.
     fn update(&mut self, index: usize) {
         if self.states[index] != FAR {
             return;
@@ -237,7 +238,8 @@ impl Front {
         }
     }
 
-    /// Along one axis: weight and offset of `weight * (d - offset)^2`, and the plain neighbour.
+    /// Return the along one axis: weight and offset of `weight * (d - offset)^2`, and the plain
+    /// neighbour.
     fn upwind(&self, index: usize, step: isize) -> Option<Term> {
         let side = |step: isize| {
             let near = index.wrapping_add_signed(step);
@@ -276,7 +278,8 @@ struct Term {
     near: f32,
 }
 
-/// The larger root of `sum weight * (d - offset)^2 = 1`, not below a neighbour it is taken from.
+/// Return the larger root of `sum weight * (d - offset)^2 = 1`, not below a neighbour it is taken
+/// from.
 fn solve(terms: [Option<Term>; 2]) -> f32 {
     let alone = |term: Term| term.offset + 1.0 / term.weight.sqrt();
     match terms {

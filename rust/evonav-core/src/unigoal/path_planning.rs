@@ -19,7 +19,7 @@ pub struct ShortTermGoal {
     pub gain: f32,
 }
 
-/// The cell on a circle around the agent that is nearest to the goal by `field`.
+/// Return the cell on a circle around the agent that is nearest to the goal by `field`.
 ///
 /// A cell that gains more than 1.5 times its straight distance lies beyond a wall that is thinner
 /// than the circle is wide; it is passed over (as in UniGoal).
@@ -94,7 +94,7 @@ pub struct Plan {
     pub short_term_m: Option<Vec2>,
 }
 
-/// Finds the way from a place to the nearest of some goal cells.
+/// Find the way from a place to the nearest of some goal cells.
 ///
 /// # Arguments
 /// * `agent_m` - `[x, z]`, on the map.
@@ -147,7 +147,7 @@ pub fn plan(
     })
 }
 
-/// The cell that a way leads to and that is nearest to some goals.
+/// Return the cell that a way leads to and that is nearest to some goals.
 fn nearest_reachable(
     passable: &BitGrid,
     agent: [usize; 2],

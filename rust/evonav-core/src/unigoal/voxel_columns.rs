@@ -19,12 +19,12 @@ pub struct Column {
 const A_POINT: f32 = 0.5;
 
 impl Column {
-    /// Something at any height.
+    /// Return the something at any height.
     pub fn is_explored(self) -> bool {
         self.below + self.floor + self.obstacle + self.above >= A_POINT
     }
 
-    /// Something between the lowest obstacle and the camera, or a hole in the floor.
+    /// Return the something between the lowest obstacle and the camera, or a hole in the floor.
     pub fn is_obstacle(self) -> bool {
         let is_hole = self.below >= A_POINT && self.floor < A_POINT;
         self.obstacle >= A_POINT || is_hole
@@ -64,7 +64,7 @@ struct Levels {
 }
 
 impl Levels {
-    /// Voxel centres are at whole multiples of a cell over the lowest height.
+    /// Return the voxel centres are at whole multiples of a cell over the lowest height.
     fn new(config: &BevConfig, camera_height_m: f64) -> Self {
         let (low_m, per_m) = (config.heights_m[0], 1.0 / config.cell_m);
         let level = |height_m: f64| ((height_m - low_m) * per_m + 1e-6).floor() as i64;
@@ -91,7 +91,7 @@ impl Levels {
 }
 
 impl Block {
-    /// Takes a view's points, and counts them in each column.
+    /// Take a view's points, and counts them in each column.
     pub fn fill(&mut self, view: &DepthView<'_>, spec: &GridSpec, config: &BevConfig) {
         self.place(view, spec, config);
         self.collect(view, spec, config);
@@ -108,7 +108,7 @@ impl Block {
         }
     }
 
-    /// Columns on the map that are explored, with their cells.
+    /// Return the columns on the map that are explored, with their cells.
     pub fn explored<'a>(
         &'a self,
         spec: &'a GridSpec,
@@ -117,7 +117,7 @@ impl Block {
         seen.filter_map(|(index, column)| Some((self.cell(index, spec)?, *column)))
     }
 
-    /// Categories of the points, each once, ascending.
+    /// Return the categories of the points, each once, ascending.
     pub fn categories(&self) -> Vec<usize> {
         let mut found: Vec<usize> =
             self.points.iter().filter_map(|point| usize::try_from(point.category).ok()).collect();
@@ -126,7 +126,7 @@ impl Block {
         found
     }
 
-    /// Points of a category among the obstacles of each cell, rounded.
+    /// Return the points of a category among the obstacles of each cell, rounded.
     pub fn count_category(&self, category: usize, spec: &GridSpec) -> Vec<([usize; 2], u32)> {
         let mut counts = vec![0.0_f32; self.columns.len()];
         for point in &self.points {
@@ -150,7 +150,7 @@ impl Block {
         (row < spec.rows && col < spec.cols).then_some([row, col])
     }
 
-    /// Lays the columns around the block before the camera, whichever way it is turned.
+    /// Lay the columns around the block before the camera, whichever way it is turned.
     fn place(&mut self, view: &DepthView<'_>, spec: &GridSpec, config: &BevConfig) {
         let [camera_x, _, camera_z] = view.camera.position_m;
         let (sin, cos) = view.camera.yaw_rad.sin_cos();
@@ -170,7 +170,7 @@ impl Block {
         self.side = (2.0_f64.sqrt() * config.block_m / config.cell_m).ceil() as usize + 6;
     }
 
-    /// The points of every `stride_px`-th pixel that lie in the block before the camera.
+    /// Return the points of every `stride_px`-th pixel that lie in the block before the camera.
     fn collect(&mut self, view: &DepthView<'_>, spec: &GridSpec, config: &BevConfig) {
         let camera = &view.camera;
         let [camera_x, camera_y, camera_z] = camera.position_m;
@@ -214,7 +214,7 @@ impl Block {
     }
 }
 
-/// The four columns around a point and its nearness to each.
+/// Return the four columns around a point and its nearness to each.
 fn around(at: [f32; 2], side: usize) -> [(usize, f32); 4] {
     let low = at.map(f32::floor);
     let [row_share, col_share] = [at[0] - low[0], at[1] - low[1]];

@@ -1,4 +1,4 @@
-//! What a body covers of the ground plane, seen by an agent of some height.
+//! The part of the ground plane that a body covers between two heights.
 
 use crate::{
     assets::{Catalogue, UnknownAssets, part::Part},
@@ -11,7 +11,7 @@ use crate::{
     },
 };
 
-/// Points nearer than this are one.
+/// Distance below which two points are merged.
 const MERGE_M: f64 = 1e-9;
 
 /// The part of a convex solid between two heights, projected to the ground.
@@ -22,13 +22,15 @@ pub struct Footprint {
     pub outline_m: Vec<Vec2>,
     /// Lowest height of the solid inside the band.
     pub bottom_m: f64,
-    /// Highest.
+    /// Highest height of the solid inside the band.
     pub top_m: f64,
 }
 
-/// Projects what a part has between the heights `low_m` and `high_m`; `None` if nothing.
+/// Project the slice of a part between the heights `low_m` and `high_m`; `None` if the slice is
+/// empty.
 ///
-/// Of the polyhedron that is drawn, so that the agent collides with what it sees.
+/// The part is the polyhedron that is drawn, so that the agent collides with the shape that it
+/// sees.
 pub fn footprint(part: &Part, low_m: f64, high_m: f64) -> Option<Footprint> {
     let own = vertices_of(&part.primitive);
     let place = |corner: &Vec3| add(rotate(&part.rotation, *corner), part.centre_m);
@@ -65,10 +67,11 @@ pub fn footprint(part: &Part, low_m: f64, high_m: f64) -> Option<Footprint> {
     (!shadow.is_empty()).then(|| Footprint { outline_m: convex_hull(shadow), bottom_m, top_m })
 }
 
-/// What every object of a house covers of the floor plan, part by part: a house as a drawing shows it.
+/// Return the footprints of every object of a house, part by part, as a drawing of the house shows
+/// them.
 ///
 /// # Returns
-/// Category and footprints of each object, in [`House::objects`] order, at rest on what it stands on.
+/// Category and footprints of each object, in [`House::objects`] order, at rest on its support.
 ///
 /// # Errors
 /// Those of [`Scene::build`].
@@ -83,7 +86,7 @@ pub fn object_footprints(
     Ok(objects.map(|body| (body.category, body.parts.iter().filter_map(whole).collect())).collect())
 }
 
-/// Convex hull, counter-clockwise when x turns towards z, collinear points left out.
+/// Return the convex hull, counter-clockwise when x turns towards z, collinear points left out.
 pub fn convex_hull(mut points: Vec<Vec2>) -> Vec<Vec2> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
     points.dedup_by(|a, b| (a[0] - b[0]).abs() < MERGE_M && (a[1] - b[1]).abs() < MERGE_M);
@@ -105,7 +108,8 @@ pub fn convex_hull(mut points: Vec<Vec2>) -> Vec<Vec2> {
     hull
 }
 
-/// Whether going on to `point` turns right, or left by less than a nanometre.
+/// Return whether the hull turns right at its last point on the way to `point`, or left by less
+/// than a nanometre.
 fn is_right_or_straight(hull: &[Vec2], point: Vec2) -> bool {
     let [.., a, b] = hull else { return false };
     let along = [point[0] - a[0], point[1] - a[1]];

@@ -1,4 +1,4 @@
-//! Surfaces of a scene as convex planar faces: what is drawn and what rays hit.
+//! Surfaces of a scene as convex planar faces, for rendering and ray casting.
 
 use std::ops::Range;
 
@@ -20,9 +20,9 @@ const LEAST_AREA_M2: f64 = 1e-12;
 pub struct Face {
     /// Outward unit normal, world frame.
     pub normal: Vec3,
-    /// `normal . p` of its points `p`.
+    /// Offset of its plane: `normal . p` of its points `p`.
     pub offset_m: f64,
-    /// First of its corners in [`SceneMesh::corners`].
+    /// Index in [`SceneMesh::corners`] of its first corner.
     first_corner: u32,
     /// Number of corners, 3 or more.
     num_corners: u32,
@@ -52,7 +52,7 @@ pub struct SceneMesh {
     num_bodies: usize,
 }
 
-/// A triangle of the world, for consumers that know no polygons.
+/// A triangle in the world frame, for consumers that cannot use polygons.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triangle {
     /// Corners, world frame, clockwise seen from outside.
@@ -64,7 +64,7 @@ pub struct Triangle {
 }
 
 impl SceneMesh {
-    /// Tessellates every part of every body.
+    /// Tessellate every part of every body.
     ///
     /// Cuboids become 6 quads, frusta two polygons and a ring of quads, ellipsoids a globe of
     /// quads and triangles inscribed in them. Faces without an area are left out.
@@ -74,7 +74,7 @@ impl SceneMesh {
     pub fn build(scene: &Scene) -> Self {
         let mut mesh = Self { num_bodies: scene.bodies.len(), ..Self::default() };
         for (index, body) in scene.bodies.iter().enumerate() {
-            // As AI2-THOR's, ceilings have one side: from above one looks into the house.
+            // Ceilings have one side, as AI2-THOR's: from above one looks into the house.
             let is_shown = |normal: Vec3| body.kind != BodyKind::Ceiling || normal[1] < 0.0;
             for part in &body.parts {
                 mesh.push(part, index as u32, is_shown);
@@ -83,17 +83,17 @@ impl SceneMesh {
         mesh
     }
 
-    /// Number of bodies of the scene it was built from.
+    /// Return the number of bodies of the scene from which the mesh was built.
     pub fn num_bodies(&self) -> usize {
         self.num_bodies
     }
 
-    /// The faces, grouped by body in rising order.
+    /// Return the faces, grouped by body in ascending order.
     pub fn faces(&self) -> &[Face] {
         &self.faces
     }
 
-    /// The faces cut into triangles, in their order.
+    /// Return the faces cut into triangles, in their order.
     pub fn triangles(&self) -> impl Iterator<Item = Triangle> + '_ {
         self.parts.iter().flat_map(move |part| {
             let vertices_m = &self.vertices_m[part.vertices.clone()];
@@ -108,7 +108,7 @@ impl SceneMesh {
         })
     }
 
-    /// A face's vertex indices, counted from its part's first vertex.
+    /// Return a face's vertex indices, counted from its part's first vertex.
     pub(crate) fn corners_of(&self, face: &Face) -> &[u32] {
         let first = face.first_corner as usize;
         &self.corners[first..first + face.num_corners as usize]
@@ -134,8 +134,8 @@ impl SceneMesh {
         });
     }
 
-    /// Adds a polygon, in two halves where its four corners do not lie in a plane (the sides of a
-    /// frustum whose ends are ellipses of different shapes).
+    /// Add a polygon. Four corners that do not lie in a plane (the sides of a frustum whose ends
+    /// are ellipses of different shapes) become two triangles.
     fn push_polygon(
         &mut self,
         polygon: &[u32],
@@ -174,7 +174,8 @@ impl SceneMesh {
     }
 }
 
-/// Unit normal (towards the side from which the polygon runs clockwise) and twice the area.
+/// Return the unit normal (towards the side from which the polygon runs clockwise) and twice the
+/// area.
 fn newell(points_m: impl Iterator<Item = Vec3> + Clone) -> (Vec3, f64) {
     let mut sum = [0.0; 3];
     let next = points_m.clone().cycle().skip(1);
@@ -193,7 +194,7 @@ pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Vertices of a primitive in its own frame.
+/// Return the vertices of a primitive in its own frame.
 pub(crate) fn vertices_of(primitive: &Primitive) -> Vec<Vec3> {
     match *primitive {
         Primitive::Cuboid { half_m } => {
@@ -221,8 +222,8 @@ pub(crate) fn vertices_of(primitive: &Primitive) -> Vec<Vec3> {
     }
 }
 
-/// The solid's corners on elliptic rings `(half axes [x, z], y)`, lowest first, over a regular
-/// `sides`-gon with a corner on +x.
+/// Return the solid's corners on elliptic rings `(half axes [x, z], y)`, lowest first, over a
+/// regular `sides`-gon with a corner on +x.
 fn rings(sides: usize, levels: &[([f64; 2], f64)]) -> Vec<Vec3> {
     let turn = |k: usize| (std::f64::consts::TAU * k as f64 / sides as f64).sin_cos();
     let turns: Vec<(f64, f64)> = (0..sides).map(turn).collect();
@@ -235,7 +236,7 @@ fn rings(sides: usize, levels: &[([f64; 2], f64)]) -> Vec<Vec3> {
 const CUBOID: [[u32; 4]; 6] =
     [[1, 3, 7, 5], [0, 4, 6, 2], [2, 6, 7, 3], [0, 1, 5, 4], [4, 5, 7, 6], [0, 2, 3, 1]];
 
-/// Calls `visit` with each of a primitive's outward polygons, as indices of its vertices.
+/// Call `visit` with each of a primitive's outward polygons, as indices of its vertices.
 ///
 /// # Arguments
 /// * `vertices_m` - [`vertices_of`] the primitive, in its own frame.
@@ -244,15 +245,15 @@ pub(crate) fn each_polygon(
     vertices_m: &[Vec3],
     mut visit: impl FnMut(&[u32]),
 ) {
-    let sides = match *primitive {
+    let num_sides = match *primitive {
         Primitive::Cuboid { .. } => return CUBOID.iter().for_each(|polygon| visit(polygon)),
         Primitive::Frustum { sides, .. } => u32::from(sides.max(3)),
         Primitive::Ellipsoid { .. } => ELLIPSOID_MERIDIANS as u32,
     };
-    let last = vertices_m.len() as u32 - sides;
+    let last = vertices_m.len() as u32 - num_sides;
     let mut polygon = Vec::new();
     let at = |i: u32| vertices_m[i as usize];
-    // Rings shrunk to a point have coinciding corners.
+    // Rings that are shrunk to a point have coinciding corners.
     let mut visit_distinct = |corners: &mut dyn Iterator<Item = u32>| {
         polygon.clear();
         polygon.extend(corners);
@@ -264,12 +265,12 @@ pub(crate) fn each_polygon(
             visit(&polygon);
         }
     };
-    visit_distinct(&mut (0..sides));
-    visit_distinct(&mut (last..last + sides).rev());
-    for low in (0..last).step_by(sides as usize) {
-        for k in 0..sides {
-            let next = (k + 1) % sides;
-            let corners = [low + k, low + sides + k, low + sides + next, low + next];
+    visit_distinct(&mut (0..num_sides));
+    visit_distinct(&mut (last..last + num_sides).rev());
+    for low in (0..last).step_by(num_sides as usize) {
+        for k in 0..num_sides {
+            let next = (k + 1) % num_sides;
+            let corners = [low + k, low + num_sides + k, low + num_sides + next, low + next];
             visit_distinct(&mut corners.into_iter());
         }
     }

@@ -1,4 +1,4 @@
-//! A house instantiated: bodies in the world frame, collision, navigation, and where things can stand.
+//! A house instantiated: bodies in the world frame, navigation, layouts of objects, and inspection.
 
 pub mod footprint;
 pub mod inspection;

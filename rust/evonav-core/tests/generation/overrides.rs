@@ -1,4 +1,4 @@
-//! Given draws against drawn ones: what is given as it was drawn changes nothing, what is given
+//! Overrides draws against drawn ones: what is given as it was drawn changes nothing, what is given
 //! otherwise changes that alone.
 
 #![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
@@ -6,7 +6,7 @@
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     generation::{
-        Generation, Given, GivenStage, Parameters, generate_given, generate_task,
+        Generation, Overrides, Parameters, StageOverrides, generate_task, generate_with_overrides,
         record::{EvolutionOutcome, GeneratedTask, RejectReason},
     },
     house::House,
@@ -25,9 +25,10 @@ fn small(evolve_probability: f64) -> Parameters {
     Parameters { evolve_probability, reference_image_px: 64, ..Parameters::default() }
 }
 
-fn made(house: &House, seed: u64, parameters: &Parameters, given: &Given) -> Generation {
+fn made(house: &House, seed: u64, parameters: &Parameters, given: &Overrides) -> Generation {
     let unknown = UnknownAssets::Error;
-    generate_given(house, Catalogue::bundled(), unknown, seed, "test", parameters, given).unwrap()
+    generate_with_overrides(house, Catalogue::bundled(), unknown, seed, "test", parameters, given)
+        .unwrap()
 }
 
 fn task(generation: Generation) -> GeneratedTask {
@@ -50,9 +51,9 @@ fn without_refusals(task: &GeneratedTask) -> GeneratedTask {
     task
 }
 
-fn goals_of(task: &GeneratedTask) -> Vec<GivenStage> {
+fn goals_of(task: &GeneratedTask) -> Vec<StageOverrides> {
     let goals = task.stages.iter().map(|stage| stage.target.id.clone());
-    goals.map(|id| GivenStage { goal_id: Some(id), is_evolved: None }).collect()
+    goals.map(|id| StageOverrides { goal_id: Some(id), is_evolved: None }).collect()
 }
 
 proptest! {
@@ -68,7 +69,7 @@ proptest! {
             given.is_evolved = Some(stage.evolution.outcome != EvolutionOutcome::NotTriggered);
         }
         // The probability no longer matters either: every trigger is given.
-        let again = task(made(house, seed, &small(0.0), &Given { stages }));
+        let again = task(made(house, seed, &small(0.0), &Overrides { stages }));
         prop_assert_eq!(without_refusals(&free), without_refusals(&again));
     }
 
@@ -79,7 +80,7 @@ proptest! {
         let house = &houses()[which];
         let stages = goals_of(&drawn(house, seed, &small(0.0)));
         let triggers = |p: f64| -> Option<Vec<bool>> {
-            let given = Given { stages: stages.clone() };
+            let given = Overrides { stages: stages.clone() };
             let Generation::Task(task) = made(house, seed, &small(p), &given) else { return None };
             for (given, stage) in stages.iter().zip(&task.stages) {
                 assert_eq!(given.goal_id.as_ref(), Some(&stage.target.id));
@@ -108,7 +109,8 @@ fn a_change_is_made_where_it_is_given_and_nowhere_else() {
         let first_goal = stages[0].goal_id.clone();
         stages[2].goal_id = first_goal;
         stages[2].is_evolved = Some(true);
-        let Generation::Task(evolved) = made(house, seed, &small(0.0), &Given { stages }) else {
+        let Generation::Task(evolved) = made(house, seed, &small(0.0), &Overrides { stages })
+        else {
             continue;
         };
         assert_eq!(evolved.stages.len(), 3);
@@ -131,7 +133,7 @@ fn a_change_is_made_where_it_is_given_and_nowhere_else() {
 #[test]
 fn a_goal_that_is_not_there_is_refused() {
     let goal_id = Some("no such object".to_owned());
-    let given = Given { stages: vec![GivenStage { goal_id, is_evolved: None }] };
+    let given = Overrides { stages: vec![StageOverrides { goal_id, is_evolved: None }] };
     match made(&houses()[0], 0, &small(0.5), &given) {
         Generation::Rejected(rejected) => {
             assert_eq!((rejected.reason, rejected.stage), (RejectReason::NoValidGoal, 1));
@@ -143,10 +145,10 @@ fn a_goal_that_is_not_there_is_refused() {
 
 #[test]
 fn what_cannot_be_given_is_told() {
-    assert_eq!(Given::from_json("{}").unwrap(), Given::default());
+    assert_eq!(Overrides::from_json("{}").unwrap(), Overrides::default());
     for json in ["", "[1]", r#"{"stages": [{"goal": "a"}]}"#, r#"{"stages": [{"goal_id": 3}]}"#] {
-        assert!(Given::from_json(json).unwrap_err().to_string().contains("given"), "{json}");
+        assert!(Overrides::from_json(json).unwrap_err().to_string().contains("given"), "{json}");
     }
     let many = format!(r#"{{"stages": [{}]}}"#, vec!["{}"; 65].join(","));
-    assert!(Given::from_json(&many).unwrap_err().to_string().contains("64"));
+    assert!(Overrides::from_json(&many).unwrap_err().to_string().contains("64"));
 }

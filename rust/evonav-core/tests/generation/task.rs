@@ -10,7 +10,7 @@ use crate::points::{contains, interpenetrate, object, parts_of, points_in};
 use evonav_core::{
     assets::{Catalogue, UnknownAssets, part::Part, placement_rule::Place},
     generation::{
-        Generation, Group, Mode, Parameters, asset_groups, generate_task,
+        AssetGroup, Generation, Mode, Parameters, asset_groups, generate_task,
         record::{EvolutionOutcome, GeneratedStage, GeneratedTask, RejectReason},
     },
     geometry::{Vec2, Vec3, polygon_contains, sub},
@@ -189,7 +189,7 @@ fn retained_groups_keep_their_shape() {
                 stage.evolution.changes.iter().map(|c| c.id.as_str()).collect();
             let groups = asset_groups(before, Catalogue::bundled(), UNKNOWN).unwrap();
             let after_groups = asset_groups(after, Catalogue::bundled(), UNKNOWN).unwrap();
-            for Group { roots, definition } in groups {
+            for AssetGroup { roots, definition } in groups {
                 let id = |&root: &usize| before.objects[root].id.as_str();
                 let ids: BTreeSet<&str> = roots.iter().map(id).collect();
                 let family = |root: &usize| -> BTreeSet<&str> {
@@ -201,7 +201,7 @@ fn retained_groups_keep_their_shape() {
                 assert!(members.is_subset(&moved) || members.is_disjoint(&moved), "{members:?}");
                 if stage.evolution.rearranged_ids.iter().any(|r| ids.contains(r.as_str())) {
                     roots.iter().for_each(|root| check_rigid(before, after, &family(root)));
-                    let is_same = |other: &Group| {
+                    let is_same = |other: &AssetGroup| {
                         other
                             .roots
                             .iter()

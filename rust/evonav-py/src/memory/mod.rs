@@ -6,7 +6,7 @@ mod snapshots;
 
 use pyo3::prelude::*;
 
-/// Adds the classes and functions to the module.
+/// Add the classes and functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     objects::register(module)?;
     occupancy::register(module)?;

@@ -231,7 +231,7 @@ struct ViewSlices<'a> {
 }
 
 impl ViewArrays<'_> {
-    /// The image is as large as `masks`.
+    /// Return the image is as large as `masks`.
     fn view(&self, pose: Pose, vertical_fov_rad: f64) -> PyResult<ViewSlices<'_>> {
         let (masks, [height_px, width_px]) = arrays::row_major("masks", &self.masks)?;
         let (depth_m, depth_shape) = arrays::row_major("depth_m", &self.depth_m)?;
@@ -270,7 +270,7 @@ impl ViewSlices<'_> {
     }
 }
 
-/// Adds the classes to the module.
+/// Add the classes to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<ObjectEntry>()?;
     module.add_class::<ObjectMap>()

@@ -173,7 +173,7 @@ fn pair<'py>(
     Ok((arrays::rows_of(py, conflicts.freed)?, arrays::rows_of(py, conflicts.obstructed)?))
 }
 
-/// Adds the classes to the module.
+/// Add the classes to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Frontier>()?;
     module.add_class::<OccupancyMap>()

@@ -26,13 +26,13 @@ impl MiniNetwork {
         py.detach(|| Network::read(weights)).map(Self).map_err(error::to_py)
     }
 
-    /// What it tells apart.
+    /// Return what it tells apart.
     #[getter]
     fn classes(&self) -> Vec<String> {
         self.0.classes().to_vec()
     }
 
-    /// Logits of each cell.
+    /// Return the logits of each cell.
     fn logits<'py>(
         &self,
         py: Python<'py>,
@@ -48,7 +48,7 @@ impl MiniNetwork {
         arrays::image_of(py, logits.values, shape)
     }
 
-    /// Masks, classes and confidences.
+    /// Return the masks, classes and confidences.
     #[pyo3(signature = (rgb, depth_m, horizon_rad, *, min_cells, min_confidence, colour=0.02, depth=8.0, place=0.5))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
     #[expect(clippy::type_complexity, reason = "a triple of arrays")]
@@ -80,7 +80,7 @@ impl MiniNetwork {
     }
 }
 
-/// Pixels, depths, width and height of a picture.
+/// Return the pixels, depths, width and height of a picture.
 fn picture<'a>(
     rgb: &'a PyReadonlyArray3<'_, u8>,
     depth_m: &'a PyReadonlyArray2<'_, f32>,
@@ -95,7 +95,7 @@ fn picture<'a>(
     Ok((rgb.as_slice()?, depths, [width, height]))
 }
 
-/// Adds the class to the module.
+/// Add the class to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<MiniNetwork>()
 }

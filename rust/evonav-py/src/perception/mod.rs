@@ -5,7 +5,7 @@ mod noise;
 
 use pyo3::prelude::*;
 
-/// Adds the classes and functions to the module.
+/// Add the classes and functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     mini::register(module)?;
     noise::register(module)

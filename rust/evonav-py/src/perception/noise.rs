@@ -19,7 +19,7 @@ fn stream(seed: u64, labels: &[String]) -> Stream {
     Stream::new(seed, &labels.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// Standard normals, a row a stream.
+/// Return the standard normals, a row a stream.
 #[pyfunction]
 #[pyo3(signature = (seed, labels, *, num_draws))]
 fn draw_normals(
@@ -35,7 +35,7 @@ fn draw_normals(
     arrays::image_of(py, drawn.collect(), [labels.len(), num_draws])
 }
 
-/// A row a mask: sides of its outline, those that are cut, mean depth.
+/// Return a row a mask: sides of its outline, those that are cut, mean depth.
 #[pyfunction]
 #[pyo3(signature = (masks, depth_m, *, num_masks))]
 fn mask_outlines<'py>(
@@ -53,7 +53,7 @@ fn mask_outlines<'py>(
     arrays::rows_of(py, outlines.into_iter().map(row).collect())
 }
 
-/// Masks that shrink, grow, are cut, split and renamed.
+/// Return the masks that shrink, grow, are cut, split and renamed.
 #[pyfunction]
 fn distort_masks<'py>(
     py: Python<'py>,
@@ -121,7 +121,7 @@ fn surface_sites<'py>(
     Ok((arrays::rows_of(py, pixels)?, arrays::rows_of(py, values)?))
 }
 
-/// Paints ellipses into masks, in place.
+/// Paint ellipses into masks, in place.
 #[pyfunction]
 fn paint_blobs(
     mut masks: PyReadwriteArray2<'_, i32>,
@@ -177,7 +177,7 @@ fn noisy_depth<'py>(
     arrays::image_of(py, found, shape)
 }
 
-/// Adds the functions to the module.
+/// Add the functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(draw_normals, module)?)?;
     module.add_function(wrap_pyfunction!(mask_outlines, module)?)?;

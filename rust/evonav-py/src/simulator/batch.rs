@@ -90,7 +90,7 @@ impl PyBatchSimulator {
         self.core.aim(slot, field).map_err(error::to_py)
     }
 
-    /// Corners of a path of one agent.
+    /// Return the corners of a path of one agent.
     fn plan_one(
         &mut self,
         py: Python<'_>,
@@ -133,7 +133,7 @@ impl PyBatchSimulator {
         self.core.slot(slot).map(Slot::distance_m).map_err(error::to_py)
     }
 
-    /// `(B, 5)`: x, y, z, yaw and horizon.
+    /// Return `(B, 5)`: x, y, z, yaw and horizon.
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let rows = (0..self.core.num_slots()).map(|index| {
             let Pose { position_m: [x_m, y_m, z_m], yaw_rad, horizon_rad } =
@@ -159,7 +159,7 @@ impl PyBatchSimulator {
     }
 }
 
-/// Adds the classes to the module.
+/// Add the classes to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyGeodesicField>()?;
     module.add_class::<PyBatchSimulator>()

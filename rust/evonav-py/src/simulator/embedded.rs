@@ -84,7 +84,7 @@ impl PyEmbeddedSimulator {
             .map_err(error::to_py)
     }
 
-    /// A simulator of this house after a `HouseDelta` (JSON).
+    /// Return a simulator of this house after a `HouseDelta` (JSON).
     fn apply(&self, py: Python<'_>, delta_json: &str) -> PyResult<Self> {
         let delta: HouseDelta = HouseDelta::from_json(delta_json).map_err(error::to_py)?;
         py.detach(|| self.core.apply(&delta)).map(Self::from).map_err(error::to_py)
@@ -98,7 +98,7 @@ impl PyEmbeddedSimulator {
         self.core.bodies().iter().map(body_record).collect()
     }
 
-    /// The `HouseDelta` of a `SpawnRequest` (both JSON), and the ids of what found no place.
+    /// Return the `HouseDelta` of a `SpawnRequest` (both JSON), and the ids of what found no place.
     fn random_spawn(&self, py: Python<'_>, request_json: &str) -> PyResult<(String, Vec<String>)> {
         let (house, scene) = (self.core.house(), self.core.scene());
         py.detach(|| {
@@ -110,7 +110,7 @@ impl PyEmbeddedSimulator {
         .map_err(error::to_py)
     }
 
-    /// The `HouseDelta` (JSON) that brings down what hangs in the air.
+    /// Return the `HouseDelta` (JSON) that brings down what hangs in the air.
     fn settled(&self, py: Python<'_>) -> PyResult<String> {
         let (house, scene) = (self.core.house(), self.core.scene());
         py.detach(|| settled(house, Catalogue::bundled(), UnknownAssets::CategoryDefault, scene))
@@ -118,7 +118,7 @@ impl PyEmbeddedSimulator {
             .map_err(error::to_py)
     }
 
-    /// Position, yaw and horizon.
+    /// Return the position, yaw and horizon.
     fn start(&self) -> (Vec3, f64, f64) {
         let Pose { position_m, yaw_rad, horizon_rad } = self.core.start();
         (position_m, yaw_rad, horizon_rad)
@@ -202,7 +202,7 @@ impl PyEmbeddedSimulator {
         self.core.navigation().try_move(from_m, to_m)
     }
 
-    /// Index of a body that a straight move touches.
+    /// Return the index of a body that a straight move touches.
     fn blocker(&self, from_m: Vec2, to_m: Vec2) -> Option<usize> {
         self.core.navigation().obstacles().blocker_between(from_m, to_m)
     }
@@ -244,7 +244,7 @@ impl PyEmbeddedSimulator {
         Ok(lengths_m.into_pyarray(py))
     }
 
-    /// Cells and `(x, z)` of the grid's corner.
+    /// Return the cells and `(x, z)` of the grid's corner.
     fn occupancy<'py>(
         &self,
         py: Python<'py>,
@@ -297,7 +297,7 @@ fn body_record(body: &Body) -> BodyRecord {
     (body.id.clone(), body.category.clone(), kind, aabb.centre_m, aabb.half_m.map(|h| 2.0 * h))
 }
 
-/// Shape and corner of the oracle occupancy's grid.
+/// Return the shape and corner of the oracle occupancy's grid.
 #[pyfunction]
 #[pyo3(signature = (house_json, *, name, cell_m))]
 fn map_spec(py: Python<'_>, house_json: &str, name: &str, cell_m: f64) -> PyResult<MapSpec> {
@@ -308,7 +308,7 @@ fn map_spec(py: Python<'_>, house_json: &str, name: &str, cell_m: f64) -> PyResu
     spec.map(|spec| ((spec.rows, spec.cols), spec.corner_m)).map_err(error::to_py)
 }
 
-/// Adds class and function to the module.
+/// Add class and function to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     // Images are freed as often as they are made. Having seen one block of this size freed, glibc
     // keeps that much memory instead of returning it, and getting it back costs a third of a frame.

@@ -5,7 +5,7 @@ mod embedded;
 
 use pyo3::prelude::*;
 
-/// Adds the classes and functions to the module.
+/// Add the classes and functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     batch::register(module)?;
     embedded::register(module)

@@ -1,4 +1,4 @@
-//! Bathroom fixtures, laundry machines and textiles that hang.
+//! Shapes of bathroom fixtures, laundry machines and hanging textiles.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,7 +7,7 @@ use crate::assets::shapes::{
     sketch::{Along, Motion, Sketch, between, ends, inside},
 };
 
-/// Tank at the back, bowl in front, seat and open lid.
+/// Draw a toilet: tank at the back, bowl in front, seat and open lid.
 pub fn toilet(s: &mut Sketch<'_>) {
     let [_, h, _] = s.size();
     let [x, y, z] = s.spans();
@@ -40,7 +40,7 @@ pub fn toilet(s: &mut Sketch<'_>) {
     });
 }
 
-/// A tub: bottom and four sides.
+/// Draw a tub: bottom and four sides.
 pub fn bathtub(s: &mut Sketch<'_>) {
     let h = s.size()[1];
     let [x, y, z] = s.spans();
@@ -55,7 +55,7 @@ pub fn bathtub(s: &mut Sketch<'_>) {
     }
 }
 
-/// Basins: set into counters (flat), or standing on a pedestal or a cabinet (tall).
+/// Draw basins: set into counters (flat), or standing on a pedestal or a cabinet (tall).
 pub fn sink(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
@@ -96,7 +96,7 @@ pub fn sink(s: &mut Sketch<'_>) {
     }
 }
 
-/// A base, a riser, a spout forward and two handles where the box is wide.
+/// Draw a faucet: a base, a riser, a spout towards the front, and two handles if the box is wide.
 pub fn faucet(s: &mut Sketch<'_>) {
     let [w, _, _] = s.size();
     let [x, y, z] = s.spans();
@@ -115,7 +115,7 @@ pub fn faucet(s: &mut Sketch<'_>) {
     }
 }
 
-/// A rail on the wall, an arm and a rose.
+/// Draw a shower head: a rail on the wall, an arm and a rose.
 pub fn shower_head(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let metal = s.tint(0, STEEL);
@@ -125,7 +125,7 @@ pub fn shower_head(s: &mut Sketch<'_>) {
     s.cuboid(between(x, 0.3, 0.7), between(y, 0.3, 0.36), between(z, 0.0, 0.35), shade(metal, 0.8));
 }
 
-/// A rail with folds hanging from it.
+/// Draw a curtain: a rail with folds hanging from it.
 pub fn curtain(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let cloth = s.tint(0, [225, 228, 230]);
@@ -139,7 +139,7 @@ pub fn curtain(s: &mut Sketch<'_>) {
     }
 }
 
-/// A hanging or lying cloth.
+/// Draw a hanging or lying cloth.
 pub fn towel(s: &mut Sketch<'_>) {
     let [_, h, d] = s.size();
     let [x, y, z] = s.spans();
@@ -160,7 +160,7 @@ pub fn towel(s: &mut Sketch<'_>) {
     }
 }
 
-/// A plate on the wall (-z) and a bar.
+/// Draw a holder: a plate on the wall (-z) and a bar.
 pub fn holder(s: &mut Sketch<'_>) {
     let [w, _, _] = s.size();
     let [x, y, z] = s.spans();
@@ -172,7 +172,7 @@ pub fn holder(s: &mut Sketch<'_>) {
     s.cuboid(inside(x, 0.12 * w), between(y, 0.35, 0.65), between(z, 0.75, 1.0), metal);
 }
 
-/// A stick with a cup or a brush at its foot.
+/// Draw a stick with a cup or a brush at its foot.
 pub fn brush(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let rubber = s.tint(1, [150, 60, 50]);
@@ -187,7 +187,7 @@ pub fn brush(s: &mut Sketch<'_>) {
     );
 }
 
-/// A white box with a round door and a panel.
+/// Draw a washing machine: a white box with a round door and a panel.
 pub fn washer(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let white = s.tint(0, [232, 233, 235]);

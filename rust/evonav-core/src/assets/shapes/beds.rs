@@ -1,4 +1,4 @@
-//! Beds and what belongs on them.
+//! Shapes of beds and of objects on them.
 
 use crate::assets::shapes::{
     colour::{FABRICS, WOODS, liveliest, shade},
@@ -14,7 +14,8 @@ const LINEN: [[u8; 3]; 6] = [
     [70, 80, 105],
 ];
 
-/// Frame, mattress, blanket, pillows, headboard; above 1.5 m a bunk or canopy bed on four posts.
+/// Draw a bed: frame, mattress, blanket, pillows and headboard; above 1.5 m a bunk or canopy bed on
+/// four posts.
 pub fn bed(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, _, z] = s.spans();
@@ -48,7 +49,7 @@ pub fn bed(s: &mut Sketch<'_>) {
     }
 }
 
-/// Slats, mattress, blanket and pillows at one height.
+/// Draw one level of a bunk: slats, mattress, blanket and pillows.
 fn bunk(s: &mut Sketch<'_>, [wood, linen]: [[u8; 3]; 2], top: f64, x: Span) {
     let z = s.spans()[2];
     let length = inside(z, 0.05);
@@ -66,7 +67,7 @@ fn bunk(s: &mut Sketch<'_>, [wood, linen]: [[u8; 3]; 2], top: f64, x: Span) {
     }
 }
 
-/// A cushion with a raised rim.
+/// Draw a dog bed: a cushion with a raised rim.
 pub fn dog_bed(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
@@ -74,7 +75,7 @@ pub fn dog_bed(s: &mut Sketch<'_>) {
     let rim = 0.15 * w.min(d);
     if (w - d).abs() < 0.03 {
         s.form("round");
-        // Round ones: recorded agents stand in the corners of their boxes.
+        // Dog beds are round: recorded agents stand in the corners of their boxes.
         s.column(x, [0.0, 0.7 * h], z, 1.0, 16, fabric);
         s.column(
             inside(x, 0.5 * rim),
@@ -94,7 +95,7 @@ pub fn dog_bed(s: &mut Sketch<'_>) {
     s.cuboid(inside(x, rim), [0.0, 0.7 * h], ends(z, rim, 0.0)[1], fabric);
 }
 
-/// A pillow: thick in the middle.
+/// Draw a pillow that is thick in the middle.
 pub fn pillow(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let fabric = s.tint(0, s.choose(&FABRICS, FABRICS[5]));

@@ -1,11 +1,11 @@
-//! Plants, pictures, openings seen as assets, ornaments and sports goods.
+//! Shapes of plants, pictures, doors and windows as assets, ornaments and sports goods.
 
 use crate::assets::shapes::{
     colour::{DARK, STEEL, WOODS, shade},
     sketch::{Along, Sketch, between, ends, inside},
 };
 
-/// Pot, soil, stem and foliage.
+/// Draw a plant: pot, soil, stem and foliage.
 pub fn plant(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
@@ -41,7 +41,7 @@ fn span_length(span: [f64; 2]) -> f64 {
     span[1] - span[0]
 }
 
-/// Frame and canvas with a horizon.
+/// Draw a painting: frame and canvas with a horizon.
 pub fn painting(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
@@ -74,7 +74,7 @@ pub fn painting(s: &mut Sketch<'_>) {
     }
 }
 
-/// A window as an asset of its own.
+/// Draw a window as an asset of its own.
 pub fn window(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
@@ -89,7 +89,7 @@ pub fn window(s: &mut Sketch<'_>) {
     }
 }
 
-/// A door as an asset of its own: frame, and a closed leaf unless it is a bare frame.
+/// Draw a door as an asset of its own: frame, and a closed leaf unless it is a bare frame.
 pub fn doorway(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
@@ -104,14 +104,14 @@ pub fn doorway(s: &mut Sketch<'_>) {
     }
 }
 
-/// A plinth and a figure.
+/// Draw a plinth and a figure.
 pub fn statue(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();
     let stone =
         s.tint(0, s.choose(&[[190, 180, 160], [120, 110, 100], [160, 120, 60]], [190, 180, 160]));
     if w > h {
-        // An animal: body, head, legs.
+        // An animal has a body, a head and legs.
         s.cuboid(between(x, 0.1, 0.8), between(y, 0.35, 0.75), between(z, 0.15, 0.85), stone);
         s.blob(between(x, 0.65, 1.0), between(y, 0.5, 1.0), between(z, 0.1, 0.9), stone);
         for end in ends(between(x, 0.0, 0.8), 0.15 * w, 0.0) {
@@ -131,7 +131,7 @@ pub fn statue(s: &mut Sketch<'_>) {
     s.blob(between(x, 0.28, 0.72), between(y, 0.72, 1.0), between(z, 0.28, 0.72), stone);
 }
 
-/// Body, head, ears, arms and legs.
+/// Draw a teddy bear: body, head, ears, arms and legs.
 pub fn teddy_bear(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let fur = s.tint(0, [150, 105, 65]);
@@ -157,13 +157,13 @@ pub fn teddy_bear(s: &mut Sketch<'_>) {
     s.cuboid(between(x, 0.4, 0.6), between(y, 0.1, 0.3), between(z, 0.0, 0.1), fur);
 }
 
-/// A ball.
+/// Draw a ball.
 pub fn ball(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     s.ellipsoid(x, y, z, s.tint(0, [205, 105, 45]));
 }
 
-/// Two boots.
+/// Draw two boots.
 pub fn boots(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let leather = s.tint(0, [75, 55, 40]);
@@ -173,13 +173,13 @@ pub fn boots(s: &mut Sketch<'_>) {
     }
 }
 
-/// A long cone.
+/// Draw a bat: a long cone.
 pub fn bat(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     s.column(x, y, z, 0.45, 8, s.tint(0, WOODS[0]));
 }
 
-/// Head and handle along the box's longest side.
+/// Draw a racket: head and handle along the box's longest side.
 pub fn racket(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
@@ -197,7 +197,7 @@ pub fn racket(s: &mut Sketch<'_>) {
     }
 }
 
-/// Two weights and a bar.
+/// Draw a dumbbell: two weights and a bar.
 pub fn dumbbell(s: &mut Sketch<'_>) {
     let [w, _, d] = s.size();
     let [x, y, z] = s.spans();
@@ -215,14 +215,14 @@ pub fn dumbbell(s: &mut Sketch<'_>) {
     }
 }
 
-/// Wax and wick.
+/// Draw a candle: wax and wick.
 pub fn candle(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     s.column(x, between(y, 0.0, 0.9), z, 1.0, 8, s.tint(0, [235, 225, 195]));
     s.column(between(x, 0.44, 0.56), between(y, 0.9, 1.0), between(z, 0.44, 0.56), 1.0, 4, DARK);
 }
 
-/// Books and other flat things: a block with a lighter core that shows at the edges.
+/// Draw books and other flat things: a block with a lighter core that shows at the edges.
 pub fn slab(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let covers = [[150, 55, 50], [50, 80, 130], [60, 110, 80], [190, 150, 70], [95, 65, 110]];

@@ -1,4 +1,4 @@
-//! Screens, lamps and gadgets.
+//! Shapes of screens, lamps and gadgets.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -8,12 +8,12 @@ use crate::assets::shapes::{
 };
 
 const SCREEN: [u8; 3] = [25, 28, 34];
-/// A picture, from afar.
+/// Colour of a screen that is on.
 const LIT_SCREEN: [u8; 3] = [120, 165, 215];
-/// A lamp's shade with light in it.
+/// Colour of a lamp's shade that is on.
 const LIT_SHADE: [u8; 3] = [255, 244, 205];
 
-/// A flat screen; on a foot, or bare where the box is too thin for one.
+/// Draw a flat screen; on a foot, or bare where the box is too thin for one.
 pub fn television(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
@@ -43,7 +43,7 @@ pub fn television(s: &mut Sketch<'_>) {
     s.cuboid(between(x, 0.25, 0.75), [0.0, 0.02], z, shade(frame, 1.3));
 }
 
-/// Base with keyboard, lid upright at the back.
+/// Draw a laptop: base with keyboard, lid upright at the back.
 pub fn laptop(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, _, z] = s.spans();
@@ -62,7 +62,7 @@ pub fn laptop(s: &mut Sketch<'_>) {
     });
 }
 
-/// A screen, a keyboard in front and a tower beside.
+/// Draw a computer: a screen, a keyboard in front and a tower beside.
 pub fn desktop(s: &mut Sketch<'_>) {
     let h = s.size()[1];
     let [x, _, z] = s.spans();
@@ -73,7 +73,7 @@ pub fn desktop(s: &mut Sketch<'_>) {
     s.cuboid(between(x, 0.78, 1.0), [0.0, 0.8 * h], z, shade(DARK, 1.2));
 }
 
-/// Foot, pole and shade.
+/// Draw a lamp: foot, pole and shade.
 pub fn lamp(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
@@ -91,7 +91,7 @@ pub fn lamp(s: &mut Sketch<'_>) {
     s.column(x, between(y, shade_from, 1.0), z, s.choose(&[0.6, 0.75, 1.0], 0.75), 16, cloth);
 }
 
-/// A body with a face: phones, remote controls, switches, clocks, watches.
+/// Draw a body with a face: phones, remote controls, switches, clocks, watches.
 pub fn gadget(s: &mut Sketch<'_>) {
     let [_, h, d] = s.size();
     let [x, y, z] = s.spans();
@@ -116,7 +116,7 @@ pub fn gadget(s: &mut Sketch<'_>) {
     }
 }
 
-/// A head on the floor, a body and a slanting handle drawn upright.
+/// Draw a vacuum cleaner: a head on the floor, a body and an upright handle.
 pub fn vacuum_cleaner(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let body = s.tint(0, [160, 45, 45]);

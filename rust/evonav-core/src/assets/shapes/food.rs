@@ -1,11 +1,11 @@
-//! Food, and what it is eaten with.
+//! Shapes of food and utensils.
 
 use crate::assets::shapes::{
     colour::{DARK, STEEL, WOODS, shade},
     sketch::{Along, Sketch, between},
 };
 
-/// Fruit, vegetables, eggs and bread.
+/// Draw fruit, vegetables, eggs and bread.
 pub fn food(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     match s.asset().category.as_str() {
@@ -38,7 +38,7 @@ pub fn food(s: &mut Sketch<'_>) {
             s.round(Along::Z, 0.6, 8, stump, [185, 205, 150]);
         }
         _ => {
-            // Bread: a loaf with a rounded top.
+            // Bread is a loaf with a rounded top.
             let crust = [190, 130, 70];
             s.cuboid(x, between(y, 0.0, 0.6), z, crust);
             s.round(Along::Z, 1.0, 12, [x, between(y, 0.2, 1.0), z], shade(crust, 1.1));
@@ -46,7 +46,7 @@ pub fn food(s: &mut Sketch<'_>) {
     }
 }
 
-/// Cutlery, cooking and writing tools: a handle and a tip along the longest side.
+/// Draw cutlery, cooking and writing tools: a handle and a tip along the longest side.
 pub fn utensil(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();

@@ -1,4 +1,4 @@
-//! Counters, the fridge, appliances and cookware.
+//! Shapes of counters, the fridge, appliances and cookware.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,14 +7,15 @@ use crate::assets::shapes::{
     sketch::{Along, Motion, Sketch, Span, between, ends, inside},
 };
 
-/// Inside of what is open.
+/// Colour of the inside of open objects.
 const INSIDE: Colour = [48, 46, 44];
 
 /// Depth of ProcTHOR's counters and of each wing of its corner counters.
 const COUNTER_DEPTH_M: f64 = 0.61;
 
-/// Counters. `Countertop_L_*` have a wing along the back (-z) and one along +x, `Countertop_C_*`
-/// wings along the back and both sides; the rest is free floor (measured on what stands on them).
+/// Draw counters. `Countertop_L_*` have a wing along the back (-z) and one along +x,
+/// `Countertop_C_*` wings along the back and both sides; the rest is free floor. This was measured
+/// on the objects that stand on them.
 pub fn counter(s: &mut Sketch<'_>) {
     let [w, _, d] = s.size();
     let [x, _, z] = s.spans();
@@ -37,18 +38,18 @@ pub fn counter(s: &mut Sketch<'_>) {
     }
 }
 
-/// Which side of a run of cabinets has the doors.
+/// The side of a run of cabinets that has the doors.
 #[derive(Clone, Copy)]
 enum Face {
-    /// +z, along this part of x.
+    /// The front (+z), along this part of x.
     Front(Span),
-    /// -x.
+    /// The left (-x).
     Left,
-    /// +x.
+    /// The right (+x).
     Right,
 }
 
-/// Plinth, carcass, doors and worktop.
+/// Draw a run of cabinets: plinth, carcass, doors and worktop.
 fn cabinets(s: &mut Sketch<'_>, x: Span, z: Span, face: Face) {
     let h = s.size()[1];
     let wood =
@@ -76,7 +77,7 @@ fn cabinets(s: &mut Sketch<'_>, x: Span, z: Span, face: Face) {
     }
 }
 
-/// A fridge: a shell with shelves, closed by two doors over each other.
+/// Draw a fridge: a shell with shelves, closed by two doors over each other.
 pub fn fridge(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, _, z] = s.spans();
@@ -110,7 +111,7 @@ pub fn fridge(s: &mut Sketch<'_>) {
     }
 }
 
-/// A microwave: body, dark window, panel.
+/// Draw a microwave: body, dark window, panel.
 pub fn microwave(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let body = s.tint(0, s.choose(&[[200, 200, 202], [60, 60, 64], [230, 230, 228]], STEEL));
@@ -134,7 +135,7 @@ pub fn microwave(s: &mut Sketch<'_>) {
     }
 }
 
-/// Back column, head, drip tray and pot.
+/// Draw a coffee machine: back column, head, drip tray and pot.
 pub fn coffee_machine(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let body = s.tint(0, s.choose(&[DARK, [150, 40, 40], [180, 182, 185]], DARK));
@@ -151,7 +152,7 @@ pub fn coffee_machine(s: &mut Sketch<'_>) {
     );
 }
 
-/// Body, two slots, a lever.
+/// Draw a toaster: body, two slots and a lever.
 pub fn toaster(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let body = s.tint(0, s.choose(&[STEEL, [190, 60, 55], [235, 230, 220], DARK], STEEL));
@@ -162,7 +163,7 @@ pub fn toaster(s: &mut Sketch<'_>) {
     s.cuboid(between(x, 0.42, 0.58), between(y, 0.55, 0.65), between(z, 0.94, 1.0), DARK);
 }
 
-/// A shallow dish with a long handle along the box's longer side.
+/// Draw a pan: a shallow dish with a long handle along the box's longer side.
 pub fn pan(s: &mut Sketch<'_>) {
     let [w, _, d] = s.size();
     let [x, y, z] = s.spans();
@@ -181,7 +182,7 @@ pub fn pan(s: &mut Sketch<'_>) {
     }
 }
 
-/// A deep round vessel with two ears and a lid.
+/// Draw a pot: a deep round vessel with two ears and a lid.
 pub fn pot(s: &mut Sketch<'_>) {
     let [w, _, d] = s.size();
     let [x, y, z] = s.spans();
@@ -202,7 +203,7 @@ pub fn pot(s: &mut Sketch<'_>) {
     }
 }
 
-/// A round body with lid, spout and handle.
+/// Draw a kettle: a round body with lid, spout and handle.
 pub fn kettle(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let metal = s.tint(0, STEEL);

@@ -1,9 +1,9 @@
-//! From an asset's facts to the compound of convex parts that stands for it.
+//! Draw the compound of convex parts that represents an asset.
 //!
-//! Every shape fills its asset's box exactly: the box around its parts is the asset's box. Object
-//! frame: origin at the box's centre, y up, front towards +z (measured on ProcTHOR houses: what
-//! stands against a wall has its -z side there). What things stand on lies at the heights the
-//! catalogue knows.
+//! Every shape fills its asset's box exactly: the box around its parts is the asset's box. The
+//! object frame has its origin at the box's centre, y up and the front towards +z (measured on
+//! ProcTHOR houses: objects that stand against a wall have their -z side there). Surfaces that bear
+//! objects lie at the heights that the catalogue lists.
 
 mod bathroom;
 mod beds;
@@ -24,9 +24,9 @@ use crate::{
 };
 pub(crate) use colour::lit;
 use sketch::Sketch;
-pub use sketch::{Detail, Looks};
+pub use sketch::{Detail, ShapeTraits};
 
-/// The parts of an asset, in the object frame.
+/// Return the parts of an asset, in the object frame.
 ///
 /// # Returns
 /// At least one part; the box around them is `asset.size_m` about the origin, within rounding.
@@ -35,24 +35,25 @@ pub fn shape_of(asset: &Asset) -> Vec<Part> {
     shape_in(asset, Condition::default())
 }
 
-/// The parts of an asset in a state, in the object frame.
+/// Return the parts of an asset in a state, in the object frame.
 ///
 /// # Returns
-/// [`shape_of`] in the default state. What is open may reach out of the asset's box.
+/// The same as [`shape_of`] in the default state. Open parts may reach out of the asset's box.
 pub fn shape_in(asset: &Asset, condition: Condition) -> Vec<Part> {
     let mut sketch = Sketch::new(asset, condition);
     draw(&mut sketch);
     sketch.finish()
 }
 
-/// Form and parts of the shape that [`shape_in`] gives an asset in a state.
-pub fn looks_in(asset: &Asset, condition: Condition) -> Looks {
+/// Return the form and the striking parts of the shape that [`shape_in`] draws.
+pub fn shape_traits(asset: &Asset, condition: Condition) -> ShapeTraits {
     let mut sketch = Sketch::new(asset, condition);
     draw(&mut sketch);
-    sketch.into_looks()
+    sketch.into_traits()
 }
 
-/// Openness in which [`shape_of`] draws an asset; `None` if its shape has nothing that opens.
+/// Return the openness with which [`shape_of`] draws an asset; `None` if its shape has no part that
+/// opens.
 pub fn drawn_openness(asset: &Asset) -> Option<f64> {
     let at = |openness| shape_in(asset, Condition { openness: Some(openness), is_on: None });
     let is_drawn_open =
@@ -60,13 +61,14 @@ pub fn drawn_openness(asset: &Asset) -> Option<f64> {
     (at(0.0) != at(1.0)).then_some(is_drawn_open.unwrap_or(0.0))
 }
 
-/// Whether an asset's shape shows whether it is on.
+/// Return whether an asset's shape shows whether it is on.
 pub fn shows_light(asset: &Asset) -> bool {
     let at = |is_on| shape_in(asset, Condition { openness: None, is_on: Some(is_on) });
     at(true) != at(false)
 }
 
-/// Words in the categories of Objaverse assets, and the category whose shape fits; first match.
+/// Words in names of Objaverse categories, and the category whose shape fits; the first match
+/// counts.
 const ALIKE: [(&str, &str); 34] = [
     ("Bookshel", "ShelvingUnit"),
     ("Bookcase", "ShelvingUnit"),
@@ -104,7 +106,8 @@ const ALIKE: [(&str, &str); 34] = [
     ("Phone", "CellPhone"),
 ];
 
-/// Draws by category; categories of Objaverse assets by words in their names, others as a cuboid.
+/// Draw an asset by its category; Objaverse categories by words in their names, all others as a
+/// cuboid.
 fn draw(s: &mut Sketch<'_>) {
     let category = s.asset().category.as_str();
     if draw_category(s, category) {
@@ -116,7 +119,7 @@ fn draw(s: &mut Sketch<'_>) {
     }
 }
 
-/// Whether the category has a shape, which is then drawn.
+/// Draw the shape of a category; return false if it has none.
 fn draw_category(s: &mut Sketch<'_>, category: &str) -> bool {
     match category {
         "DiningTable" | "CoffeeTable" | "SideTable" => tables::table(s),

@@ -1,18 +1,18 @@
-//! What people sit on.
+//! Shapes of seats.
 
 use crate::assets::shapes::{
     colour::{DARK, FABRICS, STEEL, WOODS, shade},
     sketch::{Sketch, Span, between, ends, inside},
 };
 
-/// Seat height: recorded, or `otherwise`.
+/// Return the recorded height of the seat, or `otherwise`.
 fn seat_height(s: &Sketch<'_>, otherwise: f64) -> f64 {
     let h = s.size()[1];
     let seat = s.levels().into_iter().find(|&y| y > 0.2 * h && y < 0.75 * h);
     seat.unwrap_or(otherwise)
 }
 
-/// Chairs and office chairs.
+/// Draw chairs and office chairs.
 pub fn chair(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
@@ -60,7 +60,7 @@ pub fn chair(s: &mut Sketch<'_>) {
     }
 }
 
-/// A seat on legs without a back.
+/// Draw a seat on legs without a back.
 pub fn stool(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
@@ -80,7 +80,7 @@ pub fn stool(s: &mut Sketch<'_>) {
     }
 }
 
-/// Sofas and armchairs: base, back, arms, cushions.
+/// Draw sofas and armchairs: base, back, arms, cushions.
 pub fn sofa(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
@@ -98,7 +98,7 @@ pub fn sofa(s: &mut Sketch<'_>) {
     let feet = s.tint(1, WOODS[4]);
     s.legs([0.0, foot], 0.05, 0.03, feet);
     let pad = (0.3 * seat).min(0.14);
-    // The arms reach farthest: a recorded robot stood nearer to the cushions than to the box.
+    // Only the arms fill the box: a recorded robot stood in the box, close to the cushions.
     let front = z[1] - 0.03;
     s.cuboid(inner, [foot, seat - pad], [back[1], front - 0.02], fabric);
     s.cuboid(inner, [foot, h], back, fabric);
@@ -122,7 +122,7 @@ fn slot(span: Span, index: usize, count: usize) -> Span {
     inside(between(span, index as f64 / n, (index as f64 + 1.0) / n), 0.006)
 }
 
-/// A padded block on feet.
+/// Draw a padded block on feet.
 pub fn ottoman(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();

@@ -1,4 +1,4 @@
-//! Drawing aid: parts given by where they begin and end inside an asset's box.
+//! A drawing aid: parts are given by their start and end inside an asset's box.
 
 use serde::Serialize;
 
@@ -12,24 +12,24 @@ use crate::{
     house::Condition,
 };
 
-/// From where to where along one axis, metres.
+/// Start and end along one axis, metres.
 pub type Span = [f64; 2];
 
-/// What one would say of a drawn shape.
+/// Traits by which a drawn shape can be described.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
-pub struct Looks {
-    /// `round`, `L-shaped` or `U-shaped`, where its category has other forms too.
+pub struct ShapeTraits {
+    /// Form: `round`, `L-shaped` or `U-shaped`, if its category has other forms too.
     pub form: Option<&'static str>,
-    /// Parts by which it can be told, the most striking first.
+    /// Parts by which it can be recognised, the most striking first.
     pub details: Vec<Detail>,
 }
 
-/// A part that people have a word for.
+/// A part that has a common name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Detail {
-    /// Singular, with its own adjectives: `open shelf`.
+    /// Name in the singular, with adjectives, for example `open shelf`.
     pub noun: &'static str,
-    /// How many there are.
+    /// Number of such parts.
     pub count: usize,
 }
 
@@ -41,30 +41,30 @@ pub enum Along {
     Z,
 }
 
-/// How parts move as a thing opens: turning about an axis through a point of the box (x, height, z).
+/// The motion of parts as an object opens.
 #[derive(Debug, Clone, Copy)]
 pub enum Motion {
-    /// A turn.
+    /// A turn about an axis through a point of the box (x, height, z).
     Hinge { pivot_m: Vec3, axis: Along, angle_rad: f64 },
     /// A shift.
     Slide { by_m: Vec3 },
 }
 
-/// Parts that move, and in which state they are drawn.
+/// Parts that move, and the state in which they are drawn.
 struct Moving {
     parts: std::ops::Range<usize>,
     motion: Motion,
     is_drawn_open: bool,
 }
 
-/// Parts being drawn in an asset's box. x and z run about 0, y from the floor (0) up.
+/// The parts drawn so far in an asset's box. x and z are centred on 0, y starts at the floor (0).
 pub struct Sketch<'a> {
     asset: &'a Asset,
     condition: Condition,
     size_m: Vec3,
     parts: Vec<Part>,
     moving: Vec<Moving>,
-    looks: Looks,
+    traits: ShapeTraits,
 }
 
 impl<'a> Sketch<'a> {
@@ -77,26 +77,27 @@ impl<'a> Sketch<'a> {
             size_m,
             parts: Vec::new(),
             moving: Vec::new(),
-            looks: Looks::default(),
+            traits: ShapeTraits::default(),
         }
     }
 
-    /// Whether it is known to be closed or open, and on or off.
+    /// Return the known state: closed or open, on or off.
     pub fn condition(&self) -> Condition {
         self.condition
     }
 
-    /// Whether it is known not to be closed: what only then shows is worth drawing.
+    /// Return whether the asset is known not to be closed, so that parts inside show.
     pub fn is_ajar(&self) -> bool {
         self.condition.openness.is_some_and(|openness| openness > 0.0)
     }
 
-    /// What `draw` draws closed moves by `motion` when the thing is fully open.
+    /// Record parts that `draw` draws closed and that move by `motion` when the object is fully
+    /// open.
     pub fn opening(&mut self, motion: Motion, draw: impl FnOnce(&mut Self)) {
         self.record(motion, false, draw);
     }
 
-    /// What `draw` draws open moves by `motion` when the thing is closed.
+    /// Record parts that `draw` draws open and that move by `motion` when the object is closed.
     pub fn closing(&mut self, motion: Motion, draw: impl FnOnce(&mut Self)) {
         self.record(motion, true, draw);
     }
@@ -111,19 +112,20 @@ impl<'a> Sketch<'a> {
         self.asset
     }
 
-    /// Width, height, depth.
+    /// Return width, height and depth.
     pub fn size(&self) -> Vec3 {
         self.size_m
     }
 
-    /// The box: all of x, of y and of z.
+    /// Return the spans of the whole box along x, y and z.
     pub fn spans(&self) -> [Span; 3] {
         let [w, h, d] = self.size_m;
         [[-0.5 * w, 0.5 * w], [0.0, h], [-0.5 * d, 0.5 * d]]
     }
 
-    /// Heights at which things stand, rising, within the box; of two less than 8 cm apart the
-    /// lower (recorded children hover up to 5 cm over what they stand on).
+    /// Return the heights within the box at which objects stand, ascending. Of two heights less
+    /// than 8 cm apart only the lower counts: recorded children hover up to 5 cm over their
+    /// surface.
     pub fn levels(&self) -> Vec<f64> {
         let mut levels: Vec<f64> = Vec::new();
         for &level in &self.asset.surfaces_m {
@@ -135,12 +137,12 @@ impl<'a> Sketch<'a> {
         levels
     }
 
-    /// The asset's colour number `index`, or `otherwise` where it tells nothing.
+    /// Return the asset's colour number `index`, or `otherwise` if it has none.
     pub fn tint(&self, index: usize, otherwise: Colour) -> Colour {
         colour::tint(self.asset, index, otherwise)
     }
 
-    /// One of `choices`, always the same for the same asset.
+    /// Choose one of `choices`, always the same for the same asset.
     pub fn choose<T: Copy>(&self, choices: &[T], otherwise: T) -> T {
         let index = colour::hash(&self.asset.id) as usize % choices.len().max(1);
         choices.get(index).copied().unwrap_or(otherwise)
@@ -152,7 +154,7 @@ impl<'a> Sketch<'a> {
         self.push(Primitive::Cuboid { half_m }, spans, IDENTITY, colour);
     }
 
-    /// One cuboid that fills the box.
+    /// Draw one cuboid that fills the box.
     pub fn block(&mut self, colour: Colour) {
         let [x, y, z] = self.spans();
         self.cuboid(x, y, z, colour);
@@ -164,30 +166,30 @@ impl<'a> Sketch<'a> {
         self.push(Primitive::Ellipsoid { half_m }, spans, IDENTITY, colour);
     }
 
-    /// A round thing at half the triangles of an ellipsoid: two frusta base to base.
+    /// Draw a round part with half the triangles of an ellipsoid: two frusta base to base.
     pub fn blob(&mut self, x: Span, y: Span, z: Span, colour: Colour) {
         let middle = 0.45 * y[1] + 0.55 * y[0];
         self.column(x, [y[0], middle], z, 1.8, 8, colour);
         self.column(x, [middle, y[1]], z, 0.5, 8, colour);
     }
 
-    /// Upright cylinder (`taper` 1) or cone; see [`Sketch::round`].
+    /// Draw an upright cylinder (`taper` 1) or cone; see [`Sketch::round`].
     pub fn column(&mut self, x: Span, y: Span, z: Span, taper: f64, sides: u8, colour: Colour) {
         self.round(Along::Y, taper, sides, [x, y, z], colour);
     }
 
-    /// Upright cylinder of radius `radius` about `[x, z]`.
+    /// Draw an upright cylinder of radius `radius` about `[x, z]`.
     pub fn pole(&mut self, centre: [f64; 2], radius: f64, y: Span, sides: u8, colour: Colour) {
         let [x, z] = centre.map(|c| [c - radius, c + radius]);
         self.column(x, y, z, 1.0, sides, colour);
     }
 
-    /// Cylinder (`taper` 1) or cone whose far end along its axis is `taper` times as wide as its
-    /// near end; the spans hold the wider one.
+    /// Draw a cylinder (`taper` 1) or cone whose far end along its axis is `taper` times as wide as
+    /// its near end; the spans enclose the wider end.
     pub fn round(&mut self, along: Along, taper: f64, sides: u8, spans: [Span; 3], colour: Colour) {
         let spans = self.clamped(spans);
         let half = spans.map(|[low, high]| 0.5 * (high - low));
-        // Columns of the rotations are where the part's own x, y and z point.
+        // The columns of the rotations are the directions of the part's own x, y and z.
         let (half_height_m, across, rotation): (f64, [f64; 2], Mat3) = match along {
             Along::Y => (half[1], [half[0], half[2]], IDENTITY),
             Along::X => {
@@ -204,7 +206,7 @@ impl<'a> Sketch<'a> {
         self.push(primitive, spans, rotation, colour);
     }
 
-    /// Four uprights at the corners of the box, `thick` square, `inset` from its sides.
+    /// Draw four square uprights, `thick` wide, at the corners of the box, `inset` from its sides.
     pub fn legs(&mut self, y: Span, thick: f64, inset: f64, colour: Colour) {
         let [x, _, z] = self.spans();
         for x in ends(x, thick, inset) {
@@ -214,7 +216,7 @@ impl<'a> Sketch<'a> {
         }
     }
 
-    /// Nothing is drawn outside the box.
+    /// Clamp spans to the box.
     fn clamped(&self, spans: [Span; 3]) -> [Span; 3] {
         let all = self.spans();
         std::array::from_fn(|i| spans[i].map(|end| end.clamp(all[i][0], all[i][1])))
@@ -230,25 +232,25 @@ impl<'a> Sketch<'a> {
         self.parts.push(Part { primitive, centre_m, rotation, colour });
     }
 
-    /// Notes the form.
+    /// Record the form.
     pub fn form(&mut self, form: &'static str) {
-        self.looks.form = Some(form);
+        self.traits.form = Some(form);
     }
 
-    /// Notes a part that was drawn, if any was.
+    /// Record a drawn part, unless `count` is 0.
     pub fn detail(&mut self, noun: &'static str, count: usize) {
         if count > 0 {
-            self.looks.details.push(Detail { noun, count });
+            self.traits.details.push(Detail { noun, count });
         }
     }
 
-    /// What was noted.
-    pub fn into_looks(self) -> Looks {
-        self.looks
+    /// Return the recorded traits.
+    pub fn into_traits(self) -> ShapeTraits {
+        self.traits
     }
 
-    /// The parts, stretched (by a little, or not at all) to fill the box as they are drawn, then
-    /// moved to where its state has them.
+    /// Finish the shape: stretch the drawn parts slightly so that they fill the box, then move them
+    /// to their places in the asset's state.
     pub fn finish(mut self) -> Vec<Part> {
         if self.parts.is_empty() {
             self.block([160, 150, 140]);
@@ -273,7 +275,7 @@ impl<'a> Sketch<'a> {
     }
 }
 
-/// Moves a part by a share of a motion; `origin_m` is the height of the object frame's origin.
+/// Move a part by a share of a motion; `origin_m` is the height of the object frame's origin.
 fn move_part(part: &mut Part, motion: &Motion, share: f64, origin_m: f64) {
     match *motion {
         Motion::Slide { by_m } => part.centre_m = add(part.centre_m, by_m.map(|by| share * by)),
@@ -289,29 +291,29 @@ fn move_part(part: &mut Part, motion: &Motion, share: f64, origin_m: f64) {
     }
 }
 
-/// The two pieces of a span `thick` long that end `inset` before its ends.
+/// Return the two pieces of a span `thick` long that end `inset` before its ends.
 pub fn ends(span: Span, thick: f64, inset: f64) -> [Span; 2] {
     let [low, high] = [span[0] + inset, span[1] - inset];
     let thick = thick.min(0.5 * (high - low));
     [[low, low + thick], [high - thick, high]]
 }
 
-/// The span without `by` at both ends.
+/// Return the span without `by` at both ends.
 pub fn inside(span: Span, by: f64) -> Span {
     let by = by.min(0.49 * (span[1] - span[0]));
     [span[0] + by, span[1] - by]
 }
 
-/// The part of a span between two fractions of it.
+/// Return the part of a span between two fractions of it.
 pub fn between(span: Span, from: f64, to: f64) -> Span {
     let length = span[1] - span[0];
     [span[0] + from * length, span[0] + to * length]
 }
 
-/// Scales a part whose rotation maps axes to axes, about `middle`, which moves to the origin.
+/// Scale a part whose rotation maps axes to axes, about `middle`, which moves to the origin.
 fn stretch(part: &mut Part, middle: Vec3, scale: Vec3) {
     part.centre_m = std::array::from_fn(|i| (part.centre_m[i] - middle[i]) * scale[i]);
-    // Own axis j points along the box's axis i where rotation[i][j] is 1 or -1.
+    // The part's own axis j points along the box's axis i where rotation[i][j] is 1 or -1.
     let own = |j: usize| (0..3).map(|i| part.rotation[i][j].powi(2) * scale[i]).sum::<f64>();
     let [x, y, z] = [own(0), own(1), own(2)];
     match &mut part.primitive {

@@ -1,4 +1,5 @@
-//! Things that hold things: carcasses with drawers, doors or open boards, shelving, carts, safes.
+//! Shapes of storage furniture: carcasses with drawers, doors or open boards, shelving, carts,
+//! safes.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,9 +8,11 @@ use crate::assets::shapes::{
     sketch::{Along, Motion, Sketch, Span, between, ends, inside},
 };
 
-/// Dressers, television stands, nightstands: open where things were seen inside, drawers elsewhere.
+/// Draw dressers, television stands and nightstands: open where objects were recorded inside, with
+/// drawers elsewhere.
 ///
-/// Open compartments have the boards at the recorded heights, so that what lies in them shows.
+/// Open compartments have their boards at the recorded heights, so that the objects in them are
+/// visible.
 pub fn carcass(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, _, z] = s.spans();
@@ -38,7 +41,7 @@ pub fn carcass(s: &mut Sketch<'_>) {
     s.cuboid(width, [0.0, h - board], [z[0], z[0] + 0.01], shade(wood, 0.7));
     let bottom = inner[0];
     if bottom > 0.25 {
-        // Nothing was ever seen below the first board: a drawer or a door closes it.
+        // No object was recorded below the first board, so a drawer or a door closes it.
         s.cuboid(width, [0.02, bottom], [z[0] + 0.01, shell[1]], front);
     } else {
         s.cuboid(width, [(bottom - board).max(0.0), bottom], [z[0] + 0.01, z[1]], wood);
@@ -48,7 +51,7 @@ pub fn carcass(s: &mut Sketch<'_>) {
     }
 }
 
-/// Fronts with a handle each, on the +z side.
+/// Draw fronts with a handle each, on the +z side.
 fn drawers(s: &mut Sketch<'_>, [columns, rows]: [usize; 2], y: [f64; 2], colour: Colour) {
     let [x, _, z] = s.spans();
     let face = [z[1] - 0.012, z[1] - 0.004];
@@ -70,7 +73,7 @@ fn drawers(s: &mut Sketch<'_>, [columns, rows]: [usize; 2], y: [f64; 2], colour:
                 front(s);
                 continue;
             }
-            // The upper row is the one that is pulled out.
+            // The upper row of drawers opens.
             let depth = 0.5 * (z[1] - z[0]);
             s.opening(Motion::Slide { by_m: [0.0, 0.0, 0.8 * depth] }, |s| {
                 front(s);
@@ -80,7 +83,7 @@ fn drawers(s: &mut Sketch<'_>, [columns, rows]: [usize; 2], y: [f64; 2], colour:
     }
 }
 
-/// Bottom, sides and back of a drawer, which only show when it is pulled out.
+/// Draw bottom, sides and back of a drawer, which only show when it is pulled out.
 pub fn tray(s: &mut Sketch<'_>, x: Span, y: Span, z: Span) {
     if !s.is_ajar() {
         return;
@@ -93,7 +96,7 @@ pub fn tray(s: &mut Sketch<'_>, x: Span, y: Span, z: Span) {
     s.cuboid(x, y, [z[0], z[0] + 0.01], wood);
 }
 
-/// Open shelving: sides, back and boards at the recorded heights.
+/// Draw open shelving: sides, back and boards at the recorded heights.
 pub fn shelves(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, _, z] = s.spans();
@@ -119,7 +122,7 @@ pub fn shelves(s: &mut Sketch<'_>) {
     s.cuboid(width, [0.0, h], [z[0], z[0] + 0.008], shade(wood, 0.75));
 }
 
-/// A serving cart: boards on four posts, with castors.
+/// Draw a serving cart: boards on four posts, with castors.
 pub fn cart(s: &mut Sketch<'_>) {
     let h = s.size()[1];
     let [x, _, z] = s.spans();
@@ -135,7 +138,7 @@ pub fn cart(s: &mut Sketch<'_>) {
     }
 }
 
-/// A safe: a body, a door with a dial.
+/// Draw a safe: a body, a door with a dial.
 pub fn safe(s: &mut Sketch<'_>) {
     let [w, h, _] = s.size();
     let [x, y, z] = s.spans();

@@ -1,4 +1,5 @@
-//! Tables and desks: a top, legs or a pedestal, and lower boards where things were seen on them.
+//! Shapes of tables and desks: a top, legs or a pedestal, and lower boards where objects were
+//! recorded on them.
 
 use crate::assets::shapes::{
     colour::{Colour, WOODS, shade},
@@ -6,7 +7,7 @@ use crate::assets::shapes::{
     storage,
 };
 
-/// Round tables, told by their names and by recorded children that leave the corners free.
+/// Round tables, identified by their names and by recorded children that leave the corners free.
 const ROUND: [&str; 14] = [
     "Dining_Table_16_1",
     "Dining_Table_16_2",
@@ -24,11 +25,11 @@ const ROUND: [&str; 14] = [
     "Side_Table_225_1",
 ];
 
-/// Dining, coffee and side tables.
+/// Draw dining, coffee and side tables.
 pub fn table(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let low: Vec<f64> = s.levels().into_iter().filter(|&y| y < h - 0.06).collect();
-    // Something inside: a nightstand, unless it is one low board between legs.
+    // With objects inside it is a nightstand, unless it has one low board between legs.
     let is_small = s.asset().category == "SideTable" && h < 0.75 && w < 0.7;
     let is_carcass = low.len() >= 2 || is_small && low.first().is_some_and(|&y| y > 0.3 * h);
     if is_carcass && s.asset().category != "DiningTable" {
@@ -70,9 +71,9 @@ pub fn table(s: &mut Sketch<'_>) {
 /// Desks whose drawers and boards are on the right (+x); on all others they are on the left.
 const RIGHT_HANDED: [&str; 2] = ["Desk_305_1", "Desk_328_1"];
 
-/// Desks: a top, and on one side a block of drawers, or of open boards where things were seen
-/// inside; tall ones carry a shelf at the back; deep ones are L shaped like corner counters. Which
-/// side, and the L, are measured on recorded children.
+/// Draw desks: a top, and on one side a block of drawers, or of open boards where objects were
+/// recorded inside. Tall desks carry a shelf at the back, deep ones are L-shaped like corner
+/// counters. The side and the L are measured on recorded children.
 pub fn desk(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, _, z] = s.spans();
@@ -114,7 +115,7 @@ pub fn desk(s: &mut Sketch<'_>) {
         drawer_block(s, block, desk_top - top, front);
     }
     if low.iter().any(|&level| level <= desk_top - 0.16) {
-        // The upright that carries the boards' inner ends.
+        // This upright carries the boards' inner ends.
         let edge = if RIGHT_HANDED.contains(&id) { block[0] } else { block[1] - side };
         s.cuboid([edge, edge + side], leg_y, inside(z, 0.02), front);
         if id == "Desk_301_1" {
@@ -122,7 +123,7 @@ pub fn desk(s: &mut Sketch<'_>) {
         }
     }
     for level in low {
-        // One just under the top is a drawer or a ledge along the whole desk.
+        // A level just under the top is a drawer or a ledge along the whole desk.
         let is_ledge = level > desk_top - 0.16;
         let board = [(level - 0.02).max(0.0), level];
         s.cuboid(if is_ledge { inside(x, side) } else { block }, board, inside(z, 0.02), wood);
@@ -131,7 +132,7 @@ pub fn desk(s: &mut Sketch<'_>) {
         }
     }
     if h > desk_top + 0.05 {
-        // Shelf over the back of the desk.
+        // The shelf over the back of the desk.
         s.detail("raised shelf", 1);
         let back = between(z, 0.0, 0.42);
         s.cuboid(x, [h - 0.025, h], back, wood);
@@ -144,7 +145,7 @@ pub fn desk(s: &mut Sketch<'_>) {
     }
 }
 
-/// Three closed drawers over each other.
+/// Draw three drawers, one above the other.
 fn drawer_block(s: &mut Sketch<'_>, x: Span, top: f64, colour: Colour) {
     let z = s.spans()[2];
     s.detail("drawer", 3);
@@ -160,7 +161,7 @@ fn drawer_block(s: &mut Sketch<'_>, x: Span, top: f64, colour: Colour) {
             grip(s);
             continue;
         }
-        // The upper drawer is the one that is pulled out.
+        // The upper drawer opens.
         let depth = 0.5 * (z[1] - z[0]);
         s.opening(Motion::Slide { by_m: [0.0, 0.0, 0.8 * depth] }, |s| {
             grip(s);

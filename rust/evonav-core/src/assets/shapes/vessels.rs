@@ -1,4 +1,4 @@
-//! Bins, boxes, bottles, cups and other vessels.
+//! Shapes of bins, boxes, bottles, cups and other vessels.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -7,7 +7,7 @@ use crate::assets::shapes::{
     sketch::{Along, Motion, Sketch, between, ends, inside},
 };
 
-/// An open bin: four sides (or a round wall where the box is square) and a dark inside.
+/// Draw an open bin: four sides (or a round wall where the box is square) and a dark inside.
 pub fn bin(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
@@ -37,7 +37,7 @@ pub fn bin(s: &mut Sketch<'_>) {
     }
 }
 
-/// A full bag with a knot.
+/// Draw a full bag with a knot.
 pub fn bag(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let plastic = s.tint(0, [40, 42, 46]);
@@ -52,7 +52,7 @@ pub fn bag(s: &mut Sketch<'_>) {
     );
 }
 
-/// An open cardboard box; with two flaps, up within its box, where it is known how open it is.
+/// Draw an open cardboard box, with two flaps if its openness is known.
 pub fn open_box(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let [x, y, z] = s.spans();
@@ -72,7 +72,7 @@ pub fn open_box(s: &mut Sketch<'_>) {
     }
 }
 
-/// Body, shoulder, neck and cap.
+/// Draw a bottle: body, shoulder, neck and cap.
 pub fn bottle(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let glasses = [[60, 100, 70], [190, 205, 215], [120, 70, 45], [210, 160, 90], [130, 160, 190]];
@@ -89,7 +89,7 @@ pub fn bottle(s: &mut Sketch<'_>) {
     }
 }
 
-/// A body and a perforated cap.
+/// Draw a shaker: a body and a perforated cap.
 pub fn shaker(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let is_salt = s.asset().category == "SaltShaker";
@@ -98,7 +98,7 @@ pub fn shaker(s: &mut Sketch<'_>) {
     s.column(between(x, 0.1, 0.9), between(y, 0.78, 1.0), between(z, 0.1, 0.9), 0.7, 8, STEEL);
 }
 
-/// A cup with dark content, and a handle where the box is longer one way.
+/// Draw a cup with dark content, and a handle if the box is longer in one direction.
 pub fn mug(s: &mut Sketch<'_>) {
     let [w, _, d] = s.size();
     let [x, y, z] = s.spans();
@@ -122,7 +122,7 @@ pub fn mug(s: &mut Sketch<'_>) {
     }
 }
 
-/// A wide cone standing on its narrow end.
+/// Draw a bowl: a wide cone standing on its narrow end.
 pub fn bowl(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let glaze = s.tint(0, s.choose(&[CERAMIC, [150, 180, 190], [200, 150, 110]], CERAMIC));
@@ -137,7 +137,7 @@ pub fn bowl(s: &mut Sketch<'_>) {
     );
 }
 
-/// A flat disc with a rim.
+/// Draw a plate: a flat disc with a rim.
 pub fn plate(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let glaze = s.tint(0, s.choose(&[CERAMIC, [190, 205, 215], [225, 205, 180]], CERAMIC));
@@ -152,7 +152,7 @@ pub fn plate(s: &mut Sketch<'_>) {
     );
 }
 
-/// Foot, belly and neck.
+/// Draw a vase: foot, belly and neck.
 pub fn vase(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     let glazes = [[110, 150, 165], [190, 120, 90], [220, 215, 205], [90, 80, 110], [70, 70, 72]];
@@ -169,7 +169,7 @@ pub fn vase(s: &mut Sketch<'_>) {
     );
 }
 
-/// A box with a tissue standing out.
+/// Draw a box with a tissue standing out.
 pub fn tissue_box(s: &mut Sketch<'_>) {
     let [x, y, z] = s.spans();
     s.cuboid(x, between(y, 0.0, 0.7), z, s.tint(0, [140, 170, 190]));
@@ -183,7 +183,7 @@ pub fn tissue_box(s: &mut Sketch<'_>) {
     );
 }
 
-/// A roll along its longest side, with its core.
+/// Draw a roll along its longest side, with its core.
 pub fn roll(s: &mut Sketch<'_>) {
     let [w, h, d] = s.size();
     let spans = s.spans();

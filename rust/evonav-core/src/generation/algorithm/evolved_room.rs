@@ -1,25 +1,25 @@
-//! Which room evolves between two stages (paper, Sec. 3.2), and how.
+//! Sample the room that evolves between two stages (paper, Sec. 3.2).
 
 use crate::{generation::Parameters, rng::Stream};
 
-/// What a room's weight is made of.
+/// The factors of a room's weight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RoomHistory {
-    /// Objects in the room, children included.
+    /// Number of objects in the room, children included.
     pub num_assets: usize,
-    /// The reference trajectory has been in it.
+    /// Whether the reference trajectory has been in it.
     pub is_visited: bool,
-    /// The reference trajectory is in it now.
+    /// Whether the reference trajectory ends in it.
     pub is_transition_room: bool,
-    /// It changed within the last `changed_room_window` transitions.
+    /// Whether it changed within the last `changed_room_window` transitions.
     pub was_changed_recently: bool,
 }
 
-/// `q_asset * q_visited * q_current * q_evolved` of one room, not normalised.
+/// Compute `q_asset * q_visited * q_current * q_evolved` of one room, not normalised.
 ///
-/// `q_evolved` looks back `changed_room_window` transitions. The paper's "sampled at k - 2" counts
-/// transitions by their first stage: the one just before (k - 1 -> k); its hyperparameter table
-/// gives the length of the stored list (Sec. 3.2, A.2).
+/// `q_evolved` looks back `changed_room_window` transitions. The paper's "sampled at k - 2" numbers
+/// transitions by their first stage and so means the one just before (k - 1 -> k); its
+/// hyperparameter table gives the length of the stored list (Sec. 3.2, A.2).
 pub fn evolved_room_weight(room: RoomHistory, parameters: &Parameters) -> f64 {
     if room.is_transition_room {
         return 0.0;
@@ -29,10 +29,10 @@ pub fn evolved_room_weight(room: RoomHistory, parameters: &Parameters) -> f64 {
     room.num_assets as f64 * visited * changed
 }
 
-/// Draws the room that evolves.
+/// Draw the room that evolves.
 ///
 /// # Returns
-/// Its index and every room's weight; `None` for the index if all weights are 0.
+/// The room's index and every room's weight; `None` for the index if all weights are 0.
 pub fn sample_evolved_room(
     rooms: &[RoomHistory],
     parameters: &Parameters,

@@ -1,17 +1,18 @@
-//! Which object is the next target (paper, Sec. 3.2).
+//! Sample the object that is the next target (paper, Sec. 3.2).
 
 use crate::{generation::Parameters, rng::Stream};
 
 /// An object that may become a target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Candidate<'a> {
-    /// Object type.
+    /// Category of the object.
     pub category: &'a str,
     /// Index of its room.
     pub room: usize,
 }
 
-/// Target scores: 2 if the category is unique in the house, 1.5 if unique in its room, 1 otherwise.
+/// Compute the target scores: 2 if the category is unique in the house, 1.5 if unique in its room,
+/// 1 otherwise.
 pub fn target_scores(candidates: &[Candidate<'_>]) -> Vec<f64> {
     let count = |is_counted: &dyn Fn(&Candidate<'_>) -> bool| {
         candidates.iter().filter(|&other| is_counted(other)).count()
@@ -28,21 +29,23 @@ pub fn target_scores(candidates: &[Candidate<'_>]) -> Vec<f64> {
     candidates.iter().map(score).collect()
 }
 
-/// What biases the choice of a goal.
+/// The biases of the choice of a goal.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct GoalBias<'a> {
-    /// Room modified for this stage.
+    /// Room that was modified for this stage.
     pub changed_room: Option<usize>,
-    /// Goal room of the stage before; only that one, though the generation state keeps two
-    /// (paper, Sec. 3.2 against Sec. A.2: penalising both misses the published share of relocated goals).
+    /// Goal room of the previous stage. Only that one counts, though the generation state has two
+    /// (paper, Sec. 3.2 against Sec. A.2): with a penalty on both the published share of relocated
+    /// goals is missed.
     pub previous_goal_room: Option<usize>,
     /// Candidate that `SALIENT_OBJECT` moved for this stage.
     pub moved_object: Option<usize>,
-    /// Candidates that stood on it and moved with it.
+    /// Candidates that stood on the moved object and moved with it.
     pub moved_children: &'a [usize],
 }
 
-/// Goal weight of each of `num_rooms` rooms: the sum of its candidates' scores, times the biases.
+/// Compute the goal weight of each of `num_rooms` rooms: the sum of its candidates' scores, times
+/// the biases.
 pub fn goal_room_weights(
     candidates: &[Candidate<'_>],
     scores: &[f64],
@@ -67,14 +70,14 @@ pub fn goal_room_weights(
     weights
 }
 
-/// Draws candidates without replacement, room first, until one is accepted.
+/// Draw candidates without replacement, room first, until one is accepted.
 ///
 /// # Arguments
-/// * `accept` - `Ok` with what is wanted of the candidate, or `Err` to have another drawn.
+/// * `accept` - returns a value to accept the candidate, or `None` to draw another one.
 ///
 /// # Returns
-/// The accepted candidate's index and `accept`'s answer; `None` when every candidate with a
-/// positive weight was refused.
+/// Index of the accepted candidate and the value of `accept`; `None` if every candidate with a
+/// positive weight was rejected.
 pub fn sample_goal<T>(
     candidates: &[Candidate<'_>],
     num_rooms: usize,
@@ -100,8 +103,8 @@ pub fn sample_goal<T>(
             .zip(&object_weights)
             .map(|(candidate, &weight)| if candidate.room == room { weight } else { 0.0 })
             .collect();
-        // A refused candidate's room is drawn from again, until it has no candidate left: the
-        // paper "samples another target" without saying from where (Sec. A.4).
+        // The room of a rejected candidate is drawn from again until it has no candidate left: the
+        // paper "samples another target" without saying from which room (Sec. A.4).
         let Some(index) = stream.choose_weighted(&in_room) else {
             room_weights[room] = 0.0;
             continue;

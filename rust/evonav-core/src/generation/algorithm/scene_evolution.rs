@@ -1,10 +1,11 @@
-//! The hidden change between two stages: whether, where, how (paper, Sec. 3.2).
+//! Sample the hidden change between two stages: whether, where and how the house changes (paper,
+//! Sec. 3.2).
 
 use crate::{
     Error,
     generation::{
         Mode, RoomHistory,
-        algorithm::room_modification::{Blocked, Modification, Modifier},
+        algorithm::room_modification::{Modification, Modifier, UnmovedReason},
         placement::reach::Reach,
         record::{EvolutionOutcome, EvolutionRecord, ModificationFailure, RoomWeightRecord},
         sample_evolved_room,
@@ -18,105 +19,104 @@ use crate::{
     house::HouseDelta,
 };
 
-impl Generator<'_> {
-    /// `SampleSceneEvolution`: which room changes, how, and what that moves.
-    pub(crate) fn sample_scene_evolution(
-        &self,
-        world: &StageWorld,
-        state: &State,
-        stage: usize,
-    ) -> Result<(EvolutionRecord, HouseDelta), Error> {
-        let parameters = self.parameters;
-        let is_drawn = || self.stream(stage, "trigger").uniform() < parameters.evolve_probability;
-        if !self.given.is_evolved(stage).unwrap_or_else(is_drawn) {
-            return Ok((no_evolution(EvolutionOutcome::NotTriggered), HouseDelta::default()));
-        }
-        let house = &world.house;
-        let window = state.changed.len().saturating_sub(parameters.changed_room_window);
-        let rooms: Vec<RoomHistory> = (0..house.rooms.len())
-            .map(|room| RoomHistory {
-                num_assets: house.objects.iter().filter(|o| o.room == Some(room)).count(),
-                is_visited: state.visited[room],
-                is_transition_room: state.transition_room(house) == Some(room),
-                was_changed_recently: state.changed[window..].contains(&Some(room)),
-            })
-            .collect();
-        let (room, weights) =
-            sample_evolved_room(&rooms, parameters, &mut self.stream(stage, "room"));
-        let weighed = |((room, history), weight): ((usize, &RoomHistory), &f64)| RoomWeightRecord {
-            room_id: house.rooms[room].id.clone(),
-            num_assets: history.num_assets,
-            is_visited: history.is_visited,
-            is_transition_room: history.is_transition_room,
-            was_changed_recently: history.was_changed_recently,
-            weight: *weight,
-        };
-        let mut record = no_evolution(EvolutionOutcome::NoRoom);
-        record.room_weights = rooms.iter().enumerate().zip(&weights).map(weighed).collect();
-        let Some(room) = room else { return Ok((record, HouseDelta::default())) };
-        record.room_id = Some(house.rooms[room].id.clone());
-        record.mode = Mode::sample(parameters, &mut self.stream(stage, "mode"));
-        record.outcome = EvolutionOutcome::NoPlacement;
-        let Some(mode) = record.mode else { return Ok((record, HouseDelta::default())) };
-        let modified = self.modify(world, state, stage, room, mode)?;
-        let Modification { layout, salient, unmoved, crowded, rearranged } = match modified {
-            Ok(modification) => modification,
-            Err(failure) => {
-                record.failure = Some(failure);
-                return Ok((record, HouseDelta::default()));
-            }
-        };
-        let delta = layout.delta_from(house);
-        record.changes =
-            changes_of(house, &layout, parameters.relocated_min_m, |_| mode.name().to_owned());
-        record.outcome = EvolutionOutcome::Evolved;
-        let id_of = |index: usize| house.objects[index].id.clone();
-        record.salient_id = salient.map(id_of);
-        let has_moved = |id: &String| record.changes.iter().any(|c| c.is_relocated && c.id == *id);
-        let stays = |&&(index, _): &&(usize, Blocked)| !has_moved(&id_of(index));
-        let unmoved: Vec<_> = unmoved.iter().filter(stays).collect();
-        let is_blocking = |&&&(_, why): &&&(usize, Blocked)| why == Blocked::CutsOff;
-        record.unmoved_ids = unmoved.iter().map(|(index, _)| id_of(*index)).collect();
-        record.blocking_ids =
-            unmoved.iter().filter(is_blocking).map(|(index, _)| id_of(*index)).collect();
-        record.crowded_ids = crowded.into_iter().map(id_of).collect();
-        record.rearranged_ids = rearranged.into_iter().map(id_of).collect();
-        Ok((record, delta))
+/// Sample the evolution before a stage (`SampleSceneEvolution`): the room, the mode and the moves.
+pub(crate) fn sample_scene_evolution(
+    generator: &Generator<'_>,
+    world: &StageWorld,
+    state: &State,
+    stage: usize,
+) -> Result<(EvolutionRecord, HouseDelta), Error> {
+    let parameters = generator.parameters;
+    let is_drawn = || generator.stream(stage, "trigger").uniform() < parameters.evolve_probability;
+    if !generator.overrides.is_evolved(stage).unwrap_or_else(is_drawn) {
+        return Ok((no_evolution(EvolutionOutcome::NotTriggered), HouseDelta::default()));
     }
+    let house = &world.house;
+    let window = state.changed.len().saturating_sub(parameters.changed_room_window);
+    let rooms: Vec<RoomHistory> = (0..house.rooms.len())
+        .map(|room| RoomHistory {
+            num_assets: house.objects.iter().filter(|o| o.room == Some(room)).count(),
+            is_visited: state.visited[room],
+            is_transition_room: state.transition_room(house) == Some(room),
+            was_changed_recently: state.changed[window..].contains(&Some(room)),
+        })
+        .collect();
+    let (room, weights) =
+        sample_evolved_room(&rooms, parameters, &mut generator.stream(stage, "room"));
+    let weighed = |((room, history), weight): ((usize, &RoomHistory), &f64)| RoomWeightRecord {
+        room_id: house.rooms[room].id.clone(),
+        num_assets: history.num_assets,
+        is_visited: history.is_visited,
+        is_transition_room: history.is_transition_room,
+        was_changed_recently: history.was_changed_recently,
+        weight: *weight,
+    };
+    let mut record = no_evolution(EvolutionOutcome::NoRoom);
+    record.room_weights = rooms.iter().enumerate().zip(&weights).map(weighed).collect();
+    let Some(room) = room else { return Ok((record, HouseDelta::default())) };
+    record.room_id = Some(house.rooms[room].id.clone());
+    record.mode = Mode::sample(parameters, &mut generator.stream(stage, "mode"));
+    record.outcome = EvolutionOutcome::NoPlacement;
+    let Some(mode) = record.mode else { return Ok((record, HouseDelta::default())) };
+    let modified = modify_room(generator, world, state, stage, room, mode)?;
+    let Modification { layout, salient, unmoved, crowded, rearranged } = match modified {
+        Ok(modification) => modification,
+        Err(failure) => {
+            record.failure = Some(failure);
+            return Ok((record, HouseDelta::default()));
+        }
+    };
+    let delta = layout.delta_from(house);
+    record.changes =
+        changes_of(house, &layout, parameters.relocated_min_m, |_| mode.name().to_owned());
+    record.outcome = EvolutionOutcome::Evolved;
+    let id_of = |index: usize| house.objects[index].id.clone();
+    record.salient_id = salient.map(id_of);
+    let has_moved = |id: &String| record.changes.iter().any(|c| c.is_relocated && c.id == *id);
+    let stays = |&&(index, _): &&(usize, UnmovedReason)| !has_moved(&id_of(index));
+    let unmoved: Vec<_> = unmoved.iter().filter(stays).collect();
+    let is_blocking = |&&&(_, why): &&&(usize, UnmovedReason)| why == UnmovedReason::CutsOff;
+    record.unmoved_ids = unmoved.iter().map(|(index, _)| id_of(*index)).collect();
+    record.blocking_ids =
+        unmoved.iter().filter(is_blocking).map(|(index, _)| id_of(*index)).collect();
+    record.crowded_ids = crowded.into_iter().map(id_of).collect();
+    record.rearranged_ids = rearranged.into_iter().map(id_of).collect();
+    Ok((record, delta))
+}
 
-    /// Modifies a room; with fresh places, but the same room and mode, where nothing could move.
-    fn modify(
-        &self,
-        world: &StageWorld,
-        state: &State,
-        stage: usize,
-        room: usize,
-        mode: Mode,
-    ) -> Result<Result<Modification, ModificationFailure>, Error> {
-        let reach = Reach::new(
-            &world.house,
-            &world.layout,
-            &world.navigation,
-            state.position_m(),
-            self.parameters,
-        );
-        // Every stage starts at a free pose: there is nothing to reach from one that is not.
-        let Some(reach) = reach else { return Ok(Err(ModificationFailure::CutsOff)) };
-        let mut modifier = Modifier {
-            house: &world.house,
-            catalogue: self.catalogue,
-            parameters: self.parameters,
-            stream: self.stream(stage, "placement"),
-            reach,
-        };
-        let mut made = modifier.modify(&world.layout, room, mode);
-        for retry in 1..self.parameters.modification_tries {
-            if matches!(made, Ok(_) | Err(ModificationFailure::NothingMovable)) {
-                break;
-            }
-            modifier.stream = self.stream(stage, &format!("placement, retry {retry}"));
-            made = modifier.modify(&world.layout, room, mode);
+/// Modify a room. If nothing could move, try again with newly drawn places in the same room and
+/// mode.
+fn modify_room(
+    generator: &Generator<'_>,
+    world: &StageWorld,
+    state: &State,
+    stage: usize,
+    room: usize,
+    mode: Mode,
+) -> Result<Result<Modification, ModificationFailure>, Error> {
+    let reach = Reach::new(
+        &world.house,
+        &world.layout,
+        &world.navigation,
+        state.position_m(),
+        generator.parameters,
+    );
+    // Every stage starts at a free pose; from any other pose nothing can be reached.
+    let Some(reach) = reach else { return Ok(Err(ModificationFailure::CutsOff)) };
+    let mut modifier = Modifier {
+        house: &world.house,
+        catalogue: generator.catalogue,
+        parameters: generator.parameters,
+        stream: generator.stream(stage, "placement"),
+        reach,
+    };
+    let mut made = modifier.modify(&world.layout, room, mode);
+    for retry in 1..generator.parameters.modification_tries {
+        if matches!(made, Ok(_) | Err(ModificationFailure::NothingMovable)) {
+            break;
         }
-        Ok(made)
+        modifier.stream = generator.stream(stage, &format!("placement, retry {retry}"));
+        made = modifier.modify(&world.layout, room, mode);
     }
+    Ok(made)
 }

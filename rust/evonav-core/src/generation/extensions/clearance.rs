@@ -1,4 +1,4 @@
-//! Whether what moved has room in the scene.
+//! Check that moved parts do not touch other bodies.
 
 use crate::{
     assets::part::Part,
@@ -10,9 +10,9 @@ use crate::{
     },
 };
 
-/// Whether the parts of a body that are elsewhere in `new` than in `old` touch no other body; a
-/// door's leaf may touch walls, in one of which it hangs.
-pub(crate) fn has_room(old: &Scene, new: &Scene, id: &str) -> bool {
+/// Return whether the parts of a body that differ between `old` and `new` touch no other body. A
+/// door's leaf may touch walls, since it hangs in one.
+pub(crate) fn has_clearance(old: &Scene, new: &Scene, id: &str) -> bool {
     let Some(after) = new.bodies.iter().find(|body| body.id == id) else { return false };
     let before = old.bodies.iter().find(|body| body.id == id);
     let is_moved = |part: &&Part| before.is_none_or(|before| !before.parts.contains(part));

@@ -1,4 +1,4 @@
-//! Doors and furniture that open and close, lamps and screens that go on and off.
+//! Open and close doors and furniture; switch lamps and screens.
 
 use crate::{
     Error,
@@ -7,7 +7,7 @@ use crate::{
         shapes::{drawn_openness, shows_light},
     },
     generation::{
-        extensions::{clearance::has_room, transition::Transition},
+        extensions::{clearance::has_clearance, transition::Transition},
         record::{EvolutionRecord, StateChangeRecord},
         stage::stage_world::StageWorld,
     },
@@ -16,14 +16,14 @@ use crate::{
     world::scene::Scene,
 };
 
-/// Opennesses that are drawn from.
+/// Openness values from which the new one is drawn.
 const LEVELS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-/// A smaller change of openness is none.
+/// Smallest change of openness.
 const LEAST_CHANGE: f64 = 0.125;
-/// Something whose bottom is this near the top of a part may stand on it.
+/// Largest distance of the bottom of an object from the top of a part on which it may stand.
 const BEARING_M: f64 = 0.03;
 
-/// Something that can open.
+/// A door or an object that can open.
 struct Openable {
     id: String,
     category: String,
@@ -31,7 +31,7 @@ struct Openable {
 }
 
 impl Transition<'_> {
-    /// Opens or closes furniture and things, as far as there is room for what swings out.
+    /// Open or close furniture and other objects, if there is room for the parts that swing out.
     pub(crate) fn open_objects(
         &self,
         world: StageWorld,
@@ -40,13 +40,15 @@ impl Transition<'_> {
     ) -> Result<StageWorld, Error> {
         let house = &world.house;
         let objects = house.objects.iter().zip(&world.layout.items);
-        let openables = objects
-            .filter(|(object, _)| self.is_free(house, object.room) && !is_new(record, &object.id));
+        let openables = objects.filter(|(object, _)| {
+            self.may_change(house, object.room) && !is_new(record, &object.id)
+        });
         let openables = openables.filter_map(|(object, item)| {
             Some(Openable {
                 id: object.id.clone(),
                 category: item.asset.category.clone(),
-                // An openness that the shape does not show would be no change.
+                // Objects whose shape does not show the openness are excluded: nothing would
+                // change.
                 openness: drawn_openness(&item.asset)
                     .map(|drawn| object.openness.unwrap_or(drawn))?,
             })
@@ -55,7 +57,7 @@ impl Transition<'_> {
         self.open(world, openables, count, "OPENABLES", record)
     }
 
-    /// Opens or closes doors with a leaf between two rooms, as long as everything can be reached.
+    /// Open or close doors with a leaf between two rooms, as long as everything stays reachable.
     pub(crate) fn open_doors(
         &self,
         world: StageWorld,
@@ -67,7 +69,7 @@ impl Transition<'_> {
         let doors = house.doors.iter().filter(|door| {
             door.asset_id.starts_with("Doorway")
                 && door.room_ids[0] != door.room_ids[1]
-                && door.room_ids.iter().all(|id| self.is_free(house, room_of(id)))
+                && door.room_ids.iter().all(|id| self.may_change(house, room_of(id)))
         });
         let openables = doors.map(|door| Openable {
             id: door.id.clone(),
@@ -99,10 +101,11 @@ impl Transition<'_> {
             for level in levels {
                 let change = StateChange { id: one.id.clone(), openness: Some(level), is_on: None };
                 let delta = HouseDelta { states: vec![change], ..HouseDelta::default() };
-                let next = self.rebuilt(world.house.apply(&delta)?)?;
+                let next = self.rebuild(world.house.apply(&delta)?)?;
                 let [old, new] = [&world, &next].map(|world| &world.layout.scene);
-                let is_valid = has_room(old, new, &one.id) && keeps_up(&world, old, new, &one.id);
-                if is_valid && self.reaches_as_much(&world, &next)? {
+                let is_valid =
+                    has_clearance(old, new, &one.id) && supports_stay(&world, old, new, &one.id);
+                if is_valid && self.preserves_access(&world, &next)? {
                     record.states.push(StateChangeRecord {
                         id: one.id.clone(),
                         category: one.category.clone(),
@@ -120,7 +123,7 @@ impl Transition<'_> {
         Ok(world)
     }
 
-    /// Turns lamps and screens on that are off, and the other way round.
+    /// Switch lamps and screens: on if they are off, off if they are on.
     pub(crate) fn switch_objects(
         &self,
         world: StageWorld,
@@ -129,7 +132,7 @@ impl Transition<'_> {
     ) -> Result<StageWorld, Error> {
         let house = &world.house;
         let shows = |&index: &usize| {
-            self.is_free(house, house.objects[index].room)
+            self.may_change(house, house.objects[index].room)
                 && !is_new(record, &house.objects[index].id)
                 && shows_light(&world.layout.items[index].asset)
         };
@@ -154,13 +157,13 @@ impl Transition<'_> {
                 cause: "SWITCHES".to_owned(),
             });
         }
-        self.rebuilt(house.apply(&delta)?)
+        self.rebuild(house.apply(&delta)?)
     }
 }
 
-/// Whether what stands on a body stands where it stood, and not on parts that are elsewhere in
-/// `new`.
-fn keeps_up(world: &StageWorld, old: &Scene, new: &Scene, id: &str) -> bool {
+/// Return whether the objects on a body stay where they are in `new` and do not stand on parts that
+/// moved.
+fn supports_stay(world: &StageWorld, old: &Scene, new: &Scene, id: &str) -> bool {
     let body = |scene: &'_ Scene, id: &str| scene.bodies.iter().position(|body| body.id == id);
     let (Some(before), Some(after)) = (body(old, id), body(new, id)) else { return false };
     let Some(index) = world.house.object_index(id) else { return true };
@@ -186,7 +189,7 @@ fn keeps_up(world: &StageWorld, old: &Scene, new: &Scene, id: &str) -> bool {
     })
 }
 
-/// Whether something came at this very transition: it is in the state in which it came.
+/// Return whether an object was inserted at this transition; its state does not change then.
 fn is_new(record: &EvolutionRecord, id: &str) -> bool {
     record.additions.iter().any(|object| object.id == id)
 }

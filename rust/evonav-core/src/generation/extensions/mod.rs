@@ -1,5 +1,5 @@
-//! What goes beyond the paper: things that come and go, doors and furniture that open and close,
-//! lights, and days of people.
+//! Extensions beyond the paper: objects that appear and vanish, doors and furniture that open and
+//! close, lights, and people with daily schedules.
 
 mod activities;
 mod clearance;

@@ -1,10 +1,10 @@
-//! Small things that vanish and appear.
+//! Remove and insert small objects.
 
 use crate::{
     Error,
     assets::{Asset, Catalogue, Split},
     generation::{
-        extensions::{clearance::has_room, transition::Transition},
+        extensions::{clearance::has_clearance, transition::Transition},
         record::{EvolutionRecord, ObjectRecord},
         stage::stage_world::StageWorld,
     },
@@ -19,11 +19,11 @@ use crate::{
     },
 };
 
-/// Things drawn for one arrival before it is given up.
-const ARRIVAL_TRIES: usize = 20;
+/// Number of objects drawn for one insertion before it is given up.
+const INSERTION_TRIES: usize = 20;
 
 impl Transition<'_> {
-    /// Takes away things that can be carried and on which nothing stands.
+    /// Remove pickupable objects on which nothing stands.
     pub(crate) fn remove(
         &self,
         world: StageWorld,
@@ -33,7 +33,7 @@ impl Transition<'_> {
         let (house, layout) = (&world.house, &world.layout);
         let can_go = |&index: &usize| {
             let (object, item) = (&house.objects[index], &layout.items[index]);
-            self.is_free(house, object.room)
+            self.may_change(house, object.room)
                 && item.asset.is_pickupable
                 && object.children.is_empty()
                 && record.changes.iter().all(|change| change.id != object.id)
@@ -49,10 +49,10 @@ impl Transition<'_> {
         record.removals.extend(records);
         let removed = candidates.iter().map(|&index| house.objects[index].id.clone()).collect();
         let delta = HouseDelta { removed, ..HouseDelta::default() };
-        self.rebuilt(house.apply(&delta)?)
+        self.rebuild(house.apply(&delta)?)
     }
 
-    /// Puts new things on furniture.
+    /// Insert new objects on furniture.
     pub(crate) fn insert(
         &self,
         mut world: StageWorld,
@@ -64,14 +64,16 @@ impl Transition<'_> {
         let is_new = |id: &String| world.house.object_index(id).is_none();
         let ids: Vec<String> = ids.filter(is_new).take(count).collect();
         for id in ids {
-            for _ in 0..ARRIVAL_TRIES {
-                let Some(added) = self.arrival(&world, &id, &mut stream)? else { continue };
+            for _ in 0..INSERTION_TRIES {
+                let Some(added) = self.sample_insertion(&world, &id, &mut stream)? else {
+                    continue;
+                };
                 let delta = HouseDelta { added: vec![added], ..HouseDelta::default() };
-                let next = self.rebuilt(world.house.apply(&delta)?)?;
-                // It may overhang its support by a little, where somebody has to pass, or be under
-                // something that the file has in the air and the scene lets down.
+                let next = self.rebuild(world.house.apply(&delta)?)?;
+                // The object may overhang its support a little where an agent has to pass, or be
+                // under an object that hangs in the air in the file and falls in the scene.
                 let [old, new] = [&world, &next].map(|world| &world.layout.scene);
-                if has_room(old, new, &id) && self.reaches_as_much(&world, &next)? {
+                if has_clearance(old, new, &id) && self.preserves_access(&world, &next)? {
                     if let Some(index) = next.house.object_index(&id) {
                         record.additions.push(object_record(
                             &next.house,
@@ -88,9 +90,9 @@ impl Transition<'_> {
         Ok(world)
     }
 
-    /// A thing that could come, and where: category and support by how often ProcTHOR has one on
-    /// the other, and by how typical the category is of the room.
-    fn arrival(
+    /// Draw an object to insert and its place. Category and support are drawn by how often ProcTHOR
+    /// has one on the other, and by how typical the category is of the room.
+    fn sample_insertion(
         &self,
         world: &StageWorld,
         id: &str,
@@ -98,10 +100,10 @@ impl Transition<'_> {
     ) -> Result<Option<AddedObject>, Error> {
         let (house, layout) = (&world.house, &world.layout);
         let catalogue = self.generator.catalogue;
-        let kinds = self.kinds(world);
-        let weights: Vec<f64> = kinds.iter().map(|&(_, _, weight)| weight).collect();
+        let choices = self.insertion_choices(world);
+        let weights: Vec<f64> = choices.iter().map(|&(_, _, weight)| weight).collect();
         let Some(drawn) = stream.choose_weighted(&weights) else { return Ok(None) };
-        let (support, category, _) = kinds[drawn];
+        let (support, category, _) = choices[drawn];
         let split = split_of(house, catalogue);
         let fits = |asset: &&Asset| {
             asset.is_pickupable
@@ -114,7 +116,7 @@ impl Transition<'_> {
             .filter(fits)
             .collect();
         let Some(asset) = assets.get(stream.below(assets.len())) else { return Ok(None) };
-        // Where it is before it has a place does not matter, as long as it is on something.
+        // Before it has a place its position does not matter, as long as it is on its support.
         let mut added = AddedObject {
             id: id.to_owned(),
             asset_id: asset.id.clone(),
@@ -139,14 +141,17 @@ impl Transition<'_> {
         }))
     }
 
-    /// What could stand on what: index of the support, category, weight.
-    fn kinds(&self, world: &StageWorld) -> Vec<(usize, &'static str, f64)> {
+    /// List the possible insertions: index of the support, category, weight.
+    fn insertion_choices(&self, world: &StageWorld) -> Vec<(usize, &'static str, f64)> {
         let (house, layout) = (&world.house, &world.layout);
         let catalogue = Catalogue::bundled();
-        let mut kinds = Vec::new();
+        let mut choices = Vec::new();
         for (support, item) in layout.items.iter().enumerate() {
             let room = house.objects[support].room;
-            if !item.is_on_floor || item.asset.surfaces_m.is_empty() || !self.is_free(house, room) {
+            if !item.is_on_floor
+                || item.asset.surfaces_m.is_empty()
+                || !self.may_change(house, room)
+            {
                 continue;
             }
             let room_type = room.map_or("", |room| house.rooms[room].room_type.as_str());
@@ -160,15 +165,15 @@ impl Transition<'_> {
                     * rule.room_weight(room_type);
                 let is_crowd = weight > 0.0 && !rule.multiple_per_room && has(category);
                 if weight > 0.0 && !is_crowd && !FITTINGS.contains(&category) {
-                    kinds.push((support, category, weight));
+                    choices.push((support, category, weight));
                 }
             }
         }
-        kinds
+        choices
     }
 }
 
-/// An object as records name it.
+/// Return the record of an object.
 fn object_record(house: &House, layout: &Layout, index: usize, cause: &str) -> ObjectRecord {
     let (object, asset) = (&house.objects[index], &layout.items[index].asset);
     ObjectRecord {
@@ -182,7 +187,7 @@ fn object_record(house: &House, layout: &Layout, index: usize, cause: &str) -> O
     }
 }
 
-/// Split of ProcTHOR's assets that a house is furnished from; `None` if it mixes them.
+/// Return the split of ProcTHOR's assets with which a house is furnished; `None` if it mixes them.
 fn split_of(house: &House, catalogue: &Catalogue) -> Option<Split> {
     let mut splits =
         house.objects.iter().filter_map(|object| catalogue.get(&object.asset_id)?.split);

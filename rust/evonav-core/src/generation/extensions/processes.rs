@@ -1,4 +1,4 @@
-//! What the extensions change at a transition, after the paper's evolution.
+//! Apply the extensions at a transition, after the paper's evolution.
 
 use crate::{
     Error,
@@ -9,7 +9,7 @@ use crate::{
 };
 
 impl Transition<'_> {
-    /// Applies all extensions that are on but for schedules, and notes what they changed.
+    /// Apply all enabled extensions except schedules, and record their changes.
     ///
     /// # Returns
     /// The world after them.
@@ -40,7 +40,7 @@ impl Transition<'_> {
         Ok(world)
     }
 
-    /// Whether a process takes place, and on how many things.
+    /// Draw whether a process takes place; return the number of objects that it changes.
     fn draw(&self, occurrence: Option<Occurrence>, cause: &str) -> Option<usize> {
         let Occurrence { probability, max_count } = occurrence?;
         let mut stream = self.generator.stream(self.stage, &format!("{cause} trigger"));

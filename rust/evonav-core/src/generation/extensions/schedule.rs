@@ -1,5 +1,5 @@
-//! Changes by people who live in the house: they carry things to where they use them, and some of
-//! them back. Takes the place of the paper's independent draws of rooms and modifications.
+//! Changes by people who live in the house: they carry objects to the places where they use them,
+//! and some of them back. This replaces the paper's independent draws of rooms and modifications.
 
 use std::collections::BTreeMap;
 
@@ -8,8 +8,8 @@ use crate::{
     generation::{
         Schedule,
         extensions::{
-            activities::{Activity, DAY_MIN, Doing, Habit, activities, day, habits},
-            clearance::has_room,
+            activities::{Activity, DAY_MIN, Habit, PlannedActivity, activities, day, habits},
+            clearance::has_clearance,
             transition::Transition,
         },
         record::{ActivityRecord, ChangeRecord, EvolutionOutcome, EvolutionRecord},
@@ -23,28 +23,28 @@ use crate::{
     world::layout::{Layout, Placement, surfaces::sample_surface_place},
 };
 
-/// The people of a house, and what they have in hand.
+/// The people of a house, and the objects that they use.
 pub(crate) struct Household {
     schedule: Schedule,
     people: Vec<Vec<Habit>>,
     /// Time of day of stage 1.
     first_min: usize,
-    /// Where each thing was when it was first taken, by id.
-    homes: BTreeMap<String, Home>,
-    /// What is in use, by person and begin.
+    /// Place of each object when it was first taken, by id.
+    original_places: BTreeMap<String, OriginalPlace>,
+    /// Ids of the objects in use, by person and start of the activity.
     in_use: BTreeMap<(usize, usize), Vec<String>>,
 }
 
-/// A place, named by ids: indices change from stage to stage.
+/// A place with the id of its parent, since indices change from stage to stage.
 #[derive(Clone)]
-struct Home {
+struct OriginalPlace {
     placement: Placement,
     parent: Option<String>,
 }
 
-/// One begin or end.
+/// The start or end of an activity.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Moment {
+struct ScheduleEvent {
     minute: usize,
     is_begin: bool,
     person: usize,
@@ -54,7 +54,7 @@ struct Moment {
 }
 
 impl Household {
-    /// Draws the people of a house; `stream_of` gives the stream of a name.
+    /// Draw the people of a house; `stream_of` returns the stream of a name.
     pub(crate) fn new(
         schedule: Schedule,
         house: &House,
@@ -65,35 +65,35 @@ impl Household {
             schedule,
             people: (0..schedule.num_persons).map(person).collect(),
             first_min: stream_of("clock").below(DAY_MIN),
-            homes: BTreeMap::new(),
+            original_places: BTreeMap::new(),
             in_use: BTreeMap::new(),
         }
     }
 
-    /// Time of day of a stage, minutes after midnight.
+    /// Return the time of day of a stage, minutes after midnight.
     pub(crate) fn time_of_day_min(&self, stage: usize) -> usize {
         self.minute_of(stage) % DAY_MIN
     }
 
-    /// Minutes after the first midnight at a stage.
+    /// Return the minutes after the first midnight at a stage.
     fn minute_of(&self, stage: usize) -> usize {
         self.first_min + (stage - 1) * self.schedule.minutes_between_stages
     }
 
-    /// What is begun or ended after one stage and until another, in order.
-    fn moments(&self, stage: usize, stream_of: impl Fn(&str) -> Stream) -> Vec<Moment> {
+    /// Return the events after the previous stage and until this one, in order.
+    fn events(&self, stage: usize, stream_of: impl Fn(&str) -> Stream) -> Vec<ScheduleEvent> {
         let (from, to) = (self.minute_of(stage - 1), self.minute_of(stage));
-        let mut moments = Vec::new();
-        // What was begun late on the day before may end today.
+        let mut events = Vec::new();
+        // An activity that started late on the day before may end today.
         let days = (from / DAY_MIN).saturating_sub(1)..=to / DAY_MIN;
         for (number, person) in days.flat_map(|n| (0..self.people.len()).map(move |p| (n, p))) {
             let mut stream = stream_of(&format!("person {person} day {number}"));
-            for Doing { habit, start_min, end_min } in
+            for PlannedActivity { habit, start_min, end_min } in
                 day(&self.people[person], number, &mut stream)
             {
                 for (minute, is_begin) in [(start_min, true), (end_min, false)] {
                     if from < minute && minute <= to {
-                        moments.push(Moment {
+                        events.push(ScheduleEvent {
                             minute,
                             is_begin,
                             person,
@@ -105,22 +105,22 @@ impl Household {
                 }
             }
         }
-        moments.sort_unstable();
-        moments
+        events.sort_unstable();
+        events
     }
 }
 
-/// A house while people are at work in it.
-struct Work<'a, 'b> {
+/// A house while people change it.
+struct HouseInUse<'a, 'b> {
     transition: &'a Transition<'b>,
     world: &'a StageWorld,
     layout: Layout,
-    /// Who moved what last.
+    /// Cause of the last move of each object.
     causes: BTreeMap<usize, String>,
 }
 
 impl Transition<'_> {
-    /// What people did since the stage before.
+    /// Apply the activities of people since the previous stage.
     ///
     /// # Errors
     /// Those of navigation.
@@ -131,11 +131,11 @@ impl Transition<'_> {
     ) -> Result<(EvolutionRecord, HouseDelta), Error> {
         let house = &world.house;
         let layout = world.layout.clone();
-        let mut work = Work { transition: self, world, layout, causes: BTreeMap::new() };
+        let mut work = HouseInUse { transition: self, world, layout, causes: BTreeMap::new() };
         let mut record = no_evolution(EvolutionOutcome::NotTriggered);
-        let of_task = |name: &str| self.generator.stream(0, &format!("schedule {name}"));
-        for moment in household.moments(self.stage, of_task) {
-            let Moment { minute, is_begin, person, habit, start_min, end_min } = moment;
+        let task_stream = |name: &str| self.generator.stream(0, &format!("schedule {name}"));
+        for event in household.events(self.stage, task_stream) {
+            let ScheduleEvent { minute, is_begin, person, habit, start_min, end_min } = event;
             let Habit { activity, room, .. } = household.people[person][habit];
             let one = &activities()[activity];
             let name = format!("schedule {} of {person} at {minute}", one.name);
@@ -143,8 +143,8 @@ impl Transition<'_> {
             let cause = format!("ACTIVITY:{}", one.name);
             let (before, mut moved) = (work.layout.clone(), Vec::new());
             if is_begin {
-                // Nobody begins what would be seen.
-                if !self.is_free(house, Some(room)) {
+                // No activity starts in the room where the agent would see it.
+                if !self.may_change(house, Some(room)) {
                     continue;
                 }
                 record.activities.push(ActivityRecord {
@@ -154,20 +154,21 @@ impl Transition<'_> {
                     start_min,
                     end_min,
                 });
-                let liking =
-                    |id: &str| of_task(&format!("liking of person {person} for {id}")).uniform();
-                moved = work.begin(one, room, &liking, stream, household);
+                let preference = |id: &str| {
+                    task_stream(&format!("liking of person {person} for {id}")).uniform()
+                };
+                moved = work.begin(one, room, &preference, stream, household);
                 if one.tidies {
-                    let lost: Vec<String> = household.homes.keys().cloned().collect();
-                    moved.extend(work.bring_home(&lost, household, stream));
+                    let lost: Vec<String> = household.original_places.keys().cloned().collect();
+                    moved.extend(work.bring_back(&lost, household, stream));
                 }
             } else if let Some(used) = household.in_use.remove(&(person, start_min))
                 && one.returns
             {
-                moved = work.bring_home(&used, household, stream);
+                moved = work.bring_back(&used, household, stream);
             }
-            if !moved.is_empty() && !work.reaches_as_much()? {
-                // Things overhang what they stand on by a little, where somebody may have to pass.
+            if !moved.is_empty() && !work.preserves_access()? {
+                // Objects overhang their support a little, where an agent may have to pass.
                 work.layout = before;
                 moved.clear();
             }
@@ -191,8 +192,8 @@ impl Transition<'_> {
     }
 }
 
-impl Work<'_, '_> {
-    /// Room in which something is now: that of what bears it.
+impl HouseInUse<'_, '_> {
+    /// Return the room in which an object is now: that of the object that bears it.
     fn room_of(&self, index: usize) -> Option<usize> {
         let mut root = index;
         while let Some(parent) = self.layout.items[root].placement.parent {
@@ -202,19 +203,19 @@ impl Work<'_, '_> {
     }
 
     fn is_in_free_room(&self, index: usize) -> bool {
-        self.transition.is_free(&self.world.house, self.room_of(index))
+        self.transition.may_change(&self.world.house, self.room_of(index))
     }
 
-    /// Takes what an activity needs to where it takes place.
+    /// Bring the objects that an activity needs to its room.
     ///
     /// # Arguments
-    /// * `liking` - of a thing, by id, the least wins: who has taken the blue mug takes it again,
-    ///   as long as it can be had.
+    /// * `preference` - value of an object by its id; the smallest wins, so that a person uses the
+    ///   same mug again if it is available.
     fn begin(
         &mut self,
         one: &Activity,
         room: usize,
-        liking: &impl Fn(&str) -> f64,
+        preference: &impl Fn(&str) -> f64,
         stream: &mut Stream,
         household: &mut Household,
     ) -> Vec<usize> {
@@ -232,7 +233,7 @@ impl Work<'_, '_> {
                     && self.layout.with_supported(index).len() == 1
             };
             let choices = (0..self.layout.items.len()).filter(can_be_had);
-            let choices = choices.map(|i| (liking(&self.world.house.objects[i].id), i));
+            let choices = choices.map(|i| (preference(&self.world.house.objects[i].id), i));
             let Some((_, index)) = choices.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
             if self.bring(index, one, room, stream, household) {
                 taken.push(index);
@@ -241,7 +242,7 @@ impl Work<'_, '_> {
         taken
     }
 
-    /// Takes one thing to the best furniture of the room that has a place for it.
+    /// Bring one object to the best furniture of the room that has a place for it.
     fn bring(
         &mut self,
         index: usize,
@@ -260,7 +261,7 @@ impl Work<'_, '_> {
                     && self.world.house.objects[other].room == Some(room)
             };
             let supports: Vec<usize> = (0..self.layout.items.len()).filter(bears).collect();
-            // What is at hand already stays where it is.
+            // An object that is already on such furniture stays where it is.
             if parent.is_some_and(|parent| supports.contains(&parent)) {
                 return true;
             }
@@ -268,7 +269,10 @@ impl Work<'_, '_> {
                 let id = self.world.house.objects[index].id.clone();
                 let old = self.layout.items[index].placement;
                 let above = old.parent.map(|above| self.world.house.objects[above].id.clone());
-                household.homes.entry(id).or_insert(Home { placement: old, parent: above });
+                household
+                    .original_places
+                    .entry(id)
+                    .or_insert(OriginalPlace { placement: old, parent: above });
                 self.layout.put(index, place);
                 return true;
             }
@@ -287,8 +291,8 @@ impl Work<'_, '_> {
         })
     }
 
-    /// Brings things back to where they were first taken, each if its user is tidy.
-    fn bring_home(
+    /// Bring objects back to their original places, each if its user is tidy.
+    fn bring_back(
         &mut self,
         ids: &[String],
         household: &Household,
@@ -299,12 +303,13 @@ impl Work<'_, '_> {
         for id in ids {
             let is_tidy = stream.uniform() < household.schedule.tidiness;
             let is_used = household.in_use.values().flatten().any(|used| used == id);
-            let (Some(index), Some(home)) = (house.object_index(id), household.homes.get(id))
+            let (Some(index), Some(original)) =
+                (house.object_index(id), household.original_places.get(id))
             else {
                 continue;
             };
-            let parent = home.parent.as_ref().and_then(|parent| house.object_index(parent));
-            let placement = Placement { parent, ..home.placement };
+            let parent = original.parent.as_ref().and_then(|parent| house.object_index(parent));
+            let placement = Placement { parent, ..original.placement };
             let Some(support) = parent else { continue };
             if !is_tidy
                 || is_used
@@ -319,7 +324,7 @@ impl Work<'_, '_> {
                 self.layout.put(index, placement);
                 brought.push(index);
             } else if let Some(place) = self.sample(index, &[support], stream) {
-                // Somebody has put something else there.
+                // Something else stands there now: use another place on the same support.
                 self.layout.put(index, place);
                 brought.push(index);
             }
@@ -327,8 +332,8 @@ impl Work<'_, '_> {
         brought
     }
 
-    /// What has changed, as far as it holds in a scene of the house after it: files have things in
-    /// the air that the scene lets down, under which something may have been put.
+    /// Return the moves that are valid in a scene of the changed house. Others are undone: an
+    /// object may have been put under one that hangs in the air in the file and falls in the scene.
     fn valid_delta(&mut self) -> Result<HouseDelta, Error> {
         let (house, old) = (&self.world.house, &self.world.layout.scene);
         loop {
@@ -336,9 +341,9 @@ impl Work<'_, '_> {
             if delta.is_empty() {
                 return Ok(delta);
             }
-            let next = self.transition.rebuilt(house.apply(&delta)?)?;
+            let next = self.transition.rebuild(house.apply(&delta)?)?;
             let new = &next.layout.scene;
-            let clash = delta.moves.iter().find(|step| !has_room(old, new, &step.id));
+            let clash = delta.moves.iter().find(|step| !has_clearance(old, new, &step.id));
             let Some(index) = clash.and_then(|step| house.object_index(&step.id)) else {
                 return Ok(delta);
             };
@@ -346,8 +351,8 @@ impl Work<'_, '_> {
         }
     }
 
-    /// Whether everything can be reached that could be before.
-    fn reaches_as_much(&self) -> Result<bool, Error> {
+    /// Return whether all rooms that could be reached before still can.
+    fn preserves_access(&self) -> Result<bool, Error> {
         let (world, parameters) = (self.world, self.transition.generator.parameters);
         let start_m = self.transition.state.position_m();
         let access = |layout: &Layout| -> Result<Option<Access>, Error> {
@@ -361,13 +366,14 @@ impl Work<'_, '_> {
         let (then, now) = (access(&world.layout)?, access(&self.layout)?);
         let covers = |now: &[bool], then: &[bool]| now.iter().zip(then).all(|(n, t)| *n || !*t);
         Ok(then.zip(now).is_some_and(|(then, now)| {
-            // What is carried to another room is to be reached there, which goals are asked for.
+            // Objects that are carried to another room need not be reachable: that is checked for
+            // goals.
             covers(&now.rooms, &then.rooms)
         }))
     }
 }
 
-/// The room that most relocated things are in now; the first of them in the house's order.
+/// Return the room that contains most relocated objects now; of equals the first in house order.
 fn most_changed_room(house: &House, layout: &Layout, changes: &[ChangeRecord]) -> Option<String> {
     let mut counts = vec![0_usize; house.rooms.len()];
     for change in changes.iter().filter(|change| change.is_relocated) {

@@ -1,6 +1,6 @@
-//! What the extensions change at a transition, after the paper's evolution: small things that
-//! vanish and appear. Every process draws from a stream of its own, so that it changes nothing of
-//! the others, and leaves the room alone in which the reference trajectory stands.
+//! A transition between two stages to which extensions are applied. Every process draws from its
+//! own random stream, so that it does not influence the others, and changes nothing in the room in
+//! which the reference trajectory ends.
 
 use crate::{
     Error,
@@ -15,28 +15,28 @@ pub(crate) struct Transition<'a> {
     pub(crate) generator: &'a Generator<'a>,
     pub(crate) unknown: UnknownAssets,
     pub(crate) state: &'a State,
-    /// Of the stage that it leads to.
+    /// Number of the stage to which it leads.
     pub(crate) stage: usize,
 }
 
 impl Transition<'_> {
-    /// The random stream of one process.
+    /// Return the random stream of one process.
     pub(crate) fn stream(&self, cause: &str) -> Stream {
         self.generator.stream(self.stage, cause)
     }
 
-    /// Whether something may change in a room: the one in which the reference trajectory stands
-    /// would change before the agent's eyes.
-    pub(crate) fn is_free(&self, house: &House, room: Option<usize>) -> bool {
+    /// Return whether objects may change in a room. They may not in the room in which the reference
+    /// trajectory ends, where the agent would see the change.
+    pub(crate) fn may_change(&self, house: &House, room: Option<usize>) -> bool {
         room.is_some() && room != self.state.transition_room(house)
     }
 
-    pub(crate) fn rebuilt(&self, house: House) -> Result<StageWorld, Error> {
+    pub(crate) fn rebuild(&self, house: House) -> Result<StageWorld, Error> {
         StageWorld::build(house, self.generator.catalogue, self.unknown)
     }
 
-    /// Whether all rooms and objects that could be reached in `before` still can.
-    pub(crate) fn reaches_as_much(
+    /// Return whether all rooms and objects that could be reached in `before` still can.
+    pub(crate) fn preserves_access(
         &self,
         before: &StageWorld,
         after: &StageWorld,

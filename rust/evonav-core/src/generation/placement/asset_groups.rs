@@ -1,63 +1,65 @@
-//! What furniture belongs together: ProcTHOR's asset groups.
+//! Find the furniture that belongs together: ProcTHOR's asset groups.
 //!
-//! House files name the members of a group by number, `room|group|member`, some of ProcTHOR's
-//! versions with a name before it (`chair-diningtable|7|2|0`). Where ids say nothing, furniture that
-//! stands to each other as one of ProcTHOR's definitions puts it is a group; in recorded houses both
-//! ways find the same. What an earlier change took away from its group is on its own.
+//! House files name the members of a group by numbers, `room|group|member`; some of ProcTHOR's
+//! versions put a name before them (`chair-diningtable|7|2|0`). If ids contain no such numbers,
+//! furniture that is arranged as in one of ProcTHOR's definitions is a group; in recorded houses
+//! both ways find the same groups. A piece that an earlier change moved away from its group is on
+//! its own.
 
 use crate::{
     Error,
     assets::{Catalogue, UnknownAssets, group_definition::GroupDefinition},
-    generation::placement::movable_group::Unit,
+    generation::placement::movable_group::MovableGroup,
     geometry::{Vec2, Vec3, distance_2d_m, rotate, yaw_rotation},
     house::House,
     rng::Stream,
     world::{layout::Layout, scene::Scene},
 };
 
-/// How well furniture must stand as a definition puts it.
+/// Tolerances of furniture's arrangement compared with a definition.
 #[derive(Debug, Clone, Copy)]
 struct Slack {
-    /// Distance of a member from its place.
+    /// Largest distance of a member from its place.
     near_m: f64,
-    /// Turn from its yaw, on top of the definition's own spread.
+    /// Largest deviation from its yaw, in addition to the definition's own spread.
     near_deg: f64,
 }
 
-/// To be taken for a group: less than the way to the next seat of a table.
+/// Tolerances to recognise a group by its arrangement: less than the distance to the next seat of a
+/// table.
 const GROUPED: Slack = Slack { near_m: 0.25, near_deg: 15.0 };
-/// To be the group that the ids say it is.
+/// Tolerances to confirm a group that the ids name.
 const TOGETHER: Slack = Slack { near_m: 0.75, near_deg: 180.0 };
 
-/// Furniture that moves together, the main piece first, and the definition that it follows.
+/// Furniture that moves together, the main piece first, and the definition that it matches.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Group {
-    /// Objects that stand on the floor.
+pub struct AssetGroup {
+    /// Indices of the objects that stand on the floor.
     pub roots: Vec<usize>,
     /// Index in [`Catalogue::groups`].
     pub definition: Option<usize>,
 }
 
-/// What an id tells of an object's group.
+/// The group of an object by its id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Key<'a> {
-    /// Its room's and its group's number.
+    /// The object is a member; the numbers of its room and its group.
     Member([&'a str; 2]),
-    /// It stands alone: numbered, and not as a member.
+    /// The object stands alone: its id is numbered, but not as a member's.
     Alone,
-    /// Nothing.
+    /// The id contains no group.
     Unknown,
 }
 
-/// Furniture of a house by what moves together under `RETAIN_GROUP`.
+/// Group the furniture of a house by what moves together under `RETAIN_GROUP`.
 ///
 /// # Errors
-/// [`Error::House`] for an unknown asset, if `unknown` says so.
+/// [`Error::House`] for an unknown asset, unless `unknown` allows it.
 pub fn asset_groups(
     house: &House,
     catalogue: &Catalogue,
     unknown: UnknownAssets,
-) -> Result<Vec<Group>, Error> {
+) -> Result<Vec<AssetGroup>, Error> {
     let layout = Layout::new(house, catalogue, unknown, Scene::build(house, catalogue, unknown)?)?;
     let of_room = |room: usize| {
         let in_room: Vec<usize> =
@@ -67,14 +69,14 @@ pub fn asset_groups(
     Ok((0..house.rooms.len()).flat_map(of_room).collect())
 }
 
-/// Furniture of a room by group; alone where it belongs to none.
+/// Group the furniture of a room; a piece that belongs to no group is alone.
 pub(crate) fn groups_of(
     house: &House,
     layout: &Layout,
     catalogue: &Catalogue,
     in_room: &[usize],
-) -> Vec<Group> {
-    let mut groups: Vec<(Key<'_>, Group)> = Vec::new();
+) -> Vec<AssetGroup> {
+    let mut groups: Vec<(Key<'_>, AssetGroup)> = Vec::new();
     let mut unknown = Vec::new();
     for &index in in_room.iter().filter(|&&i| layout.items[i].is_on_floor) {
         let key = key_of(&house.objects[index].id);
@@ -83,18 +85,18 @@ pub(crate) fn groups_of(
         match (same, key) {
             (Some((_, group)), _) => group.roots.push(index),
             (None, Key::Unknown) => unknown.push(index),
-            (None, _) => groups.push((key, Group { roots: vec![index], definition: None })),
+            (None, _) => groups.push((key, AssetGroup { roots: vec![index], definition: None })),
         }
     }
-    let mut groups: Vec<Group> = groups.into_iter().map(|(_, group)| group).collect();
-    groups.iter_mut().for_each(|group| name(group, layout, catalogue));
+    let mut groups: Vec<AssetGroup> = groups.into_iter().map(|(_, group)| group).collect();
+    groups.iter_mut().for_each(|group| identify(group, layout, catalogue));
     let groups = groups.into_iter().flat_map(|group| match group.definition {
         Some(_) if group.roots.len() > 1 => standing(layout, catalogue, group.roots, TOGETHER),
         _ => vec![group],
     });
-    let mut groups: Vec<Group> =
+    let mut groups: Vec<AssetGroup> =
         groups.chain(standing(layout, catalogue, unknown, GROUPED)).collect();
-    groups.iter_mut().for_each(|group| name(group, layout, catalogue));
+    groups.iter_mut().for_each(|group| identify(group, layout, catalogue));
     groups
 }
 
@@ -108,8 +110,8 @@ fn key_of(id: &str) -> Key<'_> {
     }
 }
 
-/// Finds the definition of a group, and puts its main piece first.
-fn name(group: &mut Group, layout: &Layout, catalogue: &Catalogue) {
+/// Find the definition of a group, and put its main piece first.
+fn identify(group: &mut AssetGroup, layout: &Layout, catalogue: &Catalogue) {
     let category = |index: usize| layout.items[index].asset.category.as_str();
     let own = sorted(group.roots.iter().map(|&root| category(root)));
     let supports = |root: usize, above: &str| {
@@ -134,13 +136,13 @@ fn sorted<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     names
 }
 
-/// Groups among furniture by how it stands: the largest that each main piece has.
+/// AssetFind groups by the arrangement of furniture: the largest group of each main piece.
 fn standing(
     layout: &Layout,
     catalogue: &Catalogue,
     mut alone: Vec<usize>,
     slack: Slack,
-) -> Vec<Group> {
+) -> Vec<AssetGroup> {
     let mut groups = Vec::new();
     for main in alone.clone() {
         let best = catalogue
@@ -150,14 +152,16 @@ fn standing(
             .max_by_key(Vec::len);
         if let Some(roots) = best.filter(|roots| roots.len() > 1) {
             alone.retain(|index| !roots.contains(index));
-            groups.push(Group { roots, definition: None });
+            groups.push(AssetGroup { roots, definition: None });
         }
     }
-    groups.extend(alone.into_iter().map(|index| Group { roots: vec![index], definition: None }));
+    groups
+        .extend(alone.into_iter().map(|index| AssetGroup { roots: vec![index], definition: None }));
     groups
 }
 
-/// `main` and what stands to it as the definition says; empty if it is none's main piece.
+/// Return `main` and the pieces that are arranged around it as in the definition; empty if `main`
+/// is not the definition's main piece.
 fn members_about(
     layout: &Layout,
     definition: &GroupDefinition,
@@ -197,7 +201,7 @@ fn members_about(
     slots.into_iter().flatten().collect()
 }
 
-/// Centres that a definition gives to the objects in its slots.
+/// Return the centres of the objects in a definition's slots, by the definition.
 fn poses(
     layout: &Layout,
     definition: &GroupDefinition,
@@ -210,7 +214,7 @@ fn poses(
     poses.into_iter().map(|pose| pose.map(|pose| pose.centre_m)).collect()
 }
 
-/// Centre and yaw of an object in another's frame.
+/// Return the centre and yaw of an object in another's frame.
 fn in_frame(layout: &Layout, main: usize, index: usize) -> (Vec2, f64) {
     let [from, to] = [main, index].map(|i| layout.items[i].placement);
     let [x, z] = [0, 2].map(|axis| to.position_m[axis] - from.position_m[axis]);
@@ -218,24 +222,24 @@ fn in_frame(layout: &Layout, main: usize, index: usize) -> (Vec2, f64) {
     ([local[0], local[2]], to.rotation_deg[1] - from.rotation_deg[1])
 }
 
-/// The same angle in -180..180.
+/// Bring an angle into -180..180.
 fn signed_deg(angle_deg: f64) -> f64 {
     (angle_deg + 180.0).rem_euclid(360.0) - 180.0
 }
 
-/// The same furniture put together anew: by a definition that has its main piece and a place for
-/// each other piece, drawn with the places if there are several.
+/// Rearrange a group by a definition with the same main piece and a slot for each other piece.
+/// Definition and slots are drawn if there are several.
 ///
 /// # Returns
-/// `None` for what is no group, or where this draw has pieces in each other.
+/// `None` if the furniture is not a group, or if pieces overlap in this draw.
 pub(crate) fn rearranged(
-    unit: &Unit,
+    group: &MovableGroup,
     layout: &Layout,
     catalogue: &Catalogue,
     stream: &mut Stream,
-) -> Option<Unit> {
-    unit.definition?;
-    let (&main, others) = unit.roots.split_first()?;
+) -> Option<MovableGroup> {
+    group.definition?;
+    let (&main, others) = group.roots.split_first()?;
     let category = |index: usize| layout.items[index].asset.category.as_str();
     let mut choices: Vec<usize> = (0..catalogue.groups().len()).collect();
     stream.shuffle(&mut choices);
@@ -267,11 +271,11 @@ pub(crate) fn rearranged(
     let sizes_m: Vec<Option<Vec3>> =
         slots.iter().map(|slot| slot.map(|index| layout.items[index].asset.size_m)).collect();
     let poses = definition.arrange(&sizes_m, &turns_deg);
-    let mut anew = unit.clone();
+    let mut rearranged = group.clone();
     for (root, pose) in slots.iter().zip(poses).skip(1) {
         if let (Some(root), Some(pose)) = (root, pose) {
-            anew.arrange(layout, *root, pose.centre_m, pose.yaw_deg);
+            rearranged.arrange(layout, *root, pose.centre_m, pose.yaw_deg);
         }
     }
-    anew.is_sound().then_some(anew)
+    rearranged.is_sound().then_some(rearranged)
 }

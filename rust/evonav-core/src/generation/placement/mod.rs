@@ -1,4 +1,4 @@
-//! Where furniture can go in a room.
+//! Placement of furniture in a room: groups, free places, and what must stay reachable.
 
 pub mod asset_groups;
 pub mod movable_group;

@@ -1,62 +1,63 @@
-//! What moves as one: furniture with what stands on it, or an asset group.
+//! Objects that move together: a piece of furniture with the objects on it, or an asset group.
 
 use crate::{
     assets::placement_rule::Place,
-    generation::placement::room_outline::{AT_WALL_M, RoomPlan},
+    generation::placement::room_outline::{AT_WALL_M, RoomOutline},
     geometry::{Vec2, Vec3, add, rotate, sub, yaw_rotation},
     world::{
         footprint::Footprint,
         layout::{
-            Layout, Placed, Placement,
+            Layout, PlacedItem, Placement,
             contact::overlap,
-            free_floor::{self, Floor},
+            free_floor::{self, FloorPatch},
             rounding::{ROUND_DEG, ROUND_M, round_to, turned_deg},
         },
     },
 };
 
-/// Objects that move as one.
+/// Objects that move rigidly together.
 #[derive(Debug, Clone)]
-pub struct Unit {
-    /// Objects that stand on the floor, the main one first.
+pub struct MovableGroup {
+    /// Indices of the objects that stand on the floor, the main one first.
     pub roots: Vec<usize>,
-    /// ProcTHOR's definition of the group that they are, if they are one.
+    /// Index of ProcTHOR's definition, if they are an asset group.
     pub definition: Option<usize>,
-    /// All objects, each root with all that it bears behind it.
+    /// All objects; each root is followed by the objects on it.
     members: Vec<Member>,
-    /// Ways in which it should stand, and in which it may.
+    /// Preferred places, and all allowed places.
     anchors: [Vec<Place>; 2],
     /// Centre of the main root.
     pivot_m: Vec3,
-    /// Yaw of the unit's frame: its back is at -z.
+    /// Yaw of the group's frame, whose back is at -z.
     yaw_deg: f64,
-    /// Box of the roots' outlines in that frame, about the pivot: `[x, z]`.
+    /// Smallest corner `[x, z]` of the box of the roots' outlines in that frame, about the pivot.
     pub min_m: Vec2,
-    /// Largest corner.
+    /// Largest corner of that box.
     pub max_m: Vec2,
 }
 
-/// A pose of a unit's frame.
+/// A pose of a group's frame.
 #[derive(Debug, Clone, Copy)]
-pub struct Pose2 {
-    /// Centre of the unit's main object.
+pub struct FramePose {
+    /// Centre of the group's main object.
     pub point_m: Vec2,
     /// Yaw.
     pub yaw_deg: f64,
-    /// How it stands there.
+    /// Kind of the place.
     pub anchor: Place,
 }
 
-/// How strictly ProcTHOR's rules are kept.
+/// Strictness with which ProcTHOR's rules are applied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rules {
-    /// Corner, edge or middle by the category, and free floor around.
+    /// Corner, edge or middle as the category requires, and free floor around.
     All,
-    /// What stands in corners may also stand along walls, and with less than the free floor.
+    /// Furniture that stands in corners may also stand along walls, and the floor around need not
+    /// be free.
     Relaxed,
 }
 
-/// An object of a unit as it stands before it is moved.
+/// An object of a group as it stands before it is moved.
 #[derive(Debug, Clone)]
 struct Member {
     index: usize,
@@ -65,22 +66,22 @@ struct Member {
     solids: Vec<Footprint>,
 }
 
-impl Unit {
-    /// The roots and all that they bear, where they stand.
+impl MovableGroup {
+    /// Create a group from roots and the objects on them, where they stand.
     ///
     /// # Arguments
-    /// * `roots` - the main one first; at least one.
+    /// * `roots` - indices of the objects on the floor, the main one first; at least one.
     /// * `definition` - index of the definition of the group that the roots are.
-    /// * `anchors` - ways in which it should stand, and in which it may; where empty, the way it
+    /// * `anchors` - preferred places and all allowed places; if empty, the kind of place where it
     ///   stands now.
     pub fn new(
         layout: &Layout,
         roots: &[usize],
         definition: Option<usize>,
         anchors: [&[Place]; 2],
-        plan: &RoomPlan,
+        outline: &RoomOutline,
     ) -> Self {
-        let mut unit = Self {
+        let mut group = Self {
             roots: roots.to_vec(),
             definition,
             members: Vec::new(),
@@ -94,25 +95,25 @@ impl Unit {
             for index in layout.with_supported(root) {
                 let item = &layout.items[index];
                 let (placement, solids) = (item.placement, item.solids.clone());
-                unit.members.push(Member { index, is_root: index == root, placement, solids });
+                group.members.push(Member { index, is_root: index == root, placement, solids });
             }
         }
-        unit.measure();
-        if unit.anchors[1].is_empty() {
-            unit.turn_back_to_wall(plan);
+        group.measure();
+        if group.anchors[1].is_empty() {
+            group.turn_back_to_wall(outline);
         }
-        unit
+        group
     }
 
-    /// Centre of the main root.
+    /// Return the centre of the main root.
     pub fn centre_m(&self) -> Vec2 {
         [self.pivot_m[0], self.pivot_m[2]]
     }
 
-    /// Moves a root, with what it bears, about in the unit.
+    /// Move a root, with the objects on it, within the group.
     ///
     /// # Arguments
-    /// * `centre_m`, `yaw_deg` - of the root in the unit's frame about the main root.
+    /// * `centre_m`, `yaw_deg` - new pose of the root in the group's frame about the main root.
     pub fn arrange(&mut self, layout: &Layout, root: usize, centre_m: Vec2, yaw_deg: f64) {
         let frame = yaw_rotation(self.yaw_deg.to_radians());
         let to = add(rotate(&frame, [centre_m[0], 0.0, centre_m[1]]), self.pivot_m);
@@ -133,7 +134,7 @@ impl Unit {
         self.measure();
     }
 
-    /// Whether no root, with what it bears, is in another.
+    /// Return whether no root, with the objects on it, overlaps another.
     pub fn is_sound(&self) -> bool {
         let families = self.members.chunk_by(|_, next| !next.is_root).collect::<Vec<_>>();
         let touch = |a: &[Member], b: &[Member]| {
@@ -142,7 +143,7 @@ impl Unit {
         (1..families.len()).all(|i| !families[..i].iter().any(|other| touch(other, families[i])))
     }
 
-    /// Sets the box for the present frame.
+    /// Compute the box for the present frame.
     fn measure(&mut self) {
         let into_frame = yaw_rotation(-self.yaw_deg.to_radians());
         self.min_m = [f64::INFINITY; 2];
@@ -159,17 +160,17 @@ impl Unit {
         }
     }
 
-    /// Distance of the middle of its back from the nearest wall.
-    fn back_gap_m(&self, plan: &RoomPlan) -> f64 {
+    /// Return the distance of the middle of the back from the nearest wall.
+    fn back_gap_m(&self, outline: &RoomOutline) -> f64 {
         let from_frame = yaw_rotation(self.yaw_deg.to_radians());
         let middle_x = 0.5 * (self.min_m[0] + self.max_m[0]);
         let back = add(rotate(&from_frame, [middle_x, 0.0, self.min_m[1]]), self.pivot_m);
-        plan.wall_distance_m([back[0], back[2]])
+        outline.wall_distance_m([back[0], back[2]])
     }
 
-    /// Takes the side at a wall as the back, and the number of such sides as the way it stands: for
-    /// what ProcTHOR's annotations do not tell of.
-    fn turn_back_to_wall(&mut self, plan: &RoomPlan) {
+    /// Choose the side at a wall as the back, and the kind of place by the number of such sides.
+    /// This is for categories without annotations by ProcTHOR.
+    fn turn_back_to_wall(&mut self, outline: &RoomOutline) {
         let quarters = (0..4).map(|quarter| {
             let mut turned = self.clone();
             turned.yaw_deg = self.yaw_deg + 90.0 * f64::from(quarter);
@@ -177,8 +178,8 @@ impl Unit {
             turned
         });
         let mut at_wall: Vec<Self> =
-            quarters.filter(|turned| turned.back_gap_m(plan) < AT_WALL_M).collect();
-        // What stands in a corner also stands at an edge.
+            quarters.filter(|turned| turned.back_gap_m(outline) < AT_WALL_M).collect();
+        // Furniture in a corner also stands at an edge.
         let anchors = match at_wall.len() {
             0 => vec![Place::Middle],
             1 => vec![Place::Edge],
@@ -190,32 +191,32 @@ impl Unit {
         self.anchors = [anchors.clone(), anchors];
     }
 
-    /// Ways in which it stands by the rules.
+    /// Return the places that the rules allow.
     pub fn anchors(&self, rules: Rules) -> &[Place] {
         let [preferred, all] = &self.anchors;
         if rules == Rules::All { preferred } else { all }
     }
 
-    /// The floor that it keeps as it stands.
-    pub fn reserve_now(&self, plan: &RoomPlan) -> Floor {
-        let is_at_wall = self.back_gap_m(plan) < AT_WALL_M;
+    /// Return the floor of the group where it stands.
+    pub fn floor_now(&self, outline: &RoomOutline) -> FloorPatch {
+        let is_at_wall = self.back_gap_m(outline) < AT_WALL_M;
         let anchor = if is_at_wall { Place::Edge } else { Place::Middle };
-        let pose = Pose2 { point_m: self.centre_m(), yaw_deg: self.yaw_deg, anchor };
-        self.reserve_at(&pose)
+        let pose = FramePose { point_m: self.centre_m(), yaw_deg: self.yaw_deg, anchor };
+        self.floor_at(&pose)
     }
 
-    /// The floor that it keeps at a pose of its frame.
-    pub fn reserve_at(&self, pose: &Pose2) -> Floor {
+    /// Return the floor of the group at a pose of its frame.
+    pub fn floor_at(&self, pose: &FramePose) -> FloorPatch {
         let turn = yaw_rotation(pose.yaw_deg.to_radians());
         let to_world = |[x, z]: Vec2| {
             let offset = rotate(&turn, [x, 0.0, z]);
             [pose.point_m[0] + offset[0], pose.point_m[1] + offset[2]]
         };
-        free_floor::around(pose.anchor, self.min_m, self.max_m, to_world)
+        free_floor::floor_around(pose.anchor, self.min_m, self.max_m, to_world)
     }
 
-    /// All members, the unit's frame being at a pose.
-    pub fn placed_at(&self, pose: &Pose2) -> Vec<Placed> {
+    /// Return all members with the group's frame at a pose.
+    pub fn placed_at(&self, pose: &FramePose) -> Vec<PlacedItem> {
         let turn_deg = round_to(pose.yaw_deg - self.yaw_deg, ROUND_DEG);
         let turn = yaw_rotation(turn_deg.to_radians());
         let moved = |[x, z]: Vec2| {
@@ -235,7 +236,7 @@ impl Unit {
                 outline_m: solid.outline_m.iter().map(|&point| moved(point)).collect(),
                 ..*solid
             });
-            Placed {
+            PlacedItem {
                 index: member.index,
                 is_root: member.is_root,
                 placement,

@@ -1,5 +1,5 @@
-//! What an agent can reach while furniture is moved about: rooms, objects, passages between rooms
-//! and the house's own start.
+//! Reachability while furniture is moved: the rooms, objects, ways between rooms and the house's
+//! own start that an agent can reach.
 //!
 //! Gives the same answers as [`Navigation::reachable_positions`].
 
@@ -13,10 +13,10 @@ use crate::{
     world::{layout::Layout, navigation::Navigation},
 };
 
-/// What can be reached from a point, kept up to date as objects move.
+/// The rooms, objects and ways that can be reached from a point, updated as objects move.
 pub struct Reach {
     grid: StepGrid,
-    /// What each object blocks now.
+    /// Points and steps that each object blocks now.
     blocked: Vec<Blocked>,
     is_reached: Vec<bool>,
     /// The reached points.
@@ -28,7 +28,7 @@ pub struct Reach {
     before: Access,
 }
 
-/// What is reached.
+/// The rooms, objects and ways that are reached.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 struct Access {
     rooms: Vec<bool>,
@@ -41,7 +41,7 @@ struct Access {
 }
 
 impl Reach {
-    /// Find what `layout` lets an agent reach from `start_m`.
+    /// Return the find what `layout` lets an agent reach from `start_m`.
     ///
     /// # Arguments
     /// * `navigation` - built from the layout's scene.
@@ -80,7 +80,8 @@ impl Reach {
         Some(reach)
     }
 
-    /// Take in that objects have moved, and check that all that could be reached still can.
+    /// Return the take in that objects have moved, and check that all that could be reached still
+    /// can.
     ///
     /// Where it cannot, the objects must be put back and taken in again.
     pub fn still_reaches(&mut self, layout: &Layout, moved: impl Iterator<Item = usize>) -> bool {
@@ -91,7 +92,7 @@ impl Reach {
         self.access(layout).includes(&self.before)
     }
 
-    /// Take in that objects have moved; false if the geometry of one is not finite.
+    /// Return the take in that objects have moved; false if the geometry of one is not finite.
     pub fn take_in(&mut self, layout: &Layout, moved: impl Iterator<Item = usize>) -> bool {
         for index in moved {
             let Some(body) = layout.scene.bodies.get(layout.scene.first_object + index) else {
@@ -105,7 +106,7 @@ impl Reach {
         true
     }
 
-    /// Find the points that can be reached.
+    /// Return the find the points that can be reached.
     fn flood(&mut self) {
         self.is_reached.fill(false);
         let mut queue = std::mem::take(&mut self.queue);
@@ -142,7 +143,7 @@ impl Reach {
         }
     }
 
-    /// Whether a reached point of an object's room lies at the reference distance from it.
+    /// Return whether a reached point of an object's room lies at the reference distance from it.
     fn is_near(&self, layout: &Layout, index: usize) -> bool {
         let Some(room) = self.rooms_of_objects.get(index).copied().flatten() else { return false };
         let [x, _, z] = layout.items[index].placement.position_m;
@@ -154,7 +155,7 @@ impl Reach {
         })
     }
 
-    /// Find the ways through rooms, between the rooms next to them.
+    /// Return the find the ways through rooms, between the rooms next to them.
     fn ways(&self) -> Vec<[u32; 3]> {
         let room = &self.grid.room;
         // Parts of rooms: the reached points that steps within a room connect.
@@ -195,7 +196,7 @@ impl Reach {
 }
 
 impl Access {
-    /// Whether all that `before` reaches is reached.
+    /// Return whether all that `before` reaches is reached.
     fn includes(&self, before: &Self) -> bool {
         let covers = |now: &[bool], then: &[bool]| now.iter().zip(then).all(|(n, t)| *n || !*t);
         covers(&self.rooms, &before.rooms)

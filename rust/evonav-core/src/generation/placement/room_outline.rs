@@ -1,4 +1,4 @@
-//! The floor of a room, as furniture sees it.
+//! The outline of a room's floor, and which of its edges are walls.
 
 use crate::{
     geometry::{
@@ -9,22 +9,23 @@ use crate::{
     house::{House, Room},
 };
 
-/// Gap that ProcTHOR leaves between furniture and walls: exactly this in all recorded houses.
+/// Gap between furniture and walls; ProcTHOR uses exactly this in all recorded houses.
 pub const WALL_GAP_M: f64 = 0.025;
-/// A side this near a wall stands at it.
+/// Largest distance of a side that stands at a wall.
 pub const AT_WALL_M: f64 = 0.15;
 
-/// The floor of a room, as furniture sees it.
+/// The outline of a room's floor, and which of its edges are walls.
 #[derive(Debug, Clone)]
-pub struct RoomPlan {
+pub struct RoomOutline {
     /// Outline `[x, z]`, interior on the left of each edge (x turns towards z).
     pub polygon_m: Vec<Vec2>,
-    /// Whether edge `i`, from corner `i` on, is a wall along its whole length: not open plan.
+    /// Whether edge `i`, which starts at corner `i`, is a wall along its whole length and not open
+    /// plan.
     pub is_wall: Vec<bool>,
 }
 
-impl RoomPlan {
-    /// The plan of one of the house's rooms.
+impl RoomOutline {
+    /// Create the outline of one of the house's rooms.
     pub fn of(house: &House, room: &Room) -> Self {
         let mut polygon_m = room.polygon_m.clone();
         if polygon_area_m2(&polygon_m) < 0.0 {
@@ -46,7 +47,7 @@ impl RoomPlan {
         Self { polygon_m, is_wall }
     }
 
-    /// Distance of a point from the nearest wall.
+    /// Return the distance of a point from the nearest wall.
     pub fn wall_distance_m(&self, point_m: Vec2) -> f64 {
         edges(&self.polygon_m)
             .zip(&self.is_wall)
@@ -55,7 +56,7 @@ impl RoomPlan {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Edge `index`, from corner `index` on.
+    /// Return edge `index`, which starts at corner `index`.
     pub fn edge(&self, index: usize) -> Edge {
         let from_m = self.polygon_m[index];
         let to_m = self.polygon_m[(index + 1) % self.polygon_m.len()];
@@ -68,7 +69,7 @@ impl RoomPlan {
 /// One side of a room.
 pub struct Edge {
     pub from_m: Vec2,
-    /// Unit vector to its other end.
+    /// Unit vector to the other end.
     pub along: Vec2,
     /// Unit normal into the room.
     pub inward: Vec2,

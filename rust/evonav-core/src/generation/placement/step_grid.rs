@@ -61,7 +61,7 @@ pub struct StepGrid {
 }
 
 impl StepGrid {
-    /// Lays a grid over the house through `start_m`, with nothing on it yet.
+    /// Lay a grid over the house through `start_m`, with nothing on it yet.
     ///
     /// # Returns
     /// `None` if the start is not free, or the grid too large.
@@ -77,7 +77,7 @@ impl StepGrid {
         let shape = size.map(|v| v as usize);
         let start_cell = first.map(|v| -v as i64);
         let count = shape[0] * shape[1];
-        let (agent, step_height_m) = navigation.thinner();
+        let (agent, step_height_m) = navigation.collision_body();
         let mut grid = Self {
             agent,
             step_height_m,
@@ -142,7 +142,7 @@ impl StepGrid {
         (0..self.room.len()).filter(is_near).map(|point| point as u32).collect()
     }
 
-    /// Find what a body blocks; `None` if its geometry is not finite.
+    /// Return the find what a body blocks; `None` if its geometry is not finite.
     pub fn blocked_by(&self, body: &Body) -> Option<Blocked> {
         let mut blocked = Blocked::default();
         if matches!(body.kind, BodyKind::Floor | BodyKind::Ceiling) {
@@ -202,7 +202,7 @@ impl StepGrid {
         }
     }
 
-    /// Count what a body blocks once more, or once less if `is_added` is false.
+    /// Return the count what a body blocks once more, or once less if `is_added` is false.
     pub fn count(&mut self, blocked: &Blocked, is_added: bool) {
         let change = |count: &mut u16| {
             *count = if is_added { count.saturating_add(1) } else { count.saturating_sub(1) };
@@ -217,12 +217,12 @@ impl StepGrid {
         }
     }
 
-    /// Whether nothing blocks a point of the floor.
+    /// Return whether nothing blocks a point of the floor.
     pub fn is_open(&self, point: usize) -> bool {
         self.room[point] != NOWHERE && self.point_blocks[point] == 0
     }
 
-    /// Whether the step from a point to the next along an axis is clear.
+    /// Return whether the step from a point to the next along an axis is clear.
     fn is_step(&self, from: usize, axis: usize) -> bool {
         let to = from + if axis == 0 { 1 } else { self.shape[0] };
         self.step_blocks[axis][from] == 0 && self.is_open(from) && self.is_open(to)
@@ -244,7 +244,7 @@ impl StepGrid {
         .map(|(to, _, _)| to)
     }
 
-    /// Whether a clear link leads from a reached point to the house's own start.
+    /// Return whether a clear link leads from a reached point to the house's own start.
     pub fn is_house_start_reached(&self, is_reached: &[bool]) -> bool {
         let mut links = self.links.iter().zip(&self.step_blocks[2]);
         self.point_blocks.last() == Some(&0)

@@ -1,4 +1,4 @@
-//! The hidden change before a stage.
+//! Records of the hidden change before a stage.
 
 use serde::Serialize;
 
@@ -8,62 +8,62 @@ use crate::{
     house::{AddedObject, HouseDelta, ObjectMove, StateChange},
 };
 
-/// How a transition went.
+/// The outcome of a transition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EvolutionOutcome {
     /// There is no transition before stage 1.
     FirstStage,
-    /// The draw said no.
+    /// The draw decided against an evolution.
     NotTriggered,
     /// All rooms have weight 0.
     NoRoom,
-    /// Nothing in the drawn room could be moved, [`EvolutionRecord::failure`] says why.
+    /// Nothing in the drawn room could be moved; [`EvolutionRecord::failure`] gives the reason.
     NoPlacement,
     /// The room changed.
     Evolved,
 }
 
-/// ΔH_k, with what it was drawn from.
+/// ΔH_k, with the weights from which it was drawn.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EvolutionRecord {
-    /// How it went.
+    /// Outcome of the transition.
     pub outcome: EvolutionOutcome,
-    /// Drawn modification.
+    /// Drawn mode.
     pub mode: Option<Mode>,
-    /// Drawn room.
+    /// Id of the drawn room.
     pub room_id: Option<String>,
-    /// What `SALIENT_OBJECT` moved.
+    /// Id of the object that `SALIENT_OBJECT` moved.
     pub salient_id: Option<String>,
-    /// Factors of every room's weight; empty when not triggered.
+    /// Factors of every room's weight; empty if not triggered.
     pub room_weights: Vec<RoomWeightRecord>,
-    /// Why nothing could be moved; only with [`EvolutionOutcome::NoPlacement`].
+    /// Reason why nothing could be moved; only with [`EvolutionOutcome::NoPlacement`].
     pub failure: Option<ModificationFailure>,
-    /// Every object whose pose or support differs.
+    /// All objects whose pose or support differs.
     pub changes: Vec<ChangeRecord>,
-    /// Objects that were to move and could not.
+    /// Ids of the objects that were to move and could not.
     pub unmoved_ids: Vec<String>,
-    /// Those of them that had free places, each of which would have cut something off.
+    /// Ids of those among them that had free places, each of which would have cut something off.
     pub blocking_ids: Vec<String>,
-    /// Furniture that had to do without the free floor that ProcTHOR leaves around it.
+    /// Ids of furniture that stands without the free floor that ProcTHOR leaves around it.
     pub crowded_ids: Vec<String>,
-    /// Furniture of groups that fitted nowhere as they stood: arranged anew by ProcTHOR's
-    /// definition of the group.
+    /// Ids of furniture of groups that fitted nowhere as they stood and were rearranged by
+    /// ProcTHOR's definition of the group.
     pub rearranged_ids: Vec<String>,
-    /// Objects that were not there before; by an extension, as all below.
+    /// Objects that appeared. Only extensions fill this field and the following ones.
     pub additions: Vec<ObjectRecord>,
-    /// Objects that are there no more, as they were.
+    /// Objects that vanished, as they were.
     pub removals: Vec<ObjectRecord>,
-    /// Doors and objects that opened, closed, or went on or off.
+    /// Doors and objects that were opened, closed, or switched on or off.
     pub states: Vec<StateChangeRecord>,
-    /// Time of day of the stage, minutes after midnight, where people have a schedule.
+    /// Time of day of the stage, minutes after midnight, if people have a schedule.
     pub clock_min: Option<usize>,
-    /// What people did since the stage before.
+    /// Activities of people since the previous stage.
     pub activities: Vec<ActivityRecord>,
 }
 
 impl EvolutionRecord {
-    /// The change as it is applied to the house of the stage before.
+    /// Return the delta to be applied to the house of the previous stage.
     pub fn delta(&self) -> HouseDelta {
         let moves = self.changes.iter().map(|change| ObjectMove {
             id: change.id.clone(),
@@ -92,36 +92,36 @@ impl EvolutionRecord {
     }
 }
 
-/// Why nothing in a room could be moved.
+/// Reasons why nothing in a room could be moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ModificationFailure {
-    /// There is nothing in it that the modification moves.
+    /// The room has nothing that the modification moves.
     NothingMovable,
-    /// No place drawn was free.
+    /// None of the drawn places was free.
     NoFreePlace,
     /// Every free place cut off a room or object.
     CutsOff,
 }
 
-/// One room's weight.
+/// The weight of one room.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RoomWeightRecord {
-    /// Room.
+    /// Id of the room.
     pub room_id: String,
-    /// Objects in it.
+    /// Number of objects in it.
     pub num_assets: usize,
-    /// On the reference trajectory so far.
+    /// Whether the reference trajectory has been in it.
     pub is_visited: bool,
-    /// The reference trajectory ends in it.
+    /// Whether the reference trajectory ends in it.
     pub is_transition_room: bool,
-    /// Changed within the window.
+    /// Whether it changed within the window.
     pub was_changed_recently: bool,
-    /// Product, not normalised.
+    /// Product of the factors, not normalised.
     pub weight: f64,
 }
 
-/// One object's move.
+/// The move of one object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ChangeRecord {
     /// Object.
@@ -142,13 +142,13 @@ pub struct ChangeRecord {
     pub to_support_id: Option<String>,
     /// Distance of the centres.
     pub displacement_m: f64,
-    /// Farther than `relocated_min_m`, or on another support.
+    /// Whether it moved farther than `relocated_min_m`, or to another support.
     pub is_relocated: bool,
-    /// The process that moved it: the mode, or an extension.
+    /// Process that moved it: the mode, or an extension.
     pub cause: String,
 }
 
-/// An object that came or went.
+/// An object that appeared or vanished.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ObjectRecord {
     /// Object.
@@ -161,40 +161,40 @@ pub struct ObjectRecord {
     pub position_m: Vec3,
     /// Euler angles.
     pub rotation_deg: Vec3,
-    /// What it stands or stood on.
+    /// Id of the object that it stands or stood on.
     pub support_id: Option<String>,
-    /// `INSERTION` or `REMOVAL`.
+    /// Process that changed it: `INSERTION` or `REMOVAL`.
     pub cause: String,
 }
 
-/// A state of a door or an object that changed.
+/// A change of the state of a door or an object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StateChangeRecord {
-    /// Door or object.
+    /// Id of the door or object.
     pub id: String,
     /// Its category.
     pub category: String,
-    /// `openness` or `isOn`, as house files call it.
+    /// Changed field: `openness` or `isOn`, as in house files.
     pub field: &'static str,
-    /// Before: openness, or 1 for on.
+    /// Value before: openness, or 1 for on.
     pub before: f64,
-    /// After.
+    /// Value after.
     pub after: f64,
-    /// The extension.
+    /// Extension that changed it.
     pub cause: String,
 }
 
-/// What one person did.
+/// An activity of one person.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ActivityRecord {
-    /// Who, from 0.
+    /// Number of the person, from 0.
     pub person: usize,
-    /// What, as in `ACTIVITY:<name>`.
+    /// Name of the activity, as in `ACTIVITY:<name>`.
     pub name: String,
-    /// Where; `None` away from home.
+    /// Id of the room; `None` away from home.
     pub room_id: Option<String>,
-    /// Begin, minutes after midnight of the first stage's day.
+    /// Start, minutes after midnight of the first stage's day.
     pub start_min: usize,
-    /// End.
+    /// End, minutes after midnight of the first stage's day.
     pub end_min: usize,
 }

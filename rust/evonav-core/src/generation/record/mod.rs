@@ -1,4 +1,4 @@
-//! What generation leaves on record; the JSON that Python's `evonav.tasks.oracle` reads.
+//! The records of generation: the JSON that Python's `evonav.tasks.oracle` reads.
 
 mod evolution;
 mod target;

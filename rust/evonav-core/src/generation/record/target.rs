@@ -1,98 +1,99 @@
-//! The target of a stage, and what an instruction may say of it.
+//! Records of a stage's target and of its description.
 
 use serde::Serialize;
 
 use crate::{assets::shapes::Detail, geometry::Vec3};
 
-/// x_k.
+/// The target x_k.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TargetRecord {
     /// Object.
     pub id: String,
-    /// Its category.
+    /// Category of the object.
     pub category: String,
-    /// Its room.
+    /// Id of its room.
     pub room_id: String,
     /// Centre of its box.
     pub position_m: Vec3,
     /// Size of its box at zero yaw.
     pub size_m: Vec3,
-    /// What it stands on.
+    /// Id of the object that it stands on.
     pub support_id: Option<String>,
     /// Target score.
     pub score: f64,
-    /// Others of its category.
+    /// Ids of all other objects of its category.
     pub same_category_ids: Vec<String>,
-    /// By this stage's change.
+    /// Whether this stage's change relocated it.
     pub is_relocated_now: bool,
-    /// By any change so far.
+    /// Whether any change so far relocated it.
     pub is_relocated_ever: bool,
 }
 
-/// What surrounds a target, in categories (paper, Sec. A.4).
+/// The surroundings of a target, in categories (paper, Sec. A.4).
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Relations {
-    /// Type of its room.
+    /// Type of the target's room.
     pub room_type: String,
     /// Whether no other object of the house has its category.
     pub is_category_unique: bool,
     /// Whether no other room of the house is of its room's type.
     pub is_room_type_unique: bool,
-    /// What it stands on or in.
+    /// Object that it stands on or in.
     pub support: Option<Anchor>,
-    /// Whether it is in its support: in a basin, or behind a door.
+    /// Whether it is inside its support: in a basin, or behind a door.
     pub is_in_support: bool,
-    /// At most two things next to it, nearest first.
+    /// Objects next to it, at most two, nearest first.
     pub neighbours: Vec<Anchor>,
-    /// `doorway`, `window` or `corner` near it.
+    /// A `doorway`, `window` or `corner` near it.
     pub structure: Option<Anchor>,
-    /// Something on the wall near it.
+    /// An object on the wall near it.
     pub wall_object: Option<Anchor>,
-    /// Whether that hangs above it.
+    /// Whether the wall object hangs above it.
     pub is_below_wall_object: bool,
-    /// Objects of the house that all of this fits, read literally; the target is one.
+    /// Number of objects of the house to which all of this applies, read literally; the target is
+    /// one of them.
     pub num_fitting: usize,
 }
 
-/// A thing that an instruction refers to.
+/// An object or a part of a room to which an instruction refers.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Anchor {
-    /// Its category, or the word for a part of the room.
+    /// Category of the object, or the word for a part of the room.
     pub category: String,
-    /// Which of its category.
+    /// Determiner before the category.
     pub determiner: Determiner,
 }
 
-/// How a thing is referred to.
+/// The determiner of an anchor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Determiner {
-    /// The only one in the room.
+    /// The anchor is the only one of its category in the room.
     The,
-    /// One of several in the room.
+    /// The anchor is one of several in the room.
     A,
-    /// Two or more that are all next to the target.
+    /// Two or more anchors of the category are next to the target.
     Some,
 }
 
-/// What a target looks like.
+/// The appearance of a target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Appearance {
-    /// Colours that show in the reference image, the largest share first.
+    /// Colours visible in the reference image, largest share first.
     pub tints: Vec<Tint>,
-    /// `round`, `L-shaped` or `U-shaped`, where its category has other forms too.
+    /// Form: `round`, `L-shaped` or `U-shaped`, if its category has other forms too.
     pub form: Option<&'static str>,
-    /// Parts by which it can be told.
+    /// Parts by which it can be recognised.
     pub details: Vec<Detail>,
-    /// What it is made of, the most important first.
+    /// Substances of which it is made, most important first.
     pub made_of: Vec<String>,
 }
 
 /// A material's colour in an image.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tint {
-    /// Of the material, sRGB.
+    /// Colour of the material, sRGB.
     pub colour: [u8; 3],
-    /// Of the target's pixels, 0..1.
+    /// Share of the target's pixels, 0..1.
     pub share: f64,
 }

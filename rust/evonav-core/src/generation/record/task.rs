@@ -1,4 +1,4 @@
-//! A generated task and its stages.
+//! Records of a generated task and its stages.
 
 use serde::Serialize;
 
@@ -10,9 +10,9 @@ use crate::{
 /// A generated task.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GeneratedTask {
-    /// Stages, from the first.
+    /// Stages, in order.
     pub stages: Vec<GeneratedStage>,
-    /// House of each stage, JSON.
+    /// House of each stage, as JSON.
     #[serde(skip)]
     pub houses: Vec<String>,
     /// Reference image of each stage, RGB, row by row.
@@ -20,18 +20,18 @@ pub struct GeneratedTask {
     pub images: Vec<Vec<u8>>,
 }
 
-/// Why no task was made of a house.
+/// The reason why no task was generated from a house.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Rejected {
-    /// Which check it failed.
+    /// The check that the house failed.
     pub reason: RejectReason,
-    /// The stage at hand; 0 before the first.
+    /// Stage at which it failed; 0 before the first.
     pub stage: usize,
-    /// What was found.
+    /// Values found.
     pub detail: String,
 }
 
-/// Checks that a house must pass.
+/// Reasons for which a house is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RejectReason {
@@ -52,36 +52,36 @@ pub enum RejectReason {
 /// One stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GeneratedStage {
-    /// ΔH_k, with its history.
+    /// ΔH_k, the change before the stage.
     pub evolution: EvolutionRecord,
-    /// S before the stage.
+    /// Generation state S before the stage.
     pub state: StateRecord,
     /// Reference start s_k.
     pub start_pose: PoseRecord,
-    /// x_k.
+    /// Target x_k.
     pub target: TargetRecord,
-    /// Goals drawn and refused before.
+    /// Goals that were drawn before and rejected.
     pub rejections: Vec<RejectionRecord>,
-    /// Where the reference image was taken.
+    /// Pose at which the reference image was taken.
     pub reference_pose: PoseRecord,
-    /// Pixels of the target in it.
+    /// Number of pixels of the target in the reference image.
     pub reference_visible_px: usize,
-    /// What the target looks like.
+    /// Appearance of the target.
     pub appearance: Appearance,
-    /// Corners of the shortest path to it.
+    /// Corners of the shortest path to the reference pose.
     pub reference_path_m: Vec<Vec2>,
-    /// Its length.
+    /// Length of the reference path.
     pub reference_path_length_m: f64,
-    /// Ids of all objects that any change so far relocated, sorted.
+    /// Ids of all objects that any change so far has relocated, sorted.
     pub ever_relocated_ids: Vec<String>,
-    /// What an instruction may say of the target's surroundings.
+    /// Surroundings of the target, for the instruction.
     pub relations: Relations,
 }
 
-/// A pose as AI2-THOR writes it.
+/// A pose in AI2-THOR's convention.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct PoseRecord {
-    /// Middle of the body.
+    /// Position of the middle of the body.
     pub position_m: Vec3,
     /// Heading.
     pub yaw_deg: f64,
@@ -89,36 +89,36 @@ pub struct PoseRecord {
     pub horizon_deg: f64,
 }
 
-/// S.
+/// The generation state S.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StateRecord {
-    /// Rooms on the reference trajectory, in house order.
+    /// Ids of the rooms on the reference trajectory, in house order.
     pub visited_room_ids: Vec<String>,
-    /// Room changed at each of the last two transitions.
+    /// Id of the room that changed at each of the last two transitions.
     pub changed_room_ids: Vec<Option<String>>,
-    /// Goal rooms of the last two stages.
+    /// Ids of the goal rooms of the last two stages.
     pub goal_room_ids: Vec<String>,
-    /// Room in which the reference trajectory ends.
+    /// Id of the room in which the reference trajectory ends.
     pub transition_room_id: Option<String>,
 }
 
-/// A refused goal.
+/// A rejected goal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RejectionRecord {
     /// Object.
     pub id: String,
-    /// Why.
+    /// Reason for the rejection.
     pub reason: GoalRejection,
 }
 
-/// Why an object cannot be a goal.
+/// Reasons why an object cannot be a goal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GoalRejection {
-    /// No reachable position of its room lies at the reference distance.
+    /// No reachable position of its room is at the reference distance.
     NoReferencePose,
-    /// It is not visible from any of them.
+    /// The object is not visible from any such position.
     NotVisible,
-    /// No path leads there.
+    /// No path leads to the position.
     Unreachable,
 }

@@ -1,22 +1,22 @@
-//! What a target looks like in its reference image, as far as the shape and the catalogue know.
+//! The appearance of a target in its reference image, from its shape and the catalogue.
 
 use crate::{
     assets::{
         Asset,
-        shapes::{lit, looks_in, shape_in},
+        shapes::{lit, shape_in, shape_traits},
     },
     generation::record::{Appearance, Tint},
     house::Condition,
     sensors::raster::FrameBuffer,
 };
 
-/// Most of a target's pixels that are looked at: enough for shares to a hundredth or two.
+/// Largest number of a target's pixels that are used: enough for shares to one or two hundredths.
 const MAX_PIXELS: usize = 2000;
 
-/// Colours, form, parts and materials of a target.
+/// Describe colours, form, parts and materials of a target.
 ///
 /// # Arguments
-/// * `asset`, `condition` - of the target.
+/// * `asset`, `condition` - asset and state of the target.
 /// * `frame` - the reference image with its instances.
 /// * `body` - instance id of the target in it.
 pub fn appearance_of(
@@ -25,20 +25,20 @@ pub fn appearance_of(
     frame: &FrameBuffer,
     body: i32,
 ) -> Appearance {
-    let looks = looks_in(asset, condition);
+    let traits = shape_traits(asset, condition);
     Appearance {
         tints: tints(asset, condition, frame, body),
-        form: looks.form,
-        details: looks.details,
+        form: traits.form,
+        details: traits.details,
         made_of: asset.made_of.clone(),
     }
 }
 
-/// Colours of the target's materials by the share of its visible pixels that they have, largest
+/// Return the colours of the target's materials and their shares of its visible pixels, largest
 /// first.
 ///
-/// Light and shade change how bright a pixel is, hardly its hue: each pixel counts for the material
-/// whose colour, made brighter or darker, comes nearest to it.
+/// Light and shade change the brightness of a pixel, but hardly its hue. Each pixel counts for the
+/// material whose colour, made brighter or darker, is nearest to it.
 fn tints(asset: &Asset, condition: Condition, frame: &FrameBuffer, body: i32) -> Vec<Tint> {
     let mut colours: Vec<[u8; 3]> =
         shape_in(asset, condition).iter().map(|part| part.colour).collect();
@@ -74,8 +74,9 @@ fn tints(asset: &Asset, condition: Condition, frame: &FrameBuffer, body: i32) ->
     tints
 }
 
-/// Squared distance of a pixel from a colour as bright as fits best, between half and full light;
-/// being darker costs a little, so that of two colours of one hue the likelier counts.
+/// Return the squared distance of a pixel from a colour at the brightness that fits best, between
+/// half and full light. A darker colour has a small penalty, so that of two colours of one hue the
+/// more likely one counts.
 fn distance(pixel: [f64; 3], colour: [f64; 3]) -> f64 {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let light = (dot(pixel, colour) / dot(colour, colour).max(1.0)).clamp(0.45, 1.15);
@@ -83,7 +84,7 @@ fn distance(pixel: [f64; 3], colour: [f64; 3]) -> f64 {
     off + 200.0 * (light - 0.9).powi(2)
 }
 
-/// The material's colour of one as it shows indoors.
+/// Return the colour of a material from the colour that it shows indoors.
 fn unlit(colour: [u8; 3]) -> [u8; 3] {
     let [black, white] = [lit([0; 3])[0], lit([255; 3])[0]].map(f64::from);
     colour.map(|channel| {

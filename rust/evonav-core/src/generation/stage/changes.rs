@@ -1,4 +1,4 @@
-//! What differs between a house and a layout of it.
+//! Differences between a house and a layout of it.
 
 use crate::{
     generation::record::{ChangeRecord, EvolutionOutcome, EvolutionRecord},
@@ -6,7 +6,7 @@ use crate::{
     world::layout::Layout,
 };
 
-/// Every object whose pose or support differs between house and layout.
+/// List the objects whose pose or support differs between house and layout.
 pub(crate) fn changes_of(
     house: &House,
     layout: &Layout,
@@ -43,7 +43,7 @@ pub(crate) fn changes_of(
         .collect()
 }
 
-/// A transition without change.
+/// Create the record of a transition without change.
 pub(crate) fn no_evolution(outcome: EvolutionOutcome) -> EvolutionRecord {
     EvolutionRecord {
         outcome,

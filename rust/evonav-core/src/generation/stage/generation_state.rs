@@ -13,27 +13,27 @@ use crate::{
     house::House,
 };
 
-/// Spacing of the points at which a path is asked for its room.
+/// Spacing of the points at which the room of a path is determined.
 const PATH_STEP_M: f64 = 0.05;
-/// Entries of the histories that are recorded (paper, Sec. A.2).
+/// Number of entries of the histories that are recorded (paper, Sec. A.2).
 const HISTORY: usize = 2;
 
-/// S: what is known of the reference trajectory and of past changes and goals.
+/// S: the reference trajectory so far, and past changes and goals.
 pub struct State {
-    /// Per room, whether the reference trajectory has been in it.
+    /// Whether the reference trajectory has been in each room.
     pub visited: Vec<bool>,
-    /// Room that changed, per transition.
+    /// Index of the room that changed, by transition.
     pub changed: Vec<Option<usize>>,
-    /// Goal room, per stage.
+    /// Index of the goal room, by stage.
     pub goals: Vec<usize>,
     /// End of the reference trajectory.
     pub pose: PoseRecord,
-    /// Ids of objects that any change relocated.
+    /// Ids of all objects that any change has relocated.
     pub relocated: BTreeSet<String>,
 }
 
 impl State {
-    /// Before stage 1, at the house's own start pose.
+    /// Create the state before stage 1, at the house's own start pose.
     pub fn at_start(world: &StageWorld) -> Result<Self, Rejected> {
         let house = &world.house;
         let rejected = |reason, detail| Err(Rejected { reason, stage: 0, detail });
@@ -60,17 +60,17 @@ impl State {
         Ok(Self { visited, changed, goals, pose, relocated })
     }
 
-    /// Its `[x, z]`.
+    /// Return `[x, z]` of the end of the reference trajectory.
     pub fn position_m(&self) -> Vec2 {
         [self.pose.position_m[0], self.pose.position_m[2]]
     }
 
-    /// Where the reference trajectory ends.
+    /// Return the room in which the reference trajectory ends.
     pub fn transition_room(&self, house: &House) -> Option<usize> {
         house.room_of(self.position_m())
     }
 
-    /// Takes in a transition, before the stage after it is made.
+    /// Record a transition, before the stage after it is generated.
     pub fn note_evolution(&mut self, evolution: &EvolutionRecord, house: &House, stage: usize) {
         if stage > 1 {
             let is_evolved = evolution.outcome == EvolutionOutcome::Evolved;
@@ -81,7 +81,7 @@ impl State {
         self.relocated.extend(relocated.map(|change| change.id.clone()));
     }
 
-    /// Takes in a stage: the reference trajectory goes on to its reference pose.
+    /// Record a stage: the reference trajectory continues to its reference pose.
     pub fn note_stage(&mut self, world: &StageWorld, reference: &Reference, goal_room: usize) {
         for pair in reference.path_m.windows(2) {
             let num_steps = (distance_2d_m(pair[0], pair[1]) / PATH_STEP_M).ceil().max(1.0);
@@ -97,7 +97,7 @@ impl State {
         self.pose = reference.pose;
     }
 
-    /// S, as it is recorded.
+    /// Return the record of the state.
     pub fn record(&self, house: &House) -> StateRecord {
         let id = |room: usize| house.rooms[room].id.clone();
         let last = |len: usize| len.saturating_sub(HISTORY);
@@ -116,8 +116,8 @@ impl State {
     }
 }
 
-/// The start itself if the agent fits there, else the nearest place from which two rooms can be
-/// reached; the nearest of all, if there is no such place.
+/// Return the start itself if the agent fits there; otherwise the nearest free place from which two
+/// rooms can be reached, or the nearest free place if there is no such place.
 fn start_near(world: &StageWorld, start_m: Vec2) -> Option<Vec2> {
     let navigation = &world.navigation;
     if navigation.is_free(start_m) {
@@ -128,7 +128,7 @@ fn start_near(world: &StageWorld, start_m: Vec2) -> Option<Vec2> {
         let rooms: BTreeSet<usize> = reachable.iter().filter_map(|(_, room)| *room).collect();
         rooms.len() > 1
     };
-    // A place of every pocket met so far.
+    // One place of every pocket found so far.
     let mut pockets: Vec<Vec2> = Vec::new();
     for place_m in navigation.free_near(start_m) {
         if pockets.iter().any(|&pocket_m| navigation.is_connected(pocket_m, place_m)) {

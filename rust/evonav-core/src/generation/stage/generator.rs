@@ -1,28 +1,28 @@
-//! What all draws of a task share.
+//! The context that all draws of a task share.
 
 use std::cell::RefCell;
 
 use crate::{
     assets::Catalogue,
-    generation::{Given, Parameters},
+    generation::{Overrides, Parameters},
     rng::Stream,
     sensors::raster::FrameBuffer,
 };
 
-/// What all draws of a task share.
+/// The context that all draws of a task share.
 pub(crate) struct Generator<'a> {
     pub(crate) catalogue: &'a Catalogue,
     pub(crate) seed: u64,
     pub(crate) label: &'a str,
     pub(crate) parameters: &'a Parameters,
-    /// What is not drawn.
-    pub(crate) given: &'a Given,
+    /// Values that replace draws.
+    pub(crate) overrides: &'a Overrides,
     /// Working memory of the renderer.
     pub(crate) frame: RefCell<FrameBuffer>,
 }
 
 impl Generator<'_> {
-    /// The random stream of one draw.
+    /// Return the random stream of one draw.
     pub(crate) fn stream(&self, stage: usize, what: &str) -> Stream {
         Stream::new(self.seed, &[self.label, &format!("stage {stage}"), what])
     }

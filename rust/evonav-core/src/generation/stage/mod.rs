@@ -1,4 +1,4 @@
-//! What one stage of a task is made of.
+//! The parts of one stage: its world, the generation state, and the description of its target.
 
 pub mod appearance;
 pub mod changes;

@@ -1,4 +1,4 @@
-//! What an instruction may say of a target's surroundings (paper, Sec. A.4).
+//! The surroundings of a target that an instruction may mention (paper, Sec. A.4).
 
 use crate::{
     generation::record::{Anchor, Determiner, Relations},
@@ -11,31 +11,31 @@ use crate::{
     },
 };
 
-/// Gap in plan up to which things are next to each other.
+/// Largest gap in plan between objects that are next to each other.
 const NEXT_TO_M: f64 = 0.5;
-/// Difference in height up to which things stand on the same board of a shelf.
+/// Largest difference in height of objects on the same board of a shelf.
 const SAME_BOARD_M: f64 = 0.15;
-/// Gap in plan up to which a door or window is near.
+/// Largest gap in plan to a door or window that is near.
 const STRUCTURE_M: f64 = 1.0;
-/// Gap in plan up to which furniture stands in a corner.
+/// Largest gap in plan of furniture that stands in a corner.
 const CORNER_M: f64 = 0.3;
-/// Gap in plan up to which something on a wall is near; the paper names thresholds, not values.
+/// Largest gap in plan to a wall object that is near; the paper mentions thresholds without values.
 const WALL_OBJECT_M: f64 = 1.0;
-/// Gap in plan up to which something is below another.
+/// Largest gap in plan of an object that is below another.
 const BELOW_M: f64 = 0.3;
-/// Nearby anchors kept (paper, Sec. A.4).
+/// Number of nearby anchors in an instruction (paper, Sec. A.4).
 const MAX_NEIGHBOURS: usize = 2;
-/// Nearest categories that the anchors are chosen from.
+/// Number of nearest categories from which the anchors are chosen.
 const MAX_CHOICES: usize = 8;
 
-/// What things are in, never on; but a faucet stands on its sink.
+/// Categories that contain objects and never carry them, except that a faucet stands on its sink.
 const BASINS: [&str; 6] = ["Bathtub", "Box", "GarbageCan", "LaundryHamper", "Pot", "Sink"];
-/// What things are in, unless they stand on its top.
+/// Categories that contain objects unless these stand on the top.
 const CLOSED: [&str; 3] = ["Fridge", "Microwave", "Safe"];
-/// Depth under the top of something closed from which on a thing is in it.
+/// Depth under the top of a closed object from which an object is inside it.
 const INSIDE_M: f64 = 0.05;
 
-/// Something that can be said of an object's surroundings.
+/// A statement about an object's surroundings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Claim<'a> {
     kind: Kind,
@@ -43,8 +43,8 @@ struct Claim<'a> {
     what: &'a str,
     determiner: Determiner,
     gap_m: f64,
-    /// Taken after all others of its kind: not on the target's support, or a corner, which is seen
-    /// from less far away than doors and windows.
+    /// Whether it is used only after all others of its kind: objects that are not on the target's
+    /// support, and corners, which are visible from less far away than doors and windows.
     is_aside: bool,
 }
 
@@ -56,11 +56,11 @@ enum Kind {
     Below,
 }
 
-/// Everything that can be said of one object's surroundings.
+/// All statements about one object's surroundings.
 struct Surroundings<'a> {
     support: Option<&'a str>,
     is_in_support: bool,
-    /// Of each kind one a category or word, nearest first.
+    /// One claim per kind and category or word, nearest first.
     claims: Vec<Claim<'a>>,
 }
 
@@ -70,7 +70,7 @@ impl<'a> Surroundings<'a> {
         of_kind.take(MAX_CHOICES).copied().collect()
     }
 
-    /// Whether a claim about another object fits this one, read literally.
+    /// Return whether a claim about another object is true of this one, read literally.
     fn fits(&self, claim: &Claim<'_>) -> bool {
         self.claims.iter().any(|own| {
             let is_kind =
@@ -82,15 +82,15 @@ impl<'a> Surroundings<'a> {
     }
 }
 
-/// Relations of object `index` to its support, at most two neighbours, one part of the room and
-/// one thing on the wall.
+/// Return the relations of object `index` to its support, at most two neighbours, one part of the
+/// room and one object on the wall.
 ///
-/// Of the anchors within the thresholds those are taken that leave the fewest other objects which
-/// the instruction fits, the nearest among equals. Anchors are of other categories than the target,
-/// each category once: an instruction names categories only.
+/// Of the anchors within the thresholds, those are chosen with which the instruction applies to the
+/// fewest other objects; among equals the nearest. Anchors have other categories than the target,
+/// and each category occurs once, because an instruction names only categories.
 ///
 /// # Arguments
-/// * `index` - of the target in `house` and `layout`, which must belong together.
+/// * `index` - index of the target in `house` and `layout`, which must belong together.
 pub fn relations_of(house: &House, layout: &Layout, index: usize) -> Relations {
     let room_type =
         |i: usize| house.objects[i].room.map_or("", |room| house.rooms[room].room_type.as_str());
@@ -110,9 +110,9 @@ pub fn relations_of(house: &House, layout: &Layout, index: usize) -> Relations {
                 || (rival.support, rival.is_in_support) == (own.support, own.is_in_support)
         })
         .collect();
-    let (kept, num_rivals) = choose(&own, &rivals);
+    let (chosen, num_rivals) = choose(&own, &rivals);
     let find = |is_kind: &dyn Fn(Kind) -> bool| {
-        kept.iter().filter(|claim| is_kind(claim.kind)).map(anchor).collect::<Vec<_>>()
+        chosen.iter().filter(|claim| is_kind(claim.kind)).map(anchor).collect::<Vec<_>>()
     };
     let num_alike = |of: &str| house.rooms.iter().filter(|room| room.room_type == of).count();
     Relations {
@@ -127,14 +127,14 @@ pub fn relations_of(house: &House, layout: &Layout, index: usize) -> Relations {
         neighbours: find(&|kind| kind == Kind::NextTo),
         structure: find(&|kind| kind == Kind::Structure).pop(),
         wall_object: find(&|kind| matches!(kind, Kind::NearOnWall | Kind::Below)).pop(),
-        is_below_wall_object: kept.iter().any(|claim| claim.kind == Kind::Below),
+        is_below_wall_object: chosen.iter().any(|claim| claim.kind == Kind::Below),
         num_fitting: num_rivals + 1,
     }
 }
 
-/// The claims to make, and the number of rivals that all of them fit.
+/// Choose the claims to make; return them and the number of rivals to which all of them apply.
 ///
-/// Tries every choice in order of distance, and takes the first of the best.
+/// Every choice is tried in order of distance; the first of the best is taken.
 fn choose<'a>(own: &Surroundings<'a>, rivals: &[Surroundings<'_>]) -> (Vec<Claim<'a>>, usize) {
     let near = own.of_kind(|kind| kind == Kind::NextTo);
     let parts = own.of_kind(|kind| kind == Kind::Structure);
@@ -146,11 +146,12 @@ fn choose<'a>(own: &Surroundings<'a>, rivals: &[Surroundings<'_>]) -> (Vec<Claim
     for pair in subsets(&near, MAX_NEIGHBOURS) {
         for part in one_of(&parts) {
             for thing in one_of(&hung) {
-                let said: Vec<Claim<'a>> = pair.iter().copied().chain(part).chain(thing).collect();
-                let fits = |rival: &&Surroundings<'_>| said.iter().all(|claim| rival.fits(claim));
+                let claims: Vec<Claim<'a>> =
+                    pair.iter().copied().chain(part).chain(thing).collect();
+                let fits = |rival: &&Surroundings<'_>| claims.iter().all(|claim| rival.fits(claim));
                 let num_rivals = rivals.iter().filter(fits).count();
                 if num_rivals < best.1 {
-                    best = (said, num_rivals);
+                    best = (claims, num_rivals);
                 }
             }
         }
@@ -158,7 +159,8 @@ fn choose<'a>(own: &Surroundings<'a>, rivals: &[Surroundings<'_>]) -> (Vec<Claim
     best
 }
 
-/// All choices of `size` claims, or the one of all claims if there are fewer; earlier claims first.
+/// Return all pairs of claims, or all claims as a single choice if there are at most `size`;
+/// earlier claims first.
 fn subsets<'a>(claims: &[Claim<'a>], size: usize) -> Vec<Vec<Claim<'a>>> {
     if claims.len() <= size {
         return vec![claims.to_vec()];
@@ -176,7 +178,7 @@ fn anchor(claim: &Claim<'_>) -> Anchor {
     Anchor { category: claim.what.to_owned(), determiner: claim.determiner }
 }
 
-/// What is around an object.
+/// Describe the surroundings of an object.
 fn surroundings<'a>(
     house: &House,
     layout: &'a Layout,
@@ -196,7 +198,7 @@ fn surroundings<'a>(
     });
     for (i, item) in in_room {
         let what = item.asset.category.as_str();
-        // On a support its company there is what is next to it; furniture is next to both.
+        // An object on a support is next to others on that support; furniture is next to both.
         let is_fellow = target.placement.parent.is_some()
             && item.placement.parent == target.placement.parent
             && (bottom_m(&item.solids) - bottom).abs() < SAME_BOARD_M;
@@ -243,7 +245,7 @@ fn surroundings<'a>(
     }
 }
 
-/// Objects of a category in the room of object `index`.
+/// Count the objects of a category in the room of object `index`.
 fn count_in_room(house: &House, layout: &Layout, index: usize, category: &str) -> usize {
     let room = house.objects[index].room;
     let items = layout.items.iter().zip(&house.objects);
@@ -254,7 +256,7 @@ fn one_of(count: usize) -> Determiner {
     if count > 1 { Determiner::A } else { Determiner::The }
 }
 
-/// Doors, windows and corners of the room within reach.
+/// Find the doors, windows and corners of the room within the thresholds.
 fn structures_near(
     house: &House,
     layout: &Layout,
@@ -308,7 +310,7 @@ fn structures_near(
     near
 }
 
-/// Corners of a floor outline that a piece of furniture can stand in.
+/// Return the corners of a floor outline in which furniture can stand.
 fn convex_corners(polygon: &[Vec2]) -> Vec<Vec2> {
     let n = polygon.len();
     let cross =
@@ -318,7 +320,7 @@ fn convex_corners(polygon: &[Vec2]) -> Vec<Vec2> {
     (0..n).filter(|&i| turn(i) * area > 0.0).map(|i| polygon[i]).collect()
 }
 
-/// Plan outline of a whole object.
+/// Return the convex outline of a whole object on the ground plane.
 fn outline_of(item: &Item) -> Vec<Vec2> {
     convex_hull(item.solids.iter().flat_map(|solid| solid.outline_m.iter().copied()).collect())
 }

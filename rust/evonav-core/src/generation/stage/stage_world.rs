@@ -1,4 +1,4 @@
-//! One stage's world, and the reference pose of a goal in it.
+//! The world of one stage, and reference views of goals in it.
 
 use crate::{
     Error,
@@ -29,46 +29,46 @@ const CAMERA_HEIGHT_M: f64 = 1.575;
 const FIELD_OF_VIEW_DEG: f64 = 90.0;
 /// Pitch of the reference image (ProcTHOR's default embodiment).
 pub const HORIZON_DEG: f64 = 30.0;
-/// AI2-THOR's grid of reachable positions.
+/// Spacing of AI2-THOR's grid of reachable positions.
 const GRID_M: f64 = 0.25;
 
-/// A stage's house, ready for queries.
+/// The house of a stage, prepared for queries.
 pub struct StageWorld {
     /// The house.
     pub house: House,
-    /// Its objects.
+    /// Objects of the house.
     pub layout: Layout,
-    /// Where an agent can be.
+    /// Free space of the agent.
     pub navigation: Navigation,
     mesh: SceneMesh,
 }
 
-/// Which rooms and objects can be reached.
+/// The rooms and objects that can be reached.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Access {
-    /// Per room, whether a reachable position lies in it.
+    /// Whether a reachable position lies in each room.
     pub rooms: Vec<bool>,
-    /// Per object, whether a reachable position of its room lies at the reference distance.
+    /// Whether a reachable position of its room lies at the reference distance from each object.
     pub objects: Vec<bool>,
 }
 
-/// A goal's reference view.
+/// The reference view of a goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reference {
-    /// Where it is taken.
+    /// Pose of the view.
     pub pose: PoseRecord,
-    /// Pixels of the target.
+    /// Number of pixels of the target.
     pub visible_px: usize,
-    /// What they show.
+    /// Appearance of the target.
     pub appearance: Appearance,
-    /// RGB, row by row.
+    /// Image, RGB, row by row.
     pub image: Vec<u8>,
-    /// Shortest path to it.
+    /// Shortest path to the pose.
     pub path_m: Vec<Vec2>,
 }
 
 impl StageWorld {
-    /// Builds everything that a stage is asked about.
+    /// Build scene, layout, navigation and mesh of a house.
     ///
     /// # Errors
     /// Those of [`Scene::build`] and [`Navigation::build`].
@@ -85,7 +85,8 @@ impl StageWorld {
         Ok(Self { house, layout, navigation, mesh })
     }
 
-    /// Positions of AI2-THOR's grid that can be reached from `from_m`, each with its room.
+    /// Return the positions of AI2-THOR's grid that can be reached from `from_m`, each with its
+    /// room.
     ///
     /// # Errors
     /// Those of [`Navigation::reachable_positions`].
@@ -98,7 +99,7 @@ impl StageWorld {
         Ok(positions.into_iter().map(|p| (p, self.house.room_of(p))).collect())
     }
 
-    /// What `reachable` positions give access to in `layout`.
+    /// Return the rooms and objects of `layout` that `reachable` positions give access to.
     pub fn access(
         &self,
         layout: &Layout,
@@ -109,13 +110,13 @@ impl StageWorld {
             .map(|room| reachable.iter().any(|(_, other)| *other == Some(room)))
             .collect();
         let objects = (0..layout.items.len())
-            .map(|index| self.is_near(layout, index, reachable, parameters).next().is_some())
+            .map(|index| self.positions_near(layout, index, reachable, parameters).next().is_some())
             .collect();
         Access { rooms, objects }
     }
 
-    /// Reachable positions of the object's room at the reference distance from it.
-    fn is_near<'a>(
+    /// Return the reachable positions of the object's room at the reference distance from it.
+    fn positions_near<'a>(
         &self,
         layout: &Layout,
         index: usize,
@@ -135,11 +136,11 @@ impl StageWorld {
             .map(|(position, _)| *position)
     }
 
-    /// Draws a reference pose for an object: a reachable position of its room at the reference
+    /// Draw a reference pose for an object: a reachable position of its room at the reference
     /// distance, facing it, from which it is visible (paper, Sec. A.4).
     ///
     /// # Errors
-    /// Those of [`render`]; inside, why the object cannot be a goal.
+    /// Those of [`render`]. The inner error is the reason why the object cannot be a goal.
     pub fn sample_reference(
         &self,
         index: usize,
@@ -150,7 +151,7 @@ impl StageWorld {
         frame: &mut FrameBuffer,
     ) -> Result<Result<Reference, GoalRejection>, Error> {
         let mut positions: Vec<Vec2> =
-            self.is_near(&self.layout, index, reachable, parameters).collect();
+            self.positions_near(&self.layout, index, reachable, parameters).collect();
         if positions.is_empty() {
             return Ok(Err(GoalRejection::NoReferencePose));
         }
@@ -192,7 +193,7 @@ impl StageWorld {
     }
 }
 
-/// The camera of an agent at a pose.
+/// Return the camera of an agent at a pose.
 fn camera_at(pose: &PoseRecord, side_px: usize) -> Camera {
     let pose = Pose {
         position_m: pose.position_m,

@@ -37,7 +37,7 @@ impl Default for FrontierConfig {
 }
 
 impl FrontierConfig {
-    /// Checks every field.
+    /// Check every field.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming the first field outside its domain.

@@ -32,19 +32,19 @@ pub struct Frontiers {
 }
 
 impl Frontiers {
-    /// The frontiers of the last update, by ascending id.
+    /// Return the frontiers of the last update, by ascending id.
     pub fn list(&self) -> &[Frontier] {
         &self.list
     }
 
-    /// Drops all frontiers. Ids go on counting.
+    /// Drop all frontiers. Ids go on counting.
     pub fn clear(&mut self) {
         self.list.clear();
         self.given_up = None;
         self.num_stands = 0;
     }
 
-    /// Brings the frontiers up to date with the map. A frontier whose region has hardly changed
+    /// Bring the frontiers up to date with the map. A frontier whose region has hardly changed
     /// keeps its id, position and direction.
     ///
     /// # Errors
@@ -79,9 +79,9 @@ impl Frontiers {
         Ok(&self.list)
     }
 
-    /// Unknown cells that the agent did not get to see from the place meant for it, or from as
-    /// near as it could get (it went nowhere since the last update), it will not see at all. An
-    /// agent that goes nowhere twice cannot get to the nearest place.
+    /// Return the unknown cells that the agent did not get to see from the place meant for it, or
+    /// from as near as it could get (it went nowhere since the last update), it will not see at
+    /// all. An agent that goes nowhere twice cannot get to the nearest place.
     fn give_up(&mut self, map: &OccupancyMap, agent_m: Vec2) {
         let is_standing = self.last_agent_m.is_some_and(|last| distance_2d_m(last, agent_m) < 0.1);
         self.num_stands = if is_standing { self.num_stands + 1 } else { 0 };
@@ -104,7 +104,7 @@ impl Frontiers {
     }
 }
 
-/// The frontiers of a map, without a history.
+/// Return the frontiers of a map, without a history.
 ///
 /// # Arguments
 /// * `agent_m` - `[x, z]`; frontiers lie on the free floor that is connected to it.
@@ -126,7 +126,7 @@ pub fn extract(
     frontiers.update(map, agent_m, config)?;
     Ok(frontiers.list)
 }
-/// Old frontiers that stay, and the regions that become new ones.
+/// Return the old frontiers that stay, and the regions that become new ones.
 fn reconcile(
     old: Vec<Frontier>,
     regions: Vec<Vec<[i32; 2]>>,

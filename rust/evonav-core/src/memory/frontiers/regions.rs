@@ -56,7 +56,8 @@ pub(crate) fn find_regions(
     Ok(Found { regions, edges, is_last_resort: true })
 }
 
-/// Unknown cells beside island cells (4 neighbours), less those given up, and the island cells beside them.
+/// Return the unknown cells beside island cells (4 neighbours), less those given up, and the island
+/// cells beside them.
 fn borders(map: &OccupancyMap, island: &BitGrid, given_up: Option<&BitGrid>) -> (BitGrid, BitGrid) {
     let (rows, cols) = (island.rows(), island.cols());
     let (mut unknown, mut edges) = (BitGrid::new(rows, cols), BitGrid::new(rows, cols));
@@ -78,7 +79,8 @@ fn borders(map: &OccupancyMap, island: &BitGrid, given_up: Option<&BitGrid>) -> 
     (unknown, edges)
 }
 
-/// Cells grouped with their 8 neighbours, in the order of the first cells, each row-major.
+/// Return the cells grouped with their 8 neighbours, in the order of the first cells, each
+/// row-major.
 fn groups(mut cells: BitGrid) -> Vec<Vec<[i32; 2]>> {
     let mut groups = Vec::new();
     for row in 0..cells.rows() {
@@ -109,7 +111,8 @@ fn groups(mut cells: BitGrid) -> Vec<Vec<[i32; 2]>> {
     groups
 }
 
-/// The free cells connected (4 neighbours) to the agent, or to the free cell nearest to it, or to a seed.
+/// Return the free cells connected (4 neighbours) to the agent, or to the free cell nearest to it,
+/// or to a seed.
 fn island(map: &OccupancyMap, agent_m: Vec2, seeds: &[[i32; 2]]) -> BitGrid {
     let mut island = BitGrid::new(map.spec().rows, map.spec().cols);
     let components = Components::new(map.free());
@@ -142,8 +145,8 @@ fn island(map: &OccupancyMap, agent_m: Vec2, seeds: &[[i32; 2]]) -> BitGrid {
     island
 }
 
-/// Island cells whose 8 neighbours are all unexplored, and those with 4 to 6 unexplored ones.
-/// What lies off the map counts as explored.
+/// Return the island cells whose 8 neighbours are all unexplored, and those with 4 to 6 unexplored
+/// ones. What lies off the map counts as explored.
 fn split_by_unexplored_neighbours(island: &BitGrid, explored: &BitGrid) -> (BitGrid, BitGrid) {
     let (rows, cols) = (island.rows(), island.cols());
     let (mut inner, mut edges) = (BitGrid::new(rows, cols), BitGrid::new(rows, cols));
@@ -181,12 +184,12 @@ fn split_by_unexplored_neighbours(island: &BitGrid, explored: &BitGrid) -> (BitG
     (inner, edges)
 }
 
-/// Sum and carry of three bits, 64 at once.
+/// Return the sum and carry of three bits, 64 at once.
 fn add3([a, b, c]: [u64; 3]) -> (u64, u64) {
     (a ^ b ^ c, (a & b) | (c & (a ^ b)))
 }
 
-/// Splits a region that spans a wide angle around the agent, by k-means on the angle.
+/// Split a region that spans a wide angle around the agent, by k-means on the angle.
 fn split_wide(
     map: &OccupancyMap,
     agent_m: Vec2,
@@ -215,13 +218,13 @@ fn split_wide(
     regions.extend(parts.into_iter().filter(|part| !part.is_empty()));
 }
 
-/// `[x, z]` from the agent to the middle of a cell.
+/// Return `[x, z]` from the agent to the middle of a cell.
 fn offset_m(map: &OccupancyMap, agent_m: Vec2, cell: &[i32; 2]) -> Vec2 {
     let centre_m = map.spec().centre_m(cell.map(|i| i as usize));
     [centre_m[0] - agent_m[0], centre_m[1] - agent_m[1]]
 }
 
-/// Mean direction of cells seen from the agent, as a vector.
+/// Return the mean direction of cells seen from the agent, as a vector.
 pub(crate) fn mean_direction(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Vec2 {
     cells.iter().fold([0.0; 2], |sum, cell| {
         let [x, z] = offset_m(map, agent_m, cell);
@@ -230,7 +233,7 @@ pub(crate) fn mean_direction(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2
     })
 }
 
-/// Whether cells surely span no more than an angle: without an arc tangent a cell.
+/// Return whether cells surely span no more than an angle: without an arc tangent a cell.
 fn is_narrow(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]], max_span_rad: f64) -> bool {
     let ahead = mean_direction(map, agent_m, cells);
     let (mut low, mut high) = (0.0_f64, 0.0_f64);
@@ -246,8 +249,8 @@ fn is_narrow(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]], max_span_rad
     high.atan() - low.atan() <= max_span_rad
 }
 
-/// Angles of cells seen from the agent (0 along +z, growing towards +x), cut at the widest gap
-/// so that neighbours do not lie a turn apart.
+/// Return the angles of cells seen from the agent (0 along +z, growing towards +x), cut at the
+/// widest gap so that neighbours do not lie a turn apart.
 fn unwrapped_angles(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Vec<f64> {
     let mut angles: Vec<f64> = cells
         .iter()
@@ -279,7 +282,8 @@ fn unwrapped_angles(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Ve
     angles
 }
 
-/// Borders between the `num_parts` clusters of one-dimensional k-means, started evenly spread.
+/// Return the borders between the `num_parts` clusters of one-dimensional k-means, started evenly
+/// spread.
 fn k_means_limits(values: &[f64], low: f64, high: f64, num_parts: usize) -> Vec<f64> {
     let mut means: Vec<f64> =
         (0..num_parts).map(|i| low + (high - low) * (i as f64 + 0.5) / num_parts as f64).collect();

@@ -9,7 +9,7 @@ use crate::{
     },
 };
 
-/// Gives a region its direction and view position.
+/// Give a region its direction and view position.
 pub(crate) fn place(
     map: &OccupancyMap,
     edges: &BitGrid,
@@ -44,7 +44,8 @@ pub(crate) fn place(
     Frontier { id, position_m, direction_rad, cells }
 }
 
-/// Puts a viewpoint right beside a region of unknown cells, on the nearest border cell, and looks at it.
+/// Put a viewpoint right beside a region of unknown cells, on the nearest border cell, and looks at
+/// it.
 pub(crate) fn place_at_border(
     map: &OccupancyMap,
     edges: &BitGrid,
@@ -65,7 +66,8 @@ pub(crate) fn place_at_border(
     Frontier { id, position_m, direction_rad: x.atan2(z), cells }
 }
 
-/// Edge cells with 2 to 12 cells of the region in the 5 x 5 cells around them, row-major.
+/// Return the edge cells with 2 to 12 cells of the region in the 5 x 5 cells around them,
+/// row-major.
 fn edges_beside(edges: &BitGrid, cells: &[[i32; 2]]) -> Vec<[usize; 2]> {
     let mut region = BitGrid::new(edges.rows(), edges.cols());
     let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
@@ -87,7 +89,7 @@ fn edges_beside(edges: &BitGrid, cells: &[[i32; 2]]) -> Vec<[usize; 2]> {
     .collect()
 }
 
-/// Moves a point away from the nearest obstacle while that gains clearance and stays on free floor.
+/// Move a point away from the nearest obstacle while that gains clearance and stays on free floor.
 fn push_away(map: &OccupancyMap, mut point_m: Vec2, config: &FrontierConfig) -> Vec2 {
     let mut moved_m = 0.0;
     while let Some((obstacle_m, clearance_m)) = nearest_blocked(map, point_m, config.clearance_m)
@@ -108,7 +110,7 @@ fn push_away(map: &OccupancyMap, mut point_m: Vec2, config: &FrontierConfig) -> 
     point_m
 }
 
-/// Centre of the nearest blocked cell closer than `within_m`, and its distance.
+/// Return the centre of the nearest blocked cell closer than `within_m`, and its distance.
 fn nearest_blocked(map: &OccupancyMap, point_m: Vec2, within_m: f64) -> Option<(Vec2, f64)> {
     let spec = map.spec();
     let [row, col] = spec.cell_of(point_m)?;

@@ -10,7 +10,7 @@ use crate::{
     sensors::unproject::Point,
 };
 
-/// A detection's points cleaned, and the box around them; `None` if too little is left.
+/// Return a detection's points cleaned, and the box around them; `None` if too little is left.
 pub(crate) fn clean(points: &[Point], config: &ObjectMapConfig) -> Option<(Vec<Point>, Aabb)> {
     if points.len() < config.min_points {
         return None;
@@ -27,7 +27,7 @@ pub(crate) fn clean(points: &[Point], config: &ObjectMapConfig) -> Option<(Vec<P
     (volume_m3 >= config.min_box_m3).then_some((cluster, bounds_m))
 }
 
-/// Keeps the largest cluster of an entry's cloud, if that leaves enough.
+/// Keep the largest cluster of an entry's cloud, if that leaves enough.
 pub(crate) fn denoise(cloud: &mut Cloud, config: &ObjectMapConfig) {
     let radius_m = config.cluster_radius_m as f32;
     let cluster = largest_cluster(cloud.points(), radius_m, config.cluster_min_points);
@@ -36,7 +36,7 @@ pub(crate) fn denoise(cloud: &mut Cloud, config: &ObjectMapConfig) {
     }
 }
 
-/// Mean of points; the origin for none.
+/// Return the mean of points; the origin for none.
 pub(crate) fn centroid_m(points: &[Point]) -> Vec3 {
     let count = points.len().max(1) as f64;
     [0, 1, 2].map(|i| points.iter().map(|p| f64::from(p[i])).sum::<f64>() / count)

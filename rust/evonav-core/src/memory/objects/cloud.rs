@@ -27,7 +27,7 @@ pub struct Cloud {
 const END: u32 = u32::MAX;
 
 impl Cloud {
-    /// A cloud of the first point of each voxel.
+    /// Return a cloud of the first point of each voxel.
     ///
     /// # Arguments
     /// * `voxel_m` - edge of a voxel.
@@ -46,17 +46,17 @@ impl Cloud {
         cloud
     }
 
-    /// The points, `[x, y, z]`.
+    /// Return the points, `[x, y, z]`.
     pub fn points(&self) -> &[Point] {
         &self.points
     }
 
-    /// Smallest box around the points.
+    /// Return the smallest box around the points.
     pub fn bounds_m(&self) -> &Aabb {
         &self.bounds_m
     }
 
-    /// Adds the points that fall into voxels without one.
+    /// Add the points that fall into voxels without one.
     pub fn merge(&mut self, points: &[Point]) {
         let inverse_radius = 1.0 / f64::from(self.radius_m);
         for &point in points {
@@ -71,7 +71,8 @@ impl Cloud {
         }
     }
 
-    /// Part of `points` with a point of this cloud nearer than the radius, 0 for no points.
+    /// Return the part of `points` with a point of this cloud nearer than the radius, 0 for no
+    /// points.
     ///
     /// # Complexity
     /// At most 27 cells a point; the boxes are compared first.
@@ -81,7 +82,8 @@ impl Cloud {
         num as f64 / points.len().max(1) as f64
     }
 
-    /// Whether [`Cloud::overlap`] is `enough`, which every larger overlap must be, too; looks at no more points than it takes.
+    /// Return whether [`Cloud::overlap`] is `enough`, which every larger overlap must be, too;
+    /// looks at no more points than it takes.
     pub(crate) fn overlaps(&self, points: &[Point], enough: impl Fn(f64) -> bool) -> bool {
         let share = |num: usize| num as f64 / points.len().max(1) as f64;
         let mut finder = Finder::new(self);
@@ -98,7 +100,7 @@ impl Cloud {
         enough(share(num))
     }
 
-    /// Whether one of a cell's points is nearer to a point than the radius.
+    /// Return whether one of a cell's points is nearer to a point than the radius.
     fn has_near(&self, first: u32, point: Point) -> bool {
         let mut index = first;
         while index != END {
@@ -135,7 +137,7 @@ impl<'a> Finder<'a> {
         Self { cloud, reach_m, inverse_radius, last, known: nowhere, beside: Vec::new() }
     }
 
-    /// Whether a point of the cloud is nearer than the radius.
+    /// Return whether a point of the cloud is nearer than the radius.
     fn has_near(&mut self, point: Point) -> bool {
         let is_far = |i: usize| {
             let value = f64::from(point[i]);
@@ -171,7 +173,7 @@ impl<'a> Finder<'a> {
         })
     }
 
-    /// Finds the points around a cell, a block at a time.
+    /// Find the points around a cell, a block at a time.
     fn look_beside(&mut self, cell: Voxel) {
         self.known = cell;
         self.beside.clear();
@@ -197,7 +199,7 @@ impl<'a> Finder<'a> {
     }
 }
 
-/// The steps -1, 0 and 1 from a coordinate, parted where a block ends.
+/// Return the steps -1, 0 and 1 from a coordinate, parted where a block ends.
 fn within_blocks(coordinate: i32) -> impl Iterator<Item = Range<i32>> {
     let end = match coordinate & 3 {
         0 => 0,

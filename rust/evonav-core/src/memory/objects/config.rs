@@ -57,7 +57,7 @@ impl Default for ObjectMapConfig {
 }
 
 impl ObjectMapConfig {
-    /// Checks every field.
+    /// Check every field.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming the first field outside its domain.

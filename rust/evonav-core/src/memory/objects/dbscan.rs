@@ -27,8 +27,8 @@ pub fn dbscan(points: &[Point], radius_m: f32, min_points: usize) -> Vec<i32> {
     grid.label(&is_core, &clusters)
 }
 
-/// The points of the largest cluster (the first of equal ones), in their order; `None` if all is
-/// noise. Borrowed if they are all points.
+/// Return the points of the largest cluster (the first of equal ones), in their order; `None` if
+/// all is noise. Borrowed if they are all points.
 pub fn largest_cluster(
     points: &[Point],
     radius_m: f32,
@@ -46,7 +46,7 @@ pub fn largest_cluster(
     Some(points.iter().zip(&labels).filter(is_inside).map(|(&point, _)| point).collect())
 }
 
-/// Squared distance.
+/// Return the squared distance.
 pub(crate) fn distance2(a: Point, b: Point) -> f32 {
     let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     x * x + y * y + z * z
@@ -123,14 +123,14 @@ impl<'a> Grid<'a> {
         &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
-    /// The cell some steps away, if points lie there.
+    /// Return the cell some steps away, if points lie there.
     fn beside(&self, cell: usize, step: Step) -> Option<usize> {
         let beside = || [0, 1, 2].map(|i| self.voxels[cell][i].saturating_add(step.voxels[i]));
         let slot = self.slots[cell].wrapping_add_signed(step.stride);
         self.index.at(slot, beside).map(|other| other as usize)
     }
 
-    /// Cells that may hold neighbours of a cell's points, the nearest first.
+    /// Return the cells that may hold neighbours of a cell's points, the nearest first.
     fn around(&self, cell: usize) -> impl Iterator<Item = usize> {
         let steps = self.half_steps.iter().flat_map(|&step| [step, step.back()]);
         steps.filter_map(move |step| self.beside(cell, step))
@@ -165,7 +165,7 @@ impl<'a> Grid<'a> {
         is_core
     }
 
-    /// Cells joined by core points within the radius: a representative a cell.
+    /// Return the cells joined by core points within the radius: a representative a cell.
     fn join_cells(&self, is_core: &[bool]) -> Vec<u32> {
         let mut parents: Vec<u32> = (0..self.num_cells() as u32).collect();
         let cores = |cell: usize| {
@@ -199,7 +199,8 @@ impl<'a> Grid<'a> {
         (0..self.num_cells() as u32).map(|cell| root(&mut parents, cell)).collect()
     }
 
-    /// Joins what touching cells leave apart: at every place, one of the two lies not in the largest part.
+    /// Join what touching cells leave apart: at every place, one of the two lies not in the largest
+    /// part.
     fn join_rest(
         &self,
         parents: &mut [u32],
@@ -238,7 +239,7 @@ impl<'a> Grid<'a> {
         labels
     }
 
-    /// The first cluster among the core points around one that is none.
+    /// Return the first cluster among the core points around one that is none.
     fn border_label(&self, border: usize, is_core: &[bool], labels: &[i32]) -> i32 {
         let cell = self.cell_of[border] as usize;
         let others = std::iter::once(cell).chain(self.around(cell));
@@ -248,7 +249,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// The representative of a cell; shortens the way there.
+/// Return the representative of a cell; shortens the way there.
 fn root(parents: &mut [u32], mut cell: u32) -> u32 {
     while parents[cell as usize] != cell {
         let parent = parents[cell as usize];

@@ -66,23 +66,24 @@ impl Entry {
         }
     }
 
-    /// The label of most detections, of equal ones the first.
+    /// Return the label of most detections, of equal ones the first.
     pub fn label(&self) -> &str {
         let best = self.label_counts.iter().rev().max_by_key(|(_, count)| *count);
         best.map_or("", |(label, _)| label)
     }
 
-    /// Middle of the box around the points.
+    /// Return the middle of the box around the points.
     pub fn centre_m(&self) -> Vec3 {
         self.cloud.bounds_m().centre_m()
     }
 
-    /// Edges of the box around the points.
+    /// Return the edges of the box around the points.
     pub fn size_m(&self) -> Vec3 {
         self.cloud.bounds_m().size_m()
     }
 
-    /// Cosine of the features, or, where one has none, 1 for the same label and 0 for another.
+    /// Return the cosine of the features, or, where one has none, 1 for the same label and 0 for
+    /// another.
     pub(crate) fn similarity(&self, label: &str, feature: Option<&[f32]>) -> f64 {
         match (&self.feature, feature) {
             (Some(a), Some(b)) => a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum(),
@@ -90,7 +91,8 @@ impl Entry {
         }
     }
 
-    /// Whether a box touches this one's grown by the radius of overlap: if not, nothing overlaps.
+    /// Return whether a box touches this one's grown by the radius of overlap: if not, nothing
+    /// overlaps.
     pub(crate) fn is_beside(&self, other_m: &Aabb, config: &ObjectMapConfig) -> bool {
         let mut bounds_m = *self.cloud.bounds_m();
         bounds_m.min_m = bounds_m.min_m.map(|v| v - config.overlap_radius_m);
@@ -98,7 +100,7 @@ impl Entry {
         bounds_m.intersects(other_m)
     }
 
-    /// Joins a detection.
+    /// Join a detection.
     pub(crate) fn see(&mut self, sighting: Sighting, stage: u32, view: u64) {
         self.count(vec![(sighting.label, 1)], sighting.feature, 1);
         self.confidence = self.confidence.max(sighting.confidence);
@@ -107,7 +109,7 @@ impl Entry {
         self.last_seen_view = view;
     }
 
-    /// Takes over points where it has none yet.
+    /// Take over points where it has none yet.
     fn grow(&mut self, points: &[Point]) {
         let num_points = self.cloud.points().len();
         self.cloud.merge(points);
@@ -115,7 +117,7 @@ impl Entry {
         self.has_grown |= self.cloud.points().len() != num_points;
     }
 
-    /// Joins another entry; the id stays.
+    /// Join another entry; the id stays.
     pub(crate) fn absorb(&mut self, other: Self) {
         self.count(other.label_counts, other.feature, other.num_detections);
         self.confidence = self.confidence.max(other.confidence);
@@ -125,7 +127,7 @@ impl Entry {
         self.last_seen_view = self.last_seen_view.max(other.last_seen_view);
     }
 
-    /// Takes over what so many detections say of labels and looks.
+    /// Take over what so many detections say of labels and looks.
     fn count(&mut self, labels: Vec<(String, u32)>, feature: Option<Vec<f32>>, num: u32) {
         for (label, count) in labels {
             match self.label_counts.iter_mut().find(|(known, _)| *known == label) {
@@ -141,7 +143,8 @@ impl Entry {
     }
 }
 
-/// Mean of two vectors by number of detections, of length 1 again (or as it is, if it has no length).
+/// Return the mean of two vectors by number of detections, of length 1 again (or as it is, if it
+/// has no length).
 fn weighted_mean(a: &[f32], num_a: u32, b: &[f32], num_b: u32) -> Vec<f32> {
     let mix = |(a, b): (&f32, &f32)| a * num_a as f32 + b * num_b as f32;
     let sum: Vec<f32> = a.iter().zip(b).map(mix).collect();

@@ -63,7 +63,7 @@ pub struct ObjectMap {
 }
 
 impl ObjectMap {
-    /// A map without entries, in stage 1.
+    /// Return a map without entries, in stage 1.
     ///
     /// # Errors
     /// As [`ObjectMapConfig::check`].
@@ -80,35 +80,35 @@ impl ObjectMap {
         })
     }
 
-    /// Entries by ascending id.
+    /// Return the entries by ascending id.
     pub fn entries(&self) -> &[Entry] {
         &self.entries
     }
 
-    /// The entry of an id.
+    /// Return the entry of an id.
     pub fn entry(&self, id: u64) -> Option<&Entry> {
         self.entries.binary_search_by_key(&id, |entry| entry.id).ok().map(|i| &self.entries[i])
     }
 
-    /// Views integrated so far.
+    /// Return the views integrated so far.
     pub fn num_views(&self) -> u64 {
         self.num_views
     }
 
-    /// Starts a stage: entries stay, the count of views to the next clean-up starts over.
+    /// Start a stage: entries stay, the count of views to the next clean-up starts over.
     pub fn begin_stage(&mut self, stage: u32) {
         self.stage = stage;
         self.views_since_cleanup = 0;
     }
 
-    /// Takes an entry out; whether there was one.
+    /// Take an entry out; whether there was one.
     pub fn remove(&mut self, id: u64) -> bool {
         let num = self.entries.len();
         self.entries.retain(|entry| entry.id != id);
         self.entries.len() < num
     }
 
-    /// Forgets all entries; the map is as new, ids included.
+    /// Forget all entries; the map is as new, ids included.
     pub fn clear(&mut self) {
         self.entries.clear();
         self.next_id = 1;
@@ -117,8 +117,8 @@ impl ObjectMap {
         self.num_features = None;
     }
 
-    /// Takes over one view: detections become clouds, each joins the entry that it resembles most
-    /// or becomes a new one; every [`ObjectMapConfig::views_per_cleanup`] views, a clean-up.
+    /// Take over one view: detections become clouds, each joins the entry that it resembles most or
+    /// becomes a new one; every [`ObjectMapConfig::views_per_cleanup`] views, a clean-up.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming what does not fit; the map is then unchanged.
@@ -157,7 +157,8 @@ impl ObjectMap {
         Ok(update)
     }
 
-    /// Compares the detections of a view with an entry; nothing changes. How far away a detection is does not matter here.
+    /// Compare the detections of a view with an entry; nothing changes. How far away a detection is
+    /// does not matter here.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there is no such entry, or as [`ObjectMap::update`].
@@ -175,7 +176,8 @@ impl ObjectMap {
         Ok(self.sightings(view, f64::INFINITY)?.into_iter().map(compare).collect())
     }
 
-    /// Share of an object's points that each eye sees past the points of all entries and the object's own.
+    /// Return the share of an object's points that each eye sees past the points of all entries and
+    /// the object's own.
     ///
     /// # Errors
     /// As [`visible_shares`].
@@ -191,7 +193,7 @@ impl ObjectMap {
         visible_shares(near.map(Cloud::points).chain([targets]), targets, eyes, config)
     }
 
-    /// Detections as clean clouds, `None` where one is filtered out.
+    /// Return the detections as clean clouds, `None` where one is filtered out.
     fn sightings(
         &self,
         view: &DetectedView<'_>,
@@ -217,7 +219,7 @@ impl ObjectMap {
         Ok(sightings.collect())
     }
 
-    /// Length of a feature, if there are features.
+    /// Return the length of a feature, if there are features.
     fn check_view(&self, view: &DetectedView<'_>) -> Result<Option<usize>, Error> {
         let num = view.labels.len();
         Error::require("confidences", view.confidences.len(), "one a label", |n| n == num)?;
@@ -240,7 +242,7 @@ impl ObjectMap {
         Ok(Some(len / num))
     }
 
-    /// The entry, among the first `num`, that resembles a sighting most, if it does enough.
+    /// Return the entry, among the first `num`, that resembles a sighting most, if it does enough.
     fn best_match(&self, sighting: &Sighting, num: usize) -> Option<usize> {
         let threshold = self.config.match_threshold;
         let visual = |entry: &Entry| {
@@ -306,7 +308,7 @@ impl ObjectMap {
         }
     }
 
-    /// Merges entries of which one lies in the other, those that do so most first.
+    /// Merge entries of which one lies in the other, those that do so most first.
     fn merge_alike(&mut self, update: &mut Update) {
         let config = self.config;
         let mut pairs = Vec::new();

@@ -43,7 +43,7 @@ impl SightConfig {
     }
 }
 
-/// Share of a target's points that each eye sees.
+/// Return the share of a target's points that each eye sees.
 ///
 /// A point is seen if no sample of the line from the eye to it has a scene point within
 /// [`SightConfig::radius_m`]. Samples lie at `margin_m`, `margin_m + step_m`, ... from the eye, up to `margin_m` before
@@ -87,7 +87,7 @@ pub fn visible_shares<'a>(
     Ok(eyes.iter().map(share).collect())
 }
 
-/// Smallest box outside of which nothing is in the way of any line.
+/// Return the smallest box outside of which nothing is in the way of any line.
 pub(crate) fn reach_m(targets: &[Point], eyes: &[Vec3], config: &SightConfig) -> Aabb {
     let ends = targets.iter().map(|p| p.map(f64::from)).chain(eyes.iter().copied());
     let mut bounds_m = Aabb::of_points(ends);
@@ -96,7 +96,8 @@ pub(crate) fn reach_m(targets: &[Point], eyes: &[Vec3], config: &SightConfig) ->
     bounds_m
 }
 
-/// Whether no sample of a line has an obstacle by it; the end at the target first, where most are.
+/// Return whether no sample of a line has an obstacle by it; the end at the target first, where
+/// most are.
 fn is_open(obstacles: &Obstacles, eye: Vec3, target: Vec3, config: &SightConfig) -> bool {
     let offset: Vec3 = std::array::from_fn(|i| target[i] - eye[i]);
     let length_m = offset.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -195,7 +196,7 @@ impl Obstacles {
         }
     }
 
-    /// Whether a point is nearer than the radius.
+    /// Return whether a point is nearer than the radius.
     fn has_near(&self, place: Vec3) -> bool {
         let voxel = voxel_of(place, self.inverse_edge);
         if (0..3).any(|i| voxel[i] < self.low[i] || voxel[i] > self.high[i]) {
@@ -229,7 +230,7 @@ impl Obstacles {
     }
 }
 
-/// The 26 voxels beside one.
+/// Return the 26 voxels beside one.
 fn around(voxel: Voxel) -> impl Iterator<Item = Voxel> {
     (0..27).filter(|&n| n != 13).map(move |n| {
         let step = [n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1];

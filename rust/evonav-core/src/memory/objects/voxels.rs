@@ -5,7 +5,7 @@ use crate::sensors::unproject::Point;
 /// Index of a cube of space, `floor(coordinate / edge)` an axis.
 pub type Voxel = [i32; 3];
 
-/// The voxel that holds a point; far outside any house the index saturates.
+/// Return the voxel that holds a point; far outside any house the index saturates.
 pub fn voxel_of(point: Point, inverse_edge: f64) -> Voxel {
     point.map(|value| {
         let scaled = f64::from(value) * inverse_edge;
@@ -36,7 +36,8 @@ impl VoxelTable {
         (found == key).then_some(value)
     }
 
-    /// The value of a voxel, to change; `value` is entered if there is none. Says whether it was entered.
+    /// Return the value of a voxel, to change; `value` is entered if there is none. Says whether it
+    /// was entered.
     pub(crate) fn entry(&mut self, voxel: Voxel, value: u32) -> (&mut u32, bool) {
         if (self.len + 1) * 2 > self.slots.len() {
             self.grow();
@@ -51,7 +52,7 @@ impl VoxelTable {
         (&mut self.slots[slot].1, is_new)
     }
 
-    /// Where the key is, or belongs.
+    /// Return where the key is, or belongs.
     fn slot(&self, key: u64) -> usize {
         let mask = self.slots.len() - 1;
         let mut slot = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & mask;
@@ -88,12 +89,12 @@ impl<T> Blocks<T> {
         Self { index, values, last: ([i32::MAX; 3], 0) }
     }
 
-    /// What belongs to the block of a voxel.
+    /// Return what belongs to the block of a voxel.
     pub(crate) fn get(&self, voxel: Voxel) -> Option<&T> {
         self.index.get(clamped(voxel).map(|i| i >> 2)).map(|index| &self.values[index as usize])
     }
 
-    /// The same, `new` if there is nothing yet, and the voxel's [`place`].
+    /// Return the same, `new` if there is nothing yet, and the voxel's [`place`].
     pub(crate) fn entry(&mut self, voxel: Voxel, new: T) -> (&mut T, usize) {
         let voxel = clamped(voxel);
         let block = voxel.map(|i| i >> 2);
@@ -108,7 +109,7 @@ impl<T> Blocks<T> {
     }
 }
 
-/// Where a voxel is in its block: 0 to 63.
+/// Return where a voxel is in its block: 0 to 63.
 pub(crate) fn place(voxel: Voxel) -> usize {
     let [x, y, z] = clamped(voxel).map(|i| (i & 3) as usize);
     x << 4 | y << 2 | z
@@ -123,7 +124,7 @@ impl VoxelSet {
         Self(Blocks::with_capacity(num_blocks))
     }
 
-    /// Enters a voxel; whether it was not there.
+    /// Enter a voxel; whether it was not there.
     pub(crate) fn insert(&mut self, voxel: Voxel) -> bool {
         let (bits, place) = self.0.entry(voxel, 0);
         let is_new = *bits >> place & 1 == 0;
@@ -144,7 +145,8 @@ const FREE_INDEX: u32 = u32::MAX;
 const SLOTS_A_VOXEL: usize = 64;
 
 impl VoxelIndex {
-    /// Room for these voxels, to be looked up at most `margin` steps beyond their bounds.
+    /// Return the room for these voxels, to be looked up at most `margin` steps beyond their
+    /// bounds.
     pub(crate) fn spanning(voxels: &[Voxel], margin: i32) -> Self {
         let bound = |pick: fn(i32, i32) -> i32| {
             voxels.iter().copied().reduce(|a, b| [0, 1, 2].map(|i| pick(a[i], b[i])))
@@ -167,7 +169,7 @@ impl VoxelIndex {
         self.at(self.slot(voxel), || voxel)
     }
 
-    /// What [`VoxelIndex::get`] says of a voxel whose slot is known.
+    /// Return what [`VoxelIndex::get`] says of a voxel whose slot is known.
     pub(crate) fn at(&self, slot: usize, voxel: impl FnOnce() -> Voxel) -> Option<u32> {
         match self {
             Self::Dense { slots, .. } => {
@@ -177,7 +179,7 @@ impl VoxelIndex {
         }
     }
 
-    /// Place of a voxel in the array; 0 if there is no array.
+    /// Return the place of a voxel in the array; 0 if there is no array.
     pub(crate) fn slot(&self, voxel: Voxel) -> usize {
         match self {
             Self::Dense { corner, size, .. } => slot_of(voxel, corner, size),
@@ -185,14 +187,14 @@ impl VoxelIndex {
         }
     }
 
-    /// From a voxel's slot to that of the voxel a step away.
+    /// Return the from a voxel's slot to that of the voxel a step away.
     pub(crate) fn stride(&self, step: Voxel) -> isize {
         let Self::Dense { size, .. } = self else { return 0 };
         let [x, y, z] = step.map(|i| i as isize);
         (x * size[1] as isize + y) * size[2] as isize + z
     }
 
-    /// The value of a voxel; `value` is entered if there is none.
+    /// Return the value of a voxel; `value` is entered if there is none.
     pub(crate) fn entry(&mut self, voxel: Voxel, value: u32) -> u32 {
         match self {
             Self::Dense { corner, size, slots } => {
@@ -207,7 +209,7 @@ impl VoxelIndex {
     }
 }
 
-/// Place of a voxel in the array with this corner.
+/// Return the place of a voxel in the array with this corner.
 fn slot_of(voxel: Voxel, corner: &Voxel, size: &[usize; 3]) -> usize {
     let [x, y, z] = [0, 1, 2].map(|i| voxel[i].wrapping_sub(corner[i]) as usize);
     (x * size[1] + y) * size[2] + z
@@ -215,7 +217,8 @@ fn slot_of(voxel: Voxel, corner: &Voxel, size: &[usize; 3]) -> usize {
 
 const HALF: i32 = 1 << 20;
 
-/// Voxels within a million of the origin (10 km at 0.01 m) are told apart; beyond, indices clamp.
+/// Return the voxels within a million of the origin (10 km at 0.01 m) are told apart; beyond,
+/// indices clamp.
 fn clamped(voxel: Voxel) -> Voxel {
     voxel.map(|i| i.clamp(-HALF, HALF - 1))
 }
@@ -225,7 +228,7 @@ fn key_of(voxel: Voxel) -> u64 {
     x << 42 | y << 21 | z
 }
 
-/// One point a voxel: the mean of those inside, in the order in which voxels are first met
+/// Return one point a voxel: the mean of those inside, in the order in which voxels are first met
 /// (Open3D's `voxel_down_sample` with voxels aligned to the world instead of the cloud).
 pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
     let inverse_edge = 1.0 / edge_m;

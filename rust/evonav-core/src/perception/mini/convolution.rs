@@ -20,12 +20,12 @@ pub struct Tensor {
 }
 
 impl Tensor {
-    /// An image of zeros.
+    /// Return an image of zeros.
     pub fn zeros(height: usize, width: usize, channels: usize) -> Self {
         Self { height, width, channels, values: vec![0.0; height * width * channels] }
     }
 
-    /// Adds another image of the same shape, then drops what is negative.
+    /// Add another image of the same shape, then drops what is negative.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the shapes differ.
@@ -39,14 +39,14 @@ impl Tensor {
         Ok(())
     }
 
-    /// Drops what is negative.
+    /// Drop what is negative.
     pub fn relu(&mut self) {
         for value in &mut self.values {
             *value = value.max(0.0);
         }
     }
 
-    /// Every pixel four times, cut to a size.
+    /// Return every pixel four times, cut to a size.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if twice the size is smaller than that.
@@ -64,7 +64,7 @@ impl Tensor {
         Ok(Self { height, width, channels: self.channels, values })
     }
 
-    /// Height, width, channels.
+    /// Return the height, width, channels.
     pub fn shape(&self) -> [usize; 3] {
         [self.height, self.width, self.channels]
     }
@@ -90,7 +90,7 @@ pub struct ConvShape {
 }
 
 impl ConvShape {
-    /// Weights of such a convolution, biases aside.
+    /// Return the weights of such a convolution, biases aside.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there is no such convolution, or none of a sane size.
@@ -121,7 +121,7 @@ pub struct Conv {
 }
 
 impl Conv {
-    /// A convolution.
+    /// Return a convolution.
     ///
     /// # Arguments
     /// * `shape` - of it.
@@ -160,13 +160,13 @@ impl Conv {
         Ok(Self { shape, weights: packed, bias })
     }
 
-    /// What it is.
+    /// Return what it is.
     pub fn shape(&self) -> ConvShape {
         self.shape
     }
 
-    /// Convolves an image. Every output is its bias, then the products by row and column of the
-    /// window and input channel, added in that order.
+    /// Return the convolves an image. Every output is its bias, then the products by row and column
+    /// of the window and input channel, added in that order.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the image has other channels, or no pixels.
@@ -194,7 +194,7 @@ impl Conv {
         Ok(out)
     }
 
-    /// One row of the output, from the rows of the window.
+    /// Return one row of the output, from the rows of the window.
     fn row(&self, lines: &[&[f32]], out: &mut [f32]) {
         let ConvShape { num_in, num_out, size, stride, .. } = self.shape;
         let (step, reach) = (stride * num_in, size * num_in);
@@ -231,7 +231,7 @@ impl Conv {
     }
 }
 
-/// Adds a row of the window to a tile's sums: plain arrays, which compilers turn into SIMD, as long
+/// Add a row of the window to a tile's sums: plain arrays, which compilers turn into SIMD, as long
 /// as the function is not inlined and the sums stay in registers.
 #[inline(never)]
 fn add_products(
@@ -260,7 +260,7 @@ struct Padded {
 }
 
 impl Padded {
-    /// Half a window of zeros on every side, and on the right as many as make `min_width`.
+    /// Return half a window of zeros on every side, and on the right as many as make `min_width`.
     fn new(image: &Tensor, size: usize, min_width: usize) -> Self {
         let (half, channels) = (size / 2, image.channels);
         let width = (image.width + 2 * half).max(min_width);

@@ -30,7 +30,7 @@ pub struct Instances {
     pub confidences: Vec<f32>,
 }
 
-/// Finds instances in a picture.
+/// Find instances in a picture.
 ///
 /// # Arguments
 /// * `rgb`, `depth_m`, `size_px`, `horizon_rad` - as for [`input`].

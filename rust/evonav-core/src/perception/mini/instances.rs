@@ -26,7 +26,7 @@ pub struct Segments {
     pub confidences: Vec<f32>,
 }
 
-/// Joins neighbouring cells that the network links into instances, and has each instance's cells
+/// Join neighbouring cells that the network links into instances, and has each instance's cells
 /// vote for its class.
 ///
 /// A cell is part of an object if a class is likelier there than the background. Two such
@@ -103,7 +103,7 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
     Ok(kept)
 }
 
-/// Each class's share of the softmax; the background's, which comes first, is left out.
+/// Return each class's share of the softmax; the background's, which comes first, is left out.
 fn shares(logits: &[f32]) -> Vec<f32> {
     let most = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let powers: Vec<f32> = logits.iter().map(|logit| (logit - most).exp()).collect();
@@ -111,13 +111,13 @@ fn shares(logits: &[f32]) -> Vec<f32> {
     powers[1..].iter().map(|power| power / total).collect()
 }
 
-/// Whether two cells' shares are alike.
+/// Return whether two cells' shares are alike.
 fn agree(a: &[f32], b: &[f32]) -> bool {
     let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
     dot(a, b) > MIN_AGREEMENT * (dot(a, a) * dot(b, b)).sqrt()
 }
 
-/// Index of the largest number, the first of equals.
+/// Return the index of the largest number, the first of equals.
 fn largest(values: &[f32]) -> usize {
     let mut best = 0;
     for (index, value) in values.iter().enumerate() {
@@ -167,7 +167,7 @@ impl Default for Resemblance {
     }
 }
 
-/// Gives every pixel the instance of the cell around it that it resembles most: outlines become
+/// Give every pixel the instance of the cell around it that it resembles most: outlines become
 /// those of the picture.
 ///
 /// # Arguments
@@ -247,12 +247,12 @@ impl Guide {
     }
 }
 
-/// A cell's place and the ones beside it.
+/// Return a cell's place and the ones beside it.
 fn around(place: usize) -> std::ops::Range<usize> {
     place.saturating_sub(1)..(place + 2).min(SIDE_CELLS)
 }
 
-/// The instance that all cells of a block are of.
+/// Return the instance that all cells of a block are of.
 fn same_around(
     cells: &[i32],
     rows: std::ops::Range<usize>,

@@ -30,7 +30,7 @@ pub struct Network {
 }
 
 impl Network {
-    /// The network of a weights file.
+    /// Return the network of a weights file.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming what is wrong with the file.
@@ -58,12 +58,13 @@ impl Network {
         Ok(network)
     }
 
-    /// What it tells apart, background aside.
+    /// Return what it tells apart, background aside.
     pub fn classes(&self) -> &[String] {
         &self.classes
     }
 
-    /// Logits of each cell: background, classes, links to the cell on the right and to the one below.
+    /// Return the logits of each cell: background, classes, links to the cell on the right and to
+    /// the one below.
     ///
     /// # Arguments
     /// * `input` - as [`input`] makes it.
@@ -88,7 +89,7 @@ impl Network {
         self.head.run(&y)
     }
 
-    /// Half the resolution, then a residual of two convolutions.
+    /// Return half the resolution, then a residual of two convolutions.
     fn level(&self, level: usize, above: &Tensor) -> Result<Tensor, Error> {
         let mut y = relu(self.down[level].run(above)?);
         let more = self.mid_b[level - 1].run(&relu(self.mid[level].run(&y)?))?;
@@ -102,7 +103,7 @@ fn relu(mut image: Tensor) -> Tensor {
     image
 }
 
-/// A picture as the network takes it: colours, depth, height below the camera, nearness.
+/// Return a picture as the network takes it: colours, depth, height below the camera, nearness.
 ///
 /// # Arguments
 /// * `rgb` - row-major, three bytes a pixel.
@@ -147,7 +148,7 @@ pub fn input(
     Ok(Tensor { height: SIDE_PX, width: SIDE_PX, channels: 6, values })
 }
 
-/// The pixel of a side that each of the network's pixels is.
+/// Return the pixel of a side that each of the network's pixels is.
 pub fn samples(side_px: usize) -> Vec<usize> {
     (0..SIDE_PX).map(|i| (2 * i + 1) * side_px / (2 * SIDE_PX)).collect()
 }

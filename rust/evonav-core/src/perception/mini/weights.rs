@@ -37,7 +37,7 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// Reads a file.
+    /// Read a file.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming what is wrong with it.
@@ -67,7 +67,7 @@ impl Weights {
         Ok(Self { classes: header.classes, layers })
     }
 
-    /// Takes a layer out.
+    /// Take a layer out.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if it is not there or its window is another.
@@ -105,7 +105,7 @@ fn take_halves(rest: &mut &[u8], num: usize) -> Result<Vec<f32>, Error> {
     Ok(taken.as_chunks().0.iter().map(|&half| from_half(u16::from_le_bytes(half))).collect())
 }
 
-/// The number that a half-precision one (IEEE 754 binary16) is.
+/// Return the number that a half-precision one (IEEE 754 binary16) is.
 pub fn from_half(half: u16) -> f32 {
     let sign = if half >> 15 == 1 { -1.0 } else { 1.0 };
     let (exponent, fraction) = (i32::from(half >> 10 & 0x1f), f32::from(half & 0x3ff));

@@ -24,7 +24,7 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// Empties the canvas: what is no nearer than `empty` will not be drawn.
+    /// Empty the canvas: what is no nearer than `empty` will not be drawn.
     pub fn clear(&mut self, width_px: usize, height_px: usize, empty: f32) {
         (self.width_px, self.height_px) = (width_px, height_px);
         let num_blocks = self.blocks_per_row() * height_px;
@@ -37,7 +37,7 @@ impl Canvas {
         self.drawn = [0..height_px, 0..self.blocks_per_row()];
     }
 
-    /// Empties some rows and blocks, and draws on nothing else until it is emptied again; there,
+    /// Empty some rows and blocks, and draws on nothing else until it is emptied again; there,
     /// every pixel becomes what it becomes on the whole canvas.
     pub fn clear_within(
         &mut self,
@@ -64,17 +64,17 @@ impl Canvas {
         self.width_px.div_ceil(LANES)
     }
 
-    /// Blocks of a row.
+    /// Return the blocks of a row.
     pub fn row_blocks(&self, row: usize) -> Range<usize> {
         row * self.blocks_per_row()..(row + 1) * self.blocks_per_row()
     }
 
-    /// Nearness of a row, its padding included.
+    /// Return the nearness of a row, its padding included.
     pub fn row(&self, row: usize) -> &[f32] {
         self.nearness[self.row_blocks(row)].as_flattened()
     }
 
-    /// Draws a convex polygon that runs clockwise on the screen, where it is nearer than what is
+    /// Draw a convex polygon that runs clockwise on the screen, where it is nearer than what is
     /// there. `plane` gives the nearness, which is positive, at `[u, v]`: `plane . [u, v, 1]`.
     ///
     /// A pixel is covered when its centre is inside; a centre on an edge belongs to the polygon
@@ -110,7 +110,7 @@ impl Canvas {
         }
     }
 
-    /// Sets `left` and `right` for the rows that the polygon covers, and returns those.
+    /// Set `left` and `right` for the rows that the polygon covers, and returns those.
     fn scan(&mut self, corners_px: &[Vec2]) -> Range<usize> {
         let (mut top, mut bottom) = (f64::INFINITY, f64::NEG_INFINITY);
         for corner in corners_px {
@@ -138,7 +138,7 @@ impl Canvas {
         rows
     }
 
-    /// Rows that are drawn on with a centre between two heights.
+    /// Return the rows that are drawn on with a centre between two heights.
     fn rows_between(&self, top_px: f64, bottom_px: f64) -> Range<usize> {
         let [drawn, _] = &self.drawn;
         first_centre(top_px, self.height_px).max(drawn.start)
@@ -156,7 +156,8 @@ impl Canvas {
     }
 }
 
-/// Index of the first pixel whose centre is at or after `coordinate_px`, within `0..=size_px`.
+/// Return the index of the first pixel whose centre is at or after `coordinate_px`, within
+/// `0..=size_px`.
 fn first_centre(coordinate_px: f64, size_px: usize) -> usize {
     let shifted = (coordinate_px - 0.5).clamp(0.0, size_px as f64);
     // A ceiling by hand: baseline x86-64 has no instruction for it.
@@ -203,7 +204,7 @@ impl Span {
     }
 }
 
-/// Keeps the nearer of candidate and stored, lane by lane.
+/// Keep the nearer of candidate and stored, lane by lane.
 ///
 /// Written on whole arrays with masks: compilers turn a conditional store into a branch, and the
 /// loop is then three times as slow.

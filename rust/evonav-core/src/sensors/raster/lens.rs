@@ -81,7 +81,7 @@ impl Lens {
         std::array::from_fn(|i| (0..3).map(|j| self.axes[j][i] * local[j]).sum::<f64>())
     }
 
-    /// Leaves out of view what is outside some pixels or beyond a depth, in a perspective view.
+    /// Leave out of view what is outside some pixels or beyond a depth, in a perspective view.
     pub fn narrow(&mut self, columns: &Range<usize>, rows: &Range<usize>, far_m: f64) {
         let Optics::Perspective { focal_px } = self.optics else { return };
         // The first and the last pixel's outer borders, and a pixel more for rounding.
@@ -106,7 +106,7 @@ impl Lens {
         self.clip_m[1] + 1.0
     }
 
-    /// Nearness of the far plane.
+    /// Return the nearness of the far plane.
     pub fn far_nearness(&self) -> f32 {
         match self.optics {
             Optics::Perspective { .. } => (1.0 / self.clip_m[1]) as f32,
@@ -122,7 +122,7 @@ impl Lens {
         [self.centre_px[0] + scale * local_m[0], self.centre_px[1] + scale * local_m[1]]
     }
 
-    /// Whether some of the box may be in view.
+    /// Return whether some of the box may be in view.
     pub fn may_see(&self, aabb: &Aabb) -> bool {
         let (centre, size) = (sub(aabb.centre_m(), self.eye_m), aabb.size_m());
         self.frustum.iter().all(|(n, least)| {
@@ -131,7 +131,7 @@ impl Lens {
         })
     }
 
-    /// Parts in view, nearest first.
+    /// Return the parts in view, nearest first.
     pub fn collect_visible(&self, mesh: &SceneMesh, visible: &mut Vec<(f64, u32)>) {
         visible.clear();
         visible.extend(
@@ -144,7 +144,7 @@ impl Lens {
         visible.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
-    /// Smallest planar depth of the box.
+    /// Return the smallest planar depth of the box.
     fn nearest_m(&self, aabb: &Aabb) -> f64 {
         let forward = self.axes[2];
         let corner: Vec3 =
@@ -152,7 +152,7 @@ impl Lens {
         dot(forward, sub(corner, self.eye_m))
     }
 
-    /// Takes a part's vertices to the camera's frame and the image; whether the near plane cuts it.
+    /// Take a part's vertices to the camera's frame and the image; whether the near plane cuts it.
     pub fn transform(&self, vertices_m: &[Vec3], scratch: &mut Scratch) -> bool {
         scratch.local_m.clear();
         scratch.projected_px.clear();
@@ -166,8 +166,9 @@ impl Lens {
         is_clipped
     }
 
-    /// Nearness as a function of the image point, `plane . [u, v, 1]`, and what the shader lights
-    /// the face by: the camera's distance from its plane, or the cosine between normal and look.
+    /// Return the nearness as a function of the image point, `plane . [u, v, 1]`, and what the
+    /// shader lights the face by: the camera's distance from its plane, or the cosine between
+    /// normal and look.
     ///
     /// `None` for a face that is turned away, or so nearly edge-on that no pixel centre can be
     /// inside.

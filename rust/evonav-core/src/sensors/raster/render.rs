@@ -42,14 +42,14 @@ pub struct FrameBuffer {
 }
 
 impl FrameBuffer {
-    /// Hands out depth, colours and instances, as vectors of their own.
+    /// Hand out depth, colours and instances, as vectors of their own.
     pub fn take(&mut self) -> (Vec<f32>, Vec<u8>, Vec<i32>) {
         let Self { depth_m, rgb, instances, .. } = self;
         (std::mem::take(depth_m), std::mem::take(rgb), std::mem::take(instances))
     }
 }
 
-/// [`render_view`] with AI2-THOR's clip planes.
+/// Return [`render_view`] with AI2-THOR's clip planes.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] as [`Camera::check`].
@@ -62,7 +62,7 @@ pub fn render(
     render_view(mesh, &View::from(*camera), want, out)
 }
 
-/// Renders one view into `out`.
+/// Render one view into `out`.
 ///
 /// Depth has an error under 0.1 mm within 10 m. Of surfaces at equal depth the one drawn first
 /// stays; the order is a function of mesh and view alone, and so is every pixel.
@@ -127,7 +127,7 @@ pub(super) fn draw_part(
     }
 }
 
-/// The part of a polygon in front of the near plane.
+/// Return the part of a polygon in front of the near plane.
 fn clip_near(
     corners_m: impl Iterator<Item = Vec3> + Clone,
     near_m: f64,
@@ -148,7 +148,7 @@ fn clip_near(
     }
 }
 
-/// Turns the canvas into images.
+/// Turn the canvas into images.
 fn resolve(mesh: &SceneMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
     let FrameBuffer { depth_m, instances, rgb, canvas, shader, .. } = out;
     let num_pixels = canvas.width_px * canvas.height_px;
@@ -180,7 +180,7 @@ fn resolve(mesh: &SceneMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
     }
 }
 
-/// Rows of padded blocks to rows of exactly the image's width.
+/// Return the rows of padded blocks to rows of exactly the image's width.
 fn unpad<T: Copy, U: Copy>(
     canvas: &Canvas,
     blocks: &[[T; LANES]],
@@ -199,7 +199,7 @@ fn unpad<T: Copy, U: Copy>(
     }
 }
 
-/// Instance ids of face tags. Most blocks lie within one face.
+/// Return the instance ids of face tags. Most blocks lie within one face.
 fn bodies_of(mesh: &SceneMesh, tags: &[u32; LANES]) -> [i32; LANES] {
     let body_of = |tag: u32| match tag.checked_sub(1) {
         Some(face) => mesh.faces[face as usize].body as i32 + 1,

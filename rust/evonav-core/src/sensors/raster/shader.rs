@@ -85,7 +85,7 @@ impl Shader {
         self.shortness.extend(pixels.map(|(row, block)| shortness(row, block)));
     }
 
-    /// Lights a face that may be seen; `facing` as [`LitFace::facing`].
+    /// Light a face that may be seen; `facing` as [`LitFace::facing`].
     pub fn light(&mut self, index: usize, face: &Face, facing: f64) {
         let from_above = 0.5 + 0.5 * face.normal[1];
         let from_side = dot(face.normal, SIDE);
@@ -94,7 +94,7 @@ impl Shader {
         self.faces[index + 1] = LitFace { rgb, facing: facing as f32 };
     }
 
-    /// Fills `rgb` from a drawn canvas.
+    /// Fill `rgb` from a drawn canvas.
     pub fn shade(&mut self, canvas: &Canvas, rgb: &mut [u8]) {
         for (row, pixels) in rgb.chunks_exact_mut(3 * canvas.width_px).enumerate() {
             self.darken(canvas, row);
@@ -105,7 +105,7 @@ impl Shader {
         }
     }
 
-    /// Sets `light` to what corners and silhouettes leave of it in a row.
+    /// Set `light` to what corners and silhouettes leave of it in a row.
     fn darken(&mut self, canvas: &Canvas, row: usize) {
         let corner_px = ((canvas.height_px as f64 * CORNER_REACH) as usize).max(2);
         self.light.clear();
@@ -144,7 +144,7 @@ impl Shader {
         }
     }
 
-    /// Copies a row and continues it on both sides as the planes there go on.
+    /// Copy a row and continues it on both sides as the planes there go on.
     fn pad(&mut self, row: &[f32], width_px: usize, reach_px: usize) {
         let row = &row[..width_px];
         let (first, last) = (row[0], row[width_px - 1]);
@@ -156,7 +156,7 @@ impl Shader {
         self.padded.extend((1..=reach_px).map(|k| last + (last - one_but_last) * k as f32));
     }
 
-    /// Makes nearness times `shortness` 1 in a row: all looks are along the axis.
+    /// Make nearness times `shortness` 1 in a row: all looks are along the axis.
     fn level_facing(&mut self, canvas: &Canvas, row: usize) {
         let blocks = canvas.row_blocks(row);
         let nearness = &canvas.nearness[blocks.clone()];
@@ -183,9 +183,9 @@ impl Shader {
         }
     }
 
-    /// Colours of a block. `facing` is inverse depth over the length of the ray at depth 1: times
-    /// the camera's distance from a plane, the cosine between its normal and the look at it. In
-    /// orthographic views, where faces hold that cosine, it is 1.
+    /// Return the colours of a block. `facing` is inverse depth over the length of the ray at depth
+    /// 1: times the camera's distance from a plane, the cosine between its normal and the look at
+    /// it. In orthographic views, where faces hold that cosine, it is 1.
     fn colours(
         &self,
         tags: &[u32; LANES],
@@ -209,13 +209,13 @@ impl Shader {
     }
 }
 
-/// Rounds a number of 0 or more to the low byte of the result, 255 at most: by the mantissa of a
-/// sum with 2^23, which unlike a conversion needs no care for numbers out of range.
+/// Round a number of 0 or more to the low byte of the result, 255 at most: by the mantissa of a sum
+/// with 2^23, which unlike a conversion needs no care for numbers out of range.
 fn to_byte(value: f32) -> u32 {
     (value.min(255.0) + 8_388_608.0).to_bits()
 }
 
-/// Takes from `light` what `shade` makes of the bend of each pixel's surroundings.
+/// Take from `light` what `shade` makes of the bend of each pixel's surroundings.
 ///
 /// Nearness is linear on a plane: the bend is how much nearer the surroundings are than a plane
 /// would be, in `unit`s and relative to the neighbours' spacing.
@@ -235,13 +235,13 @@ fn darken_row(
     }
 }
 
-/// Darkness in a corner. A large bend is no corner but something far behind an edge.
+/// Return the darkness in a corner. A large bend is no corner but something far behind an edge.
 fn corner_shade(bend: f32) -> f32 {
     let is_corner = (1.8 - bend).clamp(0.0, 1.0);
     CORNER_SHADE * (bend / FULL_BEND).clamp(0.0, 1.0) * is_corner
 }
 
-/// Darkness of a line around what stands before something else.
+/// Return the darkness of a line around what stands before something else.
 fn line_shade(bend: f32) -> f32 {
     LINE_SHADE * (bend - 1.0).clamp(0.0, 1.0)
 }

@@ -18,8 +18,8 @@ use crate::{
 /// Share of its depth by which a part must be behind a body to be left out.
 const BEHIND: f64 = 1e-4;
 
-/// Number of pixels that [`crate::sensors::raster::render`] gives a body; `None` if they are fewer than
-/// `least_px`.
+/// Return the number of pixels that [`crate::sensors::raster::render`] gives a body; `None` if they
+/// are fewer than `least_px`.
 ///
 /// Draws the part of the image that holds the body, and of the other bodies what may be before it.
 ///
@@ -67,7 +67,8 @@ pub fn visible_px(
     counted(drawn.filter(|&&other| other == tag).count())
 }
 
-/// Columns and rows that hold a body's image, and its greatest depth; `None` if it is out of view.
+/// Return the columns and rows that hold a body's image, and its greatest depth; `None` if it is
+/// out of view.
 fn box_of(
     mesh: &SceneMesh,
     lens: &Lens,

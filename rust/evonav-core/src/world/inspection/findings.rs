@@ -1,7 +1,8 @@
-//! Whether a changed house is one that physics allows: bodies' real convex parts, by GJK and EPA.
+//! Check whether a changed house is physically possible, by GJK and EPA on the bodies' convex
+//! parts.
 //!
-//! Generation keeps its houses sound by arithmetic of its own on plan outlines and heights. This shares
-//! none of it, so that one can be held to the other.
+//! Generation checks its houses by its own arithmetic on outlines and heights. This module shares
+//! none of that code, so that one can be tested against the other.
 
 use serde::Serialize;
 
@@ -16,26 +17,27 @@ use crate::{
     },
 };
 
-/// Differences of poses that are rounding: house files keep four decimals of metres.
+/// Largest difference of positions that counts as rounding: house files have four decimals of
+/// metres.
 const SAME_POSE_M: f64 = 1e-3;
-/// The same of rotation matrices' entries.
+/// Largest difference of rotation matrices' entries that counts as rounding.
 const SAME_TURN: f64 = 1e-4;
-/// What is wrong with one body of a house.
+/// A problem of one body of a house.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// What.
+    /// Kind of the problem.
     pub kind: FindingKind,
-    /// Object.
+    /// Id of the object.
     pub id: String,
-    /// The other object, wall, door, window, floor, ceiling, room or support.
+    /// Id of the other object, wall, door, window, floor, ceiling, room or support.
     pub other_id: String,
-    /// Depth of penetration, or how far it sticks out; 0 where it is not measured.
+    /// Depth of penetration, or length that sticks out; 0 if it is not measured.
     pub amount_m: f64,
-    /// Whether the source house has it just so.
+    /// Whether the source house has the same problem.
     pub is_own: bool,
 }
 
-/// What can be wrong.
+/// Kinds of problems.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
@@ -45,22 +47,23 @@ pub enum FindingKind {
     InWall,
     /// An object is in a floor or ceiling.
     InFloor,
-    /// What stands on the floor of a room leaves it.
+    /// An object that stands on the floor of a room sticks out of the room.
     OutOfRoom,
-    /// Nothing of its support is under an object, or it hovers over it, or over the floor.
+    /// No part of its support is under an object, or the object hovers over its support or over the
+    /// floor.
     Unsupported,
 }
 
-/// How much counts.
+/// Tolerances of an inspection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerances {
-    /// Depth of penetration, and distance out of a room, up to which bodies touch.
+    /// Largest depth of penetration, and largest distance out of a room, that is not a problem.
     pub touch_m: f64,
-    /// Height over its support up to which a thing rests.
+    /// Largest height over its support at which an object still rests on it.
     pub rest_m: f64,
 }
 
-/// [`inspect`] of two houses.
+/// Build the scenes of two houses and [`inspect`] them.
 ///
 /// # Errors
 /// Those of [`Scene::build`]; [`Error::InvalidArgument`] for tolerances below 0 or not finite.
@@ -80,15 +83,15 @@ pub fn inspect_houses(
     Ok(inspect((source, &before?), (stage, &after?), tolerances))
 }
 
-/// Compares a stage's house with the source house and reports what is wrong with it.
+/// Compare a stage's house with the source house and report its problems.
 ///
 /// # Arguments
 /// * `source`, `stage` - the houses, each with the scene built from it.
-/// * `tolerances` - how much counts.
+/// * `tolerances` - deviations that are not problems.
 ///
 /// # Returns
-/// In order of the stage's objects. What the source house has just so (the same two bodies, no deeper, in
-/// the same pose to each other) is marked as its own.
+/// Findings in the order of the stage's objects. A problem that the source house has too (the same
+/// two bodies, at least as deep, in the same relative pose) is marked by [`Finding::is_own`].
 pub fn inspect(
     source: (&House, &Scene),
     stage: (&House, &Scene),
@@ -111,7 +114,8 @@ pub fn inspect(
         };
         let old = before.index_of(other);
         let is_own = if kind == FindingKind::InFloor {
-            // Level floors are alike everywhere; shapes that go below their file's floor go with their thing.
+            // Level floors are the same everywhere. Shapes that reach below the floor do so
+            // wherever their object stands.
             let extent = |body: &Body| [body.aabb.min_m[1], body.aabb.max_m[1]];
             old.is_some_and(|old| {
                 let was = extent(&source.1.bodies[old]);
@@ -145,10 +149,11 @@ pub fn inspect(
         }
         if let Some(parent) = object.parent {
             let support = scene.first_object + parent;
-            // Scenes let things fall onto their support: the file itself must have them there.
+            // Scenes let objects fall onto their support, so the height in the file is checked as
+            // well.
             let hover_m = (object.position_m[1] - body.oriented.centre_m[1]).abs();
-            let is_held = after.rests_on(body_index, support, tolerances.rest_m);
-            if !is_held || hover_m > tolerances.rest_m {
+            let is_supported = after.rests_on(body_index, support, tolerances.rest_m);
+            if !is_supported || hover_m > tolerances.rest_m {
                 let is_own = was.zip(scene.bodies.get(support)).is_some_and(|(was, supporter)| {
                     before.index_of(supporter).is_some_and(|old| {
                         is_same_relation([&source.1.bodies[old], was], [supporter, body])
@@ -158,20 +163,21 @@ pub fn inspect(
                 push(&mut findings, FindingKind::Unsupported, id, hover_m, is_own);
             }
         } else if !stays && !stands {
-            // What hangs on walls never moves, so what has moved to no support must stand.
+            // Objects on walls never move, so an object that moved and has no support must stand on
+            // the floor.
             push(&mut findings, FindingKind::Unsupported, "floor", body.aabb.min_m[1], false);
         }
     }
     findings
 }
 
-/// Whether a body is where it was.
+/// Return whether a body has the same pose as before.
 fn is_same_pose(before: &Body, after: &Body) -> bool {
     let offset = sub(after.oriented.centre_m, before.oriented.centre_m);
     is_small(offset) && is_same_turn(&before.oriented.rotation, &after.oriented.rotation)
 }
 
-/// Whether two bodies stand to each other as they did.
+/// Return whether two bodies have the same relative pose as before.
 fn is_same_relation(before: [&Body; 2], after: [&Body; 2]) -> bool {
     let relation = |[one, other]: [&Body; 2]| {
         let (a, b) = (&one.oriented, &other.oriented);
@@ -191,25 +197,26 @@ fn is_same_turn(a: &Mat3, b: &Mat3) -> bool {
     a.iter().flatten().zip(b.iter().flatten()).all(|(x, y)| (x - y).abs() <= SAME_TURN)
 }
 
-/// A scene's bodies, ready for queries between any two.
+/// A scene's bodies, prepared for queries between any two of them.
 pub struct Inspector<'a> {
     scene: &'a Scene,
     solids: Vec<Vec<Solid>>,
 }
 
 impl<'a> Inspector<'a> {
-    /// Takes a scene's parts for GJK.
+    /// Prepare a scene's parts for GJK.
     pub fn new(scene: &'a Scene) -> Self {
         let solids = scene.bodies.iter().map(|body| body.parts.iter().map(Solid::of).collect());
         Self { scene, solids: solids.collect() }
     }
 
-    /// Index of the body with the id and kind of another scene's.
+    /// Return the index of the body with the same id and kind as a body of another scene.
     fn index_of(&self, body: &Body) -> Option<usize> {
         self.scene.bodies.iter().position(|one| one.kind == body.kind && one.id == body.id)
     }
 
-    /// Pairs of bodies whose boxes meet, the second one an object, the first one before it.
+    /// Return the pairs of bodies whose boxes meet, the second one an object, the first one before
+    /// it.
     fn near_pairs(&self) -> Vec<(usize, usize)> {
         let bodies = &self.scene.bodies;
         let mut pairs = Vec::new();
@@ -220,9 +227,10 @@ impl<'a> Inspector<'a> {
         pairs
     }
 
-    /// How deep two bodies are in each other: the largest depth of a part of one in a part of the other.
+    /// Return the depth of penetration of two bodies: the largest depth of a part of one in a part
+    /// of the other.
     ///
-    /// The depth of two convex parts is the shortest way out of each other.
+    /// The depth of two convex parts is the length of the shortest move that separates them.
     pub fn depth_m(&self, first: usize, second: usize) -> f64 {
         let (Some(first), Some(second)) = (self.solids.get(first), self.solids.get(second)) else {
             return 0.0;
@@ -236,8 +244,9 @@ impl<'a> Inspector<'a> {
         deepest_m
     }
 
-    /// Whether a body comes to touch its support when it is lowered by `rest_m`, which is under its middle; or
-    /// lies within its support's box, where drawers and shelves hold it that the parts do not show.
+    /// Return whether a body rests on its support: its support is under its middle and touches it
+    /// when it is lowered by `rest_m`; or it lies within its support's box, where drawers and
+    /// shelves that the parts do not show may hold it.
     fn rests_on(&self, body: usize, support: usize, rest_m: f64) -> bool {
         let (Some(solids), Some(under)) = (self.solids.get(body), self.solids.get(support)) else {
             return false;
@@ -252,9 +261,10 @@ impl<'a> Inspector<'a> {
         is_inside || solids.iter().any(touches) && is_over()
     }
 
-    /// How far a body sticks out of a simple polygon `[x, z]`, seen from above.
+    /// Return the length by which a body sticks out of a simple polygon `[x, z]`, seen from above.
     ///
-    /// A convex part is inside just when its corners are, and no corner of the polygon is under it.
+    /// A convex part is inside if and only if its corners are inside and no corner of the polygon
+    /// is under it.
     pub fn outside_m(&self, body: usize, polygon_m: &[Vec2]) -> f64 {
         let Some(solids) = self.solids.get(body) else { return 0.0 };
         let mut farthest_m = 0.0_f64;
@@ -270,10 +280,10 @@ impl<'a> Inspector<'a> {
     }
 }
 
-/// Distance of a point from the border of a polygon.
+/// Return the distance of a point from the border of a polygon.
 fn distance_to_border_m(point: Vec2, polygon_m: &[Vec2]) -> f64 {
-    let sides = polygon_m.iter().zip(polygon_m.iter().cycle().skip(1));
-    sides.fold(f64::INFINITY, |nearest_m, (a, b)| {
+    let edges = polygon_m.iter().zip(polygon_m.iter().cycle().skip(1));
+    edges.fold(f64::INFINITY, |nearest_m, (a, b)| {
         let (along, to) = ([b[0] - a[0], b[1] - a[1]], [point[0] - a[0], point[1] - a[1]]);
         let squared = along[0].mul_add(along[0], along[1] * along[1]).max(f64::MIN_POSITIVE);
         let t = ((to[0] * along[0] + to[1] * along[1]) / squared).clamp(0.0, 1.0);

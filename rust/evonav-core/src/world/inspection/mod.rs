@@ -1,4 +1,4 @@
-//! Whether a changed house is one that physics allows.
+//! Checks whether a changed house is physically possible.
 
 mod findings;
 mod solid;

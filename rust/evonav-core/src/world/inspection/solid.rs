@@ -1,4 +1,4 @@
-//! Convex parts for tests of contact by GJK and EPA.
+//! Convex parts for contact tests by GJK and EPA.
 
 use parry3d_f64::{
     math::{Pose, Vector},
@@ -11,10 +11,11 @@ use crate::{
     geometry::{Aabb, IDENTITY, Mat3, Vec2, Vec3, add, rotate, sub, transposed},
 };
 
-/// Half the width of the column that asks whether something is over a point.
+/// Half the width of the column that tests whether something is over a point.
 const COLUMN_M: f64 = 1e-4;
 
-/// Normals and edges of solids may be thinner than millimetres; shorter products are of parallels.
+/// Length below which a cross product of edges is that of parallels; solids may be thinner than
+/// millimetres.
 const MIN_AXIS: f64 = 1e-9;
 
 /// A convex part in the world's axes, about its own centre.
@@ -22,9 +23,9 @@ const MIN_AXIS: f64 = 1e-9;
 pub(super) struct Solid {
     centre_m: Vec3,
     shape: Shape,
-    /// Of the faces, any length.
+    /// Normals of the faces, of any length.
     normals: Vec<Vector>,
-    /// Directions of the edges, any length.
+    /// Directions of the edges, of any length.
     edges: Vec<Vector>,
     pub(super) aabb: Aabb,
 }
@@ -32,7 +33,7 @@ pub(super) struct Solid {
 #[derive(Debug, Clone)]
 enum Shape {
     Corners(Vec<Vector>),
-    /// Half axes, and `world = rotation * own`.
+    /// Half axes and orientation: `world = rotation * own`.
     Ellipsoid(Vec3, Mat3),
 }
 
@@ -62,7 +63,8 @@ impl Solid {
         Self { centre_m: part.centre_m, shape, normals, edges, aabb: part.aabb() }
     }
 
-    /// A thin upright column through a point of the ground, far above and below all houses.
+    /// Create a thin upright column through a ground point that reaches far above and below all
+    /// houses.
     pub(super) fn column([x, z]: Vec2) -> Self {
         const HALF_M: Vec3 = [COLUMN_M, 100.0, COLUMN_M];
         Self::of(&Part {
@@ -85,7 +87,8 @@ impl Solid {
             && intersection_test_support_map_support_map(&between, self, other)
     }
 
-    /// Depth in another, 0 beside it: exact for flat-sided solids; EPA's, which may be too little, for ellipsoids.
+    /// Return the depth of penetration into another solid, 0 if they do not meet. It is exact for
+    /// flat-sided solids; for ellipsoids it is EPA's, which may be too small.
     pub(super) fn depth_m(&self, other: &Self) -> f64 {
         if !self.meets(other) {
             return 0.0;
@@ -96,7 +99,7 @@ impl Solid {
             let contact = contact_support_map_support_map(&between, self, other, 0.0);
             return contact.map_or(0.0, |contact| (-contact.dist).max(0.0));
         };
-        // The shortest way out is along a face's normal, or square to an edge of each.
+        // The shortest way out is along a face's normal, or perpendicular to an edge of each.
         let crossed = self.edges.iter().flat_map(|a| other.edges.iter().map(|b| a.cross(*b)));
         let axes = self.normals.iter().chain(&other.normals).copied().chain(crossed);
         let depths_m = axes.filter_map(|axis| {
@@ -111,7 +114,7 @@ impl Solid {
         depths_m.fold(f64::INFINITY, f64::min).max(0.0)
     }
 
-    /// Ground points that span it, seen from above.
+    /// Return the ground points that span the solid, seen from above.
     pub(super) fn points(&self) -> impl Iterator<Item = Vec2> + '_ {
         let centre = [self.centre_m[0], self.centre_m[2]];
         let offsets: Vec<Vector> = match &self.shape {
@@ -150,8 +153,9 @@ impl SupportMap for Solid {
     }
 }
 
-/// Face normals and edges of a frustum with these corners, the lower ring first. Sides that are not
-/// flat fold along either diagonal: taking both costs time and adds nothing to the least depth.
+/// Return the face normals and edges of a frustum with these corners, the lower ring first. Sides
+/// that are not flat fold along either diagonal; using both costs time and does not change the
+/// smallest depth.
 fn faces(corners: &[Vector], up: Vector) -> (Vec<Vector>, Vec<Vector>) {
     let (lower, upper) = corners.split_at(corners.len() / 2);
     let (mut normals, mut edges) = (vec![up], vec![]);

@@ -1,30 +1,32 @@
-//! When shapes touch: overlap of their outlines and of their heights.
+//! Contact of shapes: overlap of their outlines and of their heights.
 
 use crate::{
     geometry::{Aabb, outline::overlap_m},
     world::footprint::Footprint,
 };
 
-/// Overlap in plan or height that counts as touching: recorded houses have as much.
+/// Largest overlap of outlines or heights that counts as touching; recorded houses have overlaps up
+/// to this.
 pub const TOUCH_M: f64 = 0.002;
 
-/// Whether two shapes share more than a touch.
+/// Return whether two shapes overlap by more than a touch.
 pub fn overlap(a: &[Footprint], b: &[Footprint]) -> bool {
     a.iter().any(|a| b.iter().any(|b| collide(a, b, 0.0)))
 }
 
-/// Whether two solids share more than a touch, `gap_m` apart or nearer in plan.
+/// Return whether two solids overlap by more than a touch, or are nearer than `gap_m` in plan while
+/// their heights overlap.
 pub(super) fn collide(a: &Footprint, b: &Footprint, gap_m: f64) -> bool {
     a.top_m.min(b.top_m) - a.bottom_m.max(b.bottom_m) > TOUCH_M
         && overlap_m(&a.outline_m, &b.outline_m) > TOUCH_M - gap_m
 }
 
-/// Lowest height of solids.
+/// Return the lowest height of some solids.
 pub fn bottom_m(solids: &[Footprint]) -> f64 {
     solids.iter().map(|solid| solid.bottom_m).fold(f64::INFINITY, f64::min)
 }
 
-/// Box around solids.
+/// Return the box around some solids.
 pub fn box_of(solids: &[Footprint]) -> Aabb {
     Aabb::of_points(solids.iter().flat_map(|solid| {
         solid

@@ -1,7 +1,8 @@
-//! Floor that furniture keeps free: before doors, along open-plan borders, and around itself.
+//! FloorPatch that stays free of furniture: in front of doors, along open-plan borders, and around
+//! furniture.
 //!
 //! The lengths are those of the package `procthor` (`constants.MARGIN`, `doors.py`); 1,115 recorded
-//! houses hold to them.
+//! houses satisfy them.
 
 use crate::{
     assets::placement_rule::Place,
@@ -10,26 +11,32 @@ use crate::{
     world::layout::contact::TOUCH_M,
 };
 
-/// Before a door, on the side to which it does not open.
+/// Free depth in front of a door, on the side to which it does not open.
 const ENTRANCE_M: f64 = 0.5;
-/// Beyond the leaf of a door that stands open, and on both sides of a doorframe or open-plan border.
+/// Free depth beyond the leaf of an open door, and on both sides of a doorframe or open-plan
+/// border.
 const PASSAGE_M: f64 = 0.35;
 /// Depth of a doorframe on the side to which a door would open.
 const FRAME_M: f64 = 0.12;
-/// Before furniture with its back to a wall.
+/// Free depth in front of furniture with its back to a wall.
 const FRONT_M: f64 = 0.5;
-/// On all sides of furniture in the middle of a room.
+/// Free depth on all sides of furniture in the middle of a room.
 const AROUND_M: f64 = 0.35;
 
 /// A convex piece of floor, `[x, z]`.
-pub type Floor = [Vec2; 4];
+pub type FloorPatch = [Vec2; 4];
 
-/// The floor around a unit's box that belongs to it: the box and what is kept free around it.
+/// Return the floor of a group of furniture: its box and the free floor around it.
 ///
 /// # Arguments
-/// * `low_m`, `high_m` - the box in the unit's frame, which looks along +z.
-/// * `to_world` - from that frame.
-pub fn around(anchor: Place, low_m: Vec2, high_m: Vec2, to_world: impl Fn(Vec2) -> Vec2) -> Floor {
+/// * `low_m`, `high_m` - the box in the group's frame, which faces +z.
+/// * `to_world` - transform from that frame to the world.
+pub fn floor_around(
+    anchor: Place,
+    low_m: Vec2,
+    high_m: Vec2,
+    to_world: impl Fn(Vec2) -> Vec2,
+) -> FloorPatch {
     let (sides, front) = match anchor {
         Place::Middle => (AROUND_M, AROUND_M),
         _ => (0.0, FRONT_M),
@@ -39,14 +46,14 @@ pub fn around(anchor: Place, low_m: Vec2, high_m: Vec2, to_world: impl Fn(Vec2) 
     [low, [high[0], low[1]], high, [low[0], high[1]]].map(to_world)
 }
 
-/// Whether two pieces of floor share more than a border.
-pub fn overlap(a: &Floor, b: &Floor) -> bool {
+/// Return whether two pieces of floor share more than a border.
+pub fn overlap(a: &FloorPatch, b: &FloorPatch) -> bool {
     overlap_m(a, b) > TOUCH_M
 }
 
-/// Floor that no furniture is put on: before and behind doors, with the way of their leaves, and
-/// along borders between rooms that have no wall.
-pub fn passages(house: &House) -> Vec<Floor> {
+/// Return the floor on which no furniture may stand: on both sides of doors, where their leaves
+/// move, and along borders between rooms that have no wall.
+pub fn passages(house: &House) -> Vec<FloorPatch> {
     let doors = house.doors.iter().filter_map(|door| {
         let [near_m, far_m] = door_depths_m(door);
         let along_m = [door.hole_min_m[0], door.hole_max_m[0]];
@@ -59,7 +66,8 @@ pub fn passages(house: &House) -> Vec<Floor> {
     doors.chain(borders).collect()
 }
 
-/// Depth of the floor to the right and to the left of a door's first wall, to which it opens.
+/// Return the depth of the free floor to the right of a door's first wall, and to the left, where
+/// the door opens.
 fn door_depths_m(door: &Opening) -> [f64; 2] {
     if door.asset_id.starts_with("Doorframe") {
         return [PASSAGE_M, PASSAGE_M + FRAME_M];
@@ -69,8 +77,9 @@ fn door_depths_m(door: &Opening) -> [f64; 2] {
     [ENTRANCE_M, leaf_m + PASSAGE_M]
 }
 
-/// A rectangle in a wall's frame: along it, and across it to its left; `None` without the wall.
-fn strip(house: &House, wall_id: &str, along_m: Vec2, across_m: Vec2) -> Option<Floor> {
+/// Return a rectangle given in a wall's frame, along it and across it to its left; `None` if the
+/// wall does not exist.
+fn strip(house: &House, wall_id: &str, along_m: Vec2, across_m: Vec2) -> Option<FloorPatch> {
     let wall = house.walls.iter().find(|wall| wall.id == wall_id)?;
     let length_m = distance_2d_m(wall.from_m, wall.to_m);
     let along = [0, 1].map(|i| (wall.to_m[i] - wall.from_m[i]) / length_m.max(1e-9));

@@ -1,5 +1,6 @@
-//! What hangs in the air comes down: the part of AI2-THOR's physics that ProcTHOR's generator uses
-//! (it drops baseball bats from near the ceiling, a few degrees askew, and reads where they lie).
+//! Let objects that hang in the air fall: the part of AI2-THOR's physics that ProcTHOR's generator
+//! uses. The generator drops baseball bats from near the ceiling, a few degrees tilted, and reads
+//! where they lie.
 
 use crate::{
     Error,
@@ -10,41 +11,39 @@ use crate::{
         layout::{
             Layout, Placement,
             contact::{TOUCH_M, bottom_m},
-            rounding::{round_to, turned_deg},
+            rounding::{ROUND_M, round_to, turned_deg},
         },
         scene::Scene,
     },
 };
 
-/// Nothing falls less: files hold things a few centimetres over what they stand on.
+/// Shortest fall: files have objects a few centimetres over their support.
 const LEAST_FALL_M: f64 = 0.1;
-/// A thing so many times as high as it is deep does not stand when it lands askew.
+/// Ratio of height to depth above which an object that lands tilted does not stand.
 const SLENDER: f64 = 4.0;
-/// Less than this is upright.
+/// Largest tilt of an upright object.
 const ASKEW_DEG: f64 = 0.5;
-/// Headings to tip to, seen from its own.
+/// Directions to tip over, relative to the object's heading, in the order in which they are tried.
 const TURNS_DEG: [f64; 8] = [0.0, 180.0, 90.0, 270.0, 45.0, 135.0, 225.0, 315.0];
-/// Rounding of places.
-const ROUND_M: f64 = 1e-4;
 
-/// Where everything that hangs in the air comes to rest.
+/// Return the places where all objects that hang in the air come to rest.
 ///
-/// It falls straight down onto the highest thing under it. What is slender and askew then tips over
-/// its foot, to whichever side has room, along its heading first; the rest stands. What is fixed
-/// (`kinematic`), or of a category that hangs on walls, stays.
+/// An object falls straight down onto the highest object under it. A slender and tilted one then
+/// tips over its foot to a side that has room, along its heading first; all others stand. Fixed
+/// (`kinematic`) objects and categories that hang on walls stay.
 ///
 /// # Arguments
 /// * `scene` - built from the same house.
 ///
 /// # Errors
-/// [`Error::House`] for an unknown asset, if `unknown` says so.
+/// [`Error::House`] for an unknown asset, unless `unknown` allows it.
 pub fn settled(
     house: &House,
     catalogue: &Catalogue,
     unknown: UnknownAssets,
     scene: &Scene,
 ) -> Result<HouseDelta, Error> {
-    let mut layout = Layout::new(house, catalogue, unknown, scene.clone())?.into_filed();
+    let mut layout = Layout::new(house, catalogue, unknown, scene.clone())?.with_file_positions();
     for (index, object) in house.objects.iter().enumerate() {
         let item = &layout.items[index];
         let rule = catalogue.placement(&item.asset.category);
@@ -53,7 +52,7 @@ pub fn settled(
             continue;
         }
         let (support_m, _) = support(&layout, index, &item.placement);
-        // Inside its parent it rests on something, be it a drawer that the shapes do not show.
+        // Inside its parent it rests on something, perhaps a drawer that the shapes do not show.
         let parent_m = object.parent.map_or(f64::NEG_INFINITY, |parent| {
             layout.items[parent].solids.iter().fold(f64::NEG_INFINITY, |m, s| m.max(s.top_m))
         });
@@ -66,7 +65,7 @@ pub fn settled(
     Ok(layout.delta_from(house))
 }
 
-/// The first way to lie that is clear and does not tip over; standing where there is none.
+/// Return the first lying place that is clear and stable, or the standing place if there is none.
 fn fallen(layout: &Layout, index: usize) -> Placement {
     let item = &layout.items[index];
     let Placement { position_m, rotation_deg: [x_deg, yaw_deg, z_deg], .. } = item.placement;
@@ -75,7 +74,7 @@ fn fallen(layout: &Layout, index: usize) -> Placement {
     let is_lying = height_m > SLENDER * width_m.max(depth_m)
         && [x_deg, z_deg].iter().any(|&angle| signed(angle).abs() > ASKEW_DEG);
     let standing = ([0.0, yaw_deg, 0.0], position_m);
-    // A pitch of 90 degrees lays the top where the heading points.
+    // A pitch of 90 degrees points the top along the heading.
     let lying = |turn_deg: &f64| {
         let heading_deg = turned_deg(yaw_deg + turn_deg);
         let (sin, cos) = heading_deg.to_radians().sin_cos();
@@ -102,16 +101,17 @@ fn fallen(layout: &Layout, index: usize) -> Placement {
         .map_or_else(|| rest(standing).0, |(place, _)| place)
 }
 
-/// What a thing lands on.
+/// The object on which another one lands.
 #[derive(Clone, Copy)]
 struct Bearer {
-    /// Its index.
+    /// Index of the object.
     index: usize,
-    /// Whether it is under the middle.
+    /// Whether it is under the middle of the other one.
     is_central: bool,
 }
 
-/// Height that an object at `place` falls to, and what it lands on there: `None` for the floor.
+/// Return the height to which an object at `place` falls, and the object on which it lands; `None`
+/// for the floor.
 fn support(layout: &Layout, index: usize, place: &Placement) -> (f64, Option<Bearer>) {
     let solids = layout.items[index].solids_at(place);
     let from_m = bottom_m(&solids);

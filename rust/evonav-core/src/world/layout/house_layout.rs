@@ -1,4 +1,4 @@
-//! Objects of a house as they are moved about: poses, plan outlines, collision.
+//! The objects of a house while they are moved about: places, outlines and collisions.
 
 use crate::{
     Error,
@@ -8,9 +8,9 @@ use crate::{
     world::{
         footprint::{Footprint, footprint},
         layout::{
-            Item, Placed, Placement,
+            Item, PlacedItem, Placement,
             contact::{TOUCH_M, bottom_m, box_of, collide},
-            free_floor::{self, Floor},
+            free_floor::{self, FloorPatch},
             item::{solids_of, world_parts},
             rounding::{ROUND_M, round_to, turned_deg},
         },
@@ -18,32 +18,32 @@ use crate::{
     },
 };
 
-/// Gap that furniture keeps to furniture.
+/// Smallest gap between two pieces of furniture.
 const FURNITURE_GAP_M: f64 = 0.02;
-/// A root whose bottom is lower stands on the floor.
+/// Height of the bottom below which an object without a parent stands on the floor.
 const FLOOR_M: f64 = 0.05;
 
 /// All objects of a house, and the structure around them.
 #[derive(Debug, Clone)]
 pub struct Layout {
-    /// In the order of [`House::objects`].
+    /// The objects, in the order of [`House::objects`].
     pub items: Vec<Item>,
-    /// The scene, kept in step with `items`.
+    /// The scene; its bodies move together with `items`.
     pub scene: Scene,
-    /// Walls, doors and windows.
+    /// Outlines of walls, doors and windows, with their boxes.
     structure: Vec<(Aabb, Footprint)>,
-    /// Floor that furniture keeps off.
-    passages: Vec<Floor>,
+    /// Floor on which no furniture may stand.
+    passages: Vec<FloorPatch>,
 }
 
 impl Layout {
-    /// The objects of `house` where it puts them.
+    /// Create the layout of `house` as it is.
     ///
     /// # Arguments
     /// * `scene` - built from the same house.
     ///
     /// # Errors
-    /// [`Error::House`] for an unknown asset, if `unknown` says so.
+    /// [`Error::House`] for an unknown asset, unless `unknown` allows it.
     pub fn new(
         house: &House,
         catalogue: &Catalogue,
@@ -67,9 +67,9 @@ impl Layout {
             let bounds = box_of(&solids);
             let body = scene.bodies.get(scene.first_object + index);
             let sunk_m = body.map_or(0.0, |body| bounds.min_m[1] - body.aabb.min_m[1]);
-            let filed = (placement.parent, placement.position_m[1]);
+            let in_file = (placement.parent, placement.position_m[1]);
             let mut item =
-                Item { asset, parts, placement, solids, bounds, filed, sunk_m, is_on_floor };
+                Item { asset, parts, placement, solids, bounds, in_file, sunk_m, is_on_floor };
             item.settle();
             items.push(item);
         }
@@ -84,8 +84,8 @@ impl Layout {
         Ok(Self { items, scene, structure, passages: free_floor::passages(house) })
     }
 
-    /// The same with everything where the file has it, be it in the air.
-    pub fn into_filed(mut self) -> Self {
+    /// Put every object exactly where the file has it, even if it hangs in the air there.
+    pub fn with_file_positions(mut self) -> Self {
         for item in &mut self.items {
             item.sunk_m = 0.0;
             item.settle();
@@ -93,7 +93,7 @@ impl Layout {
         self
     }
 
-    /// `root` and everything that stands on it, directly or not; parents first.
+    /// Return `root` and everything that stands on it, directly or not; parents first.
     pub fn with_supported(&self, root: usize) -> Vec<usize> {
         let mut family = vec![root];
         let mut next = 0;
@@ -107,33 +107,35 @@ impl Layout {
         family
     }
 
-    /// An object at a place and, rigidly, all that stands on it.
-    pub fn carried(&self, index: usize, place: Placement) -> Vec<(usize, Placement)> {
+    /// Return the places of an object that is moved to `place` and of all objects on it, which move
+    /// rigidly with it.
+    pub fn carry(&self, index: usize, place: Placement) -> Vec<(usize, Placement)> {
         let old = self.items[index].placement;
         let turn_deg = place.rotation_deg[1] - old.rotation_deg[1];
         let turn = yaw_rotation(turn_deg.to_radians());
         let mut places = vec![(index, place)];
         for member in self.with_supported(index).into_iter().skip(1) {
-            let mut carried = self.items[member].placement;
-            let offset = rotate(&turn, sub(carried.position_m, old.position_m));
-            carried.position_m = add(place.position_m, offset).map(|v| round_to(v, ROUND_M));
-            carried.rotation_deg[1] = turned_deg(carried.rotation_deg[1] + turn_deg);
-            places.push((member, carried));
+            let mut moved = self.items[member].placement;
+            let offset = rotate(&turn, sub(moved.position_m, old.position_m));
+            moved.position_m = add(place.position_m, offset).map(|v| round_to(v, ROUND_M));
+            moved.rotation_deg[1] = turned_deg(moved.rotation_deg[1] + turn_deg);
+            places.push((member, moved));
         }
         places
     }
 
-    /// Floor that furniture keeps off: before doors and along open-plan borders.
-    pub fn passages(&self) -> &[Floor] {
+    /// Return the floor on which no furniture may stand: in front of doors and along open-plan
+    /// borders.
+    pub fn passages(&self) -> &[FloorPatch] {
         &self.passages
     }
 
-    /// Whether objects can be at `places` without touching anything but each other.
+    /// Return whether objects can be at `places` without touching anything but each other.
     ///
-    /// Furniture is held to whole-height outlines and a gap, so that nothing is pushed under a
-    /// table or stood in an arm's reach of nothing; what stands on it to its parts.
+    /// Furniture is compared by whole outlines whatever their heights, and with a gap, so that no
+    /// piece is pushed under a table. Objects on furniture are compared part by part.
     pub fn is_clear(&self, places: &[(usize, Placement)]) -> bool {
-        let placed = |&(index, placement): &(usize, Placement)| Placed {
+        let placed = |&(index, placement): &(usize, Placement)| PlacedItem {
             index,
             is_root: self.items[index].is_on_floor,
             placement,
@@ -142,8 +144,9 @@ impl Layout {
         self.is_free(&places.iter().map(placed).collect::<Vec<_>>())
     }
 
-    /// As [`Self::is_clear`], by the outlines that come with the places.
-    pub fn is_free(&self, placed: &[Placed]) -> bool {
+    /// Return whether objects can be at their places, as [`Self::is_clear`], by the outlines given
+    /// with the places.
+    pub fn is_free(&self, placed: &[PlacedItem]) -> bool {
         let boxes: Vec<Aabb> = placed.iter().map(|member| box_of(&member.solids)).collect();
         let is_off_passages = placed.iter().zip(&boxes).all(|(member, bounds)| {
             !self.items[member.index].is_on_floor || self.is_off_passages(&member.solids, bounds)
@@ -151,7 +154,7 @@ impl Layout {
         if !is_off_passages {
             return false;
         }
-        let hits_structure = |(member, bounds): (&Placed, &Aabb)| {
+        let hits_structure = |(member, bounds): (&PlacedItem, &Aabb)| {
             self.structure.iter().any(|(other_box, other)| {
                 bounds.intersects(other_box)
                     && member.solids.iter().any(|solid| collide(solid, other, 0.0))
@@ -166,7 +169,7 @@ impl Layout {
         }
         let all = boxes.iter().fold(Aabb::EMPTY, |all, bounds| all.union(*bounds));
         let others = self.items.iter().enumerate().filter(|(index, _)| !is_moved[*index]);
-        // Furniture is held to its whole height: no box is too high or too low to be near.
+        // Furniture counts with its whole height: no box is too high or too low to be near.
         let is_near = |other: &Item| {
             [0, 2].iter().all(|&axis| {
                 all.min_m[axis] - FURNITURE_GAP_M <= other.bounds.max_m[axis]
@@ -192,7 +195,7 @@ impl Layout {
         })
     }
 
-    /// Puts an object somewhere; what stands on it stays.
+    /// Move an object; objects on it stay where they are.
     pub fn put(&mut self, index: usize, placement: Placement) {
         let item = &mut self.items[index];
         item.placement = placement;
@@ -206,7 +209,7 @@ impl Layout {
         }
     }
 
-    /// What differs from `house`, whose objects these are.
+    /// Return the moves from `house`, of which this is a layout, to this layout.
     pub fn delta_from(&self, house: &House) -> HouseDelta {
         let moves = self.items.iter().zip(&house.objects).filter_map(|(item, object)| {
             let before = (object.position_m, object.rotation_deg, object.parent);
@@ -224,7 +227,7 @@ impl Layout {
     }
 }
 
-/// Whether `item`, with `solids`, touches `other`.
+/// Return whether `item`, with `solids`, touches `other`.
 fn hits(item: &Item, solids: &[Footprint], bounds: &Aabb, other: &Item) -> bool {
     let are_furniture = item.is_on_floor && other.is_on_floor;
     let gap_m = if are_furniture { FURNITURE_GAP_M } else { 0.0 };

@@ -1,4 +1,4 @@
-//! One object of a layout: its place, and what it covers there.
+//! One object of a layout: its place and its outlines there.
 
 use crate::{
     assets::{Asset, part::Part},
@@ -9,90 +9,91 @@ use crate::{
     },
 };
 
-/// Where an object is.
+/// The place of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
     /// Centre of its box.
     pub position_m: Vec3,
-    /// Unity Euler angles.
+    /// Unity Euler angles, degrees.
     pub rotation_deg: Vec3,
-    /// Index of what it stands on or in.
+    /// Index of the object that it stands on or in.
     pub parent: Option<usize>,
 }
 
-/// One object of the house.
+/// One object of a layout.
 #[derive(Debug, Clone)]
 pub struct Item {
-    /// Its asset.
+    /// Asset of the object.
     pub asset: Asset,
-    /// Its shape, object frame.
+    /// Shape of the object, object frame.
     pub(super) parts: Vec<Part>,
-    /// Where it is now.
+    /// Present place.
     pub placement: Placement,
-    /// Plan outlines of its parts, with their heights.
+    /// Outlines of its parts on the ground plane, with their heights.
     pub solids: Vec<Footprint>,
-    /// Box around them.
+    /// Box around the outlines.
     pub bounds: Aabb,
-    /// Where the file has it: what it stands on, and its height ...
-    pub(super) filed: (Option<usize>, f64),
-    /// ... and how far below the scene has it: files hold some things over what they stand on.
+    /// Parent and height in the house file.
+    pub(super) in_file: (Option<usize>, f64),
+    /// Height by which the scene has it below the file: files have some objects over their support.
     pub(super) sunk_m: f64,
-    /// Stands on the floor by itself: furniture, and boxes and balls on the floor.
+    /// Whether it stands on the floor by itself: furniture, and boxes and balls on the floor.
     pub is_on_floor: bool,
 }
 
 impl Item {
-    /// Plan outlines of its parts if it were at `place`.
+    /// Return the outlines of its parts if it were at `placement`.
     pub fn solids_at(&self, placement: &Placement) -> Vec<Footprint> {
         solids_of(&self.parts, &self.settled(placement))
     }
 
-    /// Where it comes to rest: what is carried along lies as far below its place as before.
+    /// Return the place where it comes to rest: an object that is carried along lies as far below
+    /// its place as before.
     pub(super) fn settled(&self, placement: &Placement) -> Placement {
         let mut settled = *placement;
-        if (placement.parent, placement.position_m[1]) == self.filed {
+        if (placement.parent, placement.position_m[1]) == self.in_file {
             settled.position_m[1] -= self.sunk_m;
         }
         settled
     }
 
-    /// Height of its centre over its lowest point.
+    /// Return the height of its centre over its lowest point.
     pub fn rise_m(&self) -> f64 {
         self.settled(&self.placement).position_m[1] - self.bounds.min_m[1]
     }
 
-    /// Brings outlines and box to where it is.
+    /// Update outlines and box to the present place.
     pub(super) fn settle(&mut self) {
         self.solids = self.solids_at(&self.placement);
         self.bounds = box_of(&self.solids);
     }
 
-    /// Whether it hangs on a wall: on nothing, and not on the floor.
+    /// Return whether it hangs on a wall: it has no parent and is not on the floor.
     pub fn is_hung(&self) -> bool {
         self.placement.parent.is_none() && !self.is_on_floor
     }
 }
 
-/// A member at a new place.
+/// An object at a new place.
 #[derive(Debug, Clone)]
-pub struct Placed {
+pub struct PlacedItem {
     /// Index of the object.
     pub index: usize,
-    /// Whether it stands on the floor by itself.
+    /// Whether the object stands on the floor by itself.
     pub is_root: bool,
-    /// Its place.
+    /// New place.
     pub placement: Placement,
-    /// Plan outlines of its parts there, up to rounding.
+    /// Outlines of its parts at the new place, up to rounding.
     pub solids: Vec<Footprint>,
 }
 
-/// A shape in the world.
+/// Return the parts of a shape at a place in the world.
 pub(super) fn world_parts(parts: &[Part], placement: &Placement) -> Vec<Part> {
     let rotation = euler_rotation_deg(placement.rotation_deg);
     parts.iter().map(|part| part.placed(placement.position_m, &rotation)).collect()
 }
 
-/// Plan outlines of a shape in the world.
+/// Return the outlines of a shape at a place in the world.
 pub(super) fn solids_of(parts: &[Part], placement: &Placement) -> Vec<Footprint> {
     world_parts(parts, placement)
         .iter()

@@ -1,4 +1,5 @@
-//! Objects of a house as they are moved about: where they can stand, and where they come to rest.
+//! Layouts: the objects of a house while they are moved about, where they can stand and where they
+//! come to rest.
 
 pub(crate) mod contact;
 pub(crate) mod free_floor;
@@ -11,5 +12,5 @@ pub(crate) mod surfaces;
 
 pub use gravity::settled;
 pub use house_layout::Layout;
-pub use item::{Item, Placed, Placement};
+pub use item::{Item, PlacedItem, Placement};
 pub use random_spawn::{SpawnRequest, Spawned, random_spawn};

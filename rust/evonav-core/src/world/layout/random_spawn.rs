@@ -1,8 +1,9 @@
-//! AI2-THOR's `InitialRandomSpawn`: things that can be carried go to random free places.
+//! AI2-THOR's `InitialRandomSpawn`: put pickupable objects at random free places.
 //!
-//! Order and number of tries are those of AI2-THOR's `PhysicsSceneManager` and
-//! `InstantiatePrefabTest`: objects and receptacles in random order, and on each receptacle so many
-//! points at four yaws each. Where a thing fits is this crate's own rule, `sample_surface_place`.
+//! The order and the number of tries are those of AI2-THOR's `PhysicsSceneManager` and
+//! `InstantiatePrefabTest`: objects and receptacles in random order, and on each receptacle a
+//! number of points with four yaws each. Whether an object fits is decided by this crate's own
+//! rule, `sample_surface_place`.
 
 use serde::Deserialize;
 
@@ -13,49 +14,51 @@ use crate::{
     house::{House, HouseDelta},
     rng::Stream,
     world::{
-        layout::{Layout, Placement, rounding::round_to, surfaces::sample_surface_place},
+        layout::{
+            Layout, Placement,
+            rounding::{ROUND_M, round_to},
+            surfaces::sample_surface_place,
+        },
         scene::Scene,
     },
 };
 
 /// Yaws that AI2-THOR tries at a point.
 const NUM_YAWS: usize = 4;
-/// Rounding of places on the floor.
-const ROUND_M: f64 = 1e-4;
 
-/// What to put where. Names are those of AI2-THOR's parameters, in our spelling.
+/// Parameters of a random spawn. The names are those of AI2-THOR's parameters in snake case.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpawnRequest {
-    /// Of the random stream, which nothing else draws from.
+    /// Seed of the random stream, which is used for nothing else.
     pub seed: u64,
-    /// Objects to put; `None` for all that can be.
+    /// Ids of the objects to move; `None` for all that can be moved.
     #[serde(default)]
     pub object_ids: Option<Vec<String>>,
-    /// Objects that stay.
+    /// Ids of objects that stay.
     #[serde(default)]
     pub excluded_object_ids: Vec<String>,
-    /// What to put them on; `None` for all on which their category was recorded.
+    /// Ids of the receptacles to use; `None` for all on which an object's category was recorded.
     #[serde(default)]
     pub receptacle_ids: Option<Vec<String>>,
-    /// Categories of which nothing is put on.
+    /// Categories of receptacles that are not used.
     #[serde(default)]
     pub excluded_receptacles: Vec<String>,
-    /// Only on what stands open: nothing behind doors or lids.
+    /// Whether only receptacles without doors or lids are used.
     #[serde(default)]
     pub forces_visible: bool,
-    /// The floors of rooms count as receptacles.
+    /// Whether the floors of rooms count as receptacles.
     #[serde(default)]
     pub allows_floor: bool,
-    /// Also what can only be pushed.
+    /// Whether objects that can only be pushed are moved too.
     #[serde(default)]
     pub allows_moveable: bool,
-    /// Points tried on a receptacle after the first.
+    /// Number of points tried on a receptacle after the first.
     pub num_attempts: usize,
 }
 
 impl SpawnRequest {
-    /// Reads a request.
+    /// Read a request.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] saying what is malformed, and where.
@@ -65,30 +68,30 @@ impl SpawnRequest {
     }
 }
 
-/// What came of a request.
+/// The result of a random spawn.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Spawned {
-    /// Everything that found a place.
+    /// Moves of the objects that found a place.
     pub delta: HouseDelta,
-    /// Ids of those that found none, and stay where they are.
+    /// Ids of the objects that found no place and stay where they are.
     pub unplaced: Vec<String>,
 }
 
-/// One place to try.
+/// A receptacle: an object or the floor of a room, by index.
 #[derive(Clone, Copy)]
 enum Receptacle {
     Object(usize),
     Floor(usize),
 }
 
-/// Puts objects of `house` at random places.
+/// Put objects of `house` at random places.
 ///
 /// # Arguments
 /// * `scene` - built from the same house.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] for an object or receptacle that the house does not hold,
-/// [`Error::House`] for an unknown asset, if `unknown` says so.
+/// [`Error::InvalidArgument`] for an object or receptacle that is not in the house,
+/// [`Error::House`] for an unknown asset, unless `unknown` allows it.
 pub fn random_spawn(
     house: &House,
     catalogue: &Catalogue,
@@ -123,7 +126,7 @@ pub fn random_spawn(
     stream.shuffle(&mut order);
     let mut unplaced = Vec::new();
     for &index in &order {
-        // It is to be held to its parts, also where it stands on the floor now.
+        // Its parts are compared one by one, also if it stands on the floor now.
         layout.items[index].is_on_floor = false;
         let mut receptacles =
             receptacles_of(house, catalogue, &layout, request, named.as_deref(), index);
@@ -141,7 +144,7 @@ pub fn random_spawn(
         });
         match place {
             Some(place) => {
-                for (member, place) in layout.carried(index, place) {
+                for (member, place) in layout.carry(index, place) {
                     layout.put(member, place);
                 }
             }
@@ -151,7 +154,7 @@ pub fn random_spawn(
     Ok(Spawned { delta: layout.delta_from(house), unplaced })
 }
 
-/// What `index` may be put on.
+/// Return the receptacles on which object `index` may be put.
 fn receptacles_of(
     house: &House,
     catalogue: &Catalogue,
@@ -182,7 +185,8 @@ fn receptacles_of(
     objects.chain((0..floors).map(Receptacle::Floor)).collect()
 }
 
-/// Draws a place on the floor of a room; `None` where it touches something or stands in a doorway.
+/// Draw a place on the floor of a room; `None` if the object would touch another one or stand in a
+/// doorway.
 fn sample_floor_place(
     house: &House,
     layout: &Layout,

@@ -1,4 +1,4 @@
-//! Where small things can go: the surfaces of receptacles, as the shapes have them.
+//! Places for small objects on the surfaces of receptacles.
 
 use crate::{
     assets::Catalogue,
@@ -9,30 +9,29 @@ use crate::{
         layout::{
             Item, Layout, Placement,
             contact::{TOUCH_M, bottom_m},
-            rounding::{round_to, turned_deg},
+            rounding::{ROUND_M, round_to, turned_deg},
         },
     },
 };
 
-/// Share of a small thing's outline, about its middle, that must lie over its support.
+/// Share of a small object's outline, about its middle, that must lie over its support.
 const SUPPORTED_SHARE: f64 = 0.8;
-/// Height difference between a recorded surface and the top of the part that bears it.
+/// Largest height difference between a recorded surface and the top of the part that bears it.
 const SURFACE_M: f64 = 0.02;
-/// Height difference between parts that bear one thing.
+/// Largest height difference between parts that bear one object.
 const LEVEL_M: f64 = 0.003;
-/// Rounding of places.
-const ROUND_M: f64 = 1e-4;
 
-/// Part of what they stand on, wherever that goes.
+/// Categories that are part of their support and move with it.
 pub const FITTINGS: [&str; 3] = ["Faucet", "ShowerHead", "Sink"];
 
-/// Whether something never leaves what it stands on.
+/// Return whether an object never leaves its support.
 pub fn is_fitting(item: &Item) -> bool {
     FITTINGS.contains(&item.asset.category.as_str())
 }
 
-/// Receptacles among `room_items` on which an object may stand, and how often its category was seen
-/// on theirs (`receptacles.json` of the `procthor` package).
+/// Return the receptacles among `room_items` on which an object may stand, and how often its
+/// category was recorded on each receptacle's category (`receptacles.json` of the `procthor`
+/// package).
 pub fn receptacles_for(
     layout: &Layout,
     catalogue: &Catalogue,
@@ -54,8 +53,8 @@ pub fn receptacles_for(
     (found, weights)
 }
 
-/// Draws a place for one small object on one of `receptacles`; `None` when this draw overhangs,
-/// touches something, or is where the object already is (within `min_move_m`).
+/// Draw a place for one small object on one of `receptacles`; `None` if the object would overhang,
+/// touch another one, or stay where it already is (within `min_move_m`).
 pub fn sample_surface_place(
     layout: &Layout,
     index: usize,
@@ -104,7 +103,8 @@ pub fn sample_surface_place(
         return None;
     }
     place.position_m[1] = round_to(top_m + rise_m, ROUND_M);
-    // It stands level: no part under it is higher than what is under its middle and its corners.
+    // The object stands level: no part under it is higher than the parts under its middle and its
+    // corners.
     let is_borne = |p: Vec2| {
         let mut level = bearing.iter().filter(|solid| top_m - solid.top_m < LEVEL_M);
         level.any(|solid| polygon_contains(&solid.outline_m, p))

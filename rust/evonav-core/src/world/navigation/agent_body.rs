@@ -5,7 +5,7 @@
 pub struct AgentBody {
     /// Radius of the cylinder and of both rounded ends.
     pub radius_m: f64,
-    /// From the floor to the crown, at least `2 * radius_m`.
+    /// Height from the floor to the top, at least `2 * radius_m`.
     pub height_m: f64,
 }
 
@@ -18,9 +18,9 @@ impl AgentBody {
     /// AI2-THOR's Stretch (agent mode "stretch": radius 0.185, height 1.436).
     pub const STRETCH: Self = Self { radius_m: 0.185_462_8, height_m: 1.435_714 };
 
-    /// Largest radius of the capsule between two heights above the floor, 0 outside it.
+    /// Return the largest radius of the capsule between two heights above the floor, 0 outside it.
     pub fn radius_between_m(&self, bottom_m: f64, top_m: f64) -> f64 {
-        // Distance of the interval from the cylinder, into one of the rounded ends.
+        // Distance by which the interval lies beyond the cylinder, in one of the rounded ends.
         let beyond_m =
             (self.radius_m - top_m).max(bottom_m - (self.height_m - self.radius_m)).max(0.0);
         (self.radius_m * self.radius_m - beyond_m * beyond_m).max(0.0).sqrt()

@@ -1,4 +1,4 @@
-//! Where an agent can stand, how it can move, and the shortest way.
+//! The free space of a scene: where an agent can stand, how it can move, and shortest paths.
 
 use std::sync::OnceLock;
 
@@ -13,16 +13,17 @@ use crate::{
     },
 };
 
-/// What blocks an agent, and how far a point off the free space is pulled back to it.
+/// Parameters of the free space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NavigationConfig {
-    /// Things that end below this height are walked over: rugs, sheets of paper, door sills.
+    /// Height below which parts are walked over: rugs, sheets of paper, door sills.
     pub step_height_m: f64,
-    /// How deep the agent's side may be in something and still be free. Scenes are not exact:
-    /// wall sides stand 5 mm inside the planes of the house file, and the catalogue's boxes, which
-    /// hold handles and cushions that AI2-THOR's colliders leave out, are off by 3-7 mm (median).
+    /// Largest depth of the agent's side in an obstacle at which the agent is still free. Scenes
+    /// are not exact: wall sides stand 5 mm inside the planes of the house file, and the
+    /// catalogue's boxes, which include handles and cushions that AI2-THOR's colliders leave out,
+    /// are off by 3-7 mm (median).
     pub tolerance_m: f64,
-    /// Farthest that [`Navigation::snap`] moves a point.
+    /// Largest distance by which [`Navigation::snap`] moves a point.
     pub snap_m: f64,
 }
 
@@ -32,14 +33,15 @@ impl Default for NavigationConfig {
     }
 }
 
-/// Rooms' floors end under the walls; a centre this far off them is still indoors.
+/// Largest distance from the floors at which a point is still indoors: rooms' floors end under the
+/// walls.
 const FLOOR_SLACK_M: f64 = 0.05;
 /// Margin of maps around the house, so that its walls are on them.
 const MAP_MARGIN_M: f64 = 0.5;
-/// Pitch of the places that [`Navigation::snap`] tries.
+/// Spacing of the points that [`Navigation::snap`] tries.
 const SNAP_PITCH_M: f64 = 0.025;
 
-/// What a flood fill knows of a grid point.
+/// State of a grid point during a flood fill.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Unknown,
@@ -50,8 +52,9 @@ enum State {
 
 /// Free space of one scene for one agent body: exact collision queries and shortest paths.
 ///
-/// Building costs about a millisecond a house, so a changed scene gets a new one
-/// ([`Navigation::with_scene`]); what paths need is computed by the first searches and kept.
+/// Building takes about a millisecond per house, so a changed scene gets a new one
+/// ([`Navigation::with_scene`]). The visibility graph for paths is computed by the first searches
+/// and reused.
 #[derive(Debug)]
 pub struct Navigation {
     agent: AgentBody,
@@ -65,7 +68,7 @@ pub struct Navigation {
 }
 
 impl Navigation {
-    /// Free space of `scene` for an agent.
+    /// Build the free space of `scene` for an agent.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a length is not finite and positive, the agent's height less
@@ -91,7 +94,7 @@ impl Navigation {
         Ok(Self { agent, config, obstacles, floors, min_m, max_m, graph: OnceLock::new() })
     }
 
-    /// The same agent and settings in a changed scene.
+    /// Build the free space of a changed scene for the same agent and settings.
     ///
     /// # Errors
     /// As [`Navigation::build`].
@@ -99,32 +102,33 @@ impl Navigation {
         Self::build(scene, self.agent, self.config)
     }
 
-    /// The agent's body.
+    /// Return the agent's body.
     pub fn agent(&self) -> AgentBody {
         self.agent
     }
 
-    /// What blocks the agent.
+    /// Return the obstacles of the agent.
     pub fn obstacles(&self) -> &Obstacles {
         &self.obstacles
     }
 
-    /// Whether the agent can stand at `[x, z]`: on a floor and in collision with nothing.
+    /// Return whether the agent can stand at `[x, z]`: on a floor and in collision with nothing.
     pub fn is_free(&self, point_m: Vec2) -> bool {
         self.obstacles.is_clear(point_m) && self.is_indoors(point_m)
     }
 
-    /// Whether the agent can move straight from one point to the other, the sweep of its whole
-    /// body touching nothing.
+    /// Return whether the agent can move straight from one point to the other without its swept
+    /// body touching anything.
     pub fn try_move(&self, from_m: Vec2, to_m: Vec2) -> bool {
         self.is_free(from_m) && self.is_free(to_m) && self.obstacles.is_clear_between(from_m, to_m)
     }
 
-    /// Points of a square grid through `from_m` that straight moves along the grid reach, as
-    /// AI2-THOR's `GetReachablePositions`: 4-connected, each step swept with the body.
+    /// Return the points of a square grid through `from_m` that can be reached by straight moves
+    /// along the grid, as AI2-THOR's `GetReachablePositions`: 4-connected, each step swept with the
+    /// body.
     ///
     /// # Returns
-    /// `[x, z]`, by rising z, then x; empty if `from_m` is not free.
+    /// Points `[x, z]` by ascending z, then x; empty if `from_m` is not free.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if `grid_m` is not finite and at least 0.01.
@@ -138,7 +142,8 @@ impl Navigation {
         if !self.is_free(from_m) {
             return Ok(Vec::new());
         }
-        // Offsets from the start, so that a point has the same coordinates by every way to it.
+        // Points are computed by their offset from the start, so that a point has the same
+        // coordinates whichever way leads to it.
         let point_of = |cell: [i64; 2]| [0, 1].map(|i| from_m[i] + cell[i] as f64 * grid_m);
         let cells_to = |bound_m: f64, i: usize| (bound_m - from_m[i]) / grid_m;
         let low = [0, 1].map(|i| cells_to(self.min_m[i] - FLOOR_SLACK_M, i).floor() - 1.0);
@@ -151,7 +156,8 @@ impl Navigation {
             (cell[1] - low[1] as i64) as usize * size[0] as usize
                 + (cell[0] - low[0] as i64) as usize
         };
-        // Free points lie in the floors' box grown by the slack, so their neighbours are on the grid.
+        // Free points lie in the box of the floors grown by the slack, so their neighbours are on
+        // the grid.
         let mut state = vec![State::Unknown; size[0] as usize * size[1] as usize];
         let mut queue = vec![[0_i64, 0]];
         state[index([0, 0])] = State::Reached;
@@ -174,7 +180,8 @@ impl Navigation {
         Ok(queue.into_iter().map(point_of).collect())
     }
 
-    /// The nearest of `reachable_m` to a point, the first of equals; `None` if there is none.
+    /// Return the nearest of `reachable_m` to a point, the first of equals; `None` if there is
+    /// none.
     pub fn nearest_reachable(&self, point_m: Vec2, reachable_m: &[Vec2]) -> Option<Vec2> {
         reachable_m
             .iter()
@@ -182,8 +189,8 @@ impl Navigation {
             .min_by(|&a, &b| distance_2d_m(a, point_m).total_cmp(&distance_2d_m(b, point_m)))
     }
 
-    /// The nearest free point within [`NavigationConfig::snap_m`], to 2.5 cm; the point itself if
-    /// it is free. It may lie in a pocket that no way leads out of.
+    /// Return the nearest free point within [`NavigationConfig::snap_m`], on a grid of 2.5 cm, or
+    /// the point itself if it is free. The result may lie in a pocket from which no path leads out.
     pub fn snap(&self, point_m: Vec2) -> Option<Vec2> {
         if self.is_free(point_m) {
             return Some(point_m);
@@ -191,7 +198,7 @@ impl Navigation {
         self.free_near(point_m).next()
     }
 
-    /// Free points within [`NavigationConfig::snap_m`], 2.5 cm apart, nearest first.
+    /// Return the free points within [`NavigationConfig::snap_m`], 2.5 cm apart, nearest first.
     pub fn free_near(&self, point_m: Vec2) -> impl Iterator<Item = Vec2> + '_ {
         let reach = (self.config.snap_m / SNAP_PITCH_M).floor() as i64;
         let mut offsets: Vec<[i64; 2]> = (-reach..=reach)
@@ -205,24 +212,25 @@ impl Navigation {
             .filter(|&candidate| self.is_free(candidate))
     }
 
-    /// Shortest any-angle path of the agent's axis, with its whole body clear of everything.
+    /// Return the shortest any-angle path of the agent's axis, with its whole body clear of
+    /// everything.
     ///
     /// # Returns
-    /// Corners, both ends (snapped) included; `None` if an end is too far off the free space or
-    /// there is no way. The length is within 1.3% of its arcs around obstacles of the exact
-    /// shortest path's, the same in both directions up to rounding.
+    /// Corners of the path, including both ends (snapped); `None` if an end is too far from the
+    /// free space or there is no path. The length differs from the exact shortest path's by at most
+    /// 1.3% of its arcs around obstacles, and is the same in both directions up to rounding.
     pub fn shortest_path(&self, start_m: Vec2, target_m: Vec2) -> Option<Vec<Vec2>> {
         let (start_m, target_m) = (self.snap(start_m)?, self.snap(target_m)?);
         self.graph().shortest_path(&self.obstacles, start_m, target_m)
     }
 
-    /// Whether there is a path between two points, both free as they are.
+    /// Return whether there is a path between two points, neither of which is snapped.
     pub fn is_connected(&self, a_m: Vec2, b_m: Vec2) -> bool {
         let is_path = || self.graph().shortest_path(&self.obstacles, a_m, b_m).is_some();
         self.is_free(a_m) && self.is_free(b_m) && is_path()
     }
 
-    /// Length of the shortest path to each target, infinite where there is none.
+    /// Return the length of the shortest path to each target, infinite where there is none.
     pub fn distances_m(&self, start_m: Vec2, targets_m: &[Vec2]) -> Vec<f64> {
         let Some(start_m) = self.snap(start_m) else {
             return vec![f64::INFINITY; targets_m.len()];
@@ -234,21 +242,21 @@ impl Navigation {
         snapped.into_iter().map(length_of).map(|l| l.unwrap_or(f64::INFINITY)).collect()
     }
 
-    /// Shortest distances from a point (snapped) to everywhere, for [`Self::field_distance_m`];
-    /// `None` if the point is too far off the free space.
+    /// Compute the shortest distances from a point (snapped) to everywhere, for
+    /// [`Self::field_distance_m`]; `None` if the point is too far from the free space.
     pub fn field(&self, source_m: Vec2) -> Option<DistanceField> {
         let source_m = self.snap(source_m)?;
         Some(self.graph().field(&self.obstacles, source_m))
     }
 
-    /// Length of the shortest path between a field's source and a point (snapped), as
-    /// [`Self::distances_m`]; infinite where there is none.
+    /// Return the length of the shortest path between a field's source and a point (snapped), as
+    /// [`Self::distances_m`]; infinite if there is none.
     pub fn field_distance_m(&self, field: &DistanceField, point_m: Vec2) -> f64 {
         let to = |point_m| self.graph().distance_m(&self.obstacles, field, point_m);
         self.snap(point_m).map_or(f64::INFINITY, to)
     }
 
-    /// [`map_spec`] of the scene.
+    /// Return the grid over the whole house, as [`map_spec`].
     ///
     /// # Errors
     /// As [`GridSpec::covering`].
@@ -256,13 +264,14 @@ impl Navigation {
         spec_around(self.min_m, self.max_m, cell_m)
     }
 
-    /// Where the agent's body can go: cells whose centres straight moves along the grid reach from
-    /// the free centre nearest to `start_m` are 0, all others 1, row-major.
+    /// Return the oracle occupancy, row-major: 0 for cells whose centres can be reached by straight
+    /// moves along the grid from the free centre nearest to `start_m`, 1 for all others.
     ///
-    /// What AI2-THOR's `GetReachablePositions` answers on a grid through that centre, so both
-    /// simulators give the same map. It holds the agent's full collision volume, as the paper asks
-    /// of its oracle map (Sec. C.2), and no floor that no way leads to. In ProcTHOR houses at
-    /// 0.1 m, 0.1% of the centres that shortest paths reach are lost to the grid's straight moves.
+    /// The same centres are returned by AI2-THOR's `GetReachablePositions` on a grid through that
+    /// centre, so both simulators give the same map. The map accounts for the agent's full
+    /// collision volume, as the paper requires of its oracle map (Sec. C.2), and excludes floor
+    /// that cannot be reached. In ProcTHOR houses at 0.1 m, straight moves along the grid miss 0.1%
+    /// of the centres that shortest paths reach.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] as [`Navigation::reachable_positions`].
@@ -276,8 +285,8 @@ impl Navigation {
         Ok(cells)
     }
 
-    /// The nearest cell centre where the agent fits, within [`NavigationConfig::snap_m`]; of
-    /// equally near ones the first, row-major.
+    /// Return the nearest cell centre where the agent fits, within [`NavigationConfig::snap_m`];
+    /// the first, row-major, of equally near ones.
     fn nearest_free_centre(&self, spec: &GridSpec, point_m: Vec2) -> Option<Vec2> {
         let squared_m2 = |p: Vec2| (p[0] - point_m[0]).powi(2) + (p[1] - point_m[1]).powi(2);
         let reach_m = self.config.snap_m;
@@ -295,18 +304,19 @@ impl Navigation {
         centres_m.into_iter().find(|&centre_m| self.is_free(centre_m))
     }
 
-    /// Smallest and largest corner of a box that holds every point of the floors, with the slack.
+    /// Return the smallest and largest corner of a box around the floors, grown by the slack.
     pub(crate) fn extent_m(&self) -> [Vec2; 2] {
         [self.min_m.map(|v| v - FLOOR_SLACK_M), self.max_m.map(|v| v + FLOOR_SLACK_M)]
     }
 
-    /// The agent's body as collisions take it, thinner by the tolerance, and the step height.
-    pub(crate) fn thinner(&self) -> (AgentBody, f64) {
+    /// Return the body that is used for collisions, which is thinner by the tolerance, and the step
+    /// height.
+    pub(crate) fn collision_body(&self) -> (AgentBody, f64) {
         let radius_m = self.agent.radius_m - self.config.tolerance_m;
         (AgentBody { radius_m, ..self.agent }, self.config.step_height_m)
     }
 
-    /// Whether a point is over a floor, up to a slack.
+    /// Return whether a point is over a floor, up to a slack.
     pub(crate) fn is_indoors(&self, point_m: Vec2) -> bool {
         self.floors.iter().any(|floor| floor.blocks(point_m))
     }
@@ -317,8 +327,8 @@ impl Navigation {
     }
 }
 
-/// A grid over a whole house and its outer walls, aligned to multiples of `cell_m`: the same for
-/// all stages of a task, since rooms stay.
+/// Return a grid over a whole house and its outer walls, aligned to multiples of `cell_m`. It is
+/// the same for all stages of a task, since rooms do not change.
 ///
 /// # Errors
 /// As [`GridSpec::covering`]; [`Error::Simulation`] if the scene has no floor.
@@ -333,7 +343,7 @@ fn spec_around(min_m: Vec2, max_m: Vec2, cell_m: f64) -> Result<GridSpec, Error>
     GridSpec::covering(low_m, high_m, cell_m)
 }
 
-/// Smallest and largest corner of all outlines.
+/// Return the smallest and largest corner of all outlines.
 fn extent_of(floors: &[Obstacle]) -> (Vec2, Vec2) {
     let (mut min_m, mut max_m) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for point in floors.iter().flat_map(|floor| &floor.outline_m) {
@@ -345,7 +355,7 @@ fn extent_of(floors: &[Obstacle]) -> (Vec2, Vec2) {
     (min_m, max_m)
 }
 
-/// The floors' parts, as polygons that hold what comes within the slack of them.
+/// Return the floors' parts as polygons that contain all points within the slack of them.
 fn floors_of(scene: &Scene) -> Result<Vec<Obstacle>, Error> {
     let bodies = scene.bodies.iter().enumerate();
     let floors: Vec<Obstacle> = bodies

@@ -1,4 +1,4 @@
-//! Where an agent can stand, how it can move, and the shortest way.
+//! Navigation: obstacles, the free space of an agent, and shortest paths.
 
 mod agent_body;
 mod free_space;

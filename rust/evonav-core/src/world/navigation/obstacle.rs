@@ -10,8 +10,8 @@ use crate::{
     },
 };
 
-/// The rounded corner of an obstacle lies between this and 1 times its radius from the outline's
-/// corner, once paths take its tangents for it ([`crate::world::navigation::visibility_graph`]).
+/// Largest distance of the tangents that replace an obstacle's rounded corner from the outline's
+/// corner, in radii ([`crate::world::navigation::visibility_graph`]).
 const HUG: f64 = 1.02;
 
 /// A convex polygon that the agent's axis must keep `radius_m` away from.
@@ -23,16 +23,16 @@ pub struct Obstacle {
     pub radius_m: f64,
     /// Index of its body in the scene.
     pub body: usize,
-    /// Smallest corner of a box around the grown outline and a little more.
+    /// Smallest corner of a box slightly larger than the grown outline.
     pub(super) min_m: Vec2,
-    /// Largest corner.
+    /// Largest corner of that box.
     pub(super) max_m: Vec2,
 }
 
-/// Obstacles that the parts of one body are, less those that another of them covers.
+/// Return the obstacles of the parts of one body, without those that another of them covers.
 ///
 /// # Errors
-/// As [`Obstacles::build`].
+/// [`Error::Simulation`] naming the body if a part's geometry is not finite.
 pub(crate) fn obstacles_of(
     body: &Body,
     index: usize,
@@ -70,12 +70,12 @@ pub(crate) struct Sweep {
     a: Vec2,
     b: Vec2,
     length_m: f64,
-    /// Unit vector from `a` to `b`; any, if they are the same.
+    /// Unit vector from `a` to `b`; any unit vector if they are equal.
     along: Vec2,
 }
 
 impl Sweep {
-    /// From `a` to `b`.
+    /// Create the move from `a` to `b`.
     pub(crate) fn new(a: Vec2, b: Vec2) -> Self {
         let length_m = (b[0] - a[0]).hypot(b[1] - a[1]);
         let along = [(b[0] - a[0]) / length_m, (b[1] - a[1]) / length_m];
@@ -84,7 +84,7 @@ impl Sweep {
 }
 
 impl Obstacle {
-    /// The polygon grown by `radius_m`.
+    /// Create an obstacle: the footprint grown by `radius_m`.
     pub(super) fn new(footprint: Footprint, radius_m: f64, body: usize) -> Self {
         let mut min_m = [f64::INFINITY; 2];
         let mut max_m = [f64::NEG_INFINITY; 2];
@@ -97,34 +97,35 @@ impl Obstacle {
         Self { outline_m: footprint.outline_m, radius_m, body, min_m, max_m }
     }
 
-    /// Smallest and largest corner of a box that holds all points that it blocks.
+    /// Return the smallest and largest corner of a box that contains all blocked points.
     pub(crate) fn extent_m(&self) -> [Vec2; 2] {
         [self.min_m, self.max_m]
     }
 
-    /// Whether whatever the other blocks, this one blocks too (sufficient, not necessary).
+    /// Return whether this obstacle surely blocks all points that the other one blocks; false if
+    /// that is not certain.
     pub(super) fn covers(&self, other: &Self) -> bool {
         self.radius_m >= other.radius_m
             && (0..2).all(|i| self.min_m[i] <= other.min_m[i] && self.max_m[i] >= other.max_m[i])
             && other.outline_m.iter().all(|&p| distance_squared(&self.outline_m, p) == 0.0)
     }
 
-    /// Whether the agent's axis at `point_m` is too close.
+    /// Return whether the agent's axis at `point_m` is too close.
     pub(crate) fn blocks(&self, point_m: Vec2) -> bool {
         let is_near = (0..2).all(|i| self.min_m[i] < point_m[i] && point_m[i] < self.max_m[i]);
         is_near && distance_squared(&self.outline_m, point_m) < self.radius_m * self.radius_m
     }
 
-    /// Whether a point is in collision or so close to it that it may lie between a rounded corner
-    /// and the corner's tangents.
+    /// Return whether a point is in collision or so close to it that it may lie between a rounded
+    /// corner and the corner's tangents.
     pub(super) fn hugs(&self, point_m: Vec2) -> bool {
         distance_squared(&self.outline_m, point_m) < (HUG * self.radius_m).powi(2)
     }
 
-    /// Whether the agent's axis comes too close while it moves.
+    /// Return whether the agent's axis comes too close while it moves.
     ///
-    /// The least distance between a segment and a convex polygon that do not meet is taken at an
-    /// end of the segment or at a corner of the polygon.
+    /// If a segment and a convex polygon do not meet, their smallest distance is at an end of the
+    /// segment or at a corner of the polygon.
     pub(crate) fn blocks_sweep(&self, sweep: &Sweep) -> bool {
         let reach = self.radius_m;
         let Sweep { a, b, length_m, along } = *sweep;
@@ -133,7 +134,7 @@ impl Obstacle {
         if !is_near {
             return false;
         }
-        // Corners in the frame of the move: how far along it, how far to its left.
+        // Corners in the frame of the move: distance along it, distance to its left.
         let in_frame = |p: Vec2| {
             let w = [p[0] - a[0], p[1] - a[1]];
             [along[0] * w[0] + along[1] * w[1], along[0] * w[1] - along[1] * w[0]]

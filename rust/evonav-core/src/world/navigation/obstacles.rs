@@ -1,12 +1,12 @@
-//! The agent's capsule against the world, exactly, on the ground plane.
+//! Exact collision of the agent's capsule with the world, on the ground plane.
 //!
-//! An upright capsule that slides over a flat floor has two degrees of freedom, so collision is
-//! a question in the plane: each convex part leaves the projection of its slice between the step
-//! height and the agent's height (a convex polygon, [`crate::world::footprint`]), and the agent
-//! is in collision when its axis comes closer to that polygon than the capsule's radius *at
-//! those heights*: the rounded ends pass over low things and under high ones. That is exact for
-//! upright prisms, which nearly all parts are, and on the safe side for tapering ones; there is
-//! no cell size, so no gap is too narrow or too wide by a cell.
+//! An upright capsule that slides over a flat floor has two degrees of freedom, so collision is a
+//! problem in the plane. Each convex part contributes the projection of its slice between the step
+//! height and the agent's height (a convex polygon, [`crate::world::footprint`]). The agent is in
+//! collision if its axis comes closer to that polygon than the capsule's radius *at those heights*:
+//! the rounded ends pass over low objects and under high ones. This is exact for upright prisms, as
+//! nearly all parts are, and on the safe side for tapering parts. There is no cell size, so no gap
+//! becomes too narrow or too wide by a cell.
 
 use crate::{
     Error,
@@ -20,14 +20,14 @@ use crate::{
     },
 };
 
-/// Edge of a bucket of the broad phase.
+/// Edge length of a bucket of the broad phase.
 const BUCKET_M: f64 = 0.5;
-/// Most buckets along an axis, whatever a house file says its size is.
+/// Largest number of buckets along an axis, whatever the size of the house.
 const MAX_BUCKETS: f64 = 1024.0;
 /// Margin of bucket look-ups, far above rounding and far below any geometry.
 const HAIR_M: f64 = 1e-7;
 
-/// Everything that blocks an agent, ready for exact queries.
+/// All obstacles of an agent, indexed for exact queries.
 #[derive(Debug, Clone)]
 pub struct Obstacles {
     obstacles: Vec<Obstacle>,
@@ -40,8 +40,8 @@ pub struct Obstacles {
 }
 
 impl Obstacles {
-    /// Obstacles for `agent` among `bodies`: all but floors and ceilings, in what they have
-    /// between `step_height_m` and the agent's height.
+    /// Build the obstacles for `agent` from `bodies`: all but floors and ceilings, sliced between
+    /// `step_height_m` and the agent's height.
     ///
     /// # Errors
     /// [`Error::Simulation`] naming the body if a part's geometry is not finite.
@@ -58,32 +58,33 @@ impl Obstacles {
         Ok(obstacles)
     }
 
-    /// The polygons, in the order of the bodies they come from.
+    /// Iterate over the obstacles, in the order of their bodies.
     pub fn iter(&self) -> impl Iterator<Item = &Obstacle> {
         self.obstacles.iter()
     }
 
-    /// Whether the agent fits at a point.
+    /// Return whether the agent fits at a point.
     pub fn is_clear(&self, point_m: Vec2) -> bool {
         let Some([row, col]) = self.bucket_of(point_m) else { return true };
         self.bucket(row, col).iter().all(|&i| !self.obstacles[i as usize].blocks(point_m))
     }
 
-    /// Whether a point is in collision or so close to it that it may lie between a rounded corner
-    /// and the corner's tangents.
+    /// Return whether a point is in collision or so close to it that it may lie between a rounded
+    /// corner and the corner's tangents.
     pub(super) fn is_hugged(&self, point_m: Vec2) -> bool {
         let Some([row, col]) = self.bucket_of(point_m) else { return false };
         self.bucket(row, col).iter().any(|&i| self.obstacles[i as usize].hugs(point_m))
     }
 
-    /// Whether the agent can slide straight from one point to the other.
+    /// Return whether the agent can slide straight from one point to the other.
     ///
     /// The answer is the same in both directions.
     pub fn is_clear_between(&self, from_m: Vec2, to_m: Vec2) -> bool {
         self.first_between(from_m, to_m).is_none()
     }
 
-    /// Index in the scene of a body that a straight move touches: the way to name the collider.
+    /// Return the index in the scene of a body that a straight move touches; `None` if it touches
+    /// none.
     pub fn blocker_between(&self, from_m: Vec2, to_m: Vec2) -> Option<usize> {
         self.first_between(from_m, to_m).map(|obstacle| obstacle.body)
     }
@@ -100,7 +101,8 @@ impl Obstacles {
         hit
     }
 
-    /// Calls `visit` for the buckets under a segment until it returns false; whether it never did.
+    /// Call `visit` for the buckets under a segment until it returns false; return whether it never
+    /// did.
     fn buckets_along(&self, a: Vec2, b: Vec2, mut visit: impl FnMut(&[u32]) -> bool) -> bool {
         let cell = |value: f64, axis: usize| {
             (((value - self.corner_m[axis]) / self.bucket_m).floor()).max(0.0) as usize
@@ -153,7 +155,7 @@ impl Obstacles {
         built
     }
 
-    /// Counting sort of the obstacles into every bucket that their box touches.
+    /// Sort the obstacles into every bucket that their box touches, by counting sort.
     fn fill_buckets(&mut self) {
         let mut starts = vec![0_u32; self.shape[0] * self.shape[1] + 1];
         for obstacle in &self.obstacles {
@@ -196,7 +198,7 @@ impl Obstacles {
         is_inside.then_some(cell.map(|v| v as usize))
     }
 
-    /// Leaves out what lies wholly under another body: most of what stands on furniture.
+    /// Remove obstacles that lie completely under another one, as most objects on furniture do.
     fn drop_covered_by_others(&mut self) {
         let is_covered = |i: usize| {
             let obstacle = &self.obstacles[i];

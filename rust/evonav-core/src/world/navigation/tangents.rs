@@ -1,18 +1,19 @@
-//! Corners of grown obstacles as nodes that taut paths pass tangentially.
+//! Corners of grown obstacles as nodes of the visibility graph, which taut paths pass tangentially.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_8, TAU};
 
 use crate::{geometry::Vec2, world::navigation::Obstacle};
 
-/// Most that a path turns at one node around a corner.
+/// Largest turn of a path at one node around a corner.
 const TURN_RAD: f64 = FRAC_PI_8;
-/// How often the turn at a node is halved to pass a narrow gap: down to two tenths of a millimetre
-/// of room.
+/// Largest number of times that the turn at a node is halved to pass a narrow gap, down to two
+/// tenths of a millimetre of room.
 const MOST_SPLITS: u32 = 5;
-/// Nodes keep this much more than the agent's radius, so that an agent that walks an edge by
-/// rounded headings, in steps, is never blocked: 1e-4 degrees are 2e-5 m after 10 m.
+/// Distance that nodes keep in addition to the agent's radius, so that an agent that walks an edge
+/// in steps by rounded headings is never blocked: 1e-4 degrees are 2e-5 m after 10 m.
 const SKIN_M: f64 = 1e-4;
-/// Slack of the tangency test, metres over the length of an edge: errs towards more edges.
+/// Tolerance of the tangency test, metres over the length of an edge; it adds edges rather than
+/// removing them.
 const TANGENT_SLACK_M: f64 = 1e-6;
 
 /// A place where shortest paths may bend.
@@ -24,7 +25,7 @@ pub(super) struct Node {
 }
 
 impl Node {
-    /// Whether a straight line through this node towards `point_m` grazes the obstacle here,
+    /// Return whether a straight line through this node towards `point_m` grazes the obstacle here,
     /// rather than running into it on one side or the other.
     pub(super) fn is_tangent_to(&self, point_m: Vec2) -> bool {
         let leg = [point_m[0] - self.point_m[0], point_m[1] - self.point_m[1]];
@@ -32,7 +33,8 @@ impl Node {
         a.min(b) <= TANGENT_SLACK_M && a.max(b) >= -TANGENT_SLACK_M
     }
 
-    /// Whether a path from `before_m` over this node to `after_m` bends towards the obstacle.
+    /// Return whether a path from `before_m` over this node to `after_m` bends towards the
+    /// obstacle.
     pub(super) fn is_taut(&self, before_m: Vec2, after_m: Vec2) -> bool {
         let cross = |a: Vec2, b: Vec2| a[0] * b[1] - a[1] * b[0];
         let [a, b] = self.normals;
@@ -44,7 +46,7 @@ impl Node {
     }
 }
 
-/// Corners of the polygon of tangents around an obstacle's grown outline, where they are free.
+/// Return the free corners of the polygon of tangents around an obstacle's grown outline.
 pub(super) fn corner_nodes(obstacle: &Obstacle, is_free: &impl Fn(Vec2) -> bool) -> Vec<Node> {
     let outline = &obstacle.outline_m;
     let num_corners = outline.len();
@@ -77,8 +79,8 @@ struct Arc {
 }
 
 impl Arc {
-    /// The node between two tangents; or, where another obstacle is so near that it is not free
-    /// but the arc is, the nodes of both halves, which are nearer to the arc.
+    /// Add the node between two tangents. If another obstacle is so near that the node is not free
+    /// but the arc is, add the nodes of both halves instead, which are nearer to the arc.
     fn push_nodes(
         &self,
         span_rad: [f64; 2],

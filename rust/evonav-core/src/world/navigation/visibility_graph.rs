@@ -1,13 +1,14 @@
-//! Any-angle shortest paths: a lazy tangent visibility graph over the grown obstacles.
+//! Any-angle shortest paths by a lazy tangent visibility graph over the grown obstacles.
 //!
-//! A shortest path among convex obstacles is a taut string: it bends only at convex corners of
-//! the grown obstacles, and passes each of them tangentially. Corners are rounded, so each is
-//! replaced by the tangent polygon around its arc, turning at most 22.5 degrees a node; that
-//! lengthens a path by at most 1.3% of its arcs. Edges are tested with the exact swept capsule,
-//! so paths are collision-free to the last bit, and there is no cell size to trade against time.
+//! A shortest path among convex obstacles is a taut string: it bends only at convex corners of the
+//! grown obstacles, and passes each of them tangentially. Corners are rounded, so each is replaced
+//! by the tangent polygon around its arc, which turns at most 22.5 degrees per node; that lengthens
+//! a path by at most 1.3% of its arcs. Edges are tested with the exact swept capsule, so paths are
+//! free of collisions to the last bit, and there is no cell size to trade against time.
 //!
-//! Tangency leaves one pair of nodes in sixty, and a node's edges are found when a search first
-//! expands it, then kept: the first queries in a house pay for the rooms they cross.
+//! Tangency excludes all but one in sixty pairs of nodes. A node's edges are computed when a search
+//! first expands it and then stored, so the first queries in a house pay for the rooms that they
+//! cross.
 //!
 //! Source: Lozano-Pérez & Wesley, "An algorithm for planning collision-free paths among
 //! polyhedral obstacles", CACM 1979; tangent pruning as in Oh & Leong, "Edge N-Level Sparse
@@ -23,7 +24,7 @@ use crate::{
     },
 };
 
-/// Length of a polyline.
+/// Return the length of a polyline.
 pub fn path_length_m(path_m: &[Vec2]) -> f64 {
     path_m.windows(2).map(|leg| distance_2d_m(leg[0], leg[1])).sum()
 }
@@ -41,22 +42,22 @@ pub struct VisibilityGraph {
     edges: Vec<OnceLock<Box<[Edge]>>>,
 }
 
-/// What one search has found of a graph: shortest distances from one point ([`VisibilityGraph::field`]).
+/// Shortest distances from one point, computed by [`VisibilityGraph::field`].
 ///
-/// It means something with the graph that made it alone.
+/// It is valid only with the graph that computed it.
 #[derive(Debug)]
 pub struct DistanceField {
     start_m: Vec2,
     search: Search,
 }
 
-/// A way to a node that a search may take: least bound first, then least node, so that ties have
-/// one outcome.
+/// An entry of the open list. The smallest bound comes first, then the smallest node, so that ties
+/// are resolved.
 #[derive(Debug, Clone, Copy)]
 struct Open {
-    /// Least length of a path through here.
+    /// Lower bound of the length of a path through this node.
     bound_m: f64,
-    /// Length so far.
+    /// Length of the path to this node.
     cost_m: f64,
     node: u32,
     parent: u32,
@@ -82,11 +83,11 @@ impl PartialEq for Open {
 
 impl Eq for Open {}
 
-/// Parent of the nodes that a search reaches straight from its start.
+/// Parent of the nodes that a search reaches directly from its start.
 const START: u32 = u32::MAX;
 
 impl VisibilityGraph {
-    /// Nodes around every obstacle, where `is_free` allows the agent to stand.
+    /// Build the graph: nodes around every obstacle where `is_free` allows the agent to stand.
     pub fn build(obstacles: &Obstacles, is_free: impl Fn(Vec2) -> bool) -> Self {
         let nodes: Vec<Node> =
             obstacles.iter().flat_map(|obstacle| corner_nodes(obstacle, &is_free)).collect();
@@ -94,25 +95,25 @@ impl VisibilityGraph {
         Self { nodes, edges }
     }
 
-    /// Number of places where paths may bend.
+    /// Return the number of places where paths may bend.
     pub fn num_nodes(&self) -> usize {
         self.nodes.len()
     }
 
-    /// The test of a node whether a taut path may go straight between it and `end_m`.
+    /// Return a test of whether a taut path may go straight between a node and `end_m`.
     ///
-    /// An end that lies inside the tangents of a corner cannot pass that corner tangentially: from
-    /// there every node will do.
+    /// From an end that lies inside the tangents of a corner, no path passes that corner
+    /// tangentially: there the test accepts every node.
     fn leads_to(obstacles: &Obstacles, end_m: Vec2) -> impl Fn(&Node) -> bool {
         let is_hugged = obstacles.is_hugged(end_m);
         move |node| is_hugged || node.is_tangent_to(end_m)
     }
 
-    /// Shortest path between two free points, both included; `None` if there is none.
+    /// Return the shortest path between two free points, both included; `None` if there is none.
     ///
     /// # Complexity
-    /// A* with the straight line as heuristic: O(k (n + log n)) for k expansions among n nodes
-    /// the first time, O(n + k log n) where earlier searches have been.
+    /// A* with the straight line as heuristic: O(k (n + log n)) for k expansions among n nodes the
+    /// first time, O(n + k log n) for nodes that earlier searches have expanded.
     pub fn shortest_path(
         &self,
         obstacles: &Obstacles,
@@ -128,8 +129,8 @@ impl VisibilityGraph {
         let leads_to_target = Self::leads_to(obstacles, target_m);
         while let Some(node) = search.pop(self, obstacles, start_m) {
             let here = &self.nodes[node as usize];
-            // Nodes come up by the length of the shortest path that may lead over them, so the
-            // first from where the target is seen is on the shortest of all.
+            // Nodes are expanded in the order of the shortest path that may lead over them, so the
+            // first node that sees the target is on the shortest path.
             if leads_to_target(here) && obstacles.is_clear_between(here.point_m, target_m) {
                 return Some(self.trace(&search, node, start_m, target_m));
             }
@@ -141,7 +142,8 @@ impl VisibilityGraph {
         None
     }
 
-    /// Shortest distances from a free point to many free points; infinite where there is no way.
+    /// Return the shortest distances from a free point to many free points; infinite where there is
+    /// no path.
     pub fn distances_m(
         &self,
         obstacles: &Obstacles,
@@ -152,10 +154,11 @@ impl VisibilityGraph {
         targets_m.iter().map(|&target_m| self.distance_m(obstacles, &field, target_m)).collect()
     }
 
-    /// Shortest distances from a free point to all places where paths may bend.
+    /// Compute the shortest distances from a free point to all places where paths may bend.
     ///
     /// # Complexity
-    /// Dijkstra over the whole graph: O(n log n + edges), and what edges are not known yet.
+    /// Dijkstra over the whole graph: O(n log n + edges), and the cost of edges that are not
+    /// computed yet.
     pub fn field(&self, obstacles: &Obstacles, start_m: Vec2) -> DistanceField {
         let mut search = Search::new(self.nodes.len());
         search.leave(self, obstacles, start_m, |_| 0.0);
@@ -168,10 +171,11 @@ impl VisibilityGraph {
         DistanceField { start_m, search }
     }
 
-    /// Shortest distance from a field's start to a free point; infinite where there is no way.
+    /// Return the shortest distance from a field's start to a free point; infinite if there is no
+    /// path.
     ///
     /// # Complexity
-    /// O(n), and one test of sight for each node that may be the last before the point.
+    /// O(n), and one visibility test for each node that may be the last before the point.
     pub fn distance_m(&self, obstacles: &Obstacles, field: &DistanceField, target_m: Vec2) -> f64 {
         let DistanceField { start_m, search } = field;
         if obstacles.is_clear_between(*start_m, target_m) {
@@ -180,7 +184,8 @@ impl VisibilityGraph {
         self.last_leg(obstacles, search, *start_m, target_m)
     }
 
-    /// Least cost to a target over the nodes that see it, given the costs to all nodes.
+    /// Return the smallest cost to a target over the nodes that see it, given the costs to all
+    /// nodes.
     fn last_leg(
         &self,
         obstacles: &Obstacles,
@@ -192,8 +197,8 @@ impl VisibilityGraph {
             START => start_m,
             parent => self.nodes[parent as usize].point_m,
         };
-        // A shortest path bends around the corner it touches. Where corners stand so close that
-        // some of their nodes are not free, only another way may be left.
+        // A shortest path bends around the corner that it touches. Where corners are so close that
+        // some of their nodes are not free, only other paths may remain.
         let bends = |i: usize, node: &Node| node.is_taut(parent_m(i), target_m);
         let taut_m = self.last_leg_over(obstacles, search, target_m, bends);
         if taut_m.is_finite() {
@@ -264,7 +269,7 @@ impl VisibilityGraph {
     }
 }
 
-/// Costs so far, and the open list.
+/// The state of a search: costs so far, and the open list.
 #[derive(Debug)]
 struct Search {
     cost_m: Vec<f64>,
@@ -283,8 +288,8 @@ impl Search {
         }
     }
 
-    /// Opens every node that a taut path from the start may go to first. Whether the start sees
-    /// it is asked when it comes up: of most nodes, never.
+    /// Open every node to which a taut path from the start may go first. Whether the start sees a
+    /// node is tested only when the node is expanded, which most nodes never are.
     fn leave(
         &mut self,
         graph: &VisibilityGraph,
@@ -302,7 +307,7 @@ impl Search {
         self.open = open.collect();
     }
 
-    /// Opens a way along an edge, if it is the best so far.
+    /// Open a path along an edge if it is the best so far.
     fn reach(&mut self, node: u32, parent: u32, cost_m: f64, ahead_m: impl Fn(u32) -> f64) {
         if cost_m < self.cost_m[node as usize] {
             self.cost_m[node as usize] = cost_m;
@@ -311,7 +316,7 @@ impl Search {
         }
     }
 
-    /// Closes the best open node.
+    /// Close the best open node.
     fn pop(
         &mut self,
         graph: &VisibilityGraph,
@@ -320,7 +325,8 @@ impl Search {
     ) -> Option<u32> {
         while let Some(Open { cost_m, node, parent, .. }) = self.open.pop() {
             let i = node as usize;
-            // An edge's cost is set when it is opened, a start's once it is known to see the node.
+            // The cost over an edge is set when the node is opened, the cost from the start once
+            // the start is known to see the node.
             let is_stale = self.is_closed[i] || cost_m > self.cost_m[i];
             if is_stale
                 || parent == START && !obstacles.is_clear_between(start_m, graph.nodes[i].point_m)

@@ -18,12 +18,12 @@ use crate::{
     },
 };
 
-/// Colours of surfaces whose material is not known.
+/// Colour of floors whose material is unknown; the next two are for walls and ceilings.
 const FLOOR: [u8; 3] = [170, 150, 125];
 const WALL: [u8; 3] = [222, 215, 200];
 const CEILING: [u8; 3] = [238, 236, 230];
 
-/// What a body is to the simulator.
+/// The kind of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BodyKind {
     /// An object of the house file.
@@ -40,19 +40,19 @@ pub enum BodyKind {
     Window,
 }
 
-/// A box that may be turned.
+/// A box with any orientation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrientedBox {
-    /// Middle.
+    /// Centre.
     pub centre_m: Vec3,
     /// Half edge lengths along its own axes.
     pub half_m: Vec3,
-    /// `world = rotation * own`.
+    /// Orientation: `world = rotation * own`.
     pub rotation: Mat3,
 }
 
 impl OrientedBox {
-    /// The box with no turn; of size zero at the origin for [`Aabb::EMPTY`].
+    /// Convert an axis-aligned box; [`Aabb::EMPTY`] becomes a box of size zero at the origin.
     pub fn of_aabb(aabb: &Aabb) -> Self {
         if *aabb == Aabb::EMPTY {
             return Self { centre_m: [0.0; 3], half_m: [0.0; 3], rotation: IDENTITY };
@@ -62,7 +62,8 @@ impl OrientedBox {
     }
 }
 
-/// A thing in the world; its instance id in images is its index in [`Scene::bodies`] plus 1.
+/// An object or a part of the building. Its instance id in images is its index in [`Scene::bodies`]
+/// plus 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
     /// Id of the object, wall, room, door or window in the house file.
@@ -70,17 +71,17 @@ pub struct Body {
     /// Asset category for objects, doors (`Doorway`, `Doorframe`) and windows (`Window`); `Wall`,
     /// `Floor` or `Ceiling` otherwise.
     pub category: String,
-    /// Its kind.
+    /// Kind of the body.
     pub kind: BodyKind,
     /// Convex parts, world frame; none for open-plan walls.
     pub parts: Vec<Part>,
     /// Box around the parts; [`Aabb::EMPTY`] if there are none.
     pub aabb: Aabb,
-    /// The same if nothing of it were opened or closed: what things are measured by does not change
-    /// with a lid.
+    /// Box around the parts as they are drawn by default, so that an object's measured size does
+    /// not change when it is opened.
     pub unopened: Aabb,
-    /// For objects the asset's box as it is placed (children at rest on their parent, which may be
-    /// below where the file has them), for the rest `aabb`.
+    /// The asset's box as it is placed for objects (children rest on their parent, which may be
+    /// lower than in the file); `aabb` for all others.
     pub oriented: OrientedBox,
 }
 
@@ -92,8 +93,8 @@ impl Body {
         Self { id, category, kind, parts, aabb, unopened: aabb, oriented }
     }
 
-    /// `parent` is what it stands on, if that is an object, and whether its shape is that of a known
-    /// asset.
+    /// Build the body of an object. `parent` is the object that it stands on, if any, and whether
+    /// that one's asset is known.
     fn object(object: &Object, asset: &Asset, parent: Option<(&Self, bool)>) -> Self {
         let rotation = euler_rotation_deg(object.rotation_deg);
         let place = |part: &Part| part.placed(object.position_m, &rotation);
@@ -136,7 +137,7 @@ impl Body {
 /// All bodies of a house.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
-    /// Structure first (rooms' floors and ceilings, walls, doors, windows), then objects in
+    /// The structure first (rooms' floors and ceilings, walls, doors, windows), then the objects in
     /// [`crate::house::House::objects`] order.
     pub bodies: Vec<Body>,
     /// Index in `bodies` of the first object.
@@ -146,12 +147,12 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The world of a house.
+    /// Build the bodies of a house.
     ///
     /// # Arguments
-    /// * `house` - where everything stands.
-    /// * `catalogue` - what the assets are.
-    /// * `unknown` - what to do about assets the catalogue does not know.
+    /// * `house` - positions of all objects and of the structure.
+    /// * `catalogue` - facts about the assets.
+    /// * `unknown` - treatment of assets that the catalogue does not contain.
     ///
     /// # Errors
     /// [`Error::House`] naming the object whose asset is unknown, unless `unknown` allows it.
@@ -169,20 +170,21 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The house without its objects.
+    /// Build the house without its objects.
     pub fn build_empty(house: &House, catalogue: &Catalogue) -> Self {
         let bodies = structure(house, catalogue);
         let bounds = bodies.iter().fold(Aabb::EMPTY, |bounds, body| bounds.union(body.aabb));
         Self { first_object: bodies.len(), bodies, bounds }
     }
 
-    /// This scene after some objects moved: equal to [`Scene::build`] of the new house.
+    /// Build this scene after some objects moved; the result is equal to [`Scene::build`] of the
+    /// new house.
     ///
     /// # Arguments
     /// * `house` - the house after the move; its structure must be this scene's.
-    /// * `catalogue`, `unknown` - as the scene was built with.
-    /// * `moved` - indices in `house.objects` of all objects whose pose or parent changed. What stands on
-    ///   them is built anew too, and so are objects that this scene does not hold.
+    /// * `catalogue`, `unknown` - the same with which the scene was built.
+    /// * `moved` - indices in `house.objects` of all objects whose pose or parent changed. Objects
+    ///   that stand on them and objects that this scene does not contain are built anew too.
     ///
     /// # Errors
     /// Those of [`Scene::build`].
@@ -204,7 +206,7 @@ impl Scene {
         let mut bodies = Vec::with_capacity(fixed.len() + house.objects.len());
         bodies.extend_from_slice(fixed);
         for (index, object) in house.objects.iter().enumerate() {
-            // Parents stand before their children.
+            // Parents come before their children.
             is_moved[index] |=
                 object.parent.is_some_and(|parent| parent < index && is_moved[parent]);
             let old = known.get(object.id.as_str()).filter(|_| !is_moved[index]);
@@ -218,7 +220,7 @@ impl Scene {
     }
 }
 
-/// The body of an object, given those of the objects before it: its parent is one of them.
+/// Build the body of an object, given the bodies of the objects before it, among them its parent.
 fn placed(
     house: &House,
     object: &Object,
@@ -234,7 +236,7 @@ fn placed(
     Ok(Body::object(object, &asset, parent))
 }
 
-/// Floors, ceilings, walls, doors and windows.
+/// Build the floors, ceilings, walls, doors and windows.
 fn structure(house: &House, catalogue: &Catalogue) -> Vec<Body> {
     let openings = Openings::of(house);
     let paint = |material: &str, tint: Option<[f64; 3]>, otherwise: [u8; 3]| {

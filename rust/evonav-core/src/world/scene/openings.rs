@@ -1,4 +1,4 @@
-//! What fills the holes in walls: doors with frame and leaf, doorframes, windows.
+//! Fillings of the holes in walls: doors with frame and leaf, doorframes, windows.
 
 use crate::{
     assets::{Asset, part::Part, shapes::lit},
@@ -7,7 +7,7 @@ use crate::{
     world::scene::structure::WallFrame,
 };
 
-/// Width of a door frame's or window frame's bars, at most.
+/// Largest width of the bars of a door frame or window frame.
 const BAR_M: f64 = 0.05;
 /// Half the depth of a door frame, about the wall's plane.
 const FRAME_HALF_M: f64 = 0.05;
@@ -15,12 +15,14 @@ const LEAF_M: f64 = 0.035;
 const WINDOW_HALF_M: f64 = 0.03;
 const SKY: [u8; 3] = [190, 215, 235];
 
-/// Frame, and for doors the leaf: turned about its hinge by `openness` of 90 degrees.
+/// Build the frame and, for doors, the leaf, which is turned about its hinge by `openness` times 90
+/// degrees.
 ///
-/// The leaf opens to the left of `wall0` seen from its start, as the ProcTHOR generator keeps free
-/// (away from `wall0`'s room): of 102 recorded positions within 1.6 m of a single open door 9 would
-/// stand in a leaf on the other side, none in one on this. Double doors have a leaf at each jamb.
-/// Which jamb carries the hinge of a single door neither files nor positions tell: the first.
+/// The leaf opens to the left of `wall0` seen from its start, away from `wall0`'s room, where
+/// ProcTHOR's generator leaves the floor free. Of 102 recorded positions within 1.6 m of a single
+/// open door, 9 would be inside a leaf on the other side and none inside a leaf on this side.
+/// Double doors have a leaf at each jamb. A single door has its hinge at the first jamb; neither
+/// files nor positions show which one it is.
 pub(super) fn door_parts(house: &House, door: &Opening, asset: Option<&Asset>) -> Vec<Part> {
     let Some((frame, along, up)) = hole(house, door) else { return Vec::new() };
     let colours = asset.map_or(&[][..], |asset| &asset.colours);
@@ -49,7 +51,8 @@ pub(super) fn door_parts(house: &House, door: &Opening, asset: Option<&Asset>) -
     parts
 }
 
-/// A leaf with two raised panels and a handle, hinged at `hinge` and reaching along `direction` (1 or -1) when closed.
+/// Build a leaf with two raised panels and a handle. It is hinged at `hinge` and reaches along
+/// `direction` (1 or -1) when closed.
 fn leaf(
     frame: &WallFrame,
     hinge: f64,
@@ -79,7 +82,7 @@ fn leaf(
         frame.cuboid(span(0.2 * width, 0.8 * width), level, depth, raised)
     };
     let [x, z] = frame.point_m(hinge, FRAME_HALF_M);
-    // Seen from above (x right, z up) a turn to the left is against the clock: negative yaw.
+    // Seen from above (x right, z up), a turn to the left is counter-clockwise: negative yaw.
     let turn = yaw_rotation(-direction * angle_rad);
     [board, handle, panel(0.08, 0.42), panel(0.52, 0.93)]
         .map(|part| turned_about(part, [x, 0.0, z], &turn))
@@ -94,7 +97,8 @@ fn turned_about(part: Part, pivot_m: Vec3, turn: &[[f64; 3]; 3]) -> Part {
     }
 }
 
-/// Frame, crossbars and a pane (opaque, the colour of the sky: nothing is outside).
+/// Build the frame, crossbars and a pane; the pane is opaque and has the colour of the sky, since
+/// nothing is outside.
 pub(super) fn window_parts(house: &House, window: &Opening, asset: Option<&Asset>) -> Vec<Part> {
     let Some((frame, along, up)) = hole(house, window) else { return Vec::new() };
     let trim = asset.and_then(|asset| asset.colours.first().copied()).unwrap_or([235, 235, 230]);
@@ -123,7 +127,8 @@ pub(super) fn window_parts(house: &House, window: &Opening, asset: Option<&Asset
     parts
 }
 
-/// The wall's frame and the hole's spans along and up; `None` if the wall is unknown or the hole empty.
+/// Return the wall's frame and the hole's spans along and up; `None` if the wall is unknown or the
+/// hole empty.
 fn hole(house: &House, opening: &Opening) -> Option<(WallFrame, Vec2, Vec2)> {
     let wall = house.walls.iter().find(|wall| wall.id == opening.wall0)?;
     let frame = WallFrame::of(wall)?;

@@ -1,24 +1,25 @@
-//! What stands on something comes to rest on it.
+//! Let objects come to rest on their support.
 //!
-//! House files keep where children were when they were put down: about a quarter of the recorded
+//! House files give the positions at which children were put down: about a quarter of the recorded
 //! ones hover 5 cm over their surface, and members of asset groups (pillows) hang at the height of
-//! the parent's box. AI2-THOR's physics lets them fall; so do we, onto the parent's own shape.
+//! the parent's box. AI2-THOR's physics lets them fall. Here they fall onto the parent's own shape.
 
 use crate::{
     assets::part::{Part, Primitive},
     geometry::{Aabb, Vec2, Vec3},
 };
 
-/// A support this little above the bottom is still one: recorded boxes dip into what holds them.
+/// Largest height of a support above the bottom of the box: recorded boxes dip into their support.
 const DIP_M: f64 = 0.03;
-/// Where under a box supports are looked for: its middle, and this far towards its corners.
+/// Share of the way from the middle to the corners of a box at which supports are looked for,
+/// besides the middle.
 const CORNER: f64 = 0.7;
 
-/// How far a box falls until it rests on one of `parts`.
+/// Return how far a box falls until it rests on one of `parts`.
 ///
-/// Beside them all (houses made without physics hang things over the free inside of corner
-/// counters) it falls to the floor, y = 0, if the parts are `exact` and not guessed. Under or between
-/// them, where something that the parts do not show must hold it, it stays.
+/// A box beside all parts falls to the floor, y = 0, if the parts are `exact` and not guessed:
+/// houses made without physics have objects over the free inside of corner counters. A box under or
+/// between the parts stays, because something that the parts do not show must hold it.
 pub(super) fn fall_m(parts: &[Part], aabb: &Aabb, exact: bool) -> f64 {
     let bottom_m = aabb.min_m[1];
     let [x, _, z] = aabb.centre_m();
@@ -41,7 +42,8 @@ pub(super) fn fall_m(parts: &[Part], aabb: &Aabb, exact: bool) -> f64 {
     }
 }
 
-/// Height of a part's level top over a ground point; `None` beside it, or where it is not level.
+/// Return the height of a part's level top over a ground point; `None` if the point is beside the
+/// part or the top is not level.
 fn top_m(part: &Part, point_m: Vec2) -> Option<f64> {
     if part.rotation[1][1] < 0.999 {
         return None;

@@ -1,9 +1,9 @@
-//! What a house is built of: floors, ceilings, walls with their openings, doors and windows.
+//! The structure of a house: floors, ceilings, and walls with their openings.
 //!
-//! ProcTHOR's walls are planes, one a room side. Here each side is a slab of [`WALL_SIDE_M`] on its
-//! room's side of the plane, so both sides keep their own colour and a wall between two rooms is
-//! 1 cm thick: recorded agents come as close as 0.18 m to the planes, and furniture stands
-//! 2 cm off them, so slabs may not be much thicker.
+//! ProcTHOR's walls are planes, one per side. Here each side is a slab of [`WALL_SIDE_M`] on its
+//! room's side of the plane, so both sides have their own colour and a wall between two rooms is 1
+//! cm thick. Slabs may not be much thicker: recorded agents come as close as 0.18 m to the planes,
+//! and furniture stands 2 cm from them.
 
 use crate::{
     assets::part::{Part, Primitive},
@@ -17,11 +17,11 @@ pub const WALL_SIDE_M: f64 = 0.005;
 pub const SLAB_M: f64 = 0.02;
 /// Height of rooms without any wall.
 const DEFAULT_HEIGHT_M: f64 = 2.5;
-/// Two walls this near to one line share their openings.
+/// Distance from one line within which two walls share their openings.
 const SAME_PLANE_M: f64 = 0.02;
-/// Slanted edges of a floor are followed in steps of this depth (ProcTHOR's rooms have none).
+/// Depth of the steps that follow slanted edges of a floor; ProcTHOR's rooms have no such edges.
 const STEP_M: f64 = 0.05;
-/// Most steps a floor may take, so that a huge room costs no more than a small one.
+/// Largest number of steps of a floor, so that a huge room costs no more than a small one.
 const MAX_STEPS: f64 = 200.0;
 
 /// A wall's own frame: origin at its foot's start, x along the foot, y up.
@@ -34,7 +34,7 @@ pub(super) struct WallFrame {
 }
 
 impl WallFrame {
-    /// `None` for a wall without length.
+    /// Create the frame of a wall; `None` for a wall without length.
     pub(super) fn of(wall: &Wall) -> Option<Self> {
         let length_m = distance_2d_m(wall.from_m, wall.to_m);
         (length_m > 1e-6).then(|| Self {
@@ -44,31 +44,31 @@ impl WallFrame {
         })
     }
 
-    /// Unit normal to the left of the foot, seen from above (x right, z up).
+    /// Return the unit normal to the left of the foot, seen from above (x right, z up).
     pub(super) fn left(&self) -> Vec2 {
         [-self.along[1], self.along[0]]
     }
 
-    /// Ground point `along_m` from the start and `left_m` to the left.
+    /// Return the ground point `along_m` from the start and `left_m` to the left.
     pub(super) fn point_m(&self, along_m: f64, left_m: f64) -> Vec2 {
         let left = self.left();
         std::array::from_fn(|i| self.from_m[i] + self.along[i] * along_m + left[i] * left_m)
     }
 
-    /// `[along, left]` of a ground point.
+    /// Return `[along, left]` of a ground point.
     fn local_m(&self, point_m: Vec2) -> Vec2 {
         let [dx, dz] = [point_m[0] - self.from_m[0], point_m[1] - self.from_m[1]];
         let left = self.left();
         [dx * self.along[0] + dz * self.along[1], dx * left[0] + dz * left[1]]
     }
 
-    /// Turns own x along the foot and own z to the left.
+    /// Return the rotation that turns own x along the foot and own z to the left.
     pub(super) fn rotation(&self) -> Mat3 {
         let [x, z] = self.along;
         [[x, 0.0, -z], [0.0, 1.0, 0.0], [z, 0.0, x]]
     }
 
-    /// A cuboid spanning `along`, `up` and `left` in this frame.
+    /// Build a cuboid that spans `along`, `up` and `left` in this frame.
     pub(super) fn cuboid(&self, along: Vec2, up: Vec2, left: Vec2, colour: [u8; 3]) -> Part {
         let spans = [along, up, left];
         let [middle, half_m] = [0.5, -0.5].map(|sign| spans.map(|[a, b]| 0.5 * b + sign * a));
@@ -89,7 +89,7 @@ struct Hole {
     up: Vec2,
 }
 
-/// Openings with the ends of their holes on the ground plane, found once a house.
+/// Openings with the ends of their holes on the ground plane, computed once per house.
 pub(super) struct Openings<'a> {
     holes: Vec<(&'a Opening, [Vec2; 2])>,
 }
@@ -105,7 +105,7 @@ impl<'a> Openings<'a> {
         Self { holes: house.doors.iter().chain(&house.windows).filter_map(place).collect() }
     }
 
-    /// Holes that fall into a wall: its own, and those of walls in the same plane.
+    /// Return the holes in a wall: its own, and those of walls in the same plane.
     fn cut_into(&self, frame: &WallFrame) -> Vec<Hole> {
         let local = |&(opening, ends): &(&Opening, [Vec2; 2])| {
             let [a, b] = ends.map(|end| frame.local_m(end));
@@ -118,7 +118,7 @@ impl<'a> Openings<'a> {
     }
 }
 
-/// The slabs of one wall side, openings cut out; none for open-plan walls.
+/// Build the slabs of one wall side, with openings cut out; none for open-plan walls.
 pub(super) fn wall_parts(
     house: &House,
     wall: &Wall,
@@ -146,7 +146,7 @@ pub(super) fn wall_parts(
     parts
 }
 
-/// `[low, high]` cut at both ends of each of `cuts`.
+/// Cut `[low, high]` at both ends of each of `cuts`.
 fn intervals(low: f64, high: f64, cuts: impl Iterator<Item = Vec2>) -> Vec<Vec2> {
     let mut marks: Vec<f64> = cuts.flatten().map(|mark| mark.clamp(low, high)).collect();
     marks.extend([low, high]);
@@ -154,7 +154,8 @@ fn intervals(low: f64, high: f64, cuts: impl Iterator<Item = Vec2>) -> Vec<Vec2>
     marks.windows(2).filter(|pair| pair[1] - pair[0] > 1e-6).map(|p| [p[0], p[1]]).collect()
 }
 
-/// Where the slab of a side lies, `[from, to]` to the left of the plane: in its room, or outside.
+/// Return the place of a side's slab, `[from, to]` to the left of the plane: in its room, or
+/// outside.
 fn side_of(house: &House, wall: &Wall, frame: &WallFrame) -> Vec2 {
     let room = house.rooms.iter().find(|room| room.id == wall.room_id);
     let probe = |sign: f64| frame.point_m(0.5 * frame.length_m, sign * 0.01);
@@ -169,7 +170,7 @@ fn side_of(house: &House, wall: &Wall, frame: &WallFrame) -> Vec2 {
     }
 }
 
-/// Height of a room: of its tallest wall, or of the house's.
+/// Return the height of a room: that of its tallest wall, or of the house's tallest wall.
 pub(super) fn room_height_m(house: &House, room: &Room) -> f64 {
     let tallest = |walls: &mut dyn Iterator<Item = &Wall>| {
         walls.map(|wall| wall.height_m).fold(0.0, f64::max)
@@ -179,7 +180,7 @@ pub(super) fn room_height_m(house: &House, room: &Room) -> f64 {
     if any > 0.0 { any } else { DEFAULT_HEIGHT_M }
 }
 
-/// Slabs that cover a polygon between heights `up`.
+/// Build slabs that cover a polygon between the heights `up`.
 ///
 /// Exact for polygons with edges along x and z; a slanted edge is covered in steps, never less.
 pub(super) fn slab_parts(polygon_m: &[Vec2], up: Vec2, colour: [u8; 3]) -> Vec<Part> {
@@ -197,7 +198,7 @@ pub(super) fn slab_parts(polygon_m: &[Vec2], up: Vec2, colour: [u8; 3]) -> Vec<P
         .collect()
 }
 
-/// Rectangles `[x, z]` that cover a polygon, in bands between its corners' z.
+/// Cover a polygon with rectangles `[x, z]`, in bands between its corners' z.
 fn covering_rectangles(polygon_m: &[Vec2]) -> Vec<[Vec2; 2]> {
     let mut marks: Vec<f64> = polygon_m.iter().map(|corner| corner[1]).collect();
     marks.sort_by(f64::total_cmp);
@@ -237,7 +238,7 @@ fn covering_rectangles(polygon_m: &[Vec2]) -> Vec<[Vec2; 2]> {
     rectangles
 }
 
-/// Adds a rectangle, or lengthens one that ends where it begins.
+/// Add a rectangle, or lengthen one that ends where it begins.
 fn push_merged(rectangles: &mut Vec<[Vec2; 2]>, new: [Vec2; 2]) {
     let [x, z] = new;
     if x[1] - x[0] <= 1e-9 {
