@@ -1,7 +1,5 @@
 //! What belongs together in recorded houses: by their ids, and without them.
 
-#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::recorded::{house_lines, house_of};

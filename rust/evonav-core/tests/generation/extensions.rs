@@ -1,8 +1,6 @@
 //! What goes beyond the paper, checked on the houses themselves: points inside solids instead of
 //! outlines, documents instead of layouts.
 
-#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use evonav_core::{

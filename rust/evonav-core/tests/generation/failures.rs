@@ -1,7 +1,5 @@
 //! Rooms that cannot take their modification: what is recorded, and that trying again helps.
 
-#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
-
 use crate::evolved::always;
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},

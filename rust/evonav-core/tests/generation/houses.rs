@@ -1,8 +1,6 @@
 //! What every modification must leave as it was, on recorded houses of all kinds: held to plain
 //! looks at the houses before and after, with points for solids and a search of its own for ways.
 
-#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::evolved::always;

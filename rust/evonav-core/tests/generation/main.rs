@@ -1,5 +1,7 @@
 //! Task generation.
 
+#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
+
 #[allow(dead_code, reason = "other test crates use the rest")]
 #[path = "../common/evolved.rs"]
 mod evolved;

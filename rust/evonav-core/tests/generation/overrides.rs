@@ -1,8 +1,6 @@
 //! Overrides draws against drawn ones: what is given as it was drawn changes nothing, what is given
 //! otherwise changes that alone.
 
-#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
-
 use evonav_core::{
     assets::{Catalogue, UnknownAssets},
     generation::{

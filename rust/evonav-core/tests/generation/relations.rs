@@ -1,8 +1,6 @@
 //! What is said of a target's surroundings, against the stage house itself: distances as the widest
 //! slab between the plans of two shapes, over directions, instead of polygons.
 
-#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
-
 use std::f64::consts::PI;
 
 use evonav_core::{

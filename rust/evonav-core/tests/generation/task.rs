@@ -1,8 +1,6 @@
 //! Generated tasks against what the paper asks of them, checked on the houses themselves: points
 //! inside solids instead of outlines, boxes instead of scenes.
 
-#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::evolved::always;

@@ -1,5 +1,7 @@
 //! Occupancy maps, object entries, sight lines and snapshots.
 
+#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
+
 mod objects;
 mod occupancy;
 mod sight_lines;

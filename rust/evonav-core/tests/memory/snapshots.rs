@@ -1,6 +1,4 @@
 //! Co-visibility clustering against a twin that works on sets, and by what must always hold.
-#![allow(clippy::unwrap_used, reason = "clippy.toml allows it in tests, but not in their helpers")]
-
 use std::collections::BTreeSet;
 
 use evonav_core::memory::snapshots::{Frame, Located, Snapshot, two_means, update_snapshots};
