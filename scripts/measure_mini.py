@@ -19,6 +19,7 @@ from mini_frames import LabelledFrame, frames, house_files
 
 from evonav.perception.detector import DetectorView, Found
 from evonav.perception.mini import MiniDetector
+from evonav.statistics import ClusterBootstrap
 
 MIN_AREA_PX = 90
 """Smaller objects are no detections under ground truth either (0.1% of the image): finding one is not held against."""
@@ -98,10 +99,12 @@ def count(house: House, frame: LabelledFrame, found: Found) -> None:
 def tell(name: str, houses: list[House], measure: Callable[[list[House]], tuple[float, int]]) -> None:
     """Prints a figure, its interval and what it is over."""
     value, num = measure(houses)
-    rng = np.random.default_rng(0)
-    draws = [measure([houses[i] for i in rng.integers(len(houses), size=len(houses))])[0] for _ in range(200)]
-    low, high = np.nanpercentile(draws, [2.5, 97.5])
-    print(f"{name}: {value:.3f} [{low:.3f}, {high:.3f}], n = {num}")
+    bootstrap = ClusterBootstrap([str(i) for i in range(len(houses))], num_resamples=200)
+    counts = bootstrap.draws[:, bootstrap.cluster_of].astype(int)
+    draws = [np.repeat(np.arange(len(houses)), row) for row in counts]
+    found = bootstrap.estimate(value, np.array([measure([houses[i] for i in drawn])[0] for drawn in draws]), num)
+    ends = "" if found.ci95 is None else " [{:.3f}, {:.3f}]".format(*found.ci95)
+    print(f"{name}: {value:.3f}{ends}, n = {num}")
 
 
 def recall(houses: list[House], low: int = 0, high: int = 10**9) -> tuple[float, int]:

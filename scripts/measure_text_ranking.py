@@ -17,6 +17,7 @@ from evonav.decision.text.features import similarity_of_label
 from evonav.decision.text.language import parse_goal
 from evonav.decision.text.matcher import Matcher
 from evonav.evaluation.run.components import load_case
+from evonav.statistics import ClusterBootstrap
 from evonav.tasks.language import noun_of
 from evonav.world.embedded import EmbeddedSimulator
 
@@ -81,17 +82,13 @@ def main() -> None:
                 meaning = {label: similarity_of_label(text, label) for label in labels}
                 for name, scores in (("words", words), ("text", meaning)):
                     first = sorted(labels, key=lambda label: (-scores[label], label))[:5]
-                    hits[kind, name][task.name].append(goal.category in first)
-    rng = np.random.default_rng(0)
+                    hits[kind, name][case.house].append(goal.category in first)
     for (kind, name), houses in hits.items():
-        rows = list(houses.values())
-        draws = [
-            np.mean([hit for i in rng.integers(len(rows), size=len(rows)) for hit in rows[i]]) for _ in range(1000)
-        ]
-        low, high = np.percentile(draws, [2.5, 97.5])
-        num = sum(map(len, rows))
-        share = np.mean([hit for row in rows for hit in row])
-        print(f"{kind}, by {name}: {share:.3f} [{low:.3f}, {high:.3f}], n = {num} in {len(rows)} houses")
+        names = [house for house, found in houses.items() for _ in found]
+        values = np.array([[hit] for found in houses.values() for hit in found], np.float64)
+        (share,) = ClusterBootstrap(names).column_means(values)
+        ends = "" if share.ci95 is None else " [{:.3f}, {:.3f}]".format(*share.ci95)
+        print(f"{kind}, by {name}: {share.value:.3f}{ends}, n = {share.n} in {share.num_clusters} houses")
 
 
 if __name__ == "__main__":
