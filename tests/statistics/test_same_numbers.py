@@ -17,7 +17,7 @@ import evonav
 from evonav.cli import app
 from evonav.statistics import ClusterBootstrap
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 HOUSES = Path(evonav.__file__).parent / "data" / "houses.jsonl.gz"
 NUM_HOUSES, NUM_HOUSES_WITH_TWO_TASKS = 8, 4
