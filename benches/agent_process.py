@@ -14,7 +14,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from evonav.agents.agent import AgentAction, Sensing, Stop
-from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, DecisionSpec, RemoteAgent
+from evonav.component import Component
+from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.parallel.local import one_thread_each
@@ -87,7 +88,9 @@ def _figures(times_s: list[tuple[float, float]]) -> tuple[float, float]:
 @contextmanager
 def _agent() -> Iterator[RemoteAgent]:
     with closing(AgentProcesses(AgentHosting())) as processes:
-        agent = RemoteAgent(processes, "benches.agent_process:Idle", DecisionSpec(), 0)
+        agent = RemoteAgent(
+            processes, "benches.agent_process:Idle", Component("evonav.decision.backends:text_match"), 0
+        )
         agent.begin_task(TaskInfo("bench", 1, 50, MapFrame(100, 100, 0.1, (0.0, 0.0)), 0))
         agent.begin_stage(StageInput(1, "Chair", "", "", "", np.zeros((SIDE_PX, SIDE_PX, 3), np.uint8)))
         yield agent

@@ -119,9 +119,9 @@ def run() -> str:
 def timed(name: str) -> Led:
     """An agent after its rounds."""
     backend = Backend()
-    simulator, perception = backend.make_simulator(), backend.make_perception()
+    simulator, perception = backend.simulator.create(), backend.perception.create()
     case = _case(backend)
-    agent = make_agent(name, backend.make_decision(0))
+    agent = make_agent(name, backend.decision.create(0))
     led = Led(agent, lambda led: _tour(led, case, simulator, perception))
     _play(case, name, led, simulator, perception)
     return led
@@ -137,7 +137,7 @@ def growth_mb(name: str) -> float:
 
 def _measure_growth(name: str) -> None:
     backend = Backend()
-    simulator, perception = backend.make_simulator(), backend.make_perception()
+    simulator, perception = backend.simulator.create(), backend.perception.create()
     case = _case(backend)
     agent: Any = make_agent(name, TextMatchWithImages())
     simulator.reset(case.stages[0].house_json, case.start)
@@ -157,7 +157,7 @@ def _peak_mb() -> float:
 
 def _case(backend: Backend) -> EpisodeSpec:
     with bundled_tasks() as folder:
-        return backend.load_case(task_file(folder / TASK).path)
+        return backend.tasks.create(task_file(folder / TASK).path)
 
 
 def _play(case: EpisodeSpec, name: str, led: Led, simulator: Simulator, perception: Perception) -> None:

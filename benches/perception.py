@@ -86,12 +86,11 @@ def _rounds() -> list[Round]:
 
 def _perceiver(word: str, rounds: Sequence[Round]) -> tuple[Callable[[int], object], bool]:
     """What perceives round `i`, and whether it needs colours."""
-    read = read_word(word)
-    backend = Backend(perception=read.make, perception_options=read.options)
+    backend = Backend(perception=read_word(word))
     goal = StageInput(1, "Bed", "the bed", "the bed", "Find the bed.", np.zeros((300, 300, 3), np.uint8))
     perceptions: list[Perception] = []
     for number, one in enumerate(rounds):
-        perception = backend.make_perception()
+        perception = backend.perception.create()
         perception.begin_stage(StageScene(str(number), goal, "fu", 0, one.simulator.objects))
         perceptions.append(perception)
     return (lambda number: perceptions[number].perceive(rounds[number].frames)), perceptions[0].needs_rgb

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from evonav.component import Component
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
@@ -26,9 +27,9 @@ from evonav.world.simulator import Simulator
 
 EMBEDDED = Backend()
 THOR = Backend(
-    simulator="evonav.evaluation.run.components:ai2thor_simulator",
-    simulator_options={"executable": "evonav"},
-    host_options={"timeout_s": 60.0},
+    simulator=Component(
+        "evonav.evaluation.run.components:ai2thor_simulator", {"executable": "evonav"}, {"timeout_s": 60.0}
+    )
 )
 
 
@@ -66,11 +67,11 @@ def differing_images(run: Path, tasks: Sequence[TaskFile], every: int = 1) -> It
     """Where the images of the two simulators differ, at the poses of a run; ends with how many were compared."""
     num_images = 0
     with ExitStack() as stack, RunStore(run) as store:
-        embedded, thor = EMBEDDED.make_simulator(), THOR.make_simulator()
+        embedded, thor = EMBEDDED.simulator.create(), THOR.simulator.create()
         for simulator in (embedded, thor):
             stack.callback(simulator.close)
         for task in tasks:
-            stages = EMBEDDED.load_case(task.path).stages
+            stages = EMBEDDED.tasks.create(task.path).stages
             records = list(store.records(task_id=task.task_id))
             for number, stage in enumerate(stages, start=1):
                 starts = {embedded.reset(stage.house_json), thor.reset(stage.house_json)}

@@ -198,8 +198,7 @@ def _plot(runs: Mapping[str, Run], measure: str) -> CurvePlot:
 
 
 def _backend(word: str) -> Backend:
-    perception = read_word(word)
-    return Backend(perception=perception.make, perception_options=perception.options)
+    return Backend(perception=read_word(word))
 
 
 def _arguments() -> argparse.Namespace:

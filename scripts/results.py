@@ -16,6 +16,7 @@ from pathlib import Path
 
 from behaviour_tables import STRATA, behaviour_of, cause_share_table, counter_table, end_table, success_by_group
 
+from evonav.component import Component
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import Progress, RunConfig, evaluate
@@ -73,7 +74,9 @@ def spread(tasks: Sequence[TaskFile], num: int) -> list[TaskFile]:
 
 def noisy_backend(rate: float) -> Backend:
     """The text matcher, of whose answers a share is another valid one."""
-    return Backend(decision_options={"noise": {"wrong": rate}} if rate else {})
+    return Backend(
+        decision=Component("evonav.decision.backends:text_match", {"noise": {"wrong": rate}} if rate else {})
+    )
 
 
 def parts(out: Path, agents: Sequence[str]) -> dict[str, str]:

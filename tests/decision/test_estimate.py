@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from evonav.component import Component
 from evonav.decision.vlm.errors import VlmError
 from evonav.decision.vlm.ledger import Ledger
 from evonav.decision.vlm.mock_answers import mock_answer
@@ -26,9 +27,7 @@ def test_an_estimate_counts_what_a_model_that_answers_alike_is_asked(tmp_path: P
         (whole,) = estimate_run(["fu"], tasks, config, {"model": "m"})
         with serving(lambda request: {"text": mock_answer(request)}) as stub:
             host = {"server": {"base_url": stub.url}, "ledger": str(tmp_path / "ledger.sqlite")}
-            backend = Backend(
-                decision="evonav.decision.backends:vlm", decision_options={"model": "m"}, decision_host_options=host
-            )
+            backend = Backend(decision=Component("evonav.decision.backends:vlm", {"model": "m"}, host))
             evaluate(
                 ["fu"],
                 tasks,
@@ -79,9 +78,7 @@ def test_a_run_of_several_processes_stops_at_its_limit(tmp_path: Path) -> None:
             "max_cost_usd": 0.03,
         }
         backend = Backend(
-            decision="evonav.decision.backends:vlm",
-            decision_options={"model": "m", "request": {"max_tokens": 250}},
-            decision_host_options=host,
+            decision=Component("evonav.decision.backends:vlm", {"model": "m", "request": {"max_tokens": 250}}, host)
         )
         config = RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=2))
         evaluate(["fu"], task_files(directory, 2), tmp_path / "run", config=config, num_workers=2)

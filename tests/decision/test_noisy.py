@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scripted_model import Scripted
 
+from evonav.component import Component
 from evonav.decision.noisy import GARBAGE, NoiseRates, Noisy
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.query import QuerySession
@@ -133,7 +134,9 @@ def test_rates_that_make_no_sense_are_told(rates: dict[str, float], words: str) 
 def noisy_run(folder: Path, num_workers: int, seed: int = 0) -> list[str]:
     noise = {"wrong": 0.2, "unparsable": 0.3, "refusal": 0.2}
     config = RunConfig(
-        seed=seed, backend=Backend(decision_options={"noise": noise}), protocol=ProtocolConfig(max_rounds=3)
+        seed=seed,
+        backend=Backend(decision=Component("evonav.decision.backends:text_match", {"noise": noise})),
+        protocol=ProtocolConfig(max_rounds=3),
     )
     with bundled_tasks() as directory:
         evaluate(["fu", "ftu"], task_files(directory, 1), folder, config=config, num_workers=num_workers)

@@ -9,6 +9,7 @@ import jsonschema
 import numpy as np
 import pytest
 
+from evonav.component import Component
 from evonav.decision.noisy import GARBAGE
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.question import AnswerError, Question, Reply
@@ -50,7 +51,8 @@ class Collecting:
 def asked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[Question[Any], Reply[Any]]]]:
     folder: Path = tmp_path_factory.mktemp("runs")
     config = RunConfig(
-        backend=Backend(decision=f"{__name__}:Collecting"), protocol=ProtocolConfig(max_rounds=9, max_actions=60)
+        backend=Backend(decision=Component(f"{__name__}:Collecting")),
+        protocol=ProtocolConfig(max_rounds=9, max_actions=60),
     )
     with bundled_tasks() as directory:
         agents = ["ftu", "3d-mem", "msgnav", "unigoal", "unigoal-paper"]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from evonav.component import Component
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.mock_server import FAULTS, MockReply, faulty, without_schemas
 from evonav.decision.vlm.response_cache import ResponseCache
@@ -57,11 +58,7 @@ class Run:
             "cache": str(self.folder / "exchanges.sqlite"),
             "mode": "auto" if url else "replay",
         }
-        backend = Backend(
-            decision="evonav.decision.backends:vlm",
-            decision_options={"model": "gpt-4o", **options},
-            decision_host_options=host,
-        )
+        backend = Backend(decision=Component("evonav.decision.backends:vlm", {"model": "gpt-4o", **options}, host))
         config = RunConfig(
             backend=backend, protocol=ProtocolConfig(max_rounds=self.max_rounds, max_actions=self.max_actions)
         )

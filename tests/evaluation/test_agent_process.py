@@ -16,13 +16,13 @@ from test_engine import CONFIG, TOY, records, texts
 from toy_house import write_tasks
 
 from evonav.agents.registry import BUILT_IN
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.hosting.process import (
     LOG_NAME,
     AgentHosting,
     AgentProcesses,
-    DecisionSpec,
     RemoteAgent,
     check_importable,
 )
@@ -215,11 +215,13 @@ import sys
 from pathlib import Path
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.listing import task_files
+from evonav.component import Component
 from evonav.evaluation.run.components import Backend
 
 if __name__ == "__main__":
     root = Path(sys.argv[1])
-    config = RunConfig(backend=Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator"))
+    backend = Backend(tasks=Component("toy_house:load_case"), simulator=Component("toy_house:make_simulator"))
+    config = RunConfig(backend=backend)
     evaluate(["unruly_agents:Announcing"], task_files(Path(sys.argv[2])), root / "run", config=config, num_workers=1)
 """
 
@@ -275,7 +277,7 @@ def digests(observation):
 @pytest.fixture
 def echo():
     processes = AgentProcesses(AgentHosting(timeout_s=30.0))
-    agent = RemoteAgent(processes, "unruly_agents:Echo", DecisionSpec(), 0)
+    agent = RemoteAgent(processes, "unruly_agents:Echo", Component("evonav.decision.backends:text_match"), 0)
     agent.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
     agent.begin_stage(StageInput(1, "Chair", "a", "b", "c", np.zeros((8, 8, 3), np.uint8)))
     yield agent
@@ -299,7 +301,10 @@ def test_arrays_cross_the_border_whatever_their_layout_and_size(echo):
 
 def test_processes_are_reused_and_agents_are_not():
     processes = AgentProcesses(AgentHosting(timeout_s=30.0))
-    first, second = (RemoteAgent(processes, "toy_agents:Explorer", DecisionSpec(), 0) for _ in range(2))
+    first, second = (
+        RemoteAgent(processes, "toy_agents:Explorer", Component("evonav.decision.backends:text_match"), 0)
+        for _ in range(2)
+    )
     first.begin_task(TaskInfo("t", 1, 50, MapFrame(2, 3, 0.1, (0.0, 0.0)), 0))
     nothing = Observation((), Pose(0.0, 0.9, 0.0, 0.0), True, 3)
     assert first.act(nothing).reason == "nothing left to explore"

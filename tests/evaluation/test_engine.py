@@ -11,6 +11,7 @@ from itertools import pairwise
 import pytest
 from toy_house import write_tasks
 
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
@@ -23,7 +24,7 @@ from evonav.report.run import load_run
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 
-TOY = Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator")
+TOY = Backend(tasks=Component("toy_house:load_case"), simulator=Component("toy_house:make_simulator"))
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
 
 
@@ -256,13 +257,14 @@ from pathlib import Path
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.listing import task_files
 from evonav.evaluation.hosting.process import AgentHosting
+from evonav.component import Component
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.protocol import ProtocolConfig
 
 if __name__ == "__main__":
     root = Path(sys.argv[1])
     config = RunConfig(
-        backend=Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator"),
+        backend=Backend(tasks=Component("toy_house:load_case"), simulator=Component("toy_house:make_simulator")),
         protocol=ProtocolConfig(max_rounds=12),
     )
     show = lambda news: print(news.num_done, flush=True)

@@ -14,6 +14,7 @@ from power_loss import Disk, read_log
 from test_engine import CONFIG
 from toy_house import EPISODES, write_tasks
 
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
@@ -128,19 +129,20 @@ def many_tasks(folder, num):
 
 
 CHEAP = RunConfig(
-    backend=Backend(cases="chaos_house:load_case", simulator="chaos_house:make_simulator"),
+    backend=Backend(tasks=Component("chaos_house:load_case"), simulator=Component("chaos_house:make_simulator")),
     protocol=ProtocolConfig(max_rounds=3),
 )
 DRIVER = """
 import sys
 from pathlib import Path
+from evonav.component import Component
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.listing import task_files
 from evonav.evaluation.protocol import ProtocolConfig
 
 config = RunConfig(
-    backend=Backend(cases="chaos_house:load_case", simulator="chaos_house:make_simulator"),
+    backend=Backend(tasks=Component("chaos_house:load_case"), simulator=Component("chaos_house:make_simulator")),
     protocol=ProtocolConfig(max_rounds=3),
 )
 evaluate(["random-walk"], task_files(Path(sys.argv[1])), Path(sys.argv[2]), config=config, num_workers=2, num_retries=5)

@@ -11,6 +11,7 @@ import pytest
 from toy_house import CHAIR_AWAY, OBJECTS, ToySimulator, episode_spec, write_tasks
 
 from evonav.agents.agent import NavigateTo, Sensing
+from evonav.component import Component
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import OracleBaseline
 from evonav.evaluation.protocol import ProtocolConfig
@@ -120,7 +121,7 @@ def process_loot(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TOY_LOOT", str(found))
         config = RunConfig(
-            backend=Backend(cases="toy_house:load_case", simulator="toy_house:make_simulator"),
+            backend=Backend(tasks=Component("toy_house:load_case"), simulator=Component("toy_house:make_simulator")),
             protocol=ProtocolConfig(max_rounds=2),
         )
         evaluate(["prying_agent:Prying"], task_files(folder / "secret-tasks", 1), folder / "secret-run", config=config)

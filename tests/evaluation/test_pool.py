@@ -11,6 +11,7 @@ from chaos import children
 from test_engine import CONFIG, texts
 from toy_house import write_tasks
 
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind
@@ -33,10 +34,8 @@ def test_runs_share_workers_and_are_as_if_alone(tasks, tmp_path):
     folder = tmp_path / "starts"
     folder.mkdir()
     backend = Backend(
-        cases="toy_house:load_case",
-        simulator="flaky_simulator:make",
-        simulator_options={"num_losses": 0},
-        host_options={"folder": str(folder)},
+        tasks=Component("toy_house:load_case"),
+        simulator=Component("flaky_simulator:make", {"num_losses": 0}, {"folder": str(folder)}),
     )
     configs = [RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=3), seed=seed) for seed in (0, 1)]
     together = [RunRequest(("random-walk",), tasks, tmp_path / f"cell-{i}", config) for i, config in enumerate(configs)]
@@ -80,7 +79,7 @@ def test_an_exception_is_kept_with_its_traceback_and_not_tried_again(tasks, tmp_
 
 
 def test_a_task_that_cannot_be_read_is_the_harness_failure_of_every_stage(tasks, tmp_path):
-    backend = Backend(cases="toy_house:no_such_function", simulator=CONFIG.backend.simulator)
+    backend = Backend(tasks=Component("toy_house:no_such_function"), simulator=CONFIG.backend.simulator)
     config = RunConfig(backend=backend, protocol=CONFIG.protocol)
     (summary,) = evaluate([AGENT], tasks[:1], tmp_path / "run", config=config, num_workers=0, num_retries=1)
     assert (summary.counts["errored"], summary.counts["not_run"]) == (1, 2)

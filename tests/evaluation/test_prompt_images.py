@@ -49,7 +49,7 @@ class Recorder:
 def recorded(request):
     backend = Backend()
     with bundled_tasks() as folder:
-        case = backend.load_case(task_file(folder / TASK).path)
+        case = backend.tasks.create(task_file(folder / TASK).path)
 
     def answer(question):
         if question.kind == "verify":
@@ -59,7 +59,7 @@ def recorded(request):
     model = Scripted(answer, needs_images=True)
     recorder = Recorder(FailThenUpdate(FailThenUpdateConfig(verify_views=request.param), model), model)
     protocol = ProtocolConfig(max_rounds=14)
-    episode = Episode(case, "ftu", recorder, backend.make_simulator(), backend.make_perception(), protocol, 0)
+    episode = Episode(case, "ftu", recorder, backend.simulator.create(), backend.perception.create(), protocol, 0)
     assert next(iter(episode.run())).record.is_scored
     return request.param, recorder
 

@@ -9,6 +9,7 @@ from toy_house import ToySimulator, stage_case
 from evonav.agents.agent import Sensing
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.unigoal.bev import BevMap
+from evonav.component import Component
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
 from evonav.evaluation.episode.spec import EpisodeSpec
@@ -157,7 +158,7 @@ def test_all_agents_of_a_run_meet_the_same_errors_and_another_seed_others(tmp_pa
     seen = []
     for seed in (0, 1):
         path = tmp_path / f"{seed}.txt"
-        backend = Backend(perception="seeds_seen:Noting", perception_options={"path": str(path)})
+        backend = Backend(perception=Component("seeds_seen:Noting", {"path": str(path)}))
         config = RunConfig(seed=seed, backend=backend, protocol=ProtocolConfig(max_rounds=1))
         with bundled_tasks() as folder:
             evaluate(["stay-still", "shortest-path"], task_files(folder, 2), tmp_path / f"run{seed}", config=config)

@@ -6,6 +6,7 @@ import pytest
 from test_engine import CONFIG, records, texts
 from toy_house import write_tasks
 
+from evonav.component import Component
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
@@ -25,10 +26,8 @@ def tasks(tmp_path):
 def flaky(folder, **options):
     folder.mkdir()
     backend = Backend(
-        cases="toy_house:load_case",
-        simulator="flaky_simulator:make",
-        simulator_options=options,
-        host_options={"folder": str(folder)},
+        tasks=Component("toy_house:load_case"),
+        simulator=Component("flaky_simulator:make", options, {"folder": str(folder)}),
     )
     return RunConfig(backend=backend, protocol=CONFIG.protocol)
 

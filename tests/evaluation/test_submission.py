@@ -112,7 +112,7 @@ def altered(document: Any, path: tuple[str | int, ...]) -> Any:
 
 def test_any_altered_field_of_a_record_is_found_by_carrying_the_actions_out(run: Path, tasks: list[TaskFile]) -> None:
     backend = Backend()
-    case, simulator = backend.load_case(tasks[0].path), backend.make_simulator()
+    case, simulator = backend.tasks.create(tasks[0].path), backend.simulator.create()
     with RunStore(run) as store:
         records = {record.stage: record for record in store.records("ftu")}
     document = json.loads(records[1].model_dump_json())
@@ -144,7 +144,7 @@ def test_any_altered_field_of_a_record_is_found_by_carrying_the_actions_out(run:
 def test_record_in_another_place_is_found(run: Path, tasks: list[TaskFile]) -> None:
     """Rounds left out, and a stage's record in place of another's."""
     backend = Backend()
-    case, simulator = backend.load_case(tasks[0].path), backend.make_simulator()
+    case, simulator = backend.tasks.create(tasks[0].path), backend.simulator.create()
     with RunStore(run) as store:
         records = {record.stage: record for record in store.records("ftu")}
     first = records[1]

@@ -14,6 +14,7 @@ from toy_house import CHAIR_AWAY, OBJECTS, make_simulator, write_tasks
 
 from evonav.agents.frontier_update.agent import FrontierUpdate
 from evonav.agents.nearest_frontier import NearestFrontier
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.protocol import ProtocolConfig
@@ -26,7 +27,7 @@ from evonav.replay.types import EXPLORED, FREE
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 
-TOY = Backend(cases="toy_house:load_case", simulator="test_trace:colour_simulator")
+TOY = Backend(tasks=Component("toy_house:load_case"), simulator=Component("test_trace:colour_simulator"))
 CONFIG = RunConfig(backend=TOY, protocol=ProtocolConfig(max_rounds=12))
 
 
@@ -140,7 +141,7 @@ def test_a_replay_equals_the_records_and_has_every_round(tmp_path, agent):
 def test_views_are_drawn_in_colours_at_the_recorded_poses(fu_run, fu_stages):
     stages = fu_stages
     simulator = ColourSimulator()
-    case = TOY.load_case(fu_run.parent / "tasks" / "toy-moved")
+    case = TOY.tasks.create(fu_run.parent / "tasks" / "toy-moved")
     simulator.reset(case.stages[2].house_json)
     for step in stages[2].rounds:
         assert len(step.views) == (7 if step.record.round == 0 else 3)

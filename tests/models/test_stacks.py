@@ -49,7 +49,7 @@ def without_published_hash(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def config_of(word: str, models: Path, **protocol: int) -> RunConfig:
     settings = PerceptionSettings(make=word, options={"models": str(models), "device": "cpu"})
-    return RunConfig(protocol=ProtocolConfig(**protocol), backend=settings.backend(Backend()))
+    return RunConfig(protocol=ProtocolConfig(**protocol), backend=Backend(perception=settings.component()))
 
 
 def run(folder: Path, config: RunConfig, agents: tuple[str, ...]) -> None:
@@ -89,7 +89,7 @@ def test_a_replay_finds_the_models_where_the_run_had_them(
         (task,) = task_files(tasks, 1)
         replay = RunReplay(tmp_path / "run", lambda _: task.path)
         stages = list(replay.episode("fu", task.task_id))
-        assert replay.backend.perception_host_options == {"models": str(tiny_models)}
+        assert replay.backend.perception.host_options == {"models": str(tiny_models)}
         assert [stage.record.stage for stage in stages] == list(range(1, task.num_stages + 1))
         assert not any(stage.differences for stage in stages)
         monkeypatch.setenv(weights.MODELS_VARIABLE, str(tmp_path / "gone"))

@@ -130,7 +130,7 @@ def test_weights_that_are_not_numbers_are_refused() -> None:
 
 
 def test_a_whole_episode_with_it(tmp_path: Path) -> None:
-    backend = PerceptionSettings(make="predicted:mini").backend(Backend())
+    backend = Backend(perception=PerceptionSettings(make="predicted:mini").component())
     config = RunConfig(protocol=ProtocolConfig(max_rounds=4), backend=backend)
     told = []
     for folder, num_workers in ((tmp_path / "a", 0), (tmp_path / "b", 2)):

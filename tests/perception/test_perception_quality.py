@@ -12,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.run.components import Backend
 from evonav.perception.words import GROUND_TRUTH
@@ -26,8 +27,11 @@ from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files
 
 SPECS = [
-    PerceptionSpec("gt", GROUND_TRUTH),
-    *(PerceptionSpec(name, f"erring_perceptions:{name}") for name in ("missing_a_third", "confusing", "deep")),
+    PerceptionSpec("gt", Component(GROUND_TRUTH)),
+    *(
+        PerceptionSpec(name, Component(f"erring_perceptions:{name}"))
+        for name in ("missing_a_third", "confusing", "deep")
+    ),
 ]
 CONFIG = TourConfig(views_per_room=6, num_houses=2)
 
@@ -197,7 +201,7 @@ def test_workers_change_nothing_and_what_is_there_is_not_done_again(folder, task
 
 def test_tours_are_walks_through_every_room_and_the_same_each_time(tasks):
     backend = Backend()
-    case, simulator = backend.load_case(tasks[0].path), backend.make_simulator()
+    case, simulator = backend.tasks.create(tasks[0].path), backend.simulator.create()
 
     def places(seed):
         simulator.reset(case.stages[0].house_json, case.start)
@@ -212,7 +216,7 @@ def test_tours_are_walks_through_every_room_and_the_same_each_time(tasks):
 
 
 def test_a_perception_that_fails_leaves_the_others_whole(tasks, tmp_path):
-    specs = [SPECS[0], PerceptionSpec("breaking", "erring_perceptions:breaking")]
+    specs = [SPECS[0], PerceptionSpec("breaking", Component("erring_perceptions:breaking"))]
     done = measure(specs, tasks[:1], tmp_path, config=CONFIG, num_workers=0)
     assert done.tasks == ()
     assert done.failures == (("breaking", tasks[0].task_id, "RuntimeError: out of memory"),)
@@ -227,12 +231,12 @@ def test_mistakes_are_named(folder, tasks, tmp_path):
     with pytest.raises(InvalidArgumentError, match="named twice: gt, gt"):
         measure([SPECS[0], SPECS[0]], tasks, tmp_path)
     with pytest.raises(InvalidArgumentError, match="cannot be imported"):
-        measure([PerceptionSpec("mine", "no_such:thing")], tasks, tmp_path)
+        measure([PerceptionSpec("mine", Component("no_such:thing"))], tasks, tmp_path)
     with pytest.raises(InvalidArgumentError, match="views_per_room = 0"):
         TourConfig(views_per_room=0)
     with pytest.raises(StoreError, match=r"tour[.]seed: there 0, asked 1"):
         measure(SPECS[:1], tasks, folder, config=TourConfig(6, 2, 1))
-    other = PerceptionSpec("deep", "erring_perceptions:confusing")
+    other = PerceptionSpec("deep", Component("erring_perceptions:confusing"))
     with pytest.raises(StoreError, match=r"deep[.]make"):
         measure([other], tasks, folder, config=CONFIG)
     with pytest.raises(StoreError, match=r"holds no perception[.]json"):
@@ -286,7 +290,7 @@ def test_the_command(tasks, tmp_path):
 
 
 def test_weights_are_the_same_for_all_records(tasks, tmp_path, monkeypatch):
-    spec = PerceptionSpec("weighted", "erring_perceptions:weighted")
+    spec = PerceptionSpec("weighted", Component("erring_perceptions:weighted"))
     measure([spec], tasks[:1], tmp_path, config=CONFIG, num_workers=0)
     assert json.loads((tmp_path / "perception.json").read_text())["models"] == {"weighted": {"weights": "one"}}
     monkeypatch.setattr("erring_perceptions.Weighted.version", "two")

@@ -20,8 +20,8 @@ WORDS = {
 @pytest.mark.parametrize("word", WORDS)
 def test_words_say_what_is_made_and_can_be_said_again(word: str) -> None:
     read = read_word(word)
-    assert (read.make, dict(read.options)) == WORDS[word]
-    assert word_of(read.make, read.options) == word
+    assert (read.path, dict(read.options)) == WORDS[word]
+    assert word_of(read.path, read.options) == word
 
 
 def test_options_go_before_those_of_the_word() -> None:

@@ -9,6 +9,7 @@ import pytest
 import scripted_models
 from scripted_models import ColourEmbedder, scripted_perception
 
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError, PerceptionError, StoreError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
@@ -225,17 +226,19 @@ def test_stacks_are_chosen_by_the_agent_and_options_are_checked() -> None:
 
 
 def test_folder_and_device_are_no_part_of_what_makes_runs_the_same() -> None:
-    backend = PerceptionSettings(make="predicted:3d-mem,models=/somewhere,device=cpu,min_confidence=0.5").backend(
-        Backend()
+    backend = Backend(
+        perception=PerceptionSettings(
+            make="predicted:3d-mem,models=/somewhere,device=cpu,min_confidence=0.5"
+        ).component()
     )
-    assert backend.perception_host_options == {"models": "/somewhere", "device": "cpu"}
+    assert backend.perception.host_options == {"models": "/somewhere", "device": "cpu"}
     assert backend.identity()["perception_options"] == {"stack": "3d-mem", "min_confidence": 0.5}
     assert "/somewhere" not in json.dumps(backend.identity())
 
 
 def run(folder, perception, agents=("fu",), limit=1):
     protocol = ProtocolConfig(max_rounds=4, max_actions=10)
-    config = RunConfig(protocol=protocol, backend=Backend(perception=f"scripted_models:{perception}"))
+    config = RunConfig(protocol=protocol, backend=Backend(perception=Component(f"scripted_models:{perception}")))
     with bundled_tasks() as tasks:
         return evaluate(list(agents), task_files(tasks, limit), folder, config=config, num_workers=0)
 

@@ -13,7 +13,7 @@ from evonav.tasks.listing import task_files
 
 def records(out: Path, word: str, num_workers: int) -> list[str]:
     """Of two bundled tasks, a few rounds a stage."""
-    backend = PerceptionSettings(make=word).backend(Backend())
+    backend = Backend(perception=PerceptionSettings(make=word).component())
     config = RunConfig(seed=3, backend=backend, protocol=ProtocolConfig(max_rounds=6))
     with bundled_tasks() as folder:
         evaluate(["fu"], task_files(folder, 2, None), out, config=config, num_workers=num_workers)

@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 from made_up_run import WriteRun, entry, record_run, stage_record
 
+from evonav.component import Component
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.run.components import Backend
@@ -40,7 +41,9 @@ def write_run(tmp_path: Path) -> WriteRun:
 def viewed_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A bundled task in which entries go stale, an agent that is shown images, and one that tells nothing."""
     path = tmp_path_factory.mktemp("run")
-    config = RunConfig(backend=Backend(decision="viewer_run:scripted"), protocol=ProtocolConfig(max_rounds=9))
+    config = RunConfig(
+        backend=Backend(decision=Component("viewer_run:scripted")), protocol=ProtocolConfig(max_rounds=9)
+    )
     with bundled_tasks() as tasks:
         evaluate(["fu", "random-walk"], task_files(tasks, 2)[1:], path, config=config, num_workers=0)
     return path

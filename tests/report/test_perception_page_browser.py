@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from browser import Chromium, needs_browser
 
+from evonav.component import Component
 from evonav.perception.ground_truth import GroundTruthPerception
 from evonav.perception.words import GROUND_TRUTH
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
@@ -37,8 +38,8 @@ def smuggling():
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("perceptions")
     specs = [
-        PerceptionSpec("gt", GROUND_TRUTH),
-        PerceptionSpec(f"mine:{SMUGGLED}", f"{__name__}:smuggling"),
+        PerceptionSpec("gt", Component(GROUND_TRUTH)),
+        PerceptionSpec(f"mine:{SMUGGLED}", Component(f"{__name__}:smuggling")),
     ]
     with bundled_tasks() as folder:
         measure(specs, task_files(folder, 2), out, config=TourConfig(6, 1), num_workers=0)

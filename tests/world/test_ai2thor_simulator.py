@@ -18,6 +18,7 @@ import compare_simulators
 import numpy as np
 import pytest
 
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore
@@ -212,16 +213,10 @@ def test_nothing_is_left_after_closing(tmp_path: Path, monkeypatch: pytest.Monke
 
 def test_an_evaluation_survives_the_loss_of_its_simulators_process(tmp_path: Path) -> None:
     """A simulator that is killed in the middle: the records are those of a run in which nothing happened."""
-    options = {"executable": "evonav"}
-    whole = RunConfig(
-        backend=replace(compare_simulators.THOR, simulator_options=options), protocol=ProtocolConfig(max_rounds=6)
-    )
-    killed = replace(
-        whole,
-        backend=replace(
-            whole.backend, simulator="test_ai2thor_simulator:killed_once", host_options={"folder": str(tmp_path)}
-        ),
-    )
+    whole = RunConfig(backend=compare_simulators.THOR, protocol=ProtocolConfig(max_rounds=6))
+    options, host_options = {"executable": "evonav"}, {"folder": str(tmp_path)}
+    dying = Component("test_ai2thor_simulator:killed_once", options, host_options)
+    killed = replace(whole, backend=replace(whole.backend, simulator=dying))
     with bundled_tasks() as directory:
         tasks = task_files(directory, 1)
         for name, config in (("whole", whole), ("killed", killed)):

@@ -23,7 +23,8 @@ from typing import Any, Literal
 from evonav.agents import wire
 from evonav.agents.agent import Agent, ExplainingAgent
 from evonav.agents.error_text import clean, describe, traceback_of
-from evonav.agents.registry import agent_factory, imported, new_agent
+from evonav.agents.registry import agent_factory, new_agent
+from evonav.component import import_callable
 from evonav.decision.metered import Metered
 from evonav.errors import DecisionError
 
@@ -162,7 +163,7 @@ class _Server:
         """Makes a decision model, and a fresh agent with it; whatever was there before is dropped."""
         assert self._factory is not None, "`load` comes first"
         self._agent = None
-        self._decision = Metered(imported(decision, "decision model")(seed, **options))
+        self._decision = Metered(import_callable(decision, "decision model")(seed, **options))
         self._agent = new_agent(self._factory, self._decision)
         return self._sensing()
 

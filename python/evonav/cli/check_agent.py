@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.decision_options import DecisionOptions, with_decision_options, with_decisions
-from evonav.cli.options import PerceptionName, Seed, with_perception
+from evonav.cli.decision_options import DecisionOptions, decision_component, with_decision_options
+from evonav.cli.options import PerceptionName, Seed, perception_component
 
 EXIT_BROKEN = 1
 _STYLES = {"pass": "green", "warn": "yellow", "fail": "bold red", "skip": "dim"}
@@ -31,8 +31,9 @@ def check_agent(
     from evonav.evaluation.run.components import Backend
 
     with TemporaryDirectory() as folder, status(f"Running {agent}"):  # a model's exchanges are kept between episodes
-        backend = with_decisions(
-            with_perception(Backend(), perception), decisions, out=Path(folder), seed=seed, num_workers=1
+        backend = Backend(
+            perception=perception_component(perception),
+            decision=decision_component(decisions, out=Path(folder), seed=seed, num_workers=1),
         )
         report = check_agent(agent, backend=backend, seed=seed, timeout_s=timeout)
     table = Table(title=f"{agent}: {'keeps the contract' if report.is_ok else 'breaks the contract'}")

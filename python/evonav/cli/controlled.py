@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.decision_options import DecisionOptions, decision_settings, with_decision_options, with_decisions
+from evonav.cli.decision_options import DecisionOptions, decision_component, decision_settings, with_decision_options
 from evonav.cli.display import interruptible, print_table, status
 from evonav.cli.options import (
     HOUSES,
@@ -21,7 +21,7 @@ from evonav.cli.options import (
     Workers,
     count_of,
     names_of,
-    with_perception,
+    perception_component,
 )
 
 if TYPE_CHECKING:  # the command must start fast
@@ -109,13 +109,15 @@ def evaluate(
     from evonav.evaluation.hosting.process import AgentHosting
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunConfig
+    from evonav.evaluation.run.settings import SimulatorSettings
 
     record = read_controlled(directory)
     num_workers = count_of(workers)
-    module = "evonav.evaluation.run.components"
-    backend = Backend(simulator=f"{module}:lenient_simulator") if record.allow_unknown_assets else Backend()
-    backend = with_perception(backend, perception)
-    backend = with_decisions(backend, decisions, out=directory, seed=seed, num_workers=num_workers)
+    backend = Backend(
+        simulator=SimulatorSettings(allow_unknown_assets=record.allow_unknown_assets).component(),
+        perception=perception_component(perception),
+        decision=decision_component(decisions, out=directory, seed=seed, num_workers=num_workers),
+    )
     settings = decision_settings(decisions)
     hosting = AgentHosting(is_in_process=in_process, timeout_s=agent_timeout or settings.answer_timeout_s)
     config = RunConfig(seed=seed, backend=backend, stage_timeout_s=settings.stage_timeout_s, hosting=hosting)

@@ -14,7 +14,8 @@ import typer
 if TYPE_CHECKING:  # the command must start fast
     from collections.abc import Iterator, Sequence
 
-    from evonav.evaluation.run.components import Backend
+    from evonav.component import Component
+    from evonav.decision.question import DecisionModel
     from evonav.evaluation.run.run import RunConfig
     from evonav.evaluation.run.settings import DecisionSettings
     from evonav.tasks.listing import TaskFile
@@ -159,10 +160,10 @@ def decision_settings(options: DecisionOptions) -> "DecisionSettings":
     return settings
 
 
-def with_decisions(
-    backend: "Backend", options: DecisionOptions, *, out: Path, seed: int, num_workers: int
-) -> "Backend":
-    """A backend whose agents ask what the options say; it is tried before the run begins.
+def decision_component(
+    options: DecisionOptions, *, out: Path, seed: int, num_workers: int
+) -> "Component[DecisionModel]":
+    """Return how to build the decision model of the options, after a check that it can be asked from here.
 
     Raises:
         InvalidArgumentError: An option makes no sense.
@@ -175,10 +176,10 @@ def with_decisions(
     spending = SpendingSettings(options.prices, options.max_cost)
     books = None if options.dry_run else Books.of_run(out, spending, num_workers)
     with spelled_as_options():
-        asking = settings.backend(backend, seed, books)
+        decision = settings.component(seed, books)
     if books is not None and settings.kind != "text":
-        try_decisions(asking, seed)
-    return asking
+        try_decisions(decision, seed)
+    return decision
 
 
 @contextmanager
@@ -215,7 +216,7 @@ def print_estimate(
     price = SpendingSettings(options.prices).price(options.model or "")
     with progress() as show:
         estimates = estimate_run(
-            agents, tasks, config, dict(config.backend.decision_options), num_workers=num_workers, on_progress=show
+            agents, tasks, config, dict(config.backend.decision.options), num_workers=num_workers, on_progress=show
         )
     first = estimates[0]
     table = Table(title=f"{first.num_stages} stages, by {first.num_stages_run} of them with the text matcher")

@@ -9,12 +9,12 @@ import typer
 
 from evonav.cli.decision_options import (
     DecisionOptions,
+    decision_component,
     decision_settings,
     print_estimate,
     print_spending,
     spelled_as_options,
     with_decision_options,
-    with_decisions,
 )
 from evonav.cli.display import generation_progress, interruptible, print_failures, print_table, progress, status
 from evonav.cli.options import (
@@ -51,18 +51,20 @@ from evonav.cli.options import (
     check_engine,
     count_of,
     names_of,
-    with_perception,
+    perception_component,
 )
 from evonav.cli.view import make_pages
 
 if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
     from collections.abc import Iterator, Sequence
 
+    from evonav.component import Component
     from evonav.evaluation.hosting.process import AgentHosting
     from evonav.evaluation.metrics.navigation import AgentSummary
     from evonav.evaluation.run.components import Backend
     from evonav.evaluation.run.run import RunConfig
     from evonav.tasks.listing import TaskFile
+    from evonav.world.simulator import Simulator
 
 NUM_RETRIES = 2
 
@@ -100,13 +102,15 @@ def evaluate(
     thor_timeout: ThorTimeout = 100.0,
 ) -> None:
     """Evaluates agents on tasks; run again to resume. Leaves records.sqlite and summary.json in OUT."""
+    from evonav.evaluation.run.components import Backend
+
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")
     check_engine(engine, ray_address, worker_gpus)
     num_workers = count_of(workers)
-    backend = _backend(
+    simulated = _simulator(
         simulator,
         allow_unknown_assets=allow_unknown_assets,
         executable=thor_executable,
@@ -116,7 +120,8 @@ def evaluate(
         x_display=thor_display,
         timeout_s=thor_timeout if simulator is SimulatorName.AI2THOR else None,
     )
-    config = _config(seed, with_perception(backend, perception, models, device), decisions, out, num_workers)
+    backend = Backend(simulator=simulated, perception=perception_component(perception, models, device))
+    config = _config(seed, backend, decisions, out, num_workers)
     hosting = _hosting(in_process, agent_timeout or decision_settings(decisions).answer_timeout_s, agent_memory)
     config = replace(config, hosting=hosting)
     names = names_of(agents, agent)
@@ -148,9 +153,11 @@ def demo(
     workers: Workers = None,
 ) -> None:
     """Evaluates the paper's three heuristics on the bundled tasks and writes a report and pages of one task."""
+    from evonav.evaluation.run.components import Backend
+
     num_workers = count_of(workers)
     with _tasks(out, None, None, limit, None, seed, False, num_workers) as task_files:
-        config = _config(seed, _backend(SimulatorName.EMBEDDED), decisions, out, num_workers)
+        config = _config(seed, Backend(), decisions, out, num_workers)
         if decisions.dry_run:
             print_estimate(decisions, names_of(agents), task_files, config, num_workers)
             return
@@ -239,8 +246,8 @@ def _evaluate(
 def _config(seed: int, backend: "Backend", decisions: DecisionOptions, out: Path, num_workers: int) -> "RunConfig":
     from evonav.evaluation.run.run import RunConfig
 
-    backend = with_decisions(backend, decisions, out=out, seed=seed, num_workers=num_workers)
-    config = RunConfig(seed=seed, backend=backend)
+    decision = decision_component(decisions, out=out, seed=seed, num_workers=num_workers)
+    config = RunConfig(seed=seed, backend=replace(backend, decision=decision))
     return replace(config, stage_timeout_s=decision_settings(decisions).stage_timeout_s)
 
 
@@ -250,12 +257,12 @@ def _hosting(in_process: bool, timeout_s: float, memory_mb: int | None) -> "Agen
     return AgentHosting(is_in_process=in_process, timeout_s=timeout_s, memory_mb=memory_mb)
 
 
-def _backend(simulator: SimulatorName, **options: Any) -> "Backend":  # noqa: ANN401 - of `SimulatorSettings`
+def _simulator(simulator: SimulatorName, **options: Any) -> "Component[Simulator]":  # noqa: ANN401 - of `SimulatorSettings`
     """The simulator of the options; those that were not given are left to it."""
     from evonav.evaluation.run.settings import SimulatorSettings
 
     with spelled_as_options():
-        return SimulatorSettings(kind=simulator.value, **options).backend()
+        return SimulatorSettings(kind=simulator.value, **options).component()
 
 
 def _exit(summaries: "list[AgentSummary]") -> None:

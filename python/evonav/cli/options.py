@@ -10,7 +10,8 @@ import typer
 from evonav.cli import completion
 
 if TYPE_CHECKING:  # the command must start fast
-    from evonav.evaluation.run.components import Backend
+    from evonav.component import Component
+    from evonav.perception import Perception
 
 EXIT_INCOMPLETE = 3
 HEURISTICS = "fu,stage-reset,ftu"
@@ -149,11 +150,10 @@ def count_of(workers: int | None) -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def with_perception(backend: "Backend", word: str, models: Path | None = None, device: str | None = None) -> "Backend":
-    """A backend whose agents see with what `--perception` names.
+def perception_component(word: str, models: Path | None = None, device: str | None = None) -> "Component[Perception]":
+    """Return how to build the perception that `--perception` names.
 
     Args:
-        backend: The rest.
         word: As `--perception` takes it.
         models: Folder of weights, for models.
         device: That they compute on.
@@ -167,4 +167,4 @@ def with_perception(backend: "Backend", word: str, models: Path | None = None, d
     options = {key: value for key, value in given.items() if value is not None}
     if options and not word.startswith("predicted"):
         raise typer.BadParameter(f"--{next(iter(options))} is for --perception predicted")
-    return PerceptionSettings(make=word, options=options).backend(backend)
+    return PerceptionSettings(make=word, options=options).component()

@@ -17,7 +17,7 @@ from evonav.cli.options import (
     Subset,
     Workers,
     count_of,
-    with_perception,
+    perception_component,
 )
 
 
@@ -59,7 +59,6 @@ def perception(
     from rich import progress as bars
     from rich.console import Console
 
-    from evonav.evaluation.run.components import Backend
     from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
     from evonav.perception_benchmark.page import write_perception_report
     from evonav.perception_benchmark.tables import perception_tables
@@ -74,8 +73,8 @@ def perception(
     specs = []
     for word in words:
         is_model = word.startswith("predicted")
-        found = with_perception(Backend(), word, models if is_model else None, device if is_model else None)
-        specs.append(PerceptionSpec(word, found.perception, found.perception_options, found.perception_host_options))
+        component = perception_component(word, models if is_model else None, device if is_model else None)
+        specs.append(PerceptionSpec(word, component))
     name = "lenient_simulator" if allow_unknown_assets else "embedded_simulator"
     columns = (
         bars.TextColumn("{task.description}"),

@@ -2,9 +2,9 @@
 
 import inspect
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any, Protocol, cast
 
+from evonav.component import import_callable
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.account import Account, Usage
@@ -168,11 +168,7 @@ def load_custom_model(path: str, seed: int) -> CustomModel | DecisionModel:
     Raises:
         InvalidArgumentError: It cannot be imported or made, or has neither `answer` nor `ask`.
     """
-    module, _, attribute = path.partition(":")
-    try:
-        factory: Callable[..., Any] = getattr(import_module(module), attribute)
-    except Exception as error:  # a stranger's code: whatever it raises belongs to the name
-        raise InvalidArgumentError(f"decision `{path}`: {type(error).__name__}: {error}") from error
+    factory = import_callable(path, "decision model")
     is_class = inspect.isclass(factory)
     if is_class and hasattr(factory, "ask") and not hasattr(factory, "answer"):
         return _MadeWhenAsked(path, factory, seed)

@@ -1,11 +1,12 @@
 """Run the jobs of a worker: load its work, yield the messages of a job, and send heartbeats."""
 
-import importlib
 import time
 import traceback
 from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import dataclass, field
+
+from evonav.component import import_callable
 
 Work = Callable[[str], str | Generator[str, None, str]]
 """Turns the text of a job into its answer. It may have a method `close`, which is called when its worker ends."""
@@ -16,8 +17,7 @@ HEARTBEAT_S = 5.0
 
 def load_work(work: str, settings: str, alive: Callable[[], None]) -> Work:
     """Import `module:factory` and return the work that it makes."""
-    module, _, factory = work.partition(":")
-    function: Work = getattr(importlib.import_module(module), factory)(settings, alive)
+    function: Work = import_callable(work)(settings, alive)
     return function
 
 

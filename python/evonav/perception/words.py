@@ -8,33 +8,28 @@ MODULE:FUNCTION[,KEY=VALUE...]   one's own
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError
+
+if TYPE_CHECKING:
+    from evonav.perception import Perception
 
 GROUND_TRUTH = "evonav.perception.ground_truth:GroundTruthPerception"
 NOISY = "evonav.perception.simulated:noisy_perception"
 PREDICTED = "evonav.perception.predicted:predicted_perception"
 STACKS = ("auto", "3d-mem", "unigoal", "transformers", "mini")
 """Of models; `auto`: UniGoal its own, all others 3D-Mem's."""
+_HOST_OPTIONS = ("models", "device")
+"""Of models: where their weights lie and what they compute on, which depends on this machine."""
 NAMES = ("gt", "noisy", "predicted")
 GRAMMAR = "gt, noisy[:PRESET][,KEY=VALUE...], predicted[:STACK][,KEY=VALUE...] or module:function"
 
 
-@dataclass(frozen=True, slots=True)
-class PerceptionWord:
-    """What a word stands for."""
-
-    make: str
-    """Import path of a function that makes a `Perception`."""
-    options: Mapping[str, Any] = field(default_factory=dict)
-    """Keywords for it, as JSON."""
-
-
-def read_word(word: str, options: Mapping[str, Any] | None = None) -> PerceptionWord:
-    """What a word stands for.
+def read_word(word: str, options: Mapping[str, Any] | None = None) -> "Component[Perception]":
+    """Return how to build the perception that a word names.
 
     Args:
         word: See above. A value is JSON or plain words.
@@ -49,20 +44,21 @@ def read_word(word: str, options: Mapping[str, Any] | None = None) -> Perception
     if kind == "gt":
         if colon or given:
             raise InvalidArgumentError(f"perception {word!r}: gt has no variants and no keys")
-        return PerceptionWord(GROUND_TRUTH)
+        return Component(GROUND_TRUTH)
     if colon and not variant:
         raise InvalidArgumentError(f"perception {word!r}: nothing after the colon; expected {GRAMMAR}")
     if kind == "noisy":
-        return PerceptionWord(NOISY, {"preset": variant, **given} if variant else given)
+        return Component(NOISY, {"preset": variant, **given} if variant else given)
     if kind == "predicted":
         if variant and variant not in STACKS:
             raise InvalidArgumentError(f"perception {word!r}: {_unknown('stack', variant, STACKS)}")
-        return PerceptionWord(PREDICTED, {"stack": variant or "auto", **given})
+        host = {key: given.pop(key) for key in _HOST_OPTIONS if key in given}
+        return Component(PREDICTED, {"stack": variant or "auto", **given}, host)
     if not colon:
         near = get_close_matches(kind, NAMES, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise InvalidArgumentError(f"perception {word!r}: expected {GRAMMAR}{hint}")
-    return PerceptionWord(f"{kind}:{variant}", given)
+    return Component(f"{kind}:{variant}", given)
 
 
 def word_of(make: str, options: Mapping[str, Any]) -> str:

@@ -4,12 +4,13 @@ One job is one perception on one task; what it leaves does not depend on the oth
 """
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from evonav._core import __version__
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.run.components import Backend
@@ -48,25 +49,10 @@ NUM_PICTURES = 4
 
 @dataclass(frozen=True, slots=True)
 class PerceptionSpec:
-    """How a perception is made."""
+    """A perception with the name under which it is measured."""
 
     word: str
-    """What it is called."""
-    make: str
-    """Import path."""
-    options: Mapping[str, Any] = field(default_factory=dict)
-    """Keywords."""
-    host_options: Mapping[str, Any] = field(default_factory=dict)
-    """More of them, on this machine's means."""
-
-    def backend(self, simulator: str) -> Backend:
-        """What a worker builds."""
-        return Backend(
-            simulator=simulator,
-            perception=self.make,
-            perception_options=self.options,
-            perception_host_options=self.host_options,
-        )
+    component: Component[Perception]
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +127,7 @@ def measure(
             for spec in specs
             if not record_path(out, spec.word, task.task_id).exists()
         ]
-        _claim_models(header, [spec for spec in specs if any(spec is job[0] for job in jobs)], out, simulator)
+        _claim_models(header, [spec for spec in specs if any(spec is job[0] for job in jobs)], out)
         num_all = len(tasks) * len(specs)
         num_done, failures = num_all - len(jobs), []
         on_progress(num_done, num_all, "")
@@ -170,7 +156,7 @@ def _begun(
     """Claims the folder; records of tasks that are others now are dropped."""
     identity = {"evonav": __version__, "tour": asdict(config), "simulator": simulator}
     there = read_header(out)
-    options = {spec.word: {"make": spec.make, "options": dict(spec.options)} for spec in specs}
+    options = {spec.word: {"make": spec.component.path, "options": dict(spec.component.options)} for spec in specs}
     digests = {task.task_id: task.digest for task in tasks}
     words = [spec.word for spec in specs]
     if there is not None:
@@ -194,10 +180,10 @@ def _begun(
     )
 
 
-def _claim_models(header: Header, specs: Sequence[PerceptionSpec], out: Path, simulator: str) -> None:
+def _claim_models(header: Header, specs: Sequence[PerceptionSpec], out: Path) -> None:
     """Notes hashes of weights and versions of libraries before anyone looks, or checks that they are the folder's."""
     for spec in specs:
-        found = spec.backend(simulator).check_perception([AGENT])
+        found = Backend(perception=spec.component).check_perception([AGENT])
         there = header.models.setdefault(spec.word, found)
         check_same_run({spec.word: there}, {spec.word: found}, out)
     write_header(out, header)
@@ -207,13 +193,13 @@ def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str
     """The function from a job to its record, as `evonav.parallel.pool` calls it."""
     values = json.loads(settings)
     config = TourConfig(**values["config"])
-    simulator = Backend(simulator=values["simulator"]).make_simulator()
+    simulators: Component[Simulator] = Component(values["simulator"])
+    simulator = simulators.create()
 
     def work(text: str) -> str:
         given, path, digest, has_picture = json.loads(text)
-        spec = PerceptionSpec(**given)
-        backend = spec.backend(values["simulator"])
-        case, perception = backend.load_case(Path(path)), backend.make_perception()
+        spec = PerceptionSpec(given["word"], Component(**given["component"]))
+        case, perception = Backend().tasks.create(Path(path)), spec.component.create()
         record = measure_task(case, perception, simulator, config, word=spec.word, has_picture=has_picture, alive=alive)
         record.digest = digest
         return record.model_dump_json()

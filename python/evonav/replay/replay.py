@@ -14,7 +14,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from evonav.agents.registry import imported
+from evonav.component import import_callable
 from evonav.decision.custom_model import load_custom_model
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.episode import Episode
@@ -74,17 +74,18 @@ class RunReplay:
         try:
             self.seed = int(config["seed"])
             self.protocol = ProtocolConfig(**config["protocol"])
-            backend = Backend(**config["backend"])
+            backend = Backend.from_identity(config["backend"])
         except (KeyError, TypeError, ValueError) as error:
             raise StoreError(f"{run_dir}: header of the run: {type(error).__name__}: {error}") from error
         if models is not None and MODELS_VARIABLE not in os.environ and Path(models).is_dir():
-            backend = replace(backend, perception_host_options={"models": models})
+            backend = replace(backend, perception=replace(backend.perception, host_options={"models": models}))
         self.backend = backend
         self._why_not = ""
-        if "cache" in inspect.signature(imported(backend.decision)).parameters:
+        if "cache" in inspect.signature(import_callable(backend.decision.path)).parameters:
             path = exchanges or run_dir / EXCHANGES_NAME
             if path.is_file():
-                self.backend = replace(self.backend, decision_host_options={"cache": str(path), "mode": "replay"})
+                decision = replace(backend.decision, host_options={"cache": str(path), "mode": "replay"})
+                self.backend = replace(backend, decision=decision)
             elif not _answers_itself(backend):
                 self._why_not = f"The model's answers were not kept: {path} not found."
 
@@ -122,7 +123,7 @@ class RunReplay:
             raise InvalidArgumentError(
                 f"{self._run_dir}: no record of task {task_id!r} by agent {agent!r}{_near(self._run_dir, task_id)}"
             )
-        case = self.backend.load_case(self._task_path(task_id))
+        case = self.backend.tasks.create(self._task_path(task_id))
         for stage in self._stages(case, agent, stored, maps, on_round):
             yield replace(stage, differences=_differences(texts.get(stage.record.stage), stage))
 
@@ -139,12 +140,12 @@ class RunReplay:
         last = 0 if self._why_not else min([max(stored) + 1, *lost]) - 1
         fov_rad = 0.0
         if last > 0:
-            with closing(self.backend.make_simulator()) as simulator:
+            with closing(self.backend.simulator.create()) as simulator:
                 seed = agent_seed(self.seed, agent_name, case.task_id)
-                agent = make_agent(agent_name, self.backend.make_decision(seed))
+                agent = make_agent(agent_name, self.backend.decision.create(seed))
                 losses = {stage: loss for stage in stored if (loss := _loss(stored[stage]))}
                 tracer = Tracer(agent, on_round, losses, self._heading_px, keeps_depth=self._keeps_depth)
-                perception = self.backend.make_perception()
+                perception = self.backend.perception.create()
                 episode = Episode(
                     case,
                     agent_name,
@@ -163,7 +164,7 @@ class RunReplay:
                     if outcome.record.stage == last:
                         break
                     if _loss(outcome.record):
-                        tracer.agent = make_agent(agent_name, self.backend.make_decision(seed))
+                        tracer.agent = make_agent(agent_name, self.backend.decision.create(seed))
                         episode.replace_agent(tracer.agent)
         for number, record in stored.items():
             if number > last:
@@ -173,7 +174,7 @@ class RunReplay:
 
 def _answers_itself(backend: Backend) -> bool:
     """Whether the model is one of the user's own that is put the questions themselves: nothing of it is kept."""
-    path = backend.decision_options.get("path")
+    path = backend.decision.options.get("path")
     return path is not None and hasattr(load_custom_model(str(path), 0), "answer")
 
 

@@ -20,6 +20,7 @@ from evonav.agents.agent import (
     Stop,
     ViewSchedule,
 )
+from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.spec import EpisodeSpec
@@ -146,17 +147,17 @@ def work(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
     """Return the work of a worker: a job holds a task's folder and records, its answer the differences.
 
     Args:
-        settings: `protocol`, `simulator` and `simulator_options`, as JSON.
+        settings: `protocol` and `simulator`, as JSON.
     """
     values = json.loads(settings)
-    backend = Backend(simulator=values["simulator"], simulator_options=values["simulator_options"])
+    simulators: Component[Simulator] = Component(values["simulator"])
     protocol = ProtocolConfig(**values["protocol"])
-    simulator = backend.make_simulator()
+    simulator = simulators.create()
 
     def answer(text: str) -> str:
         job = json.loads(text)
         records = [StageRecord.model_validate_json(record) for record in job["records"]]
-        case = backend.load_case(Path(job["path"]))
+        case = Backend().tasks.create(Path(job["path"]))
         found = rescore(case, {record.stage: record for record in records}, simulator, protocol)
         return json.dumps([[stage, list(differences)] for stage, differences in found if differences])
 

@@ -261,7 +261,7 @@ def _rescore(
     if module != Backend.__module__ or name not in _OUR_SIMULATORS:
         yield f"simulator {simulator!r}: actions can be carried out again in evonav's own alone (see --scores-only)"
         return
-    settings = {"protocol": header.config["protocol"], "simulator": simulator, "simulator_options": {}}
+    settings = {"protocol": header.config["protocol"], "simulator": simulator}
     episodes: dict[tuple[str, str], list[StageRecord]] = {}
     for agent, mine in records.items():
         for record in mine:

@@ -34,7 +34,7 @@ def cell_estimate(sweep: SweepFile, run: CellRun, num_workers: int) -> CellEstim
         TaskError: A task is malformed.
     """
     config = run.request.config
-    options = dict(config.backend.decision_options)
+    options = dict(config.backend.decision.options)
     prices = SpendingSettings(None if sweep.prices is None else Path(sweep.prices))
     price = prices.price(options["model"])
     found = estimate_run(run.cell.agents, run.request.tasks, config, options, num_workers=num_workers)

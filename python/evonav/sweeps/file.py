@@ -14,7 +14,6 @@ from pydantic import ConfigDict, Field, ValidationError
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.settings import (
     DecisionSettings,
     PerceptionSettings,
@@ -223,7 +222,7 @@ def _check(sweep: SweepFile, path: Path) -> None:
         for name, entry in table.items():
             place = f"{path}: {axis}.{name}"
             try:
-                entry.backend() if axis == "simulators" else entry.check()
+                entry.component() if axis == "simulators" else entry.check()
             except SettingError as error:
                 raise InvalidArgumentError(f"{place}.{error.key} {error.said}") from None
             except InvalidArgumentError as error:
@@ -234,7 +233,7 @@ def _check(sweep: SweepFile, path: Path) -> None:
                 )
     for name, perception in sweep.perceptions.items():
         try:
-            perception.backend(Backend())
+            perception.component()
         except InvalidArgumentError as error:
             raise InvalidArgumentError(f"{path}: perceptions.{name}: {error}") from None
     for name, tasks in sweep.tasks.items():

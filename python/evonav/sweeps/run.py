@@ -141,17 +141,15 @@ def config_of(sweep: SweepFile, cell: Cell, books: Books | None) -> RunConfig:
         EvonavError: A model's settings make no sense, or its exchanges cannot be opened.
     """
     decision = sweep.decisions[cell.decision]
-    simulated = sweep.simulators[cell.simulator].backend()
     backend = Backend(
-        simulator=simulated.simulator,
-        simulator_options=simulated.simulator_options,
-        host_options=simulated.host_options,
+        simulator=sweep.simulators[cell.simulator].component(),
+        perception=sweep.perceptions[cell.perception].component(),
+        decision=decision.component(cell.seed, books),
     )
-    backend = sweep.perceptions[cell.perception].backend(backend)
     return RunConfig(
         seed=cell.seed,
         protocol=sweep.protocol.config(),
-        backend=decision.backend(backend, cell.seed, books),
+        backend=backend,
         stage_timeout_s=sweep.stage_timeout_s or decision.stage_timeout_s,
         hosting=AgentHosting(
             is_in_process=sweep.in_process,
@@ -188,7 +186,7 @@ def asking(sweep: SweepFile, out: Path, run: CellRun, num_workers: int) -> CellR
     )
     try:
         config = config_of(sweep, run.cell, books)
-        try_decisions(config.backend, run.cell.seed)
+        try_decisions(config.backend.decision, run.cell.seed)
     except EvonavError as error:
         raise type(error)(f"decisions.{run.cell.decision}: {error}") from error
     return replace(run, request=replace(run.request, config=config))

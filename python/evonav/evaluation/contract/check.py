@@ -152,7 +152,7 @@ class _Examination:
         """An episode in a process of its own; `None` where there is no use in going on."""
         run = _Run()
         with closing(AgentProcesses(self._hosting)) as processes:
-            agent = RemoteAgent(processes, self._name, self._backend.decision_spec(), self._seed)
+            agent = RemoteAgent(processes, self._name, self._backend.decision, self._seed)
             for record in self._episode(agent, case):
                 run.records.append(record)
                 if record.error is not None and record.error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT):
@@ -172,15 +172,15 @@ class _Examination:
 
     def _here(self, factory: Callable[..., Agent], cases: Sequence[EpisodeSpec], probe: Probe | None = None) -> _Run:
         """Episodes of one agent object in this process."""
-        probe = probe or Probe(new_agent(factory, self._backend.make_decision(self._seed)))
+        probe = probe or Probe(new_agent(factory, self._backend.decision.create(self._seed)))
         run = _Run(probe=probe)
         for case in cases:
             run.records += self._episode(probe, case)
         return run
 
     def _episode(self, agent: Agent | HostedAgent, case: EpisodeSpec) -> Iterator[StageRecord]:
-        with closing(self._backend.make_simulator()) as simulator:
-            perception = self._backend.make_perception()
+        with closing(self._backend.simulator.create()) as simulator:
+            perception = self._backend.perception.create()
             episode = Episode(case, self._name, agent, simulator, perception, PROTOCOL, self._seed)
             for outcome in episode.run():
                 yield outcome.record
@@ -341,7 +341,7 @@ def _changing_cases(backend: Backend, directory: Path) -> tuple[EpisodeSpec, Epi
     """Two bundled tasks, each up to its first stage before which things were moved."""
     found = []
     for root in sorted(path.parent for path in directory.glob("*/task.json")):
-        case = backend.load_case(root)
+        case = backend.tasks.create(root)
         last = next((k for k, stage in enumerate(case.stages) if stage.transition.relocations), None)
         if last is not None:
             found.append(replace(case, stages=case.stages[: last + 1]))

@@ -19,14 +19,15 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from evonav.agents import wire
 from evonav.agents.agent import AgentAction, EntryBelief, RoundDiagnostics, Sensing
 from evonav.agents.error_text import clean
 from evonav.agents.serving import LENGTH
+from evonav.component import Component
+from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.hosting.agent import HostedAgent
@@ -66,15 +67,6 @@ class AgentHosting:
     """Address space that an agent's process may have."""
     log: str | None = None
     """File that what agents print is appended to; default: the evaluator's standard error."""
-
-
-@dataclass(frozen=True, slots=True)
-class DecisionSpec:
-    """How a decision model is made, in the agent's process."""
-
-    path: str = "evonav.decision.backends:text_match"
-    """Import path; called with a seed and `options`."""
-    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 class AgentProcess:
@@ -279,7 +271,7 @@ class RemoteAgent(HostedAgent):
     After the loss of its process it is a fresh agent in a fresh one, that knows no task yet.
     """
 
-    def __init__(self, processes: AgentProcesses, name: str, decision: DecisionSpec, seed: int) -> None:
+    def __init__(self, processes: AgentProcesses, name: str, decision: Component[DecisionModel], seed: int) -> None:
         """Starts nothing yet.
 
         Args:
@@ -353,7 +345,7 @@ class RemoteAgent(HostedAgent):
     def _make(self) -> None:
         self._process = self._processes.process(self._name)
         self._describe(self._label)
-        self._sense(self._ask("make", self._decision.path, self._seed, dict(self._decision.options)))
+        self._sense(self._ask("make", self._decision.path, self._seed, self._decision.keywords))
 
     def _sense(self, parts: Mapping[str, bytes]) -> None:
         self._sensing = wire.SENSING.read(_part(parts, "sensing"))

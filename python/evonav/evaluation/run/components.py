@@ -1,147 +1,151 @@
-"""What a worker builds for itself, named by import path so that it crosses process borders without pickle."""
+"""Name the parts of a run by import path, so that workers build them for themselves."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 from evonav.agents.agent import Agent
 from evonav.agents.registry import BUILT_IN, agent_descriptions, agent_factory, new_agent
+from evonav.component import Component
 from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES, new_oracle_baseline
 from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.hosting.process import DecisionSpec, check_importable
+from evonav.evaluation.hosting.process import check_importable
 from evonav.perception import Perception
 from evonav.perception.words import GROUND_TRUTH
 from evonav.world.simulator import Simulator
 
+TASK_FILES: Component[EpisodeSpec] = Component("evonav.evaluation.run.components:load_case")
+EMBEDDED: Component[Simulator] = Component("evonav.evaluation.run.components:embedded_simulator")
+TRUE_PERCEPTION: Component[Perception] = Component(GROUND_TRUTH)
+TEXT_MATCH: Component[DecisionModel] = Component("evonav.decision.backends:text_match")
+HEADER_KEYS = {"cases": "tasks", "simulator": "simulator", "perception": "perception", "decision": "decision"}
+"""Field of `Backend` by its key in the headers of runs; options are under `KEY_options`."""
+
 
 @runtime_checkable
 class Startable(Protocol):
-    """A simulator with a process that takes its time, and may not come up."""
+    """A simulator that runs in a process of its own, which takes time to start and may fail to."""
 
     def start(self) -> None:
-        """Starts it, without a house."""
+        """Start the process, without a house."""
         ...
 
 
 @runtime_checkable
-class NeedsMeans(Protocol):
-    """A perception of means that may be missing here: libraries, files, a device."""
+class NeedsResources(Protocol):
+    """A perception that needs libraries, files or a device, which may be missing here."""
 
     def check(self, agents: Sequence[str]) -> Mapping[str, Any]:
-        """Whether all is there that these agents will need; what it is, as far as it decides what they see."""
+        """Check that all that these agents need is here, and return what of it decides what they see."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Backend:
-    """Import paths (`module:function`) of what an episode needs."""
+    """The parts of a run that workers build for themselves."""
 
-    cases: str = "evonav.evaluation.run.components:load_case"
-    """Takes a task's directory, returns an `EpisodeSpec`."""
-    simulator: str = "evonav.evaluation.run.components:embedded_simulator"
-    """Makes a `Simulator`."""
-    perception: str = GROUND_TRUTH
-    """Makes a `Perception`."""
-    perception_options: Mapping[str, Any] = field(default_factory=dict)
-    """Keywords for `perception`, as JSON."""
-    perception_host_options: Mapping[str, Any] = field(default_factory=dict)
-    """More of them, on this machine's means (folder of models, device): not part of what makes runs the same."""
-    simulator_options: Mapping[str, Any] = field(default_factory=dict)
-    """Keywords for `simulator`, as JSON."""
-    host_options: Mapping[str, Any] = field(default_factory=dict)
-    """More of them, on this machine's means (GPU, display, timeouts): not part of what makes runs the same."""
-    decision: str = "evonav.decision.backends:text_match"
-    """Makes a `DecisionModel`; its first argument is the seed of the episode's agent."""
-    decision_options: Mapping[str, Any] = field(default_factory=dict)
-    """Keywords for `decision`, as JSON."""
-    decision_host_options: Mapping[str, Any] = field(default_factory=dict)
-    """More of them, on how the model is reached (address, file of exchanges, limits): no part of what makes runs the
-    same."""
+    tasks: Component[EpisodeSpec] = TASK_FILES
+    """Reads a task; called with the task's folder."""
+    simulator: Component[Simulator] = EMBEDDED
+    perception: Component[Perception] = TRUE_PERCEPTION
+    decision: Component[DecisionModel] = TEXT_MATCH
+    """Called with the seed of the episode's agent."""
 
     def identity(self) -> dict[str, Any]:
-        """What makes runs the same."""
-        host = ("host_options", "perception_host_options", "decision_host_options")
-        return {key: value for key, value in asdict(self).items() if key not in host and value != {}}
+        """Return what a run's header says of its parts; `from_identity` reads it.
 
-    def load_case(self, path: Path) -> EpisodeSpec:
-        """A task as the evaluator runs it."""
-        case: EpisodeSpec = _imported(self.cases)(path)
-        return case
+        Runs are resumed only where it is equal: keys and values must not change.
+        """
+        parts: dict[str, Any] = {}
+        for key, name in HEADER_KEYS.items():
+            component: Component[Any] = getattr(self, name)
+            parts |= component.identity(key)
+        return parts
 
-    def make_simulator(self) -> Simulator:
-        """A simulator of the worker's own."""
-        simulator: Simulator = _imported(self.simulator)(**self.simulator_options, **self.host_options)
-        return simulator
+    @classmethod
+    def from_identity(cls, values: Mapping[str, Any]) -> "Backend":
+        """Return the parts that a run's header describes.
 
-    def check(self) -> None:
-        """Starts a simulator and ends it, where that is something that can fail, and makes a perception.
+        Args:
+            values: The header's `config.backend`.
 
         Raises:
-            InvalidArgumentError: Their options make no sense.
-            SimulationError: It does not start; the message says what to do.
+            ValueError: An entry is unknown.
         """
-        self.make_perception()
-        simulator = self.make_simulator()
+        unknown = values.keys() - {entry for key in HEADER_KEYS for entry in (key, f"{key}_options")}
+        if unknown:
+            raise ValueError(f"unknown entries {sorted(unknown)}")
+        default = cls()
+        return cls(
+            **{
+                name: Component(values.get(key, getattr(default, name).path), values.get(f"{key}_options", {}))
+                for key, name in HEADER_KEYS.items()
+            }
+        )
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Mapping[str, Any]]) -> "Backend":
+        """Return the backend whose `dataclasses.asdict` is `values`."""
+        return cls(**{name: Component(**component) for name, component in values.items()})
+
+    def check(self) -> None:
+        """Create a perception and a simulator, start the simulator if it runs in a process of its own, and close it.
+
+        Raises:
+            InvalidArgumentError: The options of one are invalid.
+            SimulationError: The simulator does not start; the message says what to do.
+        """
+        self.perception.create()
+        simulator = self.simulator.create()
         try:
             if isinstance(simulator, Startable):
                 simulator.start()
         finally:
             simulator.close()
 
-    def decision_spec(self) -> DecisionSpec:
-        """How the decision model is made, for an agent in a process of its own."""
-        return DecisionSpec(self.decision, {**self.decision_options, **self.decision_host_options})
-
-    def make_decision(self, seed: int) -> DecisionModel:
-        """A decision model for one agent's episode."""
-        spec = self.decision_spec()
-        model: DecisionModel = _imported(spec.path)(seed, **spec.options)
-        return model
-
-    def make_perception(self) -> Perception:
-        """A perception of the worker's own."""
-        options = {**self.perception_options, **self.perception_host_options}
-        perception: Perception = _imported(self.perception)(**options)
-        return perception
-
     def check_perception(self, agents: Sequence[str]) -> dict[str, Any]:
-        """What decides what these agents see beside the perception's options: weights and versions, if it has some.
+        """Check that the perception finds all that it needs here.
+
+        Args:
+            agents: The agents that will use it.
+
+        Returns:
+            Hashes of weights and versions of libraries, where they decide what the agents see.
 
         Raises:
-            InvalidArgumentError: Its options make no sense.
-            PerceptionError: Something that it needs is missing here; the message says what to do.
+            InvalidArgumentError: Its options are invalid.
+            PerceptionError: Something that it needs is missing; the message says what to do.
         """
-        perception = self.make_perception()
-        return dict(perception.check(agents)) if isinstance(perception, NeedsMeans) else {}
+        perception = self.perception.create()
+        return dict(perception.check(agents)) if isinstance(perception, NeedsResources) else {}
 
 
 def make_agent(name: str, decision: DecisionModel | None = None) -> Agent:
-    """A fresh agent or oracle baseline.
+    """Make an agent or oracle baseline.
 
     Args:
-        name: Of a built-in agent, a plug-in or a class.
-        decision: Handed to agents that take one; default: their own.
+        name: Name of a built-in agent or plug-in, or import path of a class.
+        decision: Decision model for agents that take one; default: their own.
 
     Raises:
-        InvalidArgumentError: There is none of this name.
+        InvalidArgumentError: No agent has this name.
     """
     return new_oracle_baseline(name, decision) if name in ORACLE_BASELINES else new_agent(agent_factory(name), decision)
 
 
 def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
-    """Refuses a name that no worker could make an agent of.
+    """Check that workers can make an agent of this name.
 
     Args:
-        name: Of an agent.
-        is_in_process: Import it here; otherwise in a process of its own, unless it is one of ours.
+        name: Name of an agent.
+        is_in_process: Import the agent in this process; otherwise in a process of its own, unless it is built in.
 
     Raises:
-        InvalidArgumentError: There is none of this name, or it cannot be imported.
+        InvalidArgumentError: No agent has this name, or it cannot be imported.
     """
     if name in ORACLE_BASELINES:
         return
@@ -160,7 +164,7 @@ def check_agent_name(name: str, *, is_in_process: bool = True) -> None:
 
 
 def load_case(path: Path) -> EpisodeSpec:
-    """A task on disk."""
+    """Read a task from its folder."""
     from evonav.evaluation.episode.spec import episode_spec
     from evonav.tasks import load_task
 
@@ -168,30 +172,21 @@ def load_case(path: Path) -> EpisodeSpec:
 
 
 def embedded_simulator() -> Simulator:
-    """Evonav's own simulator, AI2-THOR's defaults."""
+    """Make evonav's own simulator, with AI2-THOR's defaults."""
     from evonav.world.embedded import EmbeddedSimulator
 
     return EmbeddedSimulator()
 
 
 def lenient_simulator() -> Simulator:
-    """The same, drawing assets that the catalogue lacks in the usual size of their category."""
+    """Make evonav's own simulator; assets missing from the catalogue get the usual size of their category."""
     from evonav.world.embedded import EmbeddedSimulator
 
     return EmbeddedSimulator(allow_unknown_assets=True)
 
 
-def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - of `Ai2ThorOptions`
-    """AI2-THOR through its client."""
+def ai2thor_simulator(**options: Any) -> Simulator:  # noqa: ANN401 - fields of `Ai2ThorOptions`
+    """Make AI2-THOR's simulator, which is run through its client."""
     from evonav.world.ai2thor import Ai2ThorOptions, Ai2ThorSimulator
 
     return Ai2ThorSimulator(options=Ai2ThorOptions(**options))
-
-
-def _imported(path: str) -> Callable[..., Any]:
-    module, _, attribute = path.partition(":")
-    try:
-        found: Callable[..., Any] = getattr(import_module(module), attribute)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise InvalidArgumentError(f"`{path}` cannot be imported: {error}") from error
-    return found

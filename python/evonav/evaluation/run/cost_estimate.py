@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from evonav.component import Component
 from evonav.decision.vlm.ledger import Ledger
 from evonav.evaluation.run.run import Progress, RunConfig, agent_seed, evaluate
 from evonav.statistics import student_quantile
@@ -66,9 +67,7 @@ def estimate_run(
         ledger = Path(folder) / "counts.sqlite"
         backend = replace(
             config.backend,
-            decision="evonav.decision.backends:counting",
-            decision_options={**options, "ledger": str(ledger)},
-            decision_host_options={},
+            decision=Component("evonav.decision.backends:counting", {**options, "ledger": str(ledger)}),
         )
         config = replace(config, backend=backend)
         evaluate(agents, chosen, Path(folder) / "run", config=config, num_workers=num_workers, on_progress=on_progress)

@@ -292,7 +292,8 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
             raise InvalidArgumentError("no task to evaluate on")
         is_in_process = _hosting(request, num_workers).is_in_process
         backend = request.config.backend
-        for name in (*request.agents, backend.cases, backend.simulator, backend.perception, backend.decision):
+        parts = (backend.tasks, backend.simulator, backend.perception, backend.decision)
+        for name in (*request.agents, *(part.path for part in parts)):
             if num_workers and name.startswith("__main__:"):
                 raise InvalidArgumentError(
                     f"`{name}`: a worker cannot import the script that is running; move it to a module of its own, "
@@ -338,7 +339,7 @@ def _claim(store: RunStore, request: RunRequest) -> None:
             "num_stages": {task.task_id: task.num_stages for task in request.tasks},
             "agents": sorted({*(store.meta("agents") or []), *request.agents}),
             "tasks_dir": str(request.tasks[0].path.absolute().parent),  # for `evonav view`
-            "models_dir": request.config.backend.perception_host_options.get("models"),  # likewise
+            "models_dir": request.config.backend.perception.host_options.get("models"),  # likewise
             "task_digests": {task.task_id: task.digest for task in request.tasks},  # for `evonav pack`
         }
     )

@@ -114,7 +114,7 @@ class Run:
         """
         task = self._tasks[job.task_id]
         try:
-            case: EpisodeSpec = self.setup.backend.load_case(task.path)
+            case: EpisodeSpec = self.setup.backend.tasks.create(task.path)
         except Exception as error:  # whatever a broken file does to whatever reads it
             message = f"the task cannot be read: {type(error).__name__}: {error}"
             failure = replace(failure, kind=ErrorKind.HARNESS, message=message)

@@ -5,18 +5,21 @@ to a `Backend`.
 """
 
 import os
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ConfigDict, Field
 
+from evonav.component import Component
+from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.client import Mode
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError, StoreError
-from evonav.evaluation.run.components import Backend
-from evonav.perception.words import PREDICTED, read_word
+from evonav.perception import Perception
+from evonav.perception.words import read_word
 from evonav.tasks.records import Record
+from evonav.world.simulator import Simulator
 
 if TYPE_CHECKING:
     from evonav.decision.vlm.account import Price
@@ -29,11 +32,9 @@ STAGE_TIMEOUT_S, VLM_STAGE_TIMEOUT_S = 900.0, 4 * 3600.0
 ANSWER_TIMEOUT_S, VLM_ANSWER_TIMEOUT_S = 600.0, 3600.0
 """Of an agent, for a round; one whose model is asked several times in it takes its time."""
 
-_BACKENDS = "evonav.evaluation.run.components"
+_COMPONENTS = "evonav.evaluation.run.components"
 _HOST = ("gpu_device", "x_display", "timeout_s")
 """Of a simulator's settings: this machine's means, not part of what makes runs the same."""
-_MEANS = ("models", "device")
-"""Likewise of predicted perception's."""
 
 
 class SettingError(InvalidArgumentError):
@@ -77,8 +78,8 @@ class SimulatorSettings(Settings):
     timeout_s: float | None = Field(default=None, ge=1.0)
     """ai2thor: seconds for an answer, three times that to start; then it is restarted."""
 
-    def backend(self) -> Backend:
-        """With this simulator and the defaults of everything else; what was not given is left to the simulator.
+    def component(self) -> Component[Simulator]:
+        """Return how to build this simulator; what is not given is left to its own defaults.
 
         Raises:
             SettingError: A setting is of no use with the simulator.
@@ -87,10 +88,10 @@ class SimulatorSettings(Settings):
         if self.kind == "ai2thor":
             # Allowing unknown assets asks nothing of AI2-THOR, which has its own catalogue.
             means: dict[str, Any] = {key: given.pop(key) for key in _HOST if key in given}
-            return Backend(simulator=f"{_BACKENDS}:ai2thor_simulator", simulator_options=given, host_options=means)
+            return Component(f"{_COMPONENTS}:ai2thor_simulator", given, means)
         if given:
             raise SettingError(next(iter(given)), "is for simulator ai2thor")
-        return Backend(simulator=f"{_BACKENDS}:lenient_simulator") if self.allow_unknown_assets else Backend()
+        return Component(f"{_COMPONENTS}:{'lenient' if self.allow_unknown_assets else 'embedded'}_simulator")
 
 
 class PerceptionSettings(Settings):
@@ -102,16 +103,13 @@ class PerceptionSettings(Settings):
     options: dict[str, Any] = Field(default_factory=dict)
     """Keywords for it, over those of the word."""
 
-    def backend(self, backend: Backend) -> Backend:
-        """A backend with this perception.
+    def component(self) -> Component[Perception]:
+        """Return how to build this perception.
 
         Raises:
             InvalidArgumentError: There is no such perception, or a keyword makes no sense.
         """
-        word = read_word(self.make, self.options)
-        means = {key: word.options[key] for key in _MEANS if word.make == PREDICTED and key in word.options}
-        options = {key: value for key, value in word.options.items() if key not in means}
-        return replace(backend, perception=word.make, perception_options=options, perception_host_options=means)
+        return read_word(self.make, self.options)
 
 
 class DecisionSettings(Settings):
@@ -208,11 +206,10 @@ class DecisionSettings(Settings):
         request = {**sampling, **given}
         return {"model": model, "structured": self.structured, "images": self.images, "request": request, **noise}
 
-    def backend(self, backend: Backend, seed: int, books: "Books | None") -> Backend:
-        """A backend whose agents ask what these settings say.
+    def component(self, seed: int, books: "Books | None") -> Component[DecisionModel]:
+        """Return how to build the decision model.
 
         Args:
-            backend: With the simulator.
             seed: Of the run.
             books: Where questions are kept and paid for; without, the model cannot be asked: for estimates.
 
@@ -223,17 +220,17 @@ class DecisionSettings(Settings):
         self.check()
         options = self.identity(seed)
         if self.kind == "text":
-            return replace(backend, decision_options=options)
+            return Component("evonav.decision.backends:text_match", options)
         maker = "vlm" if self.kind == "vlm" else "own"
-        asking = replace(backend, decision=f"evonav.decision.backends:{maker}", decision_options=options)
+        path = f"evonav.decision.backends:{maker}"
         if books is None:
-            return asking
+            return Component(path, options)
         means: dict[str, Any] = {**self._keeping(books.run_dir), "ledger": str(books.ledger.absolute())}
         if books.account:
             means["account"] = books.account
         if self.kind == "vlm":
             means |= {"server": self._server(books.num_workers), **books.spending.means(options["model"])}
-        return replace(asking, decision_host_options=means)
+        return Component(path, options, means)
 
     def _refuse_all_but(self, *allowed: str) -> None:
         """Says of settings that would be overlooked that they are."""
@@ -325,14 +322,14 @@ class Books:
         return cls(run_dir, run_dir / LEDGER_NAME, spending, num_workers=num_workers)
 
 
-def try_decisions(backend: Backend, seed: int) -> None:
+def try_decisions(decision: Component[DecisionModel], seed: int) -> None:
     """Finds out before a run what would make all its questions fail; asks nothing.
 
     Raises:
         DecisionError: The model cannot be asked from here: no key, no package.
         InvalidArgumentError: It cannot be made.
     """
-    check = getattr(backend.make_decision(seed), "check", None)
+    check = getattr(decision.create(seed), "check", None)
     if check is not None:
         check()
 

@@ -60,7 +60,7 @@ class Setup:
     def from_values(cls, values: dict[str, Any]) -> "Setup":
         """What `text` tells."""
         return cls(
-            Backend(**values["backend"]),
+            Backend.from_json(values["backend"]),
             ProtocolConfig(**values["protocol"]),
             AgentHosting(**values["hosting"]),
             values["num_retries"],
@@ -103,16 +103,16 @@ class WorkerContext:
     def agent(self, job: EpisodeJob) -> Agent | HostedAgent:
         """A fresh agent. Oracle baselines are given oracle data: they stay here."""
         if self._processes is not None and job.agent not in ORACLE_BASELINES:
-            return RemoteAgent(self._processes, job.agent, self.setup.backend.decision_spec(), job.seed)
+            return RemoteAgent(self._processes, job.agent, self.setup.backend.decision, job.seed)
         try:
-            return make_agent(job.agent, self.setup.backend.make_decision(job.seed))
+            return make_agent(job.agent, self.setup.backend.decision.create(job.seed))
         except Exception as error:
             return _Unmade(error)
 
     @contextmanager
     def simulator(self) -> Iterator[Simulator]:
         """The simulator; it is not used again after an episode that did not end by itself."""
-        simulator, self._simulator = self._simulator or self.setup.backend.make_simulator(), None
+        simulator, self._simulator = self._simulator or self.setup.backend.simulator.create(), None
         try:
             yield simulator
         except BaseException:
@@ -176,7 +176,7 @@ def run_job(job: EpisodeJob, context: WorkerContext) -> Generator[StageOutcome |
         Outcomes of the stages. After a failure that costs only the attempt, that, and the outcomes from stage 1 on
         again.
     """
-    case = context.setup.backend.load_case(Path(job.path))
+    case = context.setup.backend.tasks.create(Path(job.path))
     num_tried: Counter[int] = Counter()
     is_whole = False
     while not is_whole:
@@ -197,7 +197,7 @@ def run_job(job: EpisodeJob, context: WorkerContext) -> Generator[StageOutcome |
 
 def _attempt(case: EpisodeSpec, job: EpisodeJob, context: WorkerContext) -> Generator[StageOutcome]:
     setup = context.setup
-    perception = setup.backend.make_perception()
+    perception = setup.backend.perception.create()
     with context.simulator() as simulator:
         agent = context.agent(job)
         observer = _Heartbeat(context.on_round)

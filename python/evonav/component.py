@@ -1,0 +1,92 @@
+"""Build objects from import paths and options, which cross process borders as JSON."""
+
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Generic, TypeVar, cast
+
+from evonav.errors import InvalidArgumentError
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Component(Generic[T]):
+    """How to build one part of a run: a `T`."""
+
+    path: str
+    """Import path of a class or function: `package.module:name`, or `path/to/file.py:name`."""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    """Keyword arguments that decide results, as JSON. They are part of a run's identity."""
+    host_options: Mapping[str, Any] = field(default_factory=dict)
+    """Keyword arguments that depend on this machine (devices, addresses, files, limits), as JSON. They are not part of
+    a run's identity."""
+
+    @property
+    def keywords(self) -> dict[str, Any]:
+        """All keyword arguments."""
+        return {**self.options, **self.host_options}
+
+    def create(self, *arguments: object, **runtime: object) -> T:
+        """Build the object.
+
+        Args:
+            *arguments: Positional arguments, such as a seed or a path.
+            **runtime: Keyword arguments known only at run time.
+
+        Raises:
+            InvalidArgumentError: The path cannot be imported.
+        """
+        return cast("T", import_callable(self.path)(*arguments, **self.keywords, **runtime))
+
+    def identity(self, name: str) -> dict[str, Any]:
+        """Return the entries of a run header that describe this component: `name`, and `name_options` if it has any."""
+        return {name: self.path} | ({f"{name}_options": dict(self.options)} if self.options else {})
+
+
+def import_callable(path: str, kind: str = "") -> Callable[..., Any]:
+    """Return the class or function at an import path.
+
+    Args:
+        path: `package.module:name`, or `path/to/file.py:name`.
+        kind: What it makes, such as `agent`, for error messages.
+
+    Raises:
+        InvalidArgumentError: It cannot be imported, or is not callable.
+    """
+    module, _, name = path.rpartition(":")
+    shown = f"{kind} `{path}`".strip()
+    try:
+        found = getattr(_file_module(module) if module.endswith(".py") else import_module(module), name)
+    except Exception as error:  # importing runs other people's code, which may raise anything
+        raise InvalidArgumentError(f"{shown} cannot be imported: {type(error).__name__}: {error}") from error
+    if not callable(found):
+        raise InvalidArgumentError(f"{shown} is not callable: name a class or a function")
+    return cast("Callable[..., Any]", found)
+
+
+def _file_module(path: str) -> ModuleType:
+    """Load a Python file as a module by its own name, once; the module may import its neighbours."""
+    file = Path(path).resolve()
+    loaded = sys.modules.get(file.stem)
+    if loaded is not None and getattr(loaded, "__file__", None) == str(file):
+        return loaded
+    if loaded is not None:
+        raise ImportError(f"another module is called `{file.stem}`: rename the file")
+    spec = spec_from_file_location(file.stem, file)
+    if spec is None or spec.loader is None or not file.is_file():
+        raise FileNotFoundError(f"no file {path}")
+    module = module_from_spec(spec)
+    if str(file.parent) not in sys.path:
+        sys.path.append(str(file.parent))
+    sys.modules[file.stem] = module  # before it runs, as import does: dataclasses look it up there
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[file.stem]
+        raise
+    return module
