@@ -16,15 +16,17 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Component(Generic[T]):
-    """How to build one part of a run: a `T`."""
+    """A recipe for one part of a run, which is a `T`."""
 
     path: str
     """Import path of a class or function: `package.module:name`, or `path/to/file.py:name`."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Keyword arguments that decide results, as JSON. They are part of a run's identity."""
     host_options: Mapping[str, Any] = field(default_factory=dict)
-    """Keyword arguments that depend on this machine (devices, addresses, files, limits), as JSON. They are not part of
-    a run's identity."""
+    """Keyword arguments that depend on this machine (devices, addresses, files, limits), as JSON.
+
+    They are not part of a run's identity.
+    """
 
     @property
     def keywords(self) -> dict[str, Any]:
@@ -53,7 +55,7 @@ def import_callable(path: str, kind: str = "") -> Callable[..., Any]:
 
     Args:
         path: `package.module:name`, or `path/to/file.py:name`.
-        kind: What it makes, such as `agent`, for error messages.
+        kind: A noun for what it makes, such as `agent`, for error messages.
 
     Raises:
         InvalidArgumentError: It cannot be imported, or is not callable.
