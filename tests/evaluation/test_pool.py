@@ -18,7 +18,7 @@ from evonav.evaluation.records.schema import ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate, evaluate_all
-from evonav.parallel.pool import Resources
+from evonav.parallel.worker import Resources
 from evonav.tasks.listing import task_files
 
 AGENT = "nearest-frontier"

@@ -6,7 +6,8 @@ import pytest
 
 from evonav.errors import InvalidArgumentError
 from evonav.parallel import pool as parallel
-from evonav.parallel.pool import EngineError, Job, WorkerLostError, WorkerPool, open_pool
+from evonav.parallel.pool import Job, WorkerPool, open_pool
+from evonav.parallel.worker import EngineError, WorkerLostError
 
 
 def make_echo(settings, alive):

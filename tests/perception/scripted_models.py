@@ -5,8 +5,8 @@ from typing import ClassVar
 import numpy as np
 
 from evonav.perception.detector import Found
+from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.models.crops import padded_crops, unit
-from evonav.perception.predicted import PredictedPerception
 
 WORDS = ("couch", "dining table", "trash can", "gizmo")
 
@@ -49,7 +49,7 @@ class ColourEmbedder:
 
 
 def scripted_perception():
-    return PredictedPerception(BandDetector(), embedder=ColourEmbedder())
+    return DetectorPerception(BandDetector(), embedder=ColourEmbedder())
 
 
 class Counted:

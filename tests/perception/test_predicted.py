@@ -18,8 +18,9 @@ from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.evaluation.run.settings import PerceptionSettings
 from evonav.house import bundled_houses
 from evonav.perception.detector import Found, nothing_found
+from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.filters import FilterConfig
-from evonav.perception.predicted import PredictedPerception, StackPerception, predicted_perception
+from evonav.perception.predicted import StackPerception, predicted_perception
 from evonav.perception.stacks import EVERYTHING, JointDetector, StackConfig, SwappedColours, stack_of, weights_of
 from evonav.perception.vocabulary import (
     COCO_UNIGOAL,
@@ -95,7 +96,7 @@ def test_words_become_types_and_words_without_one_stay() -> None:
 def test_masks_confidences_and_features_stay_together_when_some_are_dropped() -> None:
     parts = found(((0, 0, 30, 20), "cup", 0.5), ((32, 32, 60, 50), "sofa", 0.3), ((40, 2, 60, 30), "bed", 0.9))
     features = np.eye(3, dtype=np.float32)
-    (percept,) = PredictedPerception(Told(replace(parts, features=features))).perceive([frame()])
+    (percept,) = DetectorPerception(Told(replace(parts, features=features))).perceive([frame()])
     assert percept.detections.labels == ("Bed", "Cup")  # the doubtful one went, the most confident is first
     assert percept.detections.confidences.tolist() == pytest.approx([0.9, 0.5])
     assert percept.detections.features.tolist() == [[0, 0, 1], [1, 0, 0]]
@@ -114,7 +115,7 @@ def test_a_mask_that_smaller_ones_cover_goes_and_the_rest_is_renumbered() -> Non
         np.eye(4, dtype=np.float32),
     )
     config = replace(EVERYTHING, min_share_of_inner=1.0)
-    (percept,) = PredictedPerception(Told(both), config).perceive([frame()])
+    (percept,) = DetectorPerception(Told(both), config).perceive([frame()])
     assert percept.detections.labels == ("Cup", "Pillow", "Book")
     assert percept.detections.features.argmax(axis=1).tolist() == [1, 2, 3]
     assert sorted(np.unique(percept.detections.masks).tolist()) == [-1, 0, 1, 2]
@@ -122,13 +123,13 @@ def test_a_mask_that_smaller_ones_cover_goes_and_the_rest_is_renumbered() -> Non
 
 
 def test_nothing_found_is_no_error_and_wrong_shapes_are() -> None:
-    (percept,) = PredictedPerception(Told(nothing_found((SIDE, SIDE))), embedder=ColourEmbedder()).perceive([frame()])
+    (percept,) = DetectorPerception(Told(nothing_found((SIDE, SIDE))), embedder=ColourEmbedder()).perceive([frame()])
     assert percept.detections.labels == ()
     assert percept.detections.features.shape == (0, 4)
     with pytest.raises(InvalidArgumentError, match="1 results for 2 views"):
-        PredictedPerception(Told(nothing_found((SIDE, SIDE)))).perceive([frame(), frame()])
+        DetectorPerception(Told(nothing_found((SIDE, SIDE)))).perceive([frame(), frame()])
     with pytest.raises(InvalidArgumentError, match="a detector's `masks`"):
-        PredictedPerception(Told(replace(found(((0, 0, 9, 9), "a", 1.0)), labels=("a", "b")))).perceive([frame()])
+        DetectorPerception(Told(replace(found(((0, 0, 9, 9), "a", 1.0)), labels=("a", "b")))).perceive([frame()])
     with pytest.raises(InvalidArgumentError, match="no colours"):
         scripted_perception().perceive([replace(frame(), rgb=None)])
 
@@ -140,7 +141,7 @@ def test_unigoals_detectors_are_one_and_the_maps_word_stands() -> None:
 
     graph = found(((0, 0, 30, 31), "sofa", 0.9), ((40, 40, 60, 60), "painting", 0.9), ((0, 0, 64, 40), "kitchen", 0.9))
     joint = JointDetector(Network(), 0.5, Told(graph))
-    (percept,) = PredictedPerception(joint, EVERYTHING).perceive([frame()])
+    (percept,) = DetectorPerception(joint, EVERYTHING).perceive([frame()])
     assert set(percept.detections.labels) == {"Sofa", "Painting"}  # a box over half the image is no object
 
 
@@ -151,7 +152,7 @@ def test_colours_can_be_swapped_as_3d_mems_code_does() -> None:
             return [nothing_found((SIDE, SIDE))]
 
     looking, one = Looking(), frame()
-    PredictedPerception(SwappedColours(looking)).perceive([one])
+    DetectorPerception(SwappedColours(looking)).perceive([one])
     (view,) = looking.views
     np.testing.assert_array_equal(view.rgb, one.rgb[..., [2, 1, 0]])
     assert view.depth_m is one.depth_m

@@ -225,7 +225,7 @@ def _evaluate(
     **crew: Any,  # noqa: ANN401 - of `evaluate`
 ) -> "list[AgentSummary]":
     from evonav.evaluation.run.run import evaluate
-    from evonav.parallel.pool import Resources
+    from evonav.parallel.worker import Resources
 
     with interruptible(out):
         with status("Starting the simulator"):

@@ -11,8 +11,8 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from types import ModuleType
 
-from evonav.parallel.pool import Worker, WorkerLostError
 from evonav.parallel.work import Heartbeat, end_work, load_work, steps
+from evonav.parallel.worker import Worker, WorkerLostError
 
 END_TIMEOUT_S = 5.0
 """Time that a worker has to end cleanly before it is killed."""

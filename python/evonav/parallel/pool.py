@@ -9,14 +9,15 @@ killed.
 
 import time
 from collections import Counter, deque
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from types import TracebackType
 from typing import Literal, Protocol
 
-from evonav.errors import EvonavError, InvalidArgumentError
+from evonav.errors import InvalidArgumentError
 from evonav.parallel.work import end_work, load_work, steps
+from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Host, Resources, Worker, WorkerLostError
 
 EngineName = Literal["local", "ray"]
 FailureKind = Literal["crash", "timeout", "error"]
@@ -25,12 +26,6 @@ MAX_LOSSES = 2
 """Default number of workers that a job may lose before it fails."""
 MAX_FAILED_STARTS = 5
 """Failed starts in a row after which no worker is started; if none is running, the pool fails."""
-START_TIMEOUT_S = 300.0
-"""Longest time until a worker is ready."""
-
-
-class EngineError(EvonavError):
-    """Workers do not start, or a library that starts them is not installed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,15 +50,6 @@ class Answer:
     failure: FailureKind | None = None
     detail: str = ""
     """A traceback or one line, if the job failed."""
-
-
-@dataclass(frozen=True, slots=True)
-class Resources:
-    """Resources that a Ray cluster reserves for each worker."""
-
-    num_cpus: float = 1.0
-    num_gpus: float = 0.0
-    """May be a fraction of a GPU."""
 
 
 class Pool(Protocol):
@@ -147,44 +133,6 @@ def answers(pool: Pool, jobs: Iterable[Job]) -> Iterator[Answer]:
         answer = pool.next_answer()
         num_open -= 1
         yield answer
-
-
-class WorkerLostError(EngineError):
-    """A worker ended by itself."""
-
-
-class Worker(Protocol):
-    """The pool's side of a worker, which sends `ready` once and then the messages of its jobs."""
-
-    def send(self, text: str) -> None:
-        """Send a job; if the worker is lost, `receive` raises."""
-
-    def receive(self) -> tuple[str, str]:
-        """Return the next message; call only when there is one.
-
-        Returns:
-            `("ready", "")`; during a job `("alive", "")` and `("progress", text)`, and at its end `("done", answer)` or
-            `("error", traceback)`; `("broken", traceback)` if the factory failed.
-
-        Raises:
-            WorkerLostError: The worker ended.
-        """
-
-    def close(self) -> None:
-        """End the worker at once; safe to call twice."""
-
-
-class Host(Protocol):
-    """Starts workers."""
-
-    def start(self) -> Worker:
-        """Start another worker."""
-
-    def wait(self, workers: Sequence[Worker], timeout_s: float) -> Sequence[Worker]:
-        """Wait until a worker has a message, and return all that have one."""
-
-    def close(self) -> None:
-        """Release the host, after all workers are closed."""
 
 
 class InlinePool:

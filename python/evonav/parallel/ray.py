@@ -10,14 +10,14 @@ from contextlib import suppress
 from typing import Any
 
 from evonav.errors import InvalidArgumentError
-from evonav.parallel.pool import (
+from evonav.parallel.work import Heartbeat, end_work, load_work, steps
+from evonav.parallel.worker import (
     START_TIMEOUT_S,
     EngineError,
     Resources,
     Worker,
     WorkerLostError,
 )
-from evonav.parallel.work import Heartbeat, end_work, load_work, steps
 
 _END_TIMEOUT_S = 5.0
 

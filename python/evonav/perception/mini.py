@@ -15,8 +15,8 @@ import numpy as np
 from evonav import _core
 from evonav.errors import InvalidArgumentError
 from evonav.perception.detector import DetectorView, Found
+from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.filters import FilterConfig
-from evonav.perception.predicted import PredictedPerception
 
 WEIGHTS = Path(__file__).parents[1] / "data" / "mini.weights"
 """What ships, made by `scripts/train_mini.py` and `scripts/export_mini.py`."""
@@ -34,7 +34,7 @@ def _network(weights: Path) -> _core.MiniNetwork:
         ) from error
 
 
-class MiniPerception(PredictedPerception):
+class MiniPerception(DetectorPerception):
     """What `predicted:mini` stands for. Masks do not overlap, so that only specks and doubts are left to filter."""
 
     def __init__(self, *, min_confidence: float = 0.3, min_cells: int = 2) -> None:

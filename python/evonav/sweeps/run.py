@@ -27,7 +27,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import NUM_RETRIES, Progress, RunConfig, RunRequest, evaluate_all, run_identity
 from evonav.evaluation.run.settings import Books, SpendingSettings, try_decisions
 from evonav.parallel.folders import write_atomically, writing
-from evonav.parallel.pool import Resources
+from evonav.parallel.worker import Resources
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import TaskFile, task_files

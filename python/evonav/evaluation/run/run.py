@@ -20,7 +20,8 @@ from evonav.evaluation.run.provenance import note_session
 from evonav.evaluation.run.scheduler import Progress, Run, run_all
 from evonav.evaluation.run.worker import WORK, EpisodeJob, Setup
 from evonav.parallel.folders import check_same_run, write_atomically, writing
-from evonav.parallel.pool import EngineName, Resources, open_pool
+from evonav.parallel.pool import EngineName, open_pool
+from evonav.parallel.worker import Resources
 from evonav.perception.words import word_of
 from evonav.tasks.listing import TaskFile
 

@@ -1,0 +1,95 @@
+"""Perceive with a detector: filter what it finds, keep one label for each pixel, and name ProcTHOR's types.
+
+Only colours and depth go in; instances and the scene's objects are not used.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evonav.errors import InvalidArgumentError
+from evonav.perception.detector import Detector, DetectorView, Embedder, Found
+from evonav.perception.filters import FilterConfig, filtered, mask_areas_px, one_label_a_pixel
+from evonav.perception.perception import Percept, StageScene
+from evonav.perception.vocabulary import TYPE_OF_WORD
+from evonav.sensors.observation import Detections
+from evonav.world.simulator import Frame
+
+
+class DetectorPerception:
+    """What a detector sees, as percepts; depth and pose are the frame's own."""
+
+    needs_rgb = True
+
+    def __init__(
+        self,
+        detector: Detector,
+        filters: FilterConfig | None = None,
+        embedder: Embedder | None = None,
+        types: Mapping[str, str] = TYPE_OF_WORD,
+    ) -> None:
+        """A perception over models that may be shared.
+
+        Args:
+            detector: Finds.
+            filters: What is believed; default: 3D-Mem's values.
+            embedder: Gives what is left features; without, they are the detector's, if it has some.
+            types: ProcTHOR's type by the detector's word; a word that is not in it stays as it is.
+        """
+        self._detector = detector
+        self._filters = filters or FilterConfig()
+        self._embedder = embedder
+        self._types = types
+
+    def begin_stage(self, scene: StageScene) -> None:
+        """Nothing of the scene is used."""
+
+    def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
+        """The views of a round, as one batch.
+
+        Raises:
+            InvalidArgumentError: A frame has no colours, or what the detector returns does not fit.
+        """
+        views = [DetectorView(_colours(frame), frame.depth_m, frame.pose.horizon_rad) for frame in frames]
+        found = self._detector.detect(views)
+        if len(found) != len(views):
+            raise InvalidArgumentError(f"a detector returned {len(found)} results for {len(views)} views")
+        kept = []
+        for one, view in zip(found, views, strict=True):
+            one.check((view.rgb.shape[0], view.rgb.shape[1]))
+            kept.append(filtered(one, self._filters))
+        features: Sequence[NDArray[np.float32] | None] = [one.features for one in kept]
+        if self._embedder is not None:
+            features = self._embedder.image_features([view.rgb for view in views], [one.boxes_px for one in kept])
+        return [
+            Percept(self._detections(one, feature), frame.depth_m, frame.pose)
+            for one, feature, frame in zip(kept, features, frames, strict=True)
+        ]
+
+    def text_feature(self, text: str) -> NDArray[np.float32] | None:
+        """Of the embedder, if there is one."""
+        return None if self._embedder is None else self._embedder.text_feature(text)
+
+    def _detections(self, found: Found, features: NDArray[np.float32] | None) -> Detections:
+        """One label a pixel; what smaller masks leave fewer pixels of than a mask must have goes."""
+        masks = one_label_a_pixel(found.masks)
+        num = len(found)
+        left_px = np.bincount(masks[masks >= 0], minlength=num)
+        min_area_px = self._filters.min_area_px * self._filters.scale_of(masks.shape) ** 2
+        is_kept = left_px >= np.minimum(np.maximum(min_area_px, 1.0), mask_areas_px(found.masks))
+        if not is_kept.all():
+            masks = one_label_a_pixel(found.masks[is_kept])
+        labels = [label for label, kept in zip(found.labels, is_kept.tolist(), strict=True) if kept]
+        return Detections(
+            masks=masks,
+            labels=tuple(self._types.get(label, label) for label in labels),
+            confidences=found.confidences[is_kept],
+            features=None if features is None else features[is_kept],
+        )
+
+
+def _colours(frame: Frame) -> NDArray[np.uint8]:
+    if frame.rgb is None:
+        raise InvalidArgumentError("argument `frames`: one has no colours, expected frames rendered with them")
+    return frame.rgb
