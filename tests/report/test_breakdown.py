@@ -11,7 +11,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import rates
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import STANDARD, breakdown, breakdown_csv, breakdown_plot, breakdown_table
-from evonav.report.compare.selection import read_sides
+from evonav.report.compare.selection import read_compared_agents
 from evonav.report.plots.run_plots import run_plots
 from evonav.report.plots.specs import CurvePlot
 from evonav.report.run import load_run
@@ -24,7 +24,7 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_every_scored_stage_is_in_one_group_and_rates_are_those_of_the_metrics(run: Path) -> None:
-    sides = read_sides([str(run)])
+    sides = read_compared_agents([str(run)])
     records = load_run(run).records_by_agent()
     for by in STANDARD[:-1]:
         found = breakdown(sides, by)
@@ -44,7 +44,7 @@ def test_every_scored_stage_is_in_one_group_and_rates_are_those_of_the_metrics(r
 
 
 def test_any_field_groups_and_any_number_is_measured(run: Path) -> None:
-    sides = read_sides([str(run), "fu"])
+    sides = read_compared_agents([str(run), "fu"])
     assert breakdown(sides, "has-stopped").groups == ("yes",)
     assert breakdown(sides, "cause").groups == ("no_object",)
     assert breakdown(sides, "num_rounds").groups == ("4",)
@@ -62,14 +62,14 @@ def test_a_length_on_a_border_is_in_the_upper_bin(tmp_path: Path) -> None:
         for task, length_m in lengths_m.items()
     ]
     run = record_run(tmp_path / "run", records, dict.fromkeys(lengths_m, 1), ["fu"])
-    found = breakdown(read_sides([str(run)]), "path-length")
+    found = breakdown(read_compared_agents([str(run)]), "path-length")
     sizes = {group: found.cells[group, "fu"].n for group in found.groups}
     assert sizes == {"0-2 m": 1, "2-4 m": 2, "16 m and more": 2}
 
 
 def test_success_at_another_radius(run: Path) -> None:
     """Successes of this run end 1 m from the target, failures 3.5 m."""
-    found = breakdown(read_sides([str(run)]), "radius")
+    found = breakdown(read_compared_agents([str(run)]), "radius")
     assert [found.cells[group, "fu"].value for group in ("0.5 m", "1 m", "1.5 m", "3 m")] == [0, 0, 10 / 18, 10 / 18]
     plot = breakdown_plot(found)
     assert isinstance(plot, CurvePlot)
@@ -77,7 +77,7 @@ def test_success_at_another_radius(run: Path) -> None:
 
 
 def test_tables_and_csv_hold_n_and_interval(run: Path) -> None:
-    found = breakdown(read_sides([str(run)]), "stratum")
+    found = breakdown(read_compared_agents([str(run)]), "stratum")
     table = breakdown_table(found)
     assert table.columns == ("stratum", "n", "fu", "ftu")
     assert table.rows[0] == ("first", "8-9", "100.0", "100.0")

@@ -13,7 +13,7 @@ from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.report.compare import wording as words
 from evonav.report.compare.compare import Comparison, compare, comparison_json
-from evonav.report.compare.selection import read_sides
+from evonav.report.compare.selection import read_compared_agents
 from evonav.report.export import csv_cell
 from evonav.report.maps.stage_map import VIEW_DIR, page_name
 
@@ -21,7 +21,7 @@ SUCCESS = EndState.SUCCESS
 
 
 def one(*words_: object, **options) -> Comparison:
-    (found,) = compare(read_sides([str(word) for word in words_]), **options)
+    (found,) = compare(read_compared_agents([str(word) for word in words_]), **options)
     return found
 
 
@@ -80,7 +80,7 @@ def test_sides_are_named_as_runs_agents_or_both(tmp_path: Path) -> None:
     a, b = lettered_run(tmp_path / "a", outcomes), lettered_run(tmp_path / "b", outcomes)
 
     def pairs(*asked: object, **options) -> list[tuple[str, str]]:
-        return [(found.a, found.b) for found in compare(read_sides([str(word) for word in asked]), **options)]
+        return [(found.a, found.b) for found in compare(read_compared_agents([str(word) for word in asked]), **options)]
 
     assert pairs(a) == [("fu", "ftu"), ("fu", "my_module:Agent"), ("ftu", "my_module:Agent")]
     assert pairs(a, "my_module:Agent", "fu") == pairs(f"{a}:my_module:Agent", f"{a}:fu")
@@ -108,7 +108,7 @@ def test_sides_are_named_as_runs_agents_or_both(tmp_path: Path) -> None:
 
 def test_several_pairs_are_adjusted_and_a_tie_says_what_could_be_found(tmp_path: Path) -> None:
     run = lettered_run(tmp_path / "run", {"a": "sf" * 12, "b": "ss" * 8 + "sf" * 4, "c": "sf" * 11 + "ss"})
-    found = compare(read_sides([str(run)]))
+    found = compare(read_compared_agents([str(run)]))
     raw = [item.all.effects["success"].p for item in found]
     assert [item.all.effects["success"].adjusted_p for item in found] == [
         pytest.approx(min(1.0, p)) for p in (3 * raw[0], raw[1], 2 * raw[2])
@@ -116,7 +116,7 @@ def test_several_pairs_are_adjusted_and_a_tie_says_what_could_be_found(tmp_path:
     assert words.says(found[0]) == "b is ahead"
     tie = words.sentence("a", "c", found[1].all.effects["success"], "success")
     assert "a tie at this n (a true difference of" in tie
-    by_rounds = compare(read_sides([str(run)]), measures=["num_rounds", "recall"])
+    by_rounds = compare(read_compared_agents([str(run)]), measures=["num_rounds", "recall"])
     assert "recall" not in by_rounds[0].all.effects  # no stage has it
     assert by_rounds[0].all.effects["num_rounds"].verdict == "equal"
 
@@ -154,7 +154,7 @@ def test_the_files_hold_what_was_computed(tmp_path: Path) -> None:
 def test_text_of_a_run_is_only_text_in_every_file(tmp_path: Path) -> None:
     evil = '=cmd|"/c calc"!A1<script>alert(1)</script>'
     run = lettered_run(tmp_path / "run", {evil: "sf" * 6, "fu": "ss" * 6})
-    found = compare(read_sides([str(run)]))
+    found = compare(read_compared_agents([str(run)]))
     from evonav.report.compare.page import comparison_page
 
     assert "<script" not in comparison_page(found)

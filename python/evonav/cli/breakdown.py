@@ -28,12 +28,12 @@ def breakdown(
 
     from evonav.parallel.folders import write_atomically
     from evonav.report.compare import breakdown as made
-    from evonav.report.compare.selection import read_sides
+    from evonav.report.compare.selection import read_compared_agents
     from evonav.report.plots.render import check_plot, write_plots
 
     if plot is not None:
         check_plot(plot)
-    sides = read_sides(runs)
+    sides = read_compared_agents(runs)
     found = [made.breakdown(sides, name, measure) for name in by or made.STANDARD]
     found = [one for one in found if one.groups]
     tables = [made.breakdown_table(one) for one in found]

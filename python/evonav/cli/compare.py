@@ -34,10 +34,10 @@ def compare(
 
     from evonav.report.compare import wording as words
     from evonav.report.compare.compare import compare as compare_sides
-    from evonav.report.compare.selection import read_sides
+    from evonav.report.compare.selection import read_compared_agents
 
     found = compare_sides(
-        read_sides(sides), measures=measure or [], baseline=baseline, allow_differences=allow_differences
+        read_compared_agents(sides), measures=measure or [], baseline=baseline, allow_differences=allow_differences
     )
     console = Console()
     for table in words.terminal_tables(found):

@@ -11,7 +11,7 @@ from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.store import RunStore
 from evonav.report.compare.compare import MODES, STRATA, check_measure
-from evonav.report.compare.selection import Side
+from evonav.report.compare.selection import ComparedAgent
 from evonav.report.compare.wording import RATES, measure_name
 from evonav.report.export import csv_text
 from evonav.report.plots.specs import CurvePlot, GroupPlot, Line, Plot, Series
@@ -25,7 +25,7 @@ ROOM_EDGES = (1, 2, 4, 6, 11)
 """First of each group of rooms: 1, 2-3, 4-5, 6-10, more."""
 MAX_PLOTTED = 10
 NUM_BINS = 4
-"""Of a number that has no bins of its own: quarters."""
+"""Number of groups for a field that has no bins of its own: quarters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,38 +44,38 @@ class Breakdown:
     """A measure of every agent by group."""
 
     by: str
-    words: str
+    label: str
     measure: str
     groups: tuple[str, ...]
     agents: tuple[str, ...]
     cells: Mapping[tuple[str, str], Cell]
-    """By (group, agent)."""
+    """Cells by (group, agent)."""
     note: str
 
 
 @dataclass(frozen=True, slots=True)
 class Grouping:
-    """How stages are grouped."""
+    """Rule that sorts stages into groups."""
 
-    words: str
+    label: str
     group_of: Callable[[StageMetrics], str | None]
     """`None` for a stage that belongs nowhere."""
     order: Sequence[str] | None
-    """Of groups; `None`: the largest first."""
+    """Order of the groups; `None`: the largest first."""
     note: str = ""
 
 
 STANDARD = ("stratum", "mode", "path-length", "earlier-stages", "room-count", "category", RADIUS)
-"""What `evonav breakdown` shows unless it is told what."""
+"""Groupings that `evonav breakdown` shows by default."""
 
 
-def breakdown(sides: Sequence[Side], by: str, measure: str = "success") -> Breakdown:
-    """A measure by group, for every side.
+def breakdown(compared_agents: Sequence[ComparedAgent], by: str, measure: str = "success") -> Breakdown:
+    """Compute a metric by group, for every compared agent.
 
     Args:
-        sides: From `read_sides`.
+        agents: Agents from `read_compared_agents`.
         by: One of `STANDARD`, or any field of a stage's row.
-        measure: Any numeric field of it; of the radius sweep always success.
+        measure: Any numeric field of a row; the radius sweep always shows success.
 
     Raises:
         InvalidArgumentError: There is no such field.
@@ -83,24 +83,24 @@ def breakdown(sides: Sequence[Side], by: str, measure: str = "success") -> Break
     """
     check_measure(measure)
     if by == RADIUS:
-        return _by_radius(sides)
-    grouping = _grouping(sides, by)
+        return _by_radius(compared_agents)
+    grouping = _grouping(compared_agents, by)
     rows: dict[tuple[str, str], list[StageMetrics]] = {}
-    for side in sides:
-        for row in side.rows.values():
+    for compared in compared_agents:
+        for row in compared.rows.values():
             group = grouping.group_of(row)
             if group is not None and row.is_scored and getattr(row, measure) is not None:
-                rows.setdefault((group, side.name), []).append(row)
+                rows.setdefault((group, compared.name), []).append(row)
     sizes: dict[str, int] = {}
     for (group, _), part in rows.items():
         sizes[group] = sizes.get(group, 0) + len(part)
     known = grouping.order or sorted(sizes, key=lambda group: (-sizes[group], group))
     return Breakdown(
         by=by,
-        words=grouping.words,
+        label=grouping.label,
         measure=measure,
         groups=tuple(group for group in known if group in sizes),
-        agents=tuple(side.name for side in sides),
+        agents=tuple(compared.name for compared in compared_agents),
         cells={key: _cell(part, [float(getattr(row, measure)) for row in part]) for key, part in rows.items()},
         note=grouping.note,
     )
@@ -112,27 +112,27 @@ def _cell(rows: Sequence[StageMetrics], values: Sequence[float]) -> Cell:
     return Cell(mean.n, mean.num_clusters, mean.value, mean.ci95)
 
 
-def _by_radius(sides: Sequence[Side]) -> Breakdown:
+def _by_radius(compared_agents: Sequence[ComparedAgent]) -> Breakdown:
     cells: dict[tuple[str, str], Cell] = {}
-    words = {f"{radius_m:g} m": radius_m for radius_m in RADII_M}
-    for side in sides:
-        scored = [row for row in side.rows.values() if row.is_scored and row.terminal_distance_m is not None]
-        for group, radius_m in words.items() if scored else ():
-            cells[group, side.name] = _cell(scored, [float(bool(row.is_success_at(radius_m))) for row in scored])
+    labels = {f"{radius_m:g} m": radius_m for radius_m in RADII_M}
+    for compared in compared_agents:
+        scored = [row for row in compared.rows.values() if row.is_scored and row.terminal_distance_m is not None]
+        for group, radius_m in labels.items() if scored else ():
+            cells[group, compared.name] = _cell(scored, [float(bool(row.is_success_at(radius_m))) for row in scored])
         for name, field in (("strict", "is_strict_success"), ("geodesic", "is_geodesic_success")):
-            told = [row for row in scored if getattr(row, field) is not None]
-            if told:
-                cells[name, side.name] = _cell(told, [float(getattr(row, field)) for row in told])
+            judged = [row for row in scored if getattr(row, field) is not None]
+            if judged:
+                cells[name, compared.name] = _cell(judged, [float(getattr(row, field)) for row in judged])
     note = (
         "The agents were run under their own radius; these are the same stages judged by others. Strict: it called "
         "stop within 1 m of the target's box with the target in view. Geodesic: the way to it is under the radius."
     )
-    groups = [group for group in (*words, "strict", "geodesic") if any(group == key for key, _ in cells)]
-    agents = tuple(side.name for side in sides)
+    groups = [group for group in (*labels, "strict", "geodesic") if any(group == key for key, _ in cells)]
+    agents = tuple(compared.name for compared in compared_agents)
     return Breakdown(RADIUS, "success radius", "success", tuple(groups), agents, cells, note)
 
 
-def _grouping(sides: Sequence[Side], by: str) -> Grouping:
+def _grouping(compared_agents: Sequence[ComparedAgent], by: str) -> Grouping:
     if by == "stratum":
         return Grouping("stratum", lambda row: STRATA.get(row.stratum), list(STRATA.values()))
     if by == "mode":
@@ -147,34 +147,34 @@ def _grouping(sides: Sequence[Side], by: str) -> Grouping:
         note = "Stages of the task before this one: how long memory has grown, and could grow stale."
         return Grouping("earlier stages", lambda row: str(row.stage - 1), names, note)
     if by == "room-count":
-        counts = _room_counts(sides)
+        counts = _room_counts(compared_agents)
         names = [_room_group(k) for k in ROOM_EDGES]
         return Grouping("rooms", lambda row: _rooms_of(counts, row), names)
-    return _field_grouping(sides, by.replace("-", "_"))
+    return _field_grouping(compared_agents, by.replace("-", "_"))
 
 
-def _field_grouping(sides: Sequence[Side], field: str) -> Grouping:
+def _field_grouping(compared_agents: Sequence[ComparedAgent], field: str) -> Grouping:
     known = {one.name for one in fields(StageMetrics)}
     if field not in known:
         raise InvalidArgumentError(
             f"argument `by` is {field!r}, expected one of {', '.join(STANDARD)}, or a field of a stage's row: "
             f"{', '.join(sorted(known))}"
         )
-    words = field.replace("_", " ")
-    values = [getattr(row, field) for side in sides for row in side.rows.values() if row.is_scored]
+    labels = field.replace("_", " ")
+    values = [getattr(row, field) for compared in compared_agents for row in compared.rows.values() if row.is_scored]
     there = [value for value in values if value is not None]
     kinds = {type(value) for value in there}
     if kinds <= {bool}:
-        return Grouping(words, lambda row: _yes(getattr(row, field)), ["yes", "no"])
+        return Grouping(labels, lambda row: _yes(getattr(row, field)), ["yes", "no"])
     if kinds <= {int} and len(set(there)) <= 12:
-        return Grouping(words, lambda row: _text(getattr(row, field)), [str(k) for k in sorted(set(there))])
+        return Grouping(labels, lambda row: _text(getattr(row, field)), [str(k) for k in sorted(set(there))])
     if kinds <= {int, float}:
         edges = sorted(
             {float(edge) for edge in np.quantile(np.array(there, dtype=float), np.linspace(0, 1, NUM_BINS + 1))}
         )
         names = [f"{a:.3g} to {b:.3g}" for a, b in pairwise(edges)] or [f"{edges[0]:.3g}"]
-        return Grouping(words, lambda row: _bin(getattr(row, field), edges, names), names, "Quarters of all stages.")
-    return Grouping(words, lambda row: _text(getattr(row, field)), None)
+        return Grouping(labels, lambda row: _bin(getattr(row, field), edges, names), names, "Quarters of all stages.")
+    return Grouping(labels, lambda row: _text(getattr(row, field)), None)
 
 
 def _yes(value: bool | None) -> str | None:
@@ -188,19 +188,22 @@ def _text(value: object) -> str | None:
 def _bin(value: float | None, edges: Sequence[float], names: Sequence[str]) -> str | None:
     if value is None:
         return None
-    return names[min(len(names) - 1, max(0, int(np.searchsorted(edges, value, side="right")) - 1))]
+    return names[min(len(names) - 1, max(0, int(np.searchsorted(edges, value, compared="right")) - 1))]
 
 
 def _length_bin(row: StageMetrics, names: Sequence[str]) -> str | None:
     return _bin(row.reference_length_m, LENGTH_EDGES_M, names)
 
 
-def _room_counts(sides: Sequence[Side]) -> dict[str, int]:
+def _room_counts(compared_agents: Sequence[ComparedAgent]) -> dict[str, int]:
     counts: dict[str, int] = {}
-    for run_dir in {side.run_dir: None for side in sides}:
+    for run_dir in {compared.run_dir: None for compared in compared_agents}:
         with RunStore(run_dir) as store:
             for task_id in {
-                row.task_id: None for side in sides if side.run_dir == run_dir for row in side.rows.values()
+                row.task_id: None
+                for compared in compared_agents
+                if compared.run_dir == run_dir
+                for row in compared.rows.values()
             }:
                 first = next(store.maps(task_id), None)
                 if first is not None:
@@ -221,7 +224,7 @@ def _rooms_of(counts: Mapping[str, int], row: StageMetrics) -> str | None:
 
 
 def breakdown_table(found: Breakdown, *, is_brief: bool = False) -> Table:
-    """A row a group, a column an agent.
+    """Build a table with one row per group and one column per agent.
 
     Args:
         found: The breakdown.
@@ -231,14 +234,14 @@ def breakdown_table(found: Breakdown, *, is_brief: bool = False) -> Table:
     for group in found.groups:
         cells = [found.cells.get((group, agent)) for agent in found.agents]
         sizes = sorted({cell.n for cell in cells if cell is not None})
-        told = (_brief(cell, found.measure) if is_brief else cell_words(cell, found.measure) for cell in cells)
-        rows.append((group, "-".join(map(str, sizes[:1] + sizes[1:][-1:])), *told))
+        shown = (_brief(cell, found.measure) if is_brief else cell_words(cell, found.measure) for cell in cells)
+        rows.append((group, "-".join(map(str, sizes[:1] + sizes[1:][-1:])), *shown))
     unit = " %" if found.measure in RATES else ""
     ends = "± half of its 95% interval" if is_brief else "[95% CI]"
     notes = [f"{measure_name(found.measure)}{unit} {ends}, bootstrap by house; n stages of an agent."]
     notes += [found.note] if found.note else []
-    columns = (found.words, "n", *found.agents)
-    return Table(f"{measure_name(found.measure)} by {found.words}", columns, tuple(rows), tuple(notes))
+    columns = (found.label, "n", *found.agents)
+    return Table(f"{measure_name(found.measure)} by {found.label}", columns, tuple(rows), tuple(notes))
 
 
 def cell_words(cell: Cell | None, measure: str) -> str:
@@ -259,7 +262,7 @@ def _brief(cell: Cell | None, measure: str) -> str:
 
 
 def breakdown_csv(found: Sequence[Breakdown]) -> str:
-    """A row a group and agent, unrounded."""
+    """Return one CSV row per group and agent, unrounded."""
     columns = ("by", "group", "agent", "measure", "n", "num_houses", "value", "low", "high")
     rows = []
     for one in found:
@@ -300,7 +303,7 @@ def breakdown_plot(found: Breakdown) -> Plot:
         for group, size in zip(groups, sizes, strict=True)
     )
     more = len(found.groups) - len(groups)
-    heading = f"{measure_name(found.measure)} by {found.words}" + (f" (the {MAX_PLOTTED} largest)" if more > 0 else "")
+    heading = f"{measure_name(found.measure)} by {found.label}" + (f" (the {MAX_PLOTTED} largest)" if more > 0 else "")
     return GroupPlot(heading, labels, tuple(series), name)
 
 

@@ -17,7 +17,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.schema import EndState
-from evonav.report.compare.selection import Side, config_differences
+from evonav.report.compare.selection import ComparedAgent, config_differences
 from evonav.report.maps.stage_map import VIEW_DIR, page_name
 from evonav.report.tables.causes import WORDS, FailureCause
 from evonav.statistics import PairedEffect, mcnemar, paired_effects, with_holm
@@ -36,8 +36,8 @@ MODES = {
     "extensions": "other extensions",
 }
 ALL = "all"
-FORCED = EndState.GUIDED.value
-"""Stages that the evaluator walked: nobody is scored on them, and nobody misses them."""
+GUIDED = EndState.GUIDED.value
+"""State of stages that the evaluator guided: no agent is scored on them, and they do not count as missing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +46,15 @@ class Part:
 
     key: str
     """`all`, a stratum or a mode."""
-    words: str
+    label: str
     n: int
     num_only_a: int
     """Stages where only `a` succeeded."""
     num_only_b: int
     mcnemar_p: float
-    """As if stages were independent; `effects["success"].p` takes houses whole."""
+    """P value that treats stages as independent; `effects["success"].p` resamples whole houses."""
     effects: Mapping[str, PairedEffect]
-    """By measure; one that no pair has is left out."""
+    """Effects by metric; a metric that no pair has is left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,16 +69,16 @@ class Flip:
     winner: str
     loser: str
     cause: str
-    """Why the other failed, in words."""
+    """Reason why the other failed, in words."""
     pages: tuple[str | None, str | None]
-    """Where `evonav view` has shown the winner and the loser, as paths with a fragment."""
+    """Replays of the winner and the loser, as paths with fragments; `None` where `evonav view` has not written one."""
     command: str
-    """That makes both pages."""
+    """Command that writes both pages."""
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Of `b` less `a`."""
+    """The comparison of agent `b` with agent `a`: `b` minus `a`."""
 
     a: str
     b: str
@@ -88,7 +88,7 @@ class Comparison:
     """Stages of either that are not compared, by reason."""
     flips: tuple[Flip, ...]
     settings: Mapping[str, tuple[str, str]]
-    """What the two runs were told differently."""
+    """Settings in which the two runs differ."""
 
     @property
     def all(self) -> Part:
@@ -97,27 +97,27 @@ class Comparison:
 
 
 def compare(
-    sides: Sequence[Side],
+    compared_agents: Sequence[ComparedAgent],
     *,
     measures: Sequence[str] = (),
     baseline: str | None = None,
     allow_differences: bool = False,
 ) -> list[Comparison]:
-    """Every pair of sides, or each against the baseline.
+    """Compare every pair of agents, or each agent with the baseline.
 
     Of several runs with the same agents, an agent is compared with itself in the other runs.
 
     Args:
-        sides: From `read_sides`.
+        compared_agents: Agents from `read_compared_agents`.
         measures: Numeric fields of a row, besides success and SPL.
-        baseline: Name of a side.
+        baseline: Name of the agent that all others are compared with.
         allow_differences: Compare what runs of different tasks or protocol have in common.
 
     Raises:
-        InvalidArgumentError: There are not two sides, their runs differ, or a name is unknown.
+        InvalidArgumentError: There are fewer than two agents, their runs differ, or a name is unknown.
     """
-    pairs = _pairs(sides, baseline)
-    names = _fields(sides, measures)
+    pairs = _pairs(compared_agents, baseline)
+    names = _fields(compared_agents, measures)
     found = [_compare(a, b, names, allow_differences) for a, b in pairs]
     adjusted: list[dict[str, PairedEffect]] = [dict(one.all.effects) for one in found]
     for field in names:
@@ -131,7 +131,7 @@ def compare(
 
 
 def check_measure(name: str) -> None:
-    """Whether a field of a row can be averaged.
+    """Check that a field of a row can be averaged.
 
     Raises:
         InvalidArgumentError: It cannot, or there is none of that name.
@@ -145,7 +145,7 @@ _NUMBERS = ("int", "float", "bool")
 
 
 def comparison_json(comparisons: Sequence[Comparison]) -> dict[str, Any]:
-    """All figures, unrounded."""
+    """Return all numbers, unrounded."""
     return {
         "schema_version": 2,
         "comparisons": [
@@ -172,54 +172,58 @@ def comparison_json(comparisons: Sequence[Comparison]) -> dict[str, Any]:
     }
 
 
-def _pairs(sides: Sequence[Side], baseline: str | None) -> list[tuple[Side, Side]]:
+def _pairs(compared_agents: Sequence[ComparedAgent], baseline: str | None) -> list[tuple[ComparedAgent, ComparedAgent]]:
     if baseline is not None:
-        first = [side for side in sides if baseline in (side.name, side.agent)]
+        first = [compared for compared in compared_agents if baseline in (compared.name, compared.agent)]
         if len(first) != 1:
-            raise InvalidArgumentError(f"baseline {baseline!r} is none of {', '.join(side.name for side in sides)}")
-        return [(first[0], side) for side in sides if side is not first[0]]
-    pairs = list(combinations(sides, 2))
-    num_runs = len({side.run_dir.resolve() for side in sides})
+            raise InvalidArgumentError(
+                f"baseline {baseline!r} is none of {', '.join(compared.name for compared in compared_agents)}"
+            )
+        return [(first[0], compared) for compared in compared_agents if compared is not first[0]]
+    pairs = list(combinations(compared_agents, 2))
+    num_runs = len({compared.run_dir.resolve() for compared in compared_agents})
     # Two runs of the same six agents: the question is what the settings changed, agent by agent.
-    if 1 < num_runs < len(sides):
+    if 1 < num_runs < len(compared_agents):
         same = [(a, b) for a, b in pairs if a.agent == b.agent]
         pairs = same or pairs
     if not pairs:
-        names = ", ".join(side.name for side in sides) or "nothing"
+        names = ", ".join(compared.name for compared in compared_agents) or "nothing"
         raise InvalidArgumentError(f"two agents are needed to compare; these are {names}")
     return pairs
 
 
-def _fields(sides: Sequence[Side], measures: Sequence[str]) -> list[str]:
-    if not any(side.rows for side in sides):
-        raise InvalidArgumentError(f"no recorded stage in {', '.join(str(side.run_dir) for side in sides)}")
+def _fields(compared_agents: Sequence[ComparedAgent], measures: Sequence[str]) -> list[str]:
+    if not any(compared.rows for compared in compared_agents):
+        raise InvalidArgumentError(
+            f"no recorded stage in {', '.join(str(compared.run_dir) for compared in compared_agents)}"
+        )
     for name in measures:
         check_measure(name)
     return list(dict.fromkeys([*MEASURES, *measures]))
 
 
-def _compare(a: Side, b: Side, fields: Sequence[str], allow_differences: bool) -> Comparison:
+def _compare(a: ComparedAgent, b: ComparedAgent, fields: Sequence[str], allow_differences: bool) -> Comparison:
     settings = config_differences(a, b)
     different = [key for key in settings if key.startswith(SAME_PROTOCOL)]
     if different and not allow_differences:
-        told = "; ".join(f"{key} {settings[key][0]} and {settings[key][1]}" for key in different)
+        differing = "; ".join(f"{key} {settings[key][0]} and {settings[key][1]}" for key in different)
         raise InvalidArgumentError(
-            f"{a.name} and {b.name} were not run alike ({told}); "
+            f"{a.name} and {b.name} were not run alike ({differing}); "
             "--allow-differences compares the stages that they have in common"
         )
     dropped: Counter[str] = Counter()
     pairs: list[tuple[StageMetrics, StageMetrics]] = []
     for key in sorted(_stages(a) | _stages(b)):
         reason = _reason(a, b, key, allow_differences)
-        if reason == FORCED:
+        if reason == GUIDED:
             continue
         if reason is None:
             pairs.append((a.rows[key], b.rows[key]))
         else:
             dropped[reason] += 1
     if not pairs:
-        told = ", ".join(f"{count} {reason}" for reason, count in dropped.items())
-        raise InvalidArgumentError(f"{a.name} and {b.name} have no scored stage in common ({told or 'no stages'})")
+        reasons = ", ".join(f"{count} {reason}" for reason, count in dropped.items())
+        raise InvalidArgumentError(f"{a.name} and {b.name} have no scored stage in common ({reasons or 'no stages'})")
     groups = {ALL: pairs}
     for field in ("stratum", "mode"):
         for pair in pairs:
@@ -230,21 +234,21 @@ def _compare(a: Side, b: Side, fields: Sequence[str], allow_differences: bool) -
     return Comparison(a.name, b.name, parts, dict(dropped.most_common()), flips, settings)
 
 
-def _stages(side: Side) -> set[tuple[str, int]]:
-    """All that the run consists of, recorded or not."""
-    asked = {(task_id, stage) for task_id, num in side.num_stages.items() for stage in range(1, num + 1)}
-    return asked | side.rows.keys()
+def _stages(compared: ComparedAgent) -> set[tuple[str, int]]:
+    """Return the stages that the run consists of, recorded or not."""
+    planned = {(task_id, stage) for task_id, num in compared.num_stages.items() for stage in range(1, num + 1)}
+    return planned | compared.rows.keys()
 
 
-def _reason(a: Side, b: Side, key: tuple[str, int], allow_differences: bool) -> str | None:
-    """Why a stage is not compared. Where differences are allowed, the house may have changed in other ways."""
-    for side in (a, b):
-        if key not in side.rows:
-            is_foreign = key[0] not in side.num_stages
-            return f"{'no such task' if is_foreign else 'not run yet'} in {side.name}"
-        if side.rows[key].success is None:
-            state = side.rows[key].state
-            return FORCED if state == FORCED else f"{state.replace('_', ' ')} in {side.name}"
+def _reason(a: ComparedAgent, b: ComparedAgent, key: tuple[str, int], allow_differences: bool) -> str | None:
+    """Return why a stage is not compared. Where differences are allowed, the house may have changed in other ways."""
+    for compared in (a, b):
+        if key not in compared.rows:
+            is_foreign = key[0] not in compared.num_stages
+            return f"{'no such task' if is_foreign else 'not run yet'} in {compared.name}"
+        if compared.rows[key].success is None:
+            state = compared.rows[key].state
+            return GUIDED if state == GUIDED else f"{state.replace('_', ' ')} in {compared.name}"
     first, second = a.rows[key], b.rows[key]
     same = ("house", "category", "num_stages", *(() if allow_differences else ("stratum", "mode")))
     if any(getattr(first, name) != getattr(second, name) for name in same):
@@ -252,7 +256,7 @@ def _reason(a: Side, b: Side, key: tuple[str, int], allow_differences: bool) -> 
     return None
 
 
-def _part(key: str, words: str, pairs: Sequence[tuple[StageMetrics, StageMetrics]], fields: Sequence[str]) -> Part:
+def _part(key: str, label: str, pairs: Sequence[tuple[StageMetrics, StageMetrics]], fields: Sequence[str]) -> Part:
     by_missing: dict[tuple[int, ...], list[str]] = {}
     for field in fields:
         there = tuple(i for i, pair in enumerate(pairs) if all(getattr(row, field) is not None for row in pair))
@@ -266,10 +270,10 @@ def _part(key: str, words: str, pairs: Sequence[tuple[StageMetrics, StageMetrics
     only_a = sum(bool(x.success) and not y.success for x, y in pairs)
     only_b = sum(bool(y.success) and not x.success for x, y in pairs)
     ordered = {name: effects[name] for name in fields if name in effects}
-    return Part(key, words, len(pairs), only_a, only_b, mcnemar(only_a, only_b), ordered)
+    return Part(key, label, len(pairs), only_a, only_b, mcnemar(only_a, only_b), ordered)
 
 
-def _flip(a: Side, b: Side, pair: tuple[StageMetrics, StageMetrics]) -> Flip:
+def _flip(a: ComparedAgent, b: ComparedAgent, pair: tuple[StageMetrics, StageMetrics]) -> Flip:
     winner, loser, row = (a, b, pair[1]) if pair[0].success else (b, a, pair[0])
     return Flip(
         task_id=row.task_id,
@@ -285,18 +289,18 @@ def _flip(a: Side, b: Side, pair: tuple[StageMetrics, StageMetrics]) -> Flip:
     )
 
 
-def _page(side: Side, row: StageMetrics) -> str | None:
+def _page(compared: ComparedAgent, row: StageMetrics) -> str | None:
     for stage in (None, row.stage):
-        path = side.run_dir / VIEW_DIR / page_name(row.task_id, side.agent, stage)
+        path = compared.run_dir / VIEW_DIR / page_name(row.task_id, compared.agent, stage)
         if path.is_file():
             return f"{path.as_posix()}#stage={row.stage}&round=1"
     return None
 
 
-def _view_command(a: Side, b: Side, row: StageMetrics) -> str:
+def _view_command(a: ComparedAgent, b: ComparedAgent, row: StageMetrics) -> str:
     agents: dict[Path, list[str]] = {}
-    for side in (a, b):
-        agents.setdefault(side.run_dir, []).append(side.agent)
+    for compared in (a, b):
+        agents.setdefault(compared.run_dir, []).append(compared.agent)
     commands = (
         ["evonav", "view", str(run_dir), "--task", row.task_id, "--agent", ",".join(names), "--stage", str(row.stage)]
         for run_dir, names in agents.items()

@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from evonav.report.compare import wording as words
+from evonav.report.compare import wording
 from evonav.report.compare.compare import Comparison, Flip
 from evonav.report.pages.template import page_environment, policy, text_of
 from evonav.report.plots.render import plot_elements
@@ -18,24 +18,24 @@ def comparison_plot(comparisons: Sequence[Comparison]) -> GapPlot:
     """SR differences: of one pair by parts, of several pairs on all stages."""
     if len(comparisons) == 1:
         (one,) = comparisons
-        gaps = tuple(_gap(part.effects["success"], part.words) for part in one.parts)
+        gaps = tuple(_gap(part.effects["success"], part.label) for part in one.parts)
         return GapPlot(f"SR of {one.b} less {one.a}, points", gaps, f"{one.a} is better", f"{one.b} is better")
     gaps = tuple(_gap(one.all.effects["success"], f"{one.b} less {one.a}", "p (Holm)") for one in comparisons)
     return GapPlot("SR differences, points", gaps, "the second is better", "the first is better")
 
 
 def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = None) -> str:
-    """The page.
+    """Render the comparison as one HTML page.
 
     Args:
-        comparisons: At least one.
+        comparisons: Comparisons to show, at least one.
         out_dir: Folder of the page, to which links to replays are relative.
     """
     sections = [
         {
             "title": f"{one.b} less {one.a}",
             "plot": plot_elements([comparison_plot([one])])[0],
-            "table": words.part_table(one),
+            "table": wording.part_table(one),
             "winners": [
                 (winner, [_shown(flip, out_dir) for flip in one.flips if flip.winner == winner])
                 for winner in (one.b, one.a)
@@ -50,9 +50,9 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
             title=f"{comparisons[0].b} and {comparisons[0].a}" if len(comparisons) == 1 else "agents",
             css=text_of("report.css") + plot_css(),
             policy=policy(None),
-            statements=words.findings(comparisons),
-            warnings=words.warnings(comparisons),
-            pairs=words.pair_table(comparisons),
+            statements=wording.findings(comparisons),
+            warnings=wording.warnings(comparisons),
+            pairs=wording.pair_table(comparisons),
             overview=plot_elements([comparison_plot(comparisons)])[0] if len(comparisons) > 1 else "",
             sections=sections,
         )
@@ -71,7 +71,7 @@ def _shown(flip: Flip, out_dir: Path | None) -> dict[str, object]:
         for name, page in zip((flip.winner, flip.loser), flip.pages, strict=True)
         if page is not None
     ]
-    return {"flip": flip, "where": words.where(flip), "links": links}
+    return {"flip": flip, "where": wording.where(flip), "links": links}
 
 
 def _relative(page: str, out_dir: Path | None) -> str:

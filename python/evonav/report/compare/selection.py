@@ -1,4 +1,4 @@
-"""What is compared: agents of runs, named `RUN`, `RUN:AGENT`, or `RUN` and then names of its agents."""
+"""Select what to compare: agents of runs, named `RUN`, `RUN:AGENT`, or `RUN` followed by names of its agents."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -12,61 +12,63 @@ from evonav.report.run import agents_in_order
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
+class ComparedAgent:
     """An agent of a run."""
 
     name: str
-    """As tables call it: the agent, with its run where several are compared."""
+    """Name in tables: the agent, with its run where several runs are compared."""
     run_dir: Path
     agent: str
     config: Mapping[str, Any]
     num_stages: Mapping[str, int]
-    """By task id, of all that the run consists of."""
+    """Number of stages of every task of the run, by task id."""
     rows: Mapping[tuple[str, int], StageMetrics]
-    """By task and stage."""
+    """Recorded stages, by task and stage."""
 
 
-def read_sides(words: Sequence[str]) -> list[Side]:
-    """The agents that these words name.
+def read_compared_agents(arguments: Sequence[str]) -> list[ComparedAgent]:
+    """Return the agents that the arguments name.
 
     Args:
-        words: Each a run's folder (all of its agents, unless names follow), `FOLDER:AGENT`, or the name of an agent of
-            the folder before it. A sweep's folder stands for the runs of its cells.
+        arguments: Each a run's folder (all of its agents, unless names follow), `FOLDER:AGENT`, or the name of an agent
+            of the folder before it. A sweep's folder stands for the runs of its cells.
 
     Raises:
-        InvalidArgumentError: A word names nothing.
+        InvalidArgumentError: An argument names nothing.
         StoreError: A run cannot be read.
     """
-    asked: list[tuple[list[Path], list[str]]] = []
+    requested: list[tuple[list[Path], list[str]]] = []
     before = ""
-    for word in words:
-        folder, agent = _split(word)
+    for argument in arguments:
+        folder, agent = _split(argument)
         if folder is not None:
-            asked.append((_runs_of(folder), [agent] if agent else []))
-            before = word if agent else ""
-        elif not asked:
-            raise InvalidArgumentError(f"{word!r} is no folder of a run: name a run first, then agents of it")
+            requested.append((_runs_of(folder), [agent] if agent else []))
+            before = argument if agent else ""
+        elif not requested:
+            raise InvalidArgumentError(f"{argument!r} is no folder of a run: name a run first, then agents of it")
         elif before:
-            raise InvalidArgumentError(f"{word!r} after {before!r}: write RUN:AGENT for it, too")
+            raise InvalidArgumentError(f"{argument!r} after {before!r}: write RUN:AGENT for it, too")
         else:
-            asked[-1][1].append(word)
-    sides: list[Side] = []
-    for run_dir, agents in ((run_dir, agents) for run_dirs, agents in asked for run_dir in run_dirs):
-        for side in _sides_of(run_dir, agents):
-            if not any(side.run_dir == other.run_dir and side.agent == other.agent for other in sides):
-                sides.append(side)
-    return _named(sides)
+            requested[-1][1].append(argument)
+    compared_agents: list[ComparedAgent] = []
+    for run_dir, agents in ((run_dir, agents) for run_dirs, agents in requested for run_dir in run_dirs):
+        for compared in _agents_of(run_dir, agents):
+            if not any(
+                compared.run_dir == other.run_dir and compared.agent == other.agent for other in compared_agents
+            ):
+                compared_agents.append(compared)
+    return _named(compared_agents)
 
 
 def _runs_of(folder: Path) -> list[Path]:
-    """The folder itself, or the runs of a sweep."""
+    """Return the folder itself, or the runs of a sweep."""
     if (folder / FILE_NAME).is_file():
         return [folder]
     cells = sorted(path.parent for path in folder.glob(f"runs/*/{FILE_NAME}"))
     return cells or [folder]
 
 
-def _sides_of(folder: Path, agents: Sequence[str]) -> list[Side]:
+def _agents_of(folder: Path, agents: Sequence[str]) -> list[ComparedAgent]:
     with RunStore(folder) as store:
         config = store.meta("config") or {}
         num_stages = store.meta("num_stages") or {}
@@ -78,7 +80,7 @@ def _sides_of(folder: Path, agents: Sequence[str]) -> list[Side]:
         chosen = list(agents or known)
         rows = read_stage_metrics(store, chosen)
     return [
-        Side(
+        ComparedAgent(
             name=agent,
             run_dir=folder,
             agent=agent,
@@ -90,30 +92,30 @@ def _sides_of(folder: Path, agents: Sequence[str]) -> list[Side]:
     ]
 
 
-def _split(word: str) -> tuple[Path | None, str]:
-    """A folder and the agent after its colon; an agent's name may hold colons, slashes and dots itself."""
-    if Path(word).is_dir():
-        return Path(word), ""
-    for i, character in enumerate(word):
-        if character == ":" and i and Path(word[:i]).is_dir():
-            return Path(word[:i]), word[i + 1 :]
-    return None, word
+def _split(argument: str) -> tuple[Path | None, str]:
+    """Split a folder and the agent after its colon; an agent's name may contain colons, slashes and dots itself."""
+    if Path(argument).is_dir():
+        return Path(argument), ""
+    for i, character in enumerate(argument):
+        if character == ":" and i and Path(argument[:i]).is_dir():
+            return Path(argument[:i]), argument[i + 1 :]
+    return None, argument
 
 
-def _named(sides: Sequence[Side]) -> list[Side]:
-    """Names that tell sides apart: the agent, the run before it where runs differ, the whole path where those agree."""
-    folders = {side.run_dir.resolve() for side in sides}
+def _named(compared_agents: Sequence[ComparedAgent]) -> list[ComparedAgent]:
+    """Give names that are unique: the agent, the run before it where runs differ, the whole path where those agree."""
+    folders = {compared.run_dir.resolve() for compared in compared_agents}
     if len(folders) < 2:
-        return list(sides)
+        return list(compared_agents)
     is_short = len({folder.name for folder in folders}) == len(folders)
     return [
-        replace(side, name=f"{side.run_dir.resolve().name if is_short else side.run_dir}:{side.agent}")
-        for side in sides
+        replace(compared, name=f"{compared.run_dir.resolve().name if is_short else compared.run_dir}:{compared.agent}")
+        for compared in compared_agents
     ]
 
 
-def config_differences(a: Side, b: Side) -> dict[str, tuple[str, str]]:
-    """Settings in which two runs differ, by dotted name."""
+def config_differences(a: ComparedAgent, b: ComparedAgent) -> dict[str, tuple[str, str]]:
+    """Return the settings in which two runs differ, by dotted name."""
     flat_a, flat_b = _flat(a.config), _flat(b.config)
     return {
         key: (flat_a.get(key, "-"), flat_b.get(key, "-"))

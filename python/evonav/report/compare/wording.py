@@ -28,12 +28,12 @@ EXPLORING = "Parts are for reading on, not for claims: their p is not adjusted f
 
 
 def measure_name(field: str) -> str:
-    """As tables head it."""
+    """Return a metric's name as tables show it."""
     return MEASURES.get(field, field.replace("_", " "))
 
 
 def pair_table(comparisons: Sequence[Comparison]) -> Table:
-    """One row a pair, on all stages that both scored."""
+    """Build a table with one row per pair, on all stages that both scored."""
     rows = []
     for one in comparisons:
         sr, spl = one.all.effects["success"], one.all.effects.get("spl")
@@ -73,7 +73,7 @@ def pair_table(comparisons: Sequence[Comparison]) -> Table:
 
 
 def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
-    """One measure on all stages, for a terminal: one row a pair."""
+    """Build a table of one metric on all stages, for a terminal: one row per pair."""
     rows = []
     for one in comparisons:
         effect = one.all.effects.get(field)
@@ -87,7 +87,7 @@ def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
 
 
 def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
-    """What fits eighty columns: the rest is in the files."""
+    """Return the tables that fit eighty columns; the files contain the rest."""
     fields = list(dict.fromkeys(field for one in comparisons for field in one.all.effects))
     tables = [measure_table(comparisons, field) for field in fields]
     if len(comparisons) == 1:
@@ -95,7 +95,7 @@ def terminal_tables(comparisons: Sequence[Comparison]) -> list[Table]:
         effects = [(part, part.effects["success"]) for part in one.parts]
         rows = tuple(
             (
-                part.words,
+                part.label,
                 str(part.n),
                 *(f"{100 * mean:.1f}" for mean in (sr.mean_a, sr.mean_b)),
                 difference(sr, "success"),
@@ -122,7 +122,7 @@ def _short_flips(one: Comparison) -> Table:
 
 
 def part_table(one: Comparison) -> Table:
-    """One pair, on all stages, by stratum and by mode."""
+    """Build a table of one pair, on all stages, by stratum and by mode."""
     fields = list(one.all.effects)
     columns = ["Stages", "n", "only first / second", f"SR % {one.a}", f"SR % {one.b}"]
     for field in fields:
@@ -130,7 +130,7 @@ def part_table(one: Comparison) -> Table:
     rows = []
     for part in one.parts:
         sr = part.effects["success"]
-        cells = [part.words, str(part.n), f"{part.num_only_b} / {part.num_only_a}"]
+        cells = [part.label, str(part.n), f"{part.num_only_b} / {part.num_only_a}"]
         cells += [f"{100 * sr.mean_a:.1f}", f"{100 * sr.mean_b:.1f}"]
         for field in fields:
             effect = part.effects.get(field)
@@ -140,7 +140,7 @@ def part_table(one: Comparison) -> Table:
 
 
 def flip_table(one: Comparison) -> Table:
-    """Stages where exactly one of the two succeeded, those of `b` first."""
+    """List stages where exactly one of the two succeeded, those of `b` first."""
     rows = [
         (f"{flip.task_id} {flip.stage}", flip.category, where(flip), winner, f"{flip.loser}: {flip.cause}")
         for winner in (one.b, one.a)
@@ -152,12 +152,12 @@ def flip_table(one: Comparison) -> Table:
 
 
 def statements(comparisons: Sequence[Comparison]) -> list[str]:
-    """What the comparison allows to say, no more, and what to mind."""
+    """Return the sentences that the comparison supports, and the warnings."""
     return findings(comparisons) + warnings(comparisons)
 
 
 def findings(comparisons: Sequence[Comparison]) -> list[str]:
-    """SR and SPL of every pair, in words."""
+    """Describe SR and SPL of every pair, in words."""
     lines = []
     for one in comparisons:
         for field in ("success", "spl"):
@@ -168,20 +168,20 @@ def findings(comparisons: Sequence[Comparison]) -> list[str]:
 
 
 def warnings(comparisons: Sequence[Comparison]) -> list[str]:
-    """Stages that were left out, and what the runs were told differently."""
+    """Describe stages that were left out, and settings in which the runs differ."""
     lines = []
     for one in comparisons:
         if one.dropped:
-            told = ", ".join(f"{count} {reason}" for reason, count in one.dropped.items())
-            lines.append(f"{one.b} and {one.a}: {sum(one.dropped.values())} stages are not compared: {told}.")
+            reasons = ", ".join(f"{count} {reason}" for reason, count in one.dropped.items())
+            lines.append(f"{one.b} and {one.a}: {sum(one.dropped.values())} stages are not compared: {reasons}.")
         if one.settings:
-            told = "; ".join(f"{key}: {a} / {b}" for key, (a, b) in one.settings.items())
-            lines.append(f"{one.a} and {one.b} were told differently: {told}.")
+            differing = "; ".join(f"{key}: {a} / {b}" for key, (a, b) in one.settings.items())
+            lines.append(f"{one.a} and {one.b} were run with different settings: {differing}.")
     return lines
 
 
 def sentence(a: str, b: str, effect: PairedEffect, field: str, num_pairs: int = 1) -> str:
-    """One difference in words."""
+    """Describe one difference in words."""
     p = f"p = {p_words(effect.adjusted_p)}".replace("= <", "< ")
     measured = f"{difference(effect, field)}{' points' if field in RATES else ''}, {p}"
     measured += f" (Holm, {num_pairs} pairs)" if num_pairs > 1 else ""
@@ -203,14 +203,14 @@ def sentence(a: str, b: str, effect: PairedEffect, field: str, num_pairs: int = 
 
 
 def says(one: Comparison, field: str = "success") -> str:
-    """What a measure on all stages allows to say, after adjustment, in a few words."""
+    """Return the verdict about a metric on all stages, after adjustment, in a few words."""
     effect = one.all.effects[field]
     is_about_rank = field in RATES or effect.verdict not in ("a", "b")
     return verdict_words(one.a, one.b, effect) if is_about_rank else "they differ"
 
 
 def comparison_csv(comparisons: Sequence[Comparison]) -> str:
-    """Every figure, unrounded: one row a pair, part and measure."""
+    """Return every number, unrounded: one CSV row per pair, part and metric."""
     columns = (
         "a",
         "b",
@@ -252,7 +252,7 @@ def comparison_csv(comparisons: Sequence[Comparison]) -> str:
 
 
 def all_tables(comparisons: Sequence[Comparison]) -> list[Table]:
-    """Of a report: the pairs, then each pair's parts and flips."""
+    """Return the tables of a report: the pairs, then each pair's parts and flips."""
     tables = [pair_table(comparisons)]
     for one in comparisons:
         tables += [part_table(one), flip_table(one)]
@@ -260,7 +260,7 @@ def all_tables(comparisons: Sequence[Comparison]) -> list[Table]:
 
 
 def comparison_markdown(comparisons: Sequence[Comparison]) -> str:
-    """Sentences, tables, and the command that replays each stage that flipped."""
+    """Return sentences, tables, and the command that replays each stage that flipped."""
     parts = ["# Comparison\n", "".join(f"- {line}\n" for line in statements(comparisons))]
     parts += [f"## {table.title}\n\n{table.markdown()}" for table in all_tables(comparisons)]
     for one in comparisons:
@@ -271,26 +271,26 @@ def comparison_markdown(comparisons: Sequence[Comparison]) -> str:
 
 
 def comparison_latex(comparisons: Sequence[Comparison]) -> str:
-    """The pairs and every pair's parts, for `booktabs`; sentences as comments."""
+    """Return the pairs and every pair's parts as tables for `booktabs`; sentences as comments."""
     lines = "".join(f"% {line}\n" for line in statements(comparisons))
     tables = [pair_table(comparisons), *(part_table(one) for one in comparisons)]
     return lines + "\n".join(table.latex() for table in tables)
 
 
 def difference(effect: PairedEffect, field: str) -> str:
-    """`+6.3 [-1.2, +13.9]`."""
+    """Return the difference as `+6.3 [-1.2, +13.9]`."""
     scale = _scale(field)
     ends = "" if effect.ci95 is None else f" [{scale * effect.ci95[0]:+.1f}, {scale * effect.ci95[1]:+.1f}]"
     return f"{scale * effect.difference:+.1f}{ends}"
 
 
 def amount(value: float, field: str) -> str:
-    """A size without a sign, with its unit where it is points."""
+    """Return a size without a sign, with its unit where it is points."""
     return f"{100 * value:.1f} points" if field in RATES else f"{value:.2g}"
 
 
 def where(flip: Flip) -> str:
-    """Stratum and mode in words."""
+    """Return the stratum and the mode in words."""
     stratum = _stratum(flip)
     return stratum if flip.mode == "first" else f"{stratum}, {flip.mode.upper() if '_' in flip.mode else flip.mode}"
 

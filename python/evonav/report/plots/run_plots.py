@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from evonav.report.compare.breakdown import Breakdown, breakdown, breakdown_plot
-from evonav.report.compare.selection import Side, read_sides
+from evonav.report.compare.selection import ComparedAgent, read_compared_agents
 from evonav.report.plots.specs import Gap, GapPlot, Plot
 from evonav.report.run import Run
 
@@ -54,10 +54,12 @@ def run_plots(run: Run) -> list[RunPlot]:
     return plots
 
 
-def _compared_agents(run: Run) -> list[Side]:
+def _compared_agents(run: Run) -> list[ComparedAgent]:
     if run.num_recorded == 0:
         return []
-    return [side for side in read_sides([str(run.run_dir)]) if any(row.is_scored for row in side.rows.values())]
+    return [
+        side for side in read_compared_agents([str(run.run_dir)]) if any(row.is_scored for row in side.rows.values())
+    ]
 
 
 def _difference_plot(run: Run) -> GapPlot:
