@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.report.run import Run
-from evonav.report.tables.causes import WORDS, FailureCause
+from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.table import NONE, Table, percent
 
 STRATA = {"stage_1": "stage 1", "relocated": "relocated", "not_relocated": "not relocated"}
@@ -91,7 +91,7 @@ def cause_share_table(run: Run, stratum: str) -> Table:
     rows = [("n", *(str(total) for total in totals.values()))]
     for cause in (None, *causes):
         shares = [part[cause] / totals[agent] if totals[agent] else None for agent, part in counts.items()]
-        rows.append(("success" if cause is None else WORDS[cause], *(percent(share, None) for share in shares)))
+        rows.append(("success" if cause is None else CAUSE_NAMES[cause], *(percent(share, None) for share in shares)))
     title = f"Why stages failed: {STRATA[stratum]}"
     return Table(title, ("% of stages", *run.agents), tuple(rows), ("One cause a stage, the first that fits.",))
 

@@ -12,7 +12,7 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import EndState
 from evonav.report.maps.floor_plan import label_point
 from evonav.report.maps.stage_map import file_css, map_css, stage_svg
-from evonav.report.maps.strip import most_telling, write_strip
+from evonav.report.maps.strip import best_highlight, write_strip
 from evonav.report.maps.svg import Point, polyline, simplified, slug
 from evonav.report.maps.trajectory import rounds as choices
 from evonav.report.run import load_run
@@ -123,7 +123,7 @@ def test_strip_is_a_command(write_run: WriteRun, tmp_path: Path) -> None:
 
 def test_the_most_telling_task_is_one_where_memory_misleads(write_run: WriteRun, tmp_path: Path) -> None:
     # fu is misled in every stage 2; in task-0 ftu failed the stage before, so task-1 is the first that tells all.
-    assert most_telling(load_run(write_run()), ["fu", "ftu"]) == ("task-1", [1, 2])
+    assert best_highlight(load_run(write_run()), ["fu", "ftu"]) == ("task-1", [1, 2])
     records = [
         stage_record("fu", task_id, 1, state, num_stages=1, chosen=entry("Plate", (2.3, 0.8, 2.0), is_stale=is_stale))
         for task_id, state, is_stale in (
@@ -133,9 +133,9 @@ def test_the_most_telling_task_is_one_where_memory_misleads(write_run: WriteRun,
         )
     ]
     run = load_run(record_run(tmp_path / "one", records, dict.fromkeys("abc", 1), ["fu"]))
-    assert most_telling(run, ["fu"]) == ("c", [1])
+    assert best_highlight(run, ["fu"]) == ("c", [1])
     with pytest.raises(InvalidArgumentError, match="no task has records of ftu"):
-        most_telling(run, ["ftu"])
+        best_highlight(run, ["ftu"])
 
 
 def test_files_write_colours_out() -> None:

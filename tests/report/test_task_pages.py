@@ -18,7 +18,7 @@ from evonav.report.maps.floor_plan import Frame, item_labels, label_point
 from evonav.report.maps.svg import cm
 from evonav.report.tasks.floor_plans import TaskDrawing, _groups, change_frame, task_drawing
 from evonav.report.tasks.pages import stage_svg, write_task_page
-from evonav.report.tasks.wording import changed_words, move_rows
+from evonav.report.tasks.wording import change_sentence, move_rows
 from evonav.tasks import Task, write_task
 from evonav.tasks.oracle import StateChange
 
@@ -132,7 +132,7 @@ def test_an_opened_door_is_marked(task: Task) -> None:
     drawing = task_drawing(dataclasses.replace(task, oracle_stages=tuple(oracle)))
     root = ElementTree.fromstring(stage_svg(drawing, stage))
     assert [len(list(group)) for group in with_class(root, "opened-doors")] == [1, 1, 1]
-    assert "1 opened, closed or switched" in changed_words(drawing.maps[stage], evolution)
+    assert "1 opened, closed or switched" in change_sentence(drawing.maps[stage], evolution)
 
 
 def test_objects_stand_where_the_stage_house_has_them(task: Task, drawing: TaskDrawing) -> None:
@@ -149,13 +149,13 @@ def test_objects_stand_where_the_stage_house_has_them(task: Task, drawing: TaskD
 def test_words_count_the_moved_and_name_the_farthest(task: Task, drawing: TaskDrawing) -> None:
     stage = evolved_stage(task)
     evolution = task.oracle(stage).evolution
-    words = changed_words(drawing.maps[stage], evolution)
+    words = change_sentence(drawing.maps[stage], evolution)
     far_m = max(change.displacement_m for change in evolution.changes)
     assert re.fullmatch(rf"FULL_SHUFFLE in the .+: {len(evolution.changes)} objects? moved, .+ {far_m:.1f} m\.", words)
     rows = move_rows(drawing.maps[stage], evolution)
     assert rows[0][2] == f"{far_m:.2f} m"
     assert {row[1] for row in rows} == {change.id for change in evolution.changes}
-    assert changed_words(drawing.maps[1], task.oracle(1).evolution).startswith("The first stage")
+    assert change_sentence(drawing.maps[1], task.oracle(1).evolution).startswith("The first stage")
 
 
 class _Page(HTMLParser):

@@ -103,7 +103,7 @@ def _replay(run: "Run", num: int | None, tasks: Path | None, exchanges: Path | N
     """Makes the pages of the most telling episodes that have none of these records yet."""
     from evonav.errors import EvonavError
     from evonav.report.maps.stage_map import VIEW_DIR
-    from evonav.report.pages.highlights import telling_episodes
+    from evonav.report.pages.highlights import highlights_first
     from evonav.report.pages.replays import listed_pages
 
     there = {
@@ -111,7 +111,7 @@ def _replay(run: "Run", num: int | None, tasks: Path | None, exchanges: Path | N
         for page in listed_pages(run.run_dir / VIEW_DIR)
         if page.is_current
     }
-    wanted = telling_episodes(run)[:num]
+    wanted = highlights_first(run)[:num]
     missing = [episode for episode in wanted if there.get(episode) != run.episodes_sha256[episode]]
     if not missing:
         return

@@ -97,7 +97,7 @@ def _replayed(
     """An episode, run again: its replay, agent, stages up to the last one asked for and those asked for, radius."""
     from evonav.errors import InvalidArgumentError
     from evonav.replay.replay import RunReplay
-    from evonav.report.pages.highlights import telling_episodes
+    from evonav.report.pages.highlights import highlights_first
     from evonav.report.run import load_run
 
     try:
@@ -105,7 +105,7 @@ def _replayed(
     except ValueError:
         raise typer.BadParameter(f"--stage {stage}: numbers, comma-separated") from None
     found = load_run(run)
-    episodes = telling_episodes(found)
+    episodes = highlights_first(found)
     fitting = (one for one in episodes if one[0] == (agent or one[0]) and one[1] == (task or one[1]))
     name, task_id = next(fitting, (agent or "", task or ""))  # what there is no record of is told by the replay
     replay = RunReplay(run, task_path(run, tasks), exchanges, heading_px=heading_px, keeps_depth=keeps_depth)

@@ -60,14 +60,14 @@ def make_pages(
         exchanges: File of a model's answers.
         out: Where to write.
     """
-    from evonav.report.pages.highlights import most_telling
+    from evonav.report.pages.highlights import best_highlight
     from evonav.report.run import load_run
 
     found = load_run(run)
     agents = agents or found.agents
     # Telling is a task in which memory misleads some, the first named, and not the last one.
     ranked = sorted(agents, key=lambda name: name not in ("fu", "stage-reset"))
-    task_id = task if task is not None else most_telling(found, ranked)[0]
+    task_id = task if task is not None else best_highlight(found, ranked)[0]
     episodes = [(name, task_id) for name in agents]
     return replay_pages(found, episodes, stage=stage, tasks=tasks, exchanges=exchanges, out=out)
 

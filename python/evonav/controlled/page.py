@@ -12,7 +12,7 @@ from evonav.controlled.paired_maps import (
     REASONS,
     Rollout,
     arm_words,
-    changed_words,
+    change_sentence,
     load_rollouts,
     pair_frame,
     pair_svg,
@@ -200,7 +200,7 @@ def _pair_context(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[s
         "arms": [
             {
                 "words": arm_words(one.arm),
-                "change": changed_words(one),
+                "change": change_sentence(one),
                 "is_static": one.record.transition.kind == "static",
             }
             for one in told

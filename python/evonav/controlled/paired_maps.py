@@ -136,7 +136,7 @@ def _panel(rollout: Rollout, frame: Frame, map_px: int, left_px: int) -> str:
     record = rollout.record
     verdict = "ok" if record.state is EndState.SUCCESS else "bad"
     why = text_lines(sentence(record), 90, 1)[0]
-    changed = text_lines(changed_words(rollout), 90, 1)[0]
+    changed = text_lines(change_sentence(rollout), 90, 1)[0]
     css = "quiet" if record.transition.kind == "static" else "change-words"
     return (
         f'<g transform="translate({left_px} {HEAD_PX})"><svg width="{PANEL_PX}" height="{map_px}" '
@@ -153,7 +153,7 @@ def arm_words(arm: str) -> str:
     return ARM_WORDS.get(arm, arm)
 
 
-def changed_words(rollout: Rollout) -> str:
+def change_sentence(rollout: Rollout) -> str:
     """What had happened since the walk."""
     words = change_words(rollout.record, rollout.maps)
     return f"{words}, the target among them" if rollout.record.target.is_relocated_now else words

@@ -11,45 +11,45 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics import stage_metrics as measures
+from evonav.evaluation.metrics import stage_metrics as metrics
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records import costs
 from evonav.evaluation.records.schema import RoundRecord
 from evonav.evaluation.records.store import RunStore
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
-"""What a spreadsheet takes for the start of a formula."""
+"""Characters that a spreadsheet takes for the start of a formula."""
 ROUND_COLUMNS = {
-    "agent": "The name that it was asked for by.",
-    "task_id": "Of the task.",
-    "stage": "1-based.",
-    "round": "0-based.",
-    "x_m": "Where the agent stood when it observed.",
+    "agent": "Name of the agent, as the run was started with it.",
+    "task_id": "Id of the task.",
+    "stage": "Number of the stage, from 1.",
+    "round": "Number of the round, from 0.",
+    "x_m": "Position of the agent when it observed.",
     "z_m": "As `x_m`; AI2-THOR's world frame.",
     "yaw_rad": "Clockwise from +z, seen from above.",
     "action": "`move`, `navigate_to` or `stop`.",
-    "target_x_m": "Of a `navigate_to`.",
-    "target_z_m": "Of a `navigate_to`.",
-    "is_action_success": "Whether it could be carried out.",
-    "is_target_visible": "Whether the target was in one of the round's views.",
-    "choice": "In the agent's words: `object 12`, `frontier 3`, `none`.",
-    "chosen_label": "Of the entry that was chosen.",
-    "is_chosen_stale": "Whether an object of that label was there.",
-    "num_entries": "In the agent's memory.",
-    "num_frontiers": "That it could choose from.",
+    "target_x_m": "Target of a `navigate_to`.",
+    "target_z_m": "Target of a `navigate_to`.",
+    "is_action_success": "True if the action could be carried out.",
+    "is_target_visible": "True if the target was in one of the round's views.",
+    "choice": "The agent's name for its choice: `object 12`, `frontier 3`, `none`.",
+    "chosen_label": "Label of the entry that was chosen.",
+    "is_chosen_stale": "True if no object of that label was there.",
+    "num_entries": "Number of entries in the agent's memory.",
+    "num_frontiers": "Number of frontiers that the agent could choose from.",
 }
-"""Columns of a table of rounds, and what they hold."""
+"""Columns of a table of rounds, and their descriptions."""
 _ARROW = {"str": "string", "bool": "bool_", "int": "int64", "float": "float64"}
 
 
 def stage_columns() -> dict[str, str]:
-    """Columns of a table of stages and what they hold: the fields of `StageMetrics`."""
-    told = {**_told(costs), **_told(measures)}
-    return {field.name: told.get(field.name, "") for field in fields(StageMetrics)}
+    """Return the columns of a table of stages and their descriptions: the fields of `StageMetrics`."""
+    descriptions = {**_field_docstrings(costs), **_field_docstrings(metrics)}
+    return {field.name: descriptions.get(field.name, "") for field in fields(StageMetrics)}
 
 
 def stage_table(run_dir: Path, agents: Sequence[str] | None = None) -> list[dict[str, Any]]:
-    """One row a recorded stage, by agent, task and stage.
+    """Return one row per recorded stage, by agent, task and stage.
 
     Raises:
         StoreError: The run cannot be read.
@@ -59,7 +59,7 @@ def stage_table(run_dir: Path, agents: Sequence[str] | None = None) -> list[dict
 
 
 def round_table(run_dir: Path, agents: Sequence[str] | None = None) -> Iterator[dict[str, Any]]:
-    """One row a decision round, of whole traces: a stage is read at a time.
+    """Yield one row per decision round, with whole traces: one stage is read at a time.
 
     Raises:
         StoreError: The run cannot be read.
@@ -98,15 +98,15 @@ def _round_row(taken: RoundRecord) -> dict[str, Any]:
 
 
 def write_table(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: Path) -> Path:
-    """Writes rows as the file's suffix says: `.csv`, `.jsonl` or `.parquet`.
+    """Write rows in the format of the file's suffix: `.csv`, `.jsonl` or `.parquet`.
 
     Args:
-        rows: All with these columns.
-        columns: With what they hold, which Parquet keeps.
-        path: Its folder is made.
+        rows: Rows that all have these columns.
+        columns: Columns with their descriptions, which Parquet stores.
+        path: File to write; its folder is made.
 
     Raises:
-        StoreError: The suffix is none of these, pyarrow is not there, or the file cannot be written.
+        StoreError: The suffix is none of these, pyarrow is not installed, or the file cannot be written.
     """
     writers = {".csv": _write_csv, ".jsonl": _write_jsonl, ".parquet": _write_parquet}
     if path.suffix not in writers:
@@ -145,8 +145,8 @@ def _write_parquet(rows: Iterable[dict[str, Any]], columns: dict[str, str], path
     kinds = {**_kinds(StageMetrics), **_round_kinds()}
     schema = pyarrow.schema(
         [
-            pyarrow.field(name, getattr(pyarrow, _ARROW[kinds[name]])(), metadata={"description": told})
-            for name, told in columns.items()
+            pyarrow.field(name, getattr(pyarrow, _ARROW[kinds[name]])(), metadata={"description": description})
+            for name, description in columns.items()
         ],
         metadata={"evonav": "one row a stage or round; docs/measures.md"},
     )
@@ -186,20 +186,21 @@ def _round_kinds() -> dict[str, str]:
     } | {"round": "int"}
 
 
-def _told(module: Any) -> dict[str, str]:  # noqa: ANN401 - a module
-    """What the strings under fields say: a field without one is told by the one before it, or by its name."""
+def _field_docstrings(module: Any) -> dict[str, str]:  # noqa: ANN401 - a module
+    """Return the docstrings of a module's fields, by field; empty for a field without one."""
     found: dict[str, str] = {}
     for node in ast.walk(ast.parse(inspect.getsource(module))):
         if isinstance(node, ast.ClassDef):
             for one, following in zip(node.body, [*node.body[1:], ast.Pass()], strict=True):
                 if isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name):
-                    is_told = isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant)
-                    found[one.target.id] = str(following.value.value) if is_told else ""  # type: ignore[attr-defined]
+                    has_docstring = isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant)
+                    text = str(following.value.value) if has_docstring else ""  # type: ignore[attr-defined]
+                    found[one.target.id] = text
     return {name: " ".join(text.split()) for name, text in found.items()}
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A CSV file; numbers unrounded, nothing for `None`, `true` and `false`, and no text that starts a formula."""
+    """Return a CSV file: numbers unrounded, empty for `None`, `true` and `false`, and no text that starts a formula."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([csv_cell(column) for column in columns])
@@ -209,7 +210,7 @@ def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def csv_cell(value: object) -> str:
-    """A value as a cell. Text that a spreadsheet would run as a formula gets an apostrophe before it."""
+    """Return a value as a cell. Text that a spreadsheet would run as a formula gets an apostrophe before it."""
     if value is None:
         return ""
     if isinstance(value, bool):

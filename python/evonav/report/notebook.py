@@ -17,7 +17,7 @@ class LoadedRun:
     """A run's stages and rounds as columns, read when they are first asked for."""
 
     def __init__(self, run_dir: Path | str) -> None:
-        """Opens a run.
+        """Open a run.
 
         Args:
             run_dir: Its folder.
@@ -58,7 +58,7 @@ class LoadedRun:
 
 
 def load(run_dir: Path | str) -> LoadedRun:
-    """A run for a notebook.
+    """Return a run for a notebook.
 
     Args:
         run_dir: Folder of a run, finished or not.

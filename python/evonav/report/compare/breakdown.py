@@ -73,7 +73,7 @@ def breakdown(compared_agents: Sequence[ComparedAgent], by: str, measure: str = 
     """Compute a metric by group, for every compared agent.
 
     Args:
-        agents: Agents from `read_compared_agents`.
+        compared_agents: Agents from `read_compared_agents`.
         by: One of `STANDARD`, or any field of a stage's row.
         measure: Any numeric field of a row; the radius sweep always shows success.
 
@@ -188,7 +188,7 @@ def _text(value: object) -> str | None:
 def _bin(value: float | None, edges: Sequence[float], names: Sequence[str]) -> str | None:
     if value is None:
         return None
-    return names[min(len(names) - 1, max(0, int(np.searchsorted(edges, value, compared="right")) - 1))]
+    return names[min(len(names) - 1, max(0, int(np.searchsorted(edges, value, side="right")) - 1))]
 
 
 def _length_bin(row: StageMetrics, names: Sequence[str]) -> str | None:

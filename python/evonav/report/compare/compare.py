@@ -19,7 +19,7 @@ from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.selection import ComparedAgent, config_differences
 from evonav.report.maps.stage_map import VIEW_DIR, page_name
-from evonav.report.tables.causes import WORDS, FailureCause
+from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.statistics import PairedEffect, mcnemar, paired_effects, with_holm
 
 MEASURES = {"success": "SR", "spl": "SPL", "soft_spl": "SoftSPL", "is_strict_success": "strict SR"}
@@ -283,7 +283,7 @@ def _flip(a: ComparedAgent, b: ComparedAgent, pair: tuple[StageMetrics, StageMet
         mode=row.mode,
         winner=winner.name,
         loser=loser.name,
-        cause=WORDS[FailureCause(row.cause)] if row.cause else "",
+        cause=CAUSE_NAMES[FailureCause(row.cause)] if row.cause else "",
         pages=(_page(winner, row), _page(loser, row)),
         command=_view_command(winner, loser, row),
     )

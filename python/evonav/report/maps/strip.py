@@ -18,7 +18,7 @@ from evonav.report.maps.stage_map import (
     task_frame,
 )
 from evonav.report.maps.svg import escape, join, text_lines
-from evonav.report.pages.highlights import most_telling
+from evonav.report.pages.highlights import best_highlight
 from evonav.report.run import load_run
 from evonav.report.tables.causes import sentence
 
@@ -36,7 +36,7 @@ def write_strip(
 
     Args:
         run_dir: A run.
-        task_id: One of its tasks; `None` for the `most_telling` one.
+        task_id: One of its tasks; `None` for the `best_highlight` one.
         agents: One of its agents, or several: a row each.
         path: The `.svg`, `.png` or `.pdf` file to write.
         stages: Numbers of stages; default all that have a record (of the most telling task, three).
@@ -51,7 +51,7 @@ def write_strip(
     check_picture(path)
     agents = [agents] if isinstance(agents, str) else list(agents)
     if task_id is None:
-        task_id, default_stages = most_telling(load_run(run_dir), agents)
+        task_id, default_stages = best_highlight(load_run(run_dir), agents)
         stages = stages or default_stages
     with RunStore(run_dir) as store:
         rows = [

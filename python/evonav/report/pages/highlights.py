@@ -1,4 +1,4 @@
-"""Which of a run's episodes tell most about the benchmark: where memory misleads one agent and not another."""
+"""Find the episodes of a run that show the benchmark best: memory misleads one agent and not another."""
 
 from collections.abc import Sequence
 
@@ -8,16 +8,16 @@ from evonav.report.run import Run, StageOutcome
 from evonav.report.tables.causes import FailureCause
 
 
-def most_telling(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[str, list[int]]:
-    """The episode whose picture tells most about the benchmark, and the stages to show.
+def best_highlight(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[str, list[int]]:
+    """Return the episode that shows the benchmark best, and the stages to show.
 
     Looks for a stage where one of the agents is misled by a stale entry and another is not, or is misled and recovers;
     then for moved targets, and for change and success on the way there. The first of equals.
 
     Args:
         run: A run.
-        agents: Whose episodes to show; the last one should succeed.
-        num_stages: How many stages to show, ending with the telling one.
+        agents: Agents whose episodes to show; the last one should succeed.
+        num_stages: Number of stages to show, ending with the highlighted one.
 
     Raises:
         InvalidArgumentError: None of the run's tasks has a record of every one of the agents.
@@ -29,7 +29,7 @@ def most_telling(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[
             keys = [(agent, task_id, k) for agent in agents for k in shown]
             if any(key not in run.outcomes for key in keys):
                 continue
-            score = _telling(run, agents, task_id, shown)
+            score = _score(run, agents, task_id, shown)
             if best is None or score > best[0]:
                 best = (score, task_id, shown)
     if best is None:
@@ -39,10 +39,10 @@ def most_telling(run: Run, agents: Sequence[str], num_stages: int = 3) -> tuple[
     return best[1], best[2]
 
 
-def telling_episodes(run: Run) -> list[tuple[str, str]]:
-    """Agent and task of every episode that has a record, the most telling ones first.
+def highlights_first(run: Run) -> list[tuple[str, str]]:
+    """Return agent and task of every recorded episode, the highlights first.
 
-    A pair tells most: in one stage, an agent that a stale entry misled, and one that succeeded. Of several such agents
+    A pair shows most: in one stage, an agent that a stale entry misled, and one that succeeded. Of several such agents
     of a task those with the fewest rounds are taken, which are the quickest to run again; a task's other episodes come
     after all pairs.
     """
@@ -67,7 +67,7 @@ def telling_episodes(run: Run) -> list[tuple[str, str]]:
 
 
 def _pair(found: dict[str, StageOutcome]) -> tuple[float, list[str]]:
-    """How much a stage tells, and by which of its agents."""
+    """Rate how well a stage shows the benchmark, and name the agents that show it."""
     good = [agent for agent, outcome in found.items() if outcome.record.state is EndState.SUCCESS]
     misled = [agent for agent, outcome in found.items() if outcome.cause is FailureCause.STALE_ENTRY]
     bad = misled or [agent for agent, outcome in found.items() if outcome.record.state is EndState.FAILURE]
@@ -84,7 +84,7 @@ def _num_rounds(run: Run, agent: str, task_id: str) -> int:
     return sum(run.outcomes[key].record.num_rounds for key in keys if key in run.outcomes)
 
 
-def _telling(run: Run, agents: Sequence[str], task_id: str, stages: Sequence[int]) -> float:
+def _score(run: Run, agents: Sequence[str], task_id: str, stages: Sequence[int]) -> float:
     last = [run.outcomes[agent, task_id, stages[-1]] for agent in agents]
     hero = last[-1]
     has_success = hero.record.state is EndState.SUCCESS

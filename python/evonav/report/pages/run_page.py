@@ -13,7 +13,7 @@ from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import VIEW_DIR, map_css, map_name, outcome_words, stage_svg
 from evonav.report.maps.svg import slug
-from evonav.report.pages.highlights import telling_episodes
+from evonav.report.pages.highlights import highlights_first
 from evonav.report.pages.replays import ListedPage, listed_pages, viewer_css, viewer_js
 from evonav.report.pages.task_cards import TaskView, filter_data, task_view
 from evonav.report.pages.template import packed, page_environment, policy, text_of
@@ -22,7 +22,7 @@ from evonav.report.plots.run_plots import run_plots
 from evonav.report.plots.style import plot_css
 from evonav.report.run import Run, StageOutcome, Task, load_run
 from evonav.report.tables import table as tables
-from evonav.report.tables.causes import WORDS, FailureCause
+from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
 from evonav.report.tables.run_tables import latex_tables, markdown_tables, run_tables, statements
 from evonav.statistics import Interval
@@ -49,16 +49,16 @@ class Replay:
 def write_report(
     run_dir: Path, out_dir: Path | None = None, *, has_maps: bool = False, max_replay_bytes: int = MAX_REPLAY_BYTES
 ) -> Path:
-    """Writes `report.html`, which needs no other file, and `table.md`, `.tex`, `.csv`.
+    """Write `report.html`, which needs no other file, and `table.md`, `.tex`, `.csv`.
 
-    Deterministic but for wall-clock figures, safe on a run that is not finished or still being written. Pages that
+    Deterministic but for wall-clock times, safe on a run that is not finished or still being written. Pages that
     `evonav view` left in the run's folder become part of the report, as long as they show the records of now.
 
     Args:
         run_dir: A run.
-        out_dir: Where to; default the run's own folder.
+        out_dir: Folder to write to; default the run's own folder.
         has_maps: Write every stage's map as a file of its own too, `maps/*.svg`.
-        max_replay_bytes: Of the pages of `evonav view` in the report; beyond, it links to them.
+        max_replay_bytes: Limit for the pages of `evonav view` in the report; it links to those that do not fit.
 
     Returns:
         Path of the page.
@@ -80,7 +80,7 @@ def write_report(
         part = path.with_name(f".{REPORT_NAME}.part")
         with part.open("w", encoding="utf-8") as file:
             tasks = _tasks(run, replays, out_dir / MAP_DIR if has_maps else None)
-            for text in page.generate(**_page_context(run, found), tasks=tasks, replays=replays):
+            for text in page.generate(**_template_values(run, found), tasks=tasks, replays=replays):
                 file.write(text)
         part.replace(path)
     except OSError as error:
@@ -89,9 +89,9 @@ def write_report(
 
 
 def _replays(run: Run, out_dir: Path, max_bytes: int) -> list[Replay]:
-    """Pages of `evonav view` that show this run's records, the most telling first."""
+    """Return the pages of `evonav view` that show this run's records, the highlights first."""
     view_dir = run.run_dir / VIEW_DIR
-    order = {episode: i for i, episode in enumerate(telling_episodes(run))}
+    order = {episode: i for i, episode in enumerate(highlights_first(run))}
     pages = [
         page
         for page in listed_pages(view_dir)
@@ -106,13 +106,13 @@ def _replays(run: Run, out_dir: Path, max_bytes: int) -> list[Replay]:
         max_bytes -= 0 if content is None else len(content)
         file = os.path.relpath(view_dir / page.href, out_dir).replace(os.sep, "/")
         where = f"#replay={page.href}&" if content is not None else f"{file}#"
-        stages = [(k, state, words, f"{where}stage={k}&round=1") for k, state, words in page.stages]
+        stages = [(k, state, outcome, f"{where}stage={k}&round=1") for k, state, outcome in page.stages]
         found.append(Replay(page, content, stages))
     return found
 
 
 def _tasks(run: Run, replays: list[Replay], map_dir: Path | None) -> Iterator[tuple[TaskView, Markup, bool]]:
-    """Every task's view and section, and whether the section is packed."""
+    """Yield every task's view and section, and whether the section is packed."""
     is_packed = run.num_recorded > MAX_OPEN_STAGES
     hrefs = {
         (replay.page.agent, replay.page.task_id, stage): href
@@ -135,7 +135,7 @@ def _write_maps(run: Run, task: Task, map_dir: Path) -> None:
         (map_dir / map_name(record)).write_text(drawn, encoding="utf-8")
 
 
-def _page_context(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
+def _template_values(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
     overview = [
         {
             "anchor": slug(task_id),
@@ -163,7 +163,7 @@ def _page_context(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
         "plots": list(zip(plot_elements([one.plot for one in plots]), [one.caption for one in plots], strict=False)),
         "statements": statements(run),
         "overview": overview,
-        "causes": [(cause.name, WORDS[cause]) for cause in FailureCause if cause in used],
+        "causes": [(cause.name, CAUSE_NAMES[cause]) for cause in FailureCause if cause in used],
         "facts": run_facts(run),
         "failures": failure_groups(run),
         "commands": reproduction(run),
@@ -180,7 +180,7 @@ def _mark(outcome: StageOutcome | None) -> tuple[str, str]:
     if outcome is None:
         return ("none", "no record yet")
     record = outcome.record
-    why = f": {WORDS[outcome.cause]}" if outcome.cause is not None and record.is_scored else ""
+    why = f": {CAUSE_NAMES[outcome.cause]}" if outcome.cause is not None and record.is_scored else ""
     return (record.state.value, f"{record.goal.category}, {outcome_words(record)}{why}")
 
 

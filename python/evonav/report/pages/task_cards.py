@@ -19,14 +19,14 @@ class Cell:
     """A stage of an agent in a task's grid."""
 
     state: str
-    words: str
+    outcome: str
     sentence: str
     facts: str
     rounds: list[str]
     svg: Markup
     change: str
     href: str | None = None
-    """Where it is shown round by round."""
+    """Link to the page that shows the stage round by round."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,19 +39,19 @@ class TaskView:
     num_rooms: int
     defs: Markup
     goals: list[tuple[int, StageRecord | None, str, str | None]]
-    """Stage, a record that tells the goal, what changed before, and the reference image as a data URI."""
+    """Stage, a record that states the goal, what changed before, and the reference image as a data URI."""
     rows: list[tuple[str, list[Cell]]]
     data: dict[str, str]
 
 
 def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, int], str]) -> TaskView:
-    """Draws a task: the house once, what moves once a stage, every agent's stages over them.
+    """Draw a task: the house once, what moves once a stage, every agent's stages over them.
 
     Args:
         run: Its run.
-        task: With its records and maps.
-        prefix: Of names in the page.
-        hrefs: Where stages are shown round by round, by agent, task and stage; those that are.
+        task: Task with its records and maps.
+        prefix: Prefix of the names in the page.
+        hrefs: Links to stages that are shown round by round, by agent, task and stage.
     """
     records = list(task.records.values())
     frame = task_frame(task.maps, records)
@@ -65,8 +65,8 @@ def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, 
         defs.append(_shared(f"{prefix}f", item_labels(fixed, frame)))
     for stage, stage_map in task.maps.items():
         items = [item for item in stage_map.objects if item.object_id in moving]
-        told = next((record for record in records if record.stage == stage), None)
-        changed = "" if told is None else _changed(told, task, frame)
+        recorded = next((record for record in records if record.stage == stage), None)
+        changed = "" if recorded is None else _changed(recorded, task, frame)
         defs.append(_shared(f"{prefix}s{stage}", furniture(items, frame) + changed))
         defs.append(_shared(f"{prefix}f{stage}", item_labels(items, frame)))
     stages = range(1, task.num_stages + 1)
@@ -92,9 +92,9 @@ def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, 
 
     goals = []
     for stage in stages:
-        told = next((task.records[agent, stage] for agent in run.agents if (agent, stage) in task.records), None)
+        recorded = next((task.records[agent, stage] for agent in run.agents if (agent, stage) in task.records), None)
         image = task.maps[stage].reference_image if stage in task.maps else None
-        goals.append((stage, told, "" if told is None else change_words(told, task.maps), image))
+        goals.append((stage, recorded, "" if recorded is None else change_words(recorded, task.maps), image))
     return TaskView(
         anchor=slug(task.task_id),
         task_id=task.task_id,
@@ -108,12 +108,12 @@ def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, 
 
 
 def _shared(name: str, drawing: str) -> str:
-    """A group that many pictures show; style rules reach into it from its own root only, hence the class."""
+    """Return a group that many pictures show; style rules reach into it from its own root only, hence the class."""
     return f'<g class="map" id="{name}">{drawing}</g>'
 
 
 def _uses(prefix: str, stage: int) -> str:
-    """A stage's house from its shared groups; names of furniture (`fine`) are for large pictures."""
+    """Return a stage's house from its shared groups; names of furniture (`fine`) are for large pictures."""
     ids = (prefix, f"{prefix}s{stage}", f"{prefix}n")
     fine = (f"{prefix}f", f"{prefix}f{stage}")
     return join([f'<use href="#{name}"/>' for name in ids] + [f'<use class="fine" href="#{name}"/>' for name in fine])
@@ -125,7 +125,7 @@ def _changed(record: StageRecord, task: Task, frame: Frame) -> str:
 
 
 def _facts(record: StageRecord) -> str:
-    """Figures of a stage in a line."""
+    """Return the numbers of a stage in a line."""
     parts = [f"{record.num_rounds} rounds"]
     if record.path_length_m is not None:
         shortest = "" if record.reference_length_m is None else f" (shortest {record.reference_length_m:.1f} m)"
@@ -142,7 +142,7 @@ def _facts(record: StageRecord) -> str:
 
 
 def filter_data(run: Run, task_id: str) -> dict[str, str]:
-    """What the page's filters look at: `data-*` attributes of a task."""
+    """Return the `data-*` attributes of a task that the page's filters use."""
     keys = [(agent, task_id, stage) for agent in run.agents for stage in range(1, run.num_stages[task_id] + 1)]
     outcomes = {key: run.outcomes[key] for key in keys if key in run.outcomes}
     states = {key: outcome.record.state for key, outcome in outcomes.items()}
@@ -151,11 +151,11 @@ def filter_data(run: Run, task_id: str) -> dict[str, str]:
         found = {states.get((agent, task_id, stage)) for agent in run.agents}
         num_disagreements += EndState.SUCCESS in found and len(found) > 1
     causes = sorted({outcome.cause.name for outcome in outcomes.values() if outcome.cause is not None})
-    words = {outcome.record.goal.category.lower() for outcome in outcomes.values()}
+    categories = {outcome.record.goal.category.lower() for outcome in outcomes.values()}
     return {
         "task": slug(task_id),
         "failures": str(sum(state is not EndState.SUCCESS for state in states.values())),
         "disagreements": str(num_disagreements),
         "causes": " ".join(causes),
-        "words": " ".join([task_id.lower(), *sorted(words)]),
+        "words": " ".join([task_id.lower(), *sorted(categories)]),
     }

@@ -1,4 +1,4 @@
-"""What every page of ours has in common: templates that escape, a policy that forbids the network, packed parts."""
+"""Provide what all pages share: templates that escape, a policy that forbids the network, packed parts."""
 
 import base64
 import hashlib
@@ -12,13 +12,13 @@ from evonav.report.maps.svg import clean
 
 
 def text_of(name: str) -> Markup:
-    """A file of the package, trusted as it is."""
+    """Return a file of the package, which is trusted as it is."""
     text = (files("evonav.report") / "templates" / name).read_text(encoding="utf-8")
     return Markup(text)  # noqa: S704 - our own file
 
 
 def page_environment() -> Environment:
-    """The package's templates; text is escaped, and characters that no page may hold are replaced."""
+    """Return the package's templates; text is escaped, and characters that no page may contain are replaced."""
     return Environment(
         loader=PackageLoader("evonav.report"),
         autoescape=True,
@@ -30,14 +30,14 @@ def page_environment() -> Environment:
 
 
 def policy(styles: tuple[str, ...] | None, scripts: tuple[str, ...] = ()) -> str:
-    """The content security policy of a page: these styles and scripts, images in the page itself, nothing else.
+    """Return the content security policy of a page: these styles and scripts, images in the page itself, nothing else.
 
     What a goal, a model or a task's name smuggles in can neither run nor load anything, even where it is not escaped.
 
     Args:
         styles: Contents of the page's `style` elements, and of pages that it embeds: they inherit its policy. `None`
             for any in the page itself, where drawings carry their own.
-        scripts: The same of `script` elements that run.
+        scripts: Contents of the page's `script` elements that run.
     """
     return "; ".join(
         (
@@ -52,12 +52,12 @@ def policy(styles: tuple[str, ...] | None, scripts: tuple[str, ...] = ()) -> str
 
 
 def picture_uri(svg: str) -> str:
-    """A picture as the source of an `img`, in the page itself."""
+    """Return a picture as the source of an `img`, in the page itself."""
     return f"data:image/svg+xml;base64,{base64.b64encode(clean(svg).encode()).decode()}"
 
 
 def packed(text: str) -> Markup:
-    """Text as zlib in base64: a part of a page that is unpacked when it is looked at (`report.js`)."""
+    """Return text as zlib in base64: a part of a page that is unpacked when it is looked at (`report.js`)."""
     return Markup(base64.b64encode(zlib.compress(text.encode(), 9)).decode())  # noqa: S704 - letters and digits
 
 

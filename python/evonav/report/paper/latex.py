@@ -41,15 +41,15 @@ class _Row:
 
 
 def paper_latex(runs: Mapping[Perception, Run]) -> str:
-    """Both tables as `table` environments; every figure with n and interval in a comment.
+    """Return both tables as `table` environments; every number with n and interval in a comment.
 
     Args:
-        runs: By perception; agents that the paper lacks come last, settings without a run show the paper alone.
+        runs: Runs by perception; agents that the paper lacks come last, settings without a run show the paper alone.
     """
     agents = _agents(list(runs.values()))
     main = {setting: _main_rows(runs.get(setting), PAPER[setting]) for setting in SETTINGS}
     relocation = {setting: _relocation_rows(runs.get(setting), PAPER[setting]) for setting in SETTINGS}
-    told = "; ".join(f"{SETTINGS[setting]}: {_run_words(run)}" for setting, run in runs.items())
+    sizes = latex_text("; ".join(f"{SETTINGS[setting]}: {_run_size(run)}" for setting, run in runs.items()))
     grey = "Grey: as published."
     return "\n".join(
         [
@@ -60,7 +60,7 @@ def paper_latex(runs: Mapping[Perception, Run]) -> str:
                 agents,
                 "Setting",
                 "Metric",
-                rf"\textbf{{Main results}} of evaluated baselines and heuristic strategies. {latex_text(told)}. {grey}",
+                rf"\textbf{{Main results}} of evaluated baselines and heuristic strategies. {sizes}. {grey}",
                 "tab:main-results",
             ),
             "",
@@ -69,7 +69,7 @@ def paper_latex(runs: Mapping[Perception, Run]) -> str:
                 agents,
                 "Perception",
                 "Target Status",
-                rf"\textbf{{Impact of target relocation}} on the success rate (SR). {latex_text(told)}. {grey}",
+                rf"\textbf{{Impact of target relocation}} on the success rate (SR). {sizes}. {grey}",
                 "tab:relocation-results",
             ),
             "",
@@ -194,8 +194,8 @@ def _agents(runs: Sequence[Run]) -> list[str]:
     return list(dict.fromkeys(agent for run in runs for agent in run.agents))
 
 
-def _run_words(run: Run) -> str:
-    """How much it is, and whether all of it is there."""
+def _run_size(run: Run) -> str:
+    """Describe the size of a run, and whether it is complete."""
     num_stages = sum(run.num_stages.values())
     part = ", incomplete" if any(summary.is_incomplete for summary in run.summaries) else ""
     return f"{len(run.num_stages)} tasks, {num_stages} stages{part}"

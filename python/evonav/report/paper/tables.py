@@ -72,7 +72,7 @@ def paper_tables(run: Run, perception: Perception = "gt") -> list[Table]:
 
     Args:
         run: Agents that the paper does not have stand without its figures.
-        perception: Which half of the paper's tables to compare with.
+        perception: Half of the paper's tables to compare with.
     """
     paper = PAPER[perception]
     return [
@@ -85,13 +85,13 @@ def paper_tables(run: Run, perception: Perception = "gt") -> list[Table]:
 
 
 def paper_markdown(run: Run, perception: Perception = "gt") -> str:
-    """The tables as one Markdown text."""
+    """Return the tables as one Markdown text."""
     tables = [*paper_tables(run, perception), power_table(run.pairs, perception)]
     return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables if table.rows)
 
 
 def power_table(pairs: Sequence[AgentPair], perception: Perception = "gt") -> Table:
-    """Whether the paper's differences in SR could be told from none on its houses, if they vary as ours do."""
+    """Show whether the paper's SR differences could be found on its houses, if they vary as ours do."""
     paper = PAPER[perception]
     rows = []
     for pair in pairs:
@@ -210,10 +210,10 @@ def order(values: Mapping[str, float | None]) -> str:
     """Names from the largest value to the smallest, `a > b = c`; those without a value are left out."""
     known = {agent: value for agent, value in values.items() if value is not None}
     ranked = sorted(known, key=lambda agent: (-known[agent], PAPER_ORDER.index(agent)))
-    words = ""
+    text = ""
     for before, agent in zip([None, *ranked], ranked, strict=False):
-        words += agent if before is None else f" {'=' if known[before] == known[agent] else '>'} {agent}"
-    return words or NONE
+        text += agent if before is None else f" {'=' if known[before] == known[agent] else '>'} {agent}"
+    return text or NONE
 
 
 def _difference_table(pairs: Sequence[AgentPair], paper: dict[str, PaperResult]) -> Table:

@@ -1,12 +1,12 @@
-"""How a stage ended, in words. What is what is decided in `evonav.evaluation.metrics.failure_causes`."""
+"""Describe how a stage ended. The causes are decided in `evonav.evaluation.metrics.failure_causes`."""
 
 from evonav.evaluation.metrics.failure_causes import FailureCause, cause_of
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.tasks.language import noun_of
 
-__all__ = ["WORDS", "FailureCause", "cause_of", "sentence"]
+__all__ = ["CAUSE_NAMES", "FailureCause", "cause_of", "sentence"]
 
-WORDS: dict[FailureCause, str] = {
+CAUSE_NAMES: dict[FailureCause, str] = {
     FailureCause.NO_OBJECT: "stopped without an object",
     FailureCause.STALE_ENTRY: "stopped at a stale entry",
     FailureCause.WRONG_CATEGORY: "stopped at another kind of object",
@@ -22,11 +22,11 @@ WORDS: dict[FailureCause, str] = {
     FailureCause.HARNESS_ERROR: "errored: the simulator or evonav failed",
     FailureCause.NOT_RUN: "not run",
 }
-"""What reports call the causes."""
+"""Names of the causes in reports."""
 
 
 def sentence(record: StageRecord) -> str:
-    """How a stage ended, in one sentence."""
+    """Describe how a stage ended, in one sentence."""
     if record.error is not None:
         return (
             f"{record.state.value.replace('_', ' ').capitalize()} ({record.error.kind.value}): {record.error.message}"
@@ -45,4 +45,4 @@ def sentence(record: StageRecord) -> str:
     if record.has_stopped:
         named = f" ({record.stop_reason})" if entry is None and record.stop_reason else ""
         named = f" ({noun_of(entry.label)})" if entry is not None else named
-    return f"{WORDS[cause].capitalize()}{named}{distance}."
+    return f"{CAUSE_NAMES[cause].capitalize()}{named}{distance}."

@@ -14,12 +14,12 @@ TITLES = {
     "memory": "Memory against the objects seen so far",
     "costs": "What a stage costs",
 }
-"""By the kind of measure."""
+"""Titles of the tables, by kind of metric."""
 _DIGITS = {"%": 1, "": 1, "m": 2, "rounds": 1, "s": 3, "$": 4, "MB": 0}
 
 
 def measures_tables(run_dir: Path, agents: Sequence[str] | None = None) -> list[Table]:
-    """One table a kind of measure; a row a measure, a column an agent.
+    """Build one table per kind of metric; one row per metric, one column per agent.
 
     Args:
         run_dir: A run, finished or not.
@@ -37,17 +37,17 @@ def measures_tables(run_dir: Path, agents: Sequence[str] | None = None) -> list[
 
 
 def measures_table(rows: Sequence[StageMetrics], kind: str) -> Table:
-    """A table of one kind.
+    """Build the table of one kind of metric.
 
     Args:
-        rows: Of a run.
-        kind: Of `MEASURES`.
+        rows: Rows of a run.
+        kind: Kind of metric, a key of `MEASURES`.
     """
     found = explain(rows, MEASURES[kind])
     totals = {agent: sum(row.is_scored for row in rows if row.agent == agent) for agent in found}
     lines = []
     for index, measure in enumerate(MEASURES[kind]):
-        cells = {agent: explained[index] for agent, explained in found.items()}
+        cells = {agent: metrics[index] for agent, metrics in found.items()}
         if any(cell.value is not None for cell in cells.values()):
             name = f"{measure.words}, {measure.unit}" if measure.unit else measure.words
             lines.append((name, *(_cell(cell, totals[agent]) for agent, cell in cells.items())))

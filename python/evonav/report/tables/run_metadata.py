@@ -1,4 +1,4 @@
-"""What a report tells of a run beside its measures: how to run it again, what it is, what went wrong in it."""
+"""Describe a run beside its metrics: how to run it again, its settings, its failures."""
 
 import json
 import shlex
@@ -23,7 +23,7 @@ class FailureGroup:
     kind: str
     message: str
     traceback: str
-    """Of the first of them, where there is one."""
+    """Traceback of the first of them, where there is one."""
     agents: tuple[str, ...]
     stages: tuple[tuple[str, str, int], ...]
     """Agent, task and stage of the first `MAX_LISTED`."""
@@ -63,15 +63,15 @@ def reproduction(run: Run) -> list[str]:
     if any(str(parts.get(name, "")).rpartition(":")[2] != part for name, part in _DEFAULT_PARTS.items()):
         return []
     perception = perception_of(run)
-    words = ["evonav", "evaluate", "--agents", ",".join(run.agents), "--seed", str(run.config.get("seed", 0))]
+    command = ["evonav", "evaluate", "--agents", ",".join(run.agents), "--seed", str(run.config.get("seed", 0))]
     if isinstance(run.notes.get("tasks_dir"), str):
-        words += ["--tasks", run.notes["tasks_dir"]]
-    words += ["--perception", perception] if perception not in ("gt", "") else []
-    return [shlex.join([*words, "--out", "out/again"])]
+        command += ["--tasks", run.notes["tasks_dir"]]
+    command += ["--perception", perception] if perception not in ("gt", "") else []
+    return [shlex.join([*command, "--out", "out/again"])]
 
 
 def perception_of(run: Run) -> str:
-    """What the agents saw with, as `--perception` names it; empty where the run does not tell."""
+    """Return the perception of the run, as `--perception` names it; empty where the run does not record it."""
     backend = run.config.get("backend")
     parts = backend if isinstance(backend, dict) else {}
     make, options = parts.get("perception"), parts.get("perception_options", {})
@@ -91,8 +91,8 @@ def run_facts(run: Run) -> list[tuple[str, str]]:
     if retries:
         facts.append(("stages tried again", ", ".join(f"{count} after {kind}" for kind, count in retries.items())))
     for number, session in enumerate(_sessions(run), 1):
-        told = {key: value for key, value in session.items() if key != "command" and value not in (None, "")}
-        facts.append((f"call {number}", "; ".join(f"{key.replace('_', ' ')}: {_json(told[key])}" for key in told)))
+        shown = {key: value for key, value in session.items() if key != "command" and value not in (None, "")}
+        facts.append((f"call {number}", "; ".join(f"{key.replace('_', ' ')}: {_json(shown[key])}" for key in shown)))
     return facts
 
 

@@ -1,4 +1,4 @@
-"""What a run shows: all its tables, and sentences that claim no more than the numbers allow."""
+"""Build all tables of a run, and sentences that claim no more than the numbers allow."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -22,7 +22,7 @@ def latex_tables(found: Iterable[tables.Table]) -> str:
 
 
 def run_tables(run: Run) -> list[tables.Table]:
-    """All tables of a run, in reading order."""
+    """Return all tables of a run, in reading order."""
     records = run.records_by_agent()
     return [
         tables.headline(run.summaries),
@@ -38,21 +38,21 @@ def run_tables(run: Run) -> list[tables.Table]:
 
 
 def effort_table(run: Run) -> tables.Table:
-    """What success cost, and what believing stale entries cost: means a scored stage."""
+    """Build the table of what success cost, and what believing stale entries cost: means per scored stage."""
     columns = ("Agent", "SoftSPL %", "rounds", "walked m", "of it to stale entries m", "stale entries", "ended itself")
     rows = []
     for summary in run.summaries:
         scored = run.scored(summary.agent)
         if not scored:
             continue
-        means = (
+        averages = (
             sum(outcome.record.num_rounds for outcome in scored) / len(scored),
             summary.mean_path_length_m or 0.0,
             sum(outcome.stale_path_m for outcome in scored) / len(scored),
             sum(outcome.num_stale_entries for outcome in scored) / len(scored),
         )
         ended = f"{summary.num_stopped} of {summary.n}"
-        rows.append((summary.agent, tables.percent(summary.soft_spl, None), *(f"{x:.1f}" for x in means), ended))
+        rows.append((summary.agent, tables.percent(summary.soft_spl, None), *(f"{x:.1f}" for x in averages), ended))
     note = (
         "Means a scored stage. Walked to stale entries: in rounds that chose an object entry with no object of its "
         "label there. Stale entries: in memory at the end of a stage."
@@ -61,7 +61,7 @@ def effort_table(run: Run) -> tables.Table:
 
 
 def failure_table(run: Run) -> tables.Table:
-    """What went wrong with agents and their models, and the stages that were scored after it; no row where nothing."""
+    """Build the table of failures of agents and models, and of stages that were scored after one; no row without."""
     columns = ("Agent", "errored stages", "failed decisions", "in stages", "scored after a failure", "without memory")
     rows = []
     for agent in run.agents:
@@ -90,7 +90,7 @@ def failure_table(run: Run) -> tables.Table:
 
 
 def statements(run: Run) -> list[str]:
-    """What the run shows, in sentences that claim no more than the intervals allow."""
+    """Describe what the run shows, in sentences that claim no more than the intervals allow."""
     scored = sorted((s for s in run.summaries if s.sr is not None), key=lambda s: -(s.sr or 0.0))
     if not scored:
         return ["No stage has been scored yet."]

@@ -17,11 +17,11 @@ from rich.text import Text
 
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, rates
 from evonav.evaluation.records.schema import StageRecord
-from evonav.report.tables.causes import WORDS, FailureCause, cause_of
+from evonav.report.tables.causes import CAUSE_NAMES, FailureCause, cause_of
 from evonav.statistics import LEVEL, NUM_RESAMPLES, Interval, PairedEffect
 
 NONE = "–"
-"""What a cell without a value says."""
+"""Text of a cell without a value."""
 INTERVALS = f"Intervals: 95%, houses resampled ({NUM_RESAMPLES:,} times)."
 VERDICTS = (
     "p: two-sided, the agents' names exchanged in whole houses. Holm: p adjusted for the number of pairs. Ahead: p is "
@@ -58,7 +58,7 @@ class Table:
         return "\n".join(lines + [f"\n{_markdown_text(note)}" for note in self.notes]) + "\n"
 
     def latex(self) -> str:
-        """A `tabular` for `booktabs`, best values in bold, notes as comments; no wider than the line (`graphicx`)."""
+        """Return a `tabular` for `booktabs`: best values bold, notes as comments, no wider than the line."""
         lines = [f"% {_one_line(self.title)}", _NO_WIDER_THAN_THE_LINE]
         lines += [rf"\begin{{tabular}}{{l{'r' * (len(self.columns) - 1)}}}", r"\toprule"]
         lines += [" & ".join(map(latex_text, self.columns)) + r" \\", r"\midrule"]
@@ -72,7 +72,7 @@ class Table:
         return "\n".join(lines) + "\n"
 
     def rich(self) -> RichTable:
-        """For `rich.print`."""
+        """Return the table for `rich.print`."""
         notes = "\n".join(self.notes)
         table = RichTable(
             title=self.title,
@@ -90,7 +90,7 @@ class Table:
 
 
 def headline(summaries: Sequence[AgentSummary]) -> Table:
-    """One row an agent: SR, SPL, n, and the stages by end state."""
+    """Build a table with one row per agent: SR, SPL, n, and the stages by end state."""
     columns = ("Agent", "SR % [95% CI]", "SPL % [95% CI]", "n", "success", "failure", "errored", "not run", "stages")
     rows = tuple(
         (
@@ -160,7 +160,7 @@ def cause_table(records: Mapping[str, Sequence[StageRecord]]) -> Table:
 def cause_count_table(counts: Mapping[str, Mapping[FailureCause | None, int]]) -> Table:
     """`cause_table` from counts."""
     causes = [cause for cause in FailureCause if any(part.get(cause) for part in counts.values())]
-    rows = tuple((WORDS[cause], *(str(part.get(cause, 0)) for part in counts.values())) for cause in causes)
+    rows = tuple((CAUSE_NAMES[cause], *(str(part.get(cause, 0)) for part in counts.values())) for cause in causes)
     note = "One cause a stage, the first that fits."
     return Table("Why stages failed", ("Cause", *counts), rows, (note,))
 
@@ -201,7 +201,7 @@ def paired_table(pairs: Sequence[AgentPair]) -> Table:
 
 
 def verdict_words(a: str, b: str, effect: PairedEffect) -> str:
-    """The verdict on `b` less `a` in a few words."""
+    """Return the verdict on `b` less `a` in a few words."""
     return {
         "equal": "equal on every stage",
         "few": f"too few houses to tell ({effect.num_clusters})",
@@ -212,12 +212,12 @@ def verdict_words(a: str, b: str, effect: PairedEffect) -> str:
 
 
 def p_heading(num_pairs: int) -> str:
-    """The head of a column of p, which is adjusted where there are several pairs."""
+    """Return the heading of a column of p, which is adjusted where there are several pairs."""
     return "p (Holm)" if num_pairs > 1 else "p"
 
 
 def p_words(p: float) -> str:
-    """`0.012`; `<0.0001` where it is less."""
+    """Return p as text: `0.012`; `<0.0001` where it is less."""
     return "<0.0001" if p < 0.0001 else f"{p:.4f}" if p < 0.01 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"
 
 
@@ -245,7 +245,7 @@ _CSV_COLUMNS = (
 
 
 def summary_csv(summaries: Sequence[AgentSummary]) -> str:
-    """Every measure of every agent and split, unrounded: one row an agent and split."""
+    """Return every metric, unrounded: one CSV row per agent and split."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(_CSV_COLUMNS)
@@ -296,7 +296,7 @@ def _rate_cell(part: Rates) -> str:
 
 
 def _best(values: Sequence[float | None], column: int) -> list[tuple[int, int]]:
-    """Where the largest value is, if there are two to compare and not all are equal."""
+    """Return the cells of the largest value, if there are two to compare and not all are equal."""
     known = [value for value in values if value is not None]
     if len(known) < 2 or min(known) == max(known):
         return []

@@ -34,7 +34,7 @@ def write_dataset_report(found: TaskStatistics, out_dir: Path) -> Path:
         if has_renderer():
             write_statistics_plot(found, out_dir / PLOT_NAME)
         path = out_dir / PAGE_NAME
-        path.write_text(page.render(**_context(found)), encoding="utf-8")
+        path.write_text(page.render(**_template_values(found)), encoding="utf-8")
     except OSError as error:
         raise StoreError(f"{out_dir}: {error}") from error
     return path
@@ -57,7 +57,7 @@ def write_statistics_plot(found: TaskStatistics, path: Path) -> Path:
     return write_plots(paper_plots(found), path, columns=3)
 
 
-def _context(found: TaskStatistics) -> dict[str, Any]:
+def _template_values(found: TaskStatistics) -> dict[str, Any]:
     groups: dict[str, list[list[str]]] = {}
     for metric in found.measures:
         if metric.raw is not None:

@@ -42,7 +42,7 @@ THUMBNAIL_MIN_M = 0.5
 MAX_SPREAD = 4.0
 """Area over its members' up to which a group is drawn as one: a shuffle tears groups apart."""
 VIEW_M = 1.1
-"""How far the view cone of the reference pose is drawn."""
+"""Length of the drawn view cone of the reference pose."""
 HALF_VIEW_RAD = math.pi / 4
 """Half of the reference image's field of view."""
 _MEMBER = re.compile(r"(?:^|\|)(\d+)\|(\d+)\|\d+$")
@@ -50,14 +50,14 @@ _MEMBER = re.compile(r"(?:^|\|)(\d+)\|(\d+)\|\d+$")
 
 @dataclass(frozen=True, slots=True)
 class TaskDrawing:
-    """What the pictures of a task share."""
+    """Data that the pictures of a task share."""
 
     task: Task
     prefix: str
-    """Of the ids of shared groups, different for every task of a page."""
+    """Prefix of the ids of shared groups, different for every task of a page."""
     frame: Frame
     maps: Mapping[int, FloorPlan]
-    """By stage."""
+    """Floor plans by stage."""
     doors: Mapping[str, tuple[Point, Point]]
     """Ends of doors on the floor plan, by id."""
     moving: frozenset[str]
@@ -65,7 +65,7 @@ class TaskDrawing:
 
 
 def task_drawing(task: Task, prefix: str = "p") -> TaskDrawing:
-    """Reads a task's houses.
+    """Read a task's houses.
 
     Raises:
         HouseError: One is malformed.
@@ -81,7 +81,7 @@ def task_drawing(task: Task, prefix: str = "p") -> TaskDrawing:
 
 
 def definitions(drawing: TaskDrawing) -> str:
-    """What is the same in all of a task's pictures, as groups that they refer to."""
+    """Return the parts that all of a task's pictures share, as groups that they refer to."""
     first, frame = drawing.maps[1], drawing.frame
     fixed = [item for item in first.objects if item.object_id not in drawing.moving]
     shared = {
@@ -93,7 +93,7 @@ def definitions(drawing: TaskDrawing) -> str:
 
 
 def before_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
-    """The house of the stage before, with what is about to move, go or open stressed: content of an `svg` element."""
+    """Draw the house of the stage before; what is about to move, go or open is stressed: content of an `svg`."""
     evolution = drawing.task.oracle(stage).evolution
     removed = {record.id for record in evolution.removals}
     leaving = {change.id for change in evolution.changes} - removed
@@ -101,7 +101,7 @@ def before_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
 
 
 def after_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
-    """The house of a stage with what was changed, and from where: content of an `svg` element."""
+    """Draw the house of a stage with what was changed, and from where: content of an `svg` element."""
     oracle, previous = drawing.task.oracle(stage), drawing.maps.get(stage - 1)
     evolution = oracle.evolution
     moved = {change.id for change in evolution.changes}
@@ -116,7 +116,7 @@ def after_svg(drawing: TaskDrawing, stage: int, frame: Frame) -> str:
 
 
 def course_svg(drawing: TaskDrawing, stage: int) -> str:
-    """The whole house of a stage, with the reference course and the target: content of an `svg` element."""
+    """Draw the whole house of a stage, with the reference course and the target: content of an `svg` element."""
     oracle, frame = drawing.task.oracle(stage), drawing.frame
     evolution = oracle.evolution
     stressed = {"moved": {change.id for change in evolution.changes}}
@@ -131,7 +131,7 @@ def course_svg(drawing: TaskDrawing, stage: int) -> str:
 
 
 def change_frame(drawing: TaskDrawing, stage: int) -> Frame:
-    """The part of the house in which a stage's change happened."""
+    """Return the part of the house in which a stage's change happened."""
     evolution = drawing.task.oracle(stage).evolution
     changed = {change.id for change in evolution.changes}
     changed |= {record.id for record in (*evolution.additions, *evolution.removals)}
@@ -145,7 +145,7 @@ def change_frame(drawing: TaskDrawing, stage: int) -> Frame:
 
 
 def thumbnail_svg(drawing: TaskDrawing, stage: int) -> str:
-    """A stage's house with nothing but large furniture and what moved: content of an `svg` element."""
+    """Draw a stage's house with nothing but large furniture and what moved: content of an `svg` element."""
     oracle, frame, stage_map = drawing.task.oracle(stage), drawing.frame, drawing.maps[stage]
     moved = {change.id for change in oracle.evolution.changes}
     large = [item for item in stage_map.objects if max(item.size_m[0], item.size_m[2]) >= THUMBNAIL_MIN_M]
@@ -171,7 +171,7 @@ def _plan(
     stressed: Mapping[str, set[str]],
     ghosts: str = "",
 ) -> str:
-    """A stage's house; `stressed` has the ids that are drawn in a CSS class of their own."""
+    """Draw a stage's house; `stressed` has the ids that are drawn in a CSS class of their own."""
     stage_map = drawing.maps[stage]
 
     def use(name: str) -> str:
@@ -219,7 +219,7 @@ def _tint(room: RoomFootprint, frame: Frame) -> str:
 
 
 def _groups(objects: Iterable[ObjectFootprint], frame: Frame) -> str:
-    """A soft shape around the members of every asset group, which ProcTHOR's ids number `room|group|member`."""
+    """Draw a soft shape around the members of every asset group, which ProcTHOR's ids number `room|group|member`."""
     members: dict[tuple[str, str], list[ObjectFootprint]] = {}
     for item in objects:
         if (match := _MEMBER.search(item.object_id)) and item.category not in FLAT_CATEGORIES:
@@ -234,7 +234,7 @@ def _groups(objects: Iterable[ObjectFootprint], frame: Frame) -> str:
 
 
 def _area_m2(polygon_m: Sequence[Point]) -> float:
-    """Of a polygon (shoelace formula)."""
+    """Return the area of a polygon (shoelace formula)."""
     ahead = zip(polygon_m, (*polygon_m[1:], *polygon_m[:1]), strict=True)
     return abs(sum(x0 * z1 - x1 * z0 for (x0, z0), (x1, z1) in ahead)) / 2
 
@@ -258,7 +258,7 @@ def _turn(a: Point, b: Point, c: Point) -> float:
 
 
 def _course(oracle: OracleStage, frame: Frame) -> str:
-    """Reference trajectory, start, and the reference pose with what it sees."""
+    """Draw the reference trajectory, the start, and the reference pose with what it sees."""
     u = frame.unit
     path = polyline([cm(point) for point in oracle.reference_path_m])
     start_m, pose = oracle.start_pose.position_m, oracle.reference_pose

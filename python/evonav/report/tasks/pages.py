@@ -23,7 +23,7 @@ from evonav.report.tasks.floor_plans import (
     task_drawing,
     thumbnail_svg,
 )
-from evonav.report.tasks.wording import changed_words, move_rows, stage_facts
+from evonav.report.tasks.wording import change_sentence, move_rows, stage_facts
 from evonav.tasks import Task
 
 INDEX_NAME = "index.html"
@@ -55,18 +55,18 @@ class Card:
     num_rooms: int
     num_stages: int
     modes: list[str]
-    words: str
+    search_text: str
     view_box: str
     svg: Markup
 
 
 def write_task_page(task: Task, path: Path, *, stages: Sequence[int] | None = None, index: str | None = None) -> Path:
-    """Writes a task as one HTML file that needs no other.
+    """Write a task as one HTML file that needs no other.
 
     Args:
         task: The task.
         path: The file.
-        stages: Which stages; default all.
+        stages: Stages to show; default all.
         index: Address of the gallery that links here.
 
     Returns:
@@ -80,7 +80,7 @@ def write_task_page(task: Task, path: Path, *, stages: Sequence[int] | None = No
 
 
 def write_stage_picture(task: Task, stage: int, path: Path) -> Path:
-    """Writes a stage as a `.svg`, `.png` or `.pdf` file: the house before (if it changed) and after, side by side.
+    """Write a stage as a `.svg`, `.png` or `.pdf` file: the house before (if it changed) and after, side by side.
 
     Raises:
         HouseError: A stage house is malformed.
@@ -94,13 +94,13 @@ def write_stage_picture(task: Task, stage: int, path: Path) -> Path:
 def write_gallery(
     tasks: Iterable[Task], out_dir: Path, name: str, *, on_task: Callable[[str], None] | None = None
 ) -> Path:
-    """Writes a page a task, and `index.html` with a card for each.
+    """Write a page for each task, and `index.html` with a card for each.
 
     Args:
         tasks: Any number, taken one at a time.
         out_dir: Folder of the pages.
         name: Heading.
-        on_task: Told of each task as its page is written.
+        on_task: Called with each task's id when its page is written.
 
     Returns:
         Path of the index.
@@ -118,7 +118,7 @@ def write_gallery(
         if on_task is not None:
             on_task(task.task_id)
     num_stages = sum(card.num_stages for card in cards)
-    context = {
+    values = {
         "name": name,
         "summary": f"{len(cards)} tasks, {num_stages} stages",
         "cards": cards,
@@ -128,22 +128,22 @@ def write_gallery(
         "js": text_of("tasks.js"),
         "policy": policy(None, (text_of("tasks.js"),)),
     }
-    return _write(out_dir / INDEX_NAME, page_environment().get_template("tasks.html.j2").render(context))
+    return _write(out_dir / INDEX_NAME, page_environment().get_template("tasks.html.j2").render(values))
 
 
 def stage_svg(drawing: TaskDrawing, stage: int) -> str:
-    """A stage as an SVG document: its plans side by side."""
+    """Draw a stage as an SVG document: its plans side by side."""
     panels, left_px = [], 0
-    for words, frame, content in _plans(drawing, stage):
+    for caption, frame, content in _plans(drawing, stage):
         width_px = round(PLAN_HEIGHT_PX * min(1.6, frame.width / frame.height))
         panels.append(
-            f'<text class="stage" x="{left_px + 12}" y="28">{escape(words)}</text>'
+            f'<text class="stage" x="{left_px + 12}" y="28">{escape(caption)}</text>'
             f'<svg x="{left_px}" y="{CAPTION_PX}" width="{width_px}" height="{PLAN_HEIGHT_PX}" '
             f'viewBox="{frame.view_box}">{content}</svg>'
         )
         left_px += width_px
     height_px = CAPTION_PX + PLAN_HEIGHT_PX
-    changed = changed_words(drawing.maps[stage], drawing.task.oracle(stage).evolution)
+    changed = change_sentence(drawing.maps[stage], drawing.task.oracle(stage).evolution)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" class="map" viewBox="0 0 {left_px} {height_px}" width="{left_px}" '
         f'height="{height_px}" role="img"><title>{escape(drawing.task.task_id)}, stage {stage}</title>'
@@ -176,8 +176,8 @@ def _stage_view(drawing: TaskDrawing, stage: int) -> StageView:
     return StageView(
         number=stage,
         has_changed=len(plans) > 1,
-        changed=changed_words(stage_map, oracle.evolution),
-        plans=[(words, frame.view_box, Markup(svg)) for words, frame, svg in plans],  # noqa: S704 - our own SVG
+        changed=change_sentence(stage_map, oracle.evolution),
+        plans=[(caption, frame.view_box, Markup(svg)) for caption, frame, svg in plans],  # noqa: S704 - our own SVG
         image=stage_map.reference_image or "",
         instructions=[
             ("basic instruction", public.basic_instruction),
@@ -190,7 +190,7 @@ def _stage_view(drawing: TaskDrawing, stage: int) -> StageView:
 
 
 def _plans(drawing: TaskDrawing, stage: int) -> list[tuple[str, Frame, str]]:
-    """Caption, frame and content of each of a stage's plans: where it changed, before and after, and the whole."""
+    """Return caption, frame and content of a stage's plans: where it changed, before and after, and the whole."""
     evolution = drawing.task.oracle(stage).evolution
     plans = []
     if stage > 1 and any((evolution.changes, evolution.additions, evolution.removals, evolution.states)):
@@ -204,14 +204,14 @@ def _card(drawing: TaskDrawing, href: str) -> Card:
     task = drawing.task
     evolutions = [stage.evolution for stage in task.oracle_stages]
     most = max(range(1, task.num_stages + 1), key=lambda k: (len(evolutions[k - 1].changes), -k))
-    words = [task.task_id, task.header.house.name, *(stage.category for stage in task.public_stages)]
+    searched = [task.task_id, task.header.house.name, *(stage.category for stage in task.public_stages)]
     return Card(
         href=href,
         task_id=task.task_id,
         num_rooms=task.header.house.num_rooms,
         num_stages=task.num_stages,
         modes=sorted({evolution.mode for evolution in evolutions if evolution.outcome == "evolved" and evolution.mode}),
-        words=" ".join(words).lower(),
+        search_text=" ".join(searched).lower(),
         view_box=drawing.frame.view_box,
         svg=Markup(thumbnail_svg(drawing, most)),  # noqa: S704 - our own SVG
     )

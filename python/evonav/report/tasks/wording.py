@@ -38,8 +38,8 @@ def stage_facts(stage_map: FloorPlan, oracle: OracleStage) -> list[tuple[str, st
     if oracle.state.transition_room_id is not None:
         facts.append(("transition room", rooms(oracle.state.transition_room_id)))
     if oracle.rejections:
-        words = [f"{nouns.get(item.id, item.id)} ({item.reason.replace('_', ' ')})" for item in oracle.rejections]
-        facts.append(("goals refused", ", ".join(words)))
+        refused = [f"{nouns.get(item.id, item.id)} ({item.reason.replace('_', ' ')})" for item in oracle.rejections]
+        facts.append(("goals refused", ", ".join(refused)))
     for name, ids in _lists(evolution):
         if ids:
             facts.append((name, ", ".join(f"{nouns.get(i, '')} {i}".strip() for i in ids)))
@@ -49,24 +49,24 @@ def stage_facts(stage_map: FloorPlan, oracle: OracleStage) -> list[tuple[str, st
     return facts
 
 
-def changed_words(stage_map: FloorPlan, evolution: Evolution) -> str:
-    """What changed before a stage, in a sentence."""
-    words = OUTCOMES[evolution.outcome]
+def change_sentence(stage_map: FloorPlan, evolution: Evolution) -> str:
+    """Describe what changed before a stage, in one sentence."""
+    text = OUTCOMES[evolution.outcome]
     if evolution.outcome == "no_placement":
-        words += f": {FAILURES[evolution.failure]}." if evolution.failure else "."
+        text += f": {FAILURES[evolution.failure]}." if evolution.failure else "."
     if evolution.outcome == "evolved" and evolution.mode is not None:
-        words = f"{evolution.mode} in the {room_namer(stage_map)(evolution.room_id or '')}: {_moved_words(evolution)}."
+        text = f"{evolution.mode} in the {room_namer(stage_map)(evolution.room_id or '')}: {_moved_text(evolution)}."
     extra = [
         (len(evolution.additions), "came"),
         (len(evolution.removals), "went"),
         (len(evolution.states), "opened, closed or switched"),
     ]
     more = ", ".join(f"{num} {what}" for num, what in extra if num)
-    return f"{words} By extensions: {more}.".strip() if more else words
+    return f"{text} By extensions: {more}.".strip() if more else text
 
 
 def move_rows(stage_map: FloorPlan, evolution: Evolution) -> list[tuple[str, ...]]:
-    """Moved objects, the farthest first: object, id, distance, turn, from and to what, cause."""
+    """List moved objects, the farthest first: object, id, distance, turn, old and new support, cause."""
     nouns = {item.object_id: noun_of(item.category) for item in stage_map.objects}
     rows: list[tuple[str, ...]] = []
     for change in sorted(evolution.changes, key=lambda change: (-change.displacement_m, change.id)):
@@ -88,7 +88,7 @@ def move_rows(stage_map: FloorPlan, evolution: Evolution) -> list[tuple[str, ...
 
 
 def room_namer(stage_map: FloorPlan) -> Callable[[str], str]:
-    """How rooms are called: their type, with the number of the room where several are of that type."""
+    """Return a function that names rooms: their type, with the room's number where several are of that type."""
     types = Counter(room.room_type for room in stage_map.rooms)
     names = {}
     for room in stage_map.rooms:
@@ -97,14 +97,14 @@ def room_namer(stage_map: FloorPlan) -> Callable[[str], str]:
     return lambda room_id: names.get(room_id, room_id)
 
 
-def _moved_words(evolution: Evolution) -> str:
-    """How many objects moved, and how far."""
+def _moved_text(evolution: Evolution) -> str:
+    """Describe how many objects moved, and how far."""
     num = len(evolution.changes)
-    words = f"{num} object{'' if num == 1 else 's'} moved"
+    text = f"{num} object{'' if num == 1 else 's'} moved"
     if evolution.changes:
         farthest = max(evolution.changes, key=lambda change: (change.displacement_m, change.id))
-        words += f", farthest the {noun_of(farthest.category)}, by {farthest.displacement_m:.1f} m"
-    return words
+        text += f", farthest the {noun_of(farthest.category)}, by {farthest.displacement_m:.1f} m"
+    return text
 
 
 def _lists(evolution: Evolution) -> list[tuple[str, tuple[str, ...]]]:
