@@ -20,7 +20,7 @@ from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import EndState, TransitionRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.compare.compare import compare
-from evonav.report.compare.selection import read_sides
+from evonav.report.compare.selection import read_compared_agents
 from evonav.report.run import load_run
 from evonav.statistics import mcnemar
 from evonav.tasks.dataset import SourceFile
@@ -117,7 +117,7 @@ def test_an_arm_has_the_rates_and_differences_of_its_run(pairs):
                 assert (series.intervals[i] is None) == (ends is None)
                 assert ends is None or series.intervals[i] == pytest.approx([100 * end for end in ends])
     for arm in analysis.arms:
-        (one,) = compare(read_sides([str(run_of(pairs, arm))]))
+        (one,) = compare(read_compared_agents([str(run_of(pairs, arm))]))
         for name, field in (("SR", "success"), ("SPL", "spl")):
             assert analysis.effect((arm, one.a), (arm, one.b), MEASURES[name]) == one.all.effects[field]
 
