@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from results import PAGE, pooled_tasks, run_agents, spread, with_part
 
-from evonav.evaluation.metrics.navigation import AgentSummary
+from evonav.evaluation.metrics.navigation import AgentSummary, house_of
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.perception.words import read_word
@@ -146,7 +146,7 @@ def _between(run_a: Run, a: str, run_b: Run, b: str, keep: Keep) -> PairedEffect
     before, after = (
         np.array([records[key].state is EndState.SUCCESS for key in keys], np.float64) for records in (ours, theirs)
     )
-    return paired_effect(before, after, [ours[key].house for key in keys])
+    return paired_effect(before, after, [house_of(ours[key]) for key in keys])
 
 
 def _points(effect: PairedEffect | None) -> str:

@@ -189,7 +189,7 @@ def _drop_table(analysis: Analysis) -> Table:
             effect = analysis.effect((fixed, agent), (evolved, agent), measure)
             rows.append((f"{agent}, {name}", str(len(analysis.keys(agent))), *effect_cells(effect)))
     keys = {(fixed, agent, key) for agent in analysis.paired_agents for key in analysis.keys(agent)}
-    num_houses = len({analysis.outcomes[arm, agent][key].row.house for arm, agent, key in keys})
+    num_houses = len({house_of(analysis.outcomes[arm, agent][key].row) for arm, agent, key in keys})
     notes = (
         f"{num_houses} houses. Rates in %; changes in points, Not Fixed less Fixed, with 95% intervals (bootstrap by "
         "house) and paired two-sided p (signs exchanged by house).",

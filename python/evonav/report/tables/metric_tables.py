@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from evonav.evaluation.metrics.aggregate import MEASURES, MetricSummary, explain
+from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records.store import RunStore
 from evonav.report.tables.table import NONE, Table
@@ -51,7 +52,7 @@ def measures_table(rows: Sequence[StageMetrics], kind: str) -> Table:
         if any(cell.value is not None for cell in cells.values()):
             name = f"{measure.words}, {measure.unit}" if measure.unit else measure.words
             lines.append((name, *(_cell(cell, totals[agent]) for agent, cell in cells.items())))
-    houses = {agent: len({row.house for row in rows if row.agent == agent and row.is_scored}) for agent in found}
+    houses = {agent: len({house_of(row) for row in rows if row.agent == agent and row.is_scored}) for agent in found}
     sizes = "; ".join(f"{agent} {totals[agent]} stages of {houses[agent]} houses" for agent in found)
     note = f"{sizes}. 95% bootstrap over houses. In parentheses: how many stages have a value, if not all."
     return Table(TITLES[kind], ("Measure", *found), tuple(lines), (note,))
