@@ -13,7 +13,7 @@ from evonav.controlled.analysis import MEASURES, load_analysis, pair_tables, sig
 from evonav.controlled.claims import claims
 from evonav.controlled.layout import Arm, ControlledRecord, run_of, write_controlled
 from evonav.controlled.page import write_controlled_report
-from evonav.controlled.paired_maps import load_rollouts, pair_svg, telling_pairs
+from evonav.controlled.paired_maps import highlighted_pairs, load_pair, pair_svg
 from evonav.controlled.plots import controlled_plots
 from evonav.controlled.rates import Crossover, _crossing, by_rate, crossover
 from evonav.errors import InvalidArgumentError, StoreError
@@ -187,7 +187,7 @@ def test_the_page_holds_tables_pictures_and_every_pair(pairs):
     page = _Text()
     page.feed(path.read_text(encoding="utf-8"))
     text = " ".join(page.text)
-    for words in ("Fixed / Not Fixed", "By what changed", "The paper's statements", "Telling pairs", "All pairs"):
+    for words in ("Fixed / Not Fixed", "By what changed", "The paper's statements", "Highlighted pairs", "All pairs"):
         assert words in text
     local = [link for link in page.links if not link.startswith("data:")]
     assert len([link for link in local if link.startswith("pairs/")]) >= len(TASKS)
@@ -204,19 +204,19 @@ def test_the_page_holds_tables_pictures_and_every_pair(pairs):
 
 def test_telling_pairs_are_of_moved_targets_that_memory_had_found(pairs):
     analysis = load_analysis(pairs)
-    assert telling_pairs(analysis, "fu", per_reason=9) == [
+    assert highlighted_pairs(analysis, "fu", per_reason=9) == [
         ("misled", ("task-0", 2)),
         ("misled", ("task-2", 2)),
         ("unharmed", ("task-4", 2)),
     ]
-    drawn = pair_svg(load_rollouts(analysis, "fu", ("task-0", 2)))
+    drawn = pair_svg(load_pair(analysis, "fu", ("task-0", 2)))
     fixed, _, evolved = drawn.partition("Not Fixed")
     assert "Fixed" in fixed
     assert evolved
     assert drawn.count("target-move") == 1 + drawn.count(".target-move")
     assert "visited" in drawn
     with pytest.raises(InvalidArgumentError, match="no task 'task-9'"):
-        load_rollouts(analysis, "fu", ("task-9", 2))
+        load_pair(analysis, "fu", ("task-9", 2))
 
 
 def test_pictures_are_asked_for_by_id(pairs, tmp_path):
@@ -259,11 +259,11 @@ def test_the_crossover_is_where_the_line_falls_through_zero(leads, expected):
 
 
 def test_crossovers_in_words():
-    assert Crossover(0.5, (0.25, math.inf), 0.9).words() == "0.50 (0.25 to >1)"
-    assert Crossover(2.0, (1.5, math.inf), 0.0).words() == "none found: memory is ahead at every rate (>1 to >1)"
-    assert Crossover(-1.0, (-math.inf, -0.2), 0.0).words().startswith("none found: stage-reset is ahead")
-    assert Crossover(-math.inf, (-math.inf, 0.2), 0.1).words() == "none found (<0 to 0.20)"
-    assert Crossover(0.1, (-1.0, math.inf), 0.4).words() == "0.10, undetermined (<0 to >1)"
+    assert Crossover(0.5, (0.25, math.inf), 0.9).text() == "0.50 (0.25 to >1)"
+    assert Crossover(2.0, (1.5, math.inf), 0.0).text() == "none found: memory is ahead at every rate (>1 to >1)"
+    assert Crossover(-1.0, (-math.inf, -0.2), 0.0).text().startswith("none found: stage-reset is ahead")
+    assert Crossover(-math.inf, (-math.inf, 0.2), 0.1).text() == "none found (<0 to 0.20)"
+    assert Crossover(0.1, (-1.0, math.inf), 0.4).text() == "0.10, undetermined (<0 to >1)"
 
 
 def test_a_sweep_tells_rates_leads_and_crossover(tmp_path):

@@ -169,7 +169,7 @@ def picture(
 ) -> None:
     """Draws one agent in one pair: Fixed on the left, Not Fixed on the right."""
     from evonav.controlled.analysis import load_analysis
-    from evonav.controlled.paired_maps import telling_pairs, write_pair
+    from evonav.controlled.paired_maps import highlighted_pairs, write_pair
     from evonav.errors import InvalidArgumentError
 
     analysis = load_analysis(directory)
@@ -177,7 +177,7 @@ def picture(
         raise InvalidArgumentError(f"{directory}: no agent {agent!r}; there are {', '.join(analysis.agents)}")
     found = [key for key in analysis.keys(agent) if task is None or key[0] == task]
     if task is None:
-        found = [key for _, key in telling_pairs(analysis, agent)] or found
+        found = [key for _, key in highlighted_pairs(analysis, agent)] or found
     if not found:
         raise InvalidArgumentError(f"{directory}: no pair {task or ''} that {agent!r} has finished")
     typer.echo(f"picture: {write_pair(analysis, agent, found[0], out)}")

@@ -19,7 +19,7 @@ from evonav.report.tables.table import NONE, Table
 from evonav.statistics import Interval, PairedEffect, paired_effect
 
 BASELINE = "stage-reset"
-"""What forgets everything: against it memory is judged."""
+"""Agent that forgets everything between stages; memory is compared with it."""
 MINUS = "\N{MINUS SIGN}"
 SPLITS = {
     "target": "the target moved",
@@ -39,7 +39,7 @@ class Outcome:
 
     row: StageMetrics
     record: StageRecord
-    """Without trace and entries."""
+    """Record without trace and entries."""
 
     @property
     def success(self) -> float:
@@ -48,20 +48,20 @@ class Outcome:
 
     @property
     def spl(self) -> float:
-        """Of the stage."""
+        """SPL of the stage."""
         return self.row.spl or 0.0
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """What agents did in every arm."""
+    """Scored stages of all agents in every arm."""
 
     directory: Path
     record: ControlledRecord
     agents: tuple[str, ...]
     """The paper's in its order, then others by name."""
     outcomes: Mapping[tuple[str, str], Mapping[Key, Outcome]]
-    """By arm and agent; scored stages only."""
+    """Scored stages by arm and agent."""
     num_unscored: int
     """Stages that should count and have no score: errored, or not run."""
 
@@ -99,7 +99,7 @@ class Analysis:
         return paired_effect(values[0], values[1], self.houses(keys, a[1]))
 
     def effect_on_change(self, a: str, b: str, measure: Measure) -> PairedEffect | None:
-        """What agent `b` gains from the first arm to the last, less what agent `a` does, pair by pair."""
+        """Estimate how much more agent `b` gains from the first arm to the last than agent `a`, pair by pair."""
         keys = self.keys(a, b)
         if not keys:
             return None
@@ -114,7 +114,7 @@ class Analysis:
 
 
 def load_analysis(directory: Path) -> Analysis:
-    """Reads the runs of a controlled analysis, finished or not.
+    """Read the runs of a controlled analysis, finished or not.
 
     Raises:
         TaskError: There is no controlled analysis.
@@ -157,7 +157,7 @@ def moved_keys(analysis: Analysis, *agents: str) -> list[Key]:
 
 
 def split_of(evolved: Outcome) -> str:
-    """What a pair's change touched: a key of `SPLITS`."""
+    """Return what a pair's change touched: a key of `SPLITS`."""
     record = evolved.record
     if record.target.is_relocated_now:
         return "target"
@@ -165,7 +165,7 @@ def split_of(evolved: Outcome) -> str:
 
 
 def has_moved_far(evolved: Outcome) -> bool:
-    """Whether the target left the success radius around its old place: nearer ones are found there, too."""
+    """Return whether the target left the success radius around its old place; if not, it is found there too."""
     target = evolved.record.target
     if not target.is_relocated_now or target.first_position_m is None:
         return False
@@ -174,7 +174,7 @@ def has_moved_far(evolved: Outcome) -> bool:
 
 
 def pair_tables(analysis: Analysis) -> list[Table]:
-    """Fixed / Not Fixed in all, by what changed, against Stage-Reset, and how stages ended."""
+    """Build the tables: Fixed / Not Fixed in all, by what changed, against Stage-Reset, and how stages ended."""
     tables = [_drop_table(analysis), _split_table(analysis)]
     if BASELINE in analysis.paired_agents and len(analysis.paired_agents) > 1:
         tables.append(_baseline_table(analysis))
@@ -199,7 +199,7 @@ def _drop_table(analysis: Analysis) -> Table:
 
 
 def _caveats(analysis: Analysis) -> list[str]:
-    """What a reader has to know of the pairs."""
+    """Return the warnings about the pairs."""
     first = analysis.arms[0]
     radius_m = SUCCESS_RADIUS_M
     near = {
@@ -220,16 +220,16 @@ def _split_table(analysis: Analysis) -> Table:
     fixed, evolved = analysis.arms
     rows = []
     parts: list[tuple[str, Callable[[Outcome], bool]]] = [
-        (words, lambda one, split=split: split_of(one) == split)  # type: ignore[misc]
-        for split, words in SPLITS.items()
+        (name, lambda one, split=split: split_of(one) == split)  # type: ignore[misc]
+        for split, name in SPLITS.items()
     ]
     parts.insert(1, (f"of these by more than {SUCCESS_RADIUS_M:g} m", has_moved_far))
-    for words, is_part in parts:
+    for name, is_part in parts:
         for agent in analysis.paired_agents:
             keys = analysis.keys(agent)
             part = [key for key in keys if is_part(analysis.outcomes[evolved, agent][key])]
             effect = analysis.effect((fixed, agent), (evolved, agent), MEASURES["SR"], part)
-            rows.append((f"{words}: {agent}", str(len(part)), *effect_cells(effect)))
+            rows.append((f"{name}: {agent}", str(len(part)), *effect_cells(effect)))
     columns = ("what changed, agent", "pairs", "SR Fixed", "Not Fixed", "change", "p")
     return Table("By what changed", columns, tuple(rows))
 
@@ -253,11 +253,11 @@ def _ends_table(analysis: Analysis) -> Table:
     rows = []
     for agent in analysis.paired_agents:
         keys = analysis.keys(agent)
-        for arm, words in zip(analysis.arms, ("Fixed", "Not Fixed"), strict=True):
+        for arm, arm_name in zip(analysis.arms, ("Fixed", "Not Fixed"), strict=True):
             found = [analysis.outcomes[arm, agent][key].row for key in keys]
             rows.append(
                 (
-                    f"{agent}, {words}",
+                    f"{agent}, {arm_name}",
                     str(len(found)),
                     str(sum(not row.success for row in found)),
                     str(sum(row.cause == "stale_entry" for row in found)),
@@ -304,5 +304,5 @@ def _point(value: float) -> str:
 
 
 def p_words(p: float) -> str:
-    """To two digits, or what it is below."""
+    """Return p to two digits, or the bound that it is below."""
     return "<0.001" if p < 0.001 else f"{p:.3f}" if p < 0.1 else f"{p:.2f}"

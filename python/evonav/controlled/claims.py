@@ -1,4 +1,4 @@
-"""What the paper says of Fixed / Not Fixed (Sec. 4.3), and whether it is so here."""
+"""Test the paper's statements about Fixed / Not Fixed (Sec. 4.3) on the agents that were run."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ MEMORY_AGENTS = ("fu", "ftu", "3d-mem", "msgnav")
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """That one figure is above another."""
+    """A statement that one number is above another."""
 
     paper: str
-    """In the paper's words, or nearly."""
+    """Statement of the paper, literally or nearly so."""
     what: str
     effect: PairedEffect
     """Positive where it is as the paper says."""
@@ -35,7 +35,7 @@ class Claim:
 
 
 def claims(analysis: Analysis) -> list[Claim]:
-    """The paper's statements of Sec. 4.3 that can be tested with the agents that were run."""
+    """Return the paper's statements of Sec. 4.3 that can be tested with the agents that were run."""
     fixed, evolved = analysis.arms
     found: list[Claim] = []
 
@@ -71,7 +71,7 @@ def claims(analysis: Analysis) -> list[Claim]:
 
 
 def claim_table(analysis: Analysis) -> Table:
-    """The claims as a table."""
+    """Return the claims as a table."""
     rows: Sequence[tuple[str, ...]] = [
         (
             one.paper,

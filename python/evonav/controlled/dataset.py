@@ -34,7 +34,7 @@ WORK = "evonav.controlled.dataset:make_worker"
 
 @dataclass(frozen=True, slots=True)
 class ControlledSummary:
-    """What a call left."""
+    """Result of one call."""
 
     record: ControlledRecord
     num_new: int
@@ -50,7 +50,7 @@ def generate_controlled(
     workforce: Workforce | None = None,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> ControlledSummary:
-    """Makes the arms of a controlled analysis; called again on the same folder, does what is left.
+    """Make the arms of a controlled analysis; called again on the same folder, make what is missing.
 
     Args:
         source: Houses as for `evonav.house.load_houses`, or a folder of tasks, whose first houses are taken.
@@ -62,9 +62,9 @@ def generate_controlled(
 
     Raises:
         HouseError: The houses cannot be read.
-        InvalidArgumentError: Of the arguments.
+        InvalidArgumentError: An argument is invalid.
         StoreError: `out` holds something else, is being written to, or cannot be written.
-        TaskError: No house allows it; it says why.
+        TaskError: No house allows it; the message says why.
         EngineError: Workers cannot be had.
     """
     options, workforce = options or ControlledOptions(), workforce or Workforce()
@@ -112,7 +112,7 @@ def _job(index: int, houses: Sequence[HouseText], options: ControlledOptions) ->
 
 
 def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], str]:
-    """The function from a house to its `Outcome`, as `evonav.parallel.pool` calls it.
+    """Return the function from a house to its `Outcome`, as `evonav.parallel.pool` calls it.
 
     Args:
         settings: `{"out": ..., "options": ...}`.
@@ -130,7 +130,7 @@ def make_worker(settings: str, _alive: Callable[[], None]) -> Callable[[str], st
 
 
 def _is_whole(outcome: Outcome, out: Path, options: ControlledOptions) -> bool:
-    """Whether what the journal says is still there."""
+    """Return whether the tasks that the journal lists still exist."""
     return outcome.task_id is None or is_complete(outcome, tasks_of(out, options.arms[-1].name))
 
 
@@ -141,7 +141,7 @@ def _write(
     limit: int | None,
     outcomes: list[Outcome],
 ) -> ControlledRecord:
-    """Writes each arm's `dataset.json`, and `controlled.json` last.
+    """Write each arm's `dataset.json`, and `controlled.json` last.
 
     Raises:
         TaskError: There is no task, or two have the same id.

@@ -18,7 +18,7 @@ def evaluate_controlled(
     retry_errored: bool = False,
     on_progress: Callable[[str, Progress], None] = lambda _arm, _progress: None,
 ) -> dict[str, list[AgentSummary]]:
-    """Evaluates agents on every arm; called again, does what is left.
+    """Evaluate agents on every arm; called again, evaluate what is missing.
 
     An agent has the same seed in every arm, since its seed is a function of the run's seed and the names of agent and
     task.
@@ -26,7 +26,7 @@ def evaluate_controlled(
     Args:
         directory: Holds `controlled.json`.
         agents: Names, see `evonav agents`.
-        config: Of the runs.
+        config: Configuration of the runs.
         num_workers: Processes; 0 runs everything in this one.
         retry_errored: Run errored stages again.
         on_progress: Called with an arm's name after each of its recorded stages.
@@ -53,6 +53,6 @@ def evaluate_controlled(
         requests,
         num_workers=num_workers,
         retry_errored=retry_errored,
-        on_progress=lambda index, news: on_progress(arms[index], news),
+        on_progress=lambda index, progress: on_progress(arms[index], progress),
     )
     return dict(zip(arms, summaries, strict=True))

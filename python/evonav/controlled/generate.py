@@ -34,22 +34,22 @@ _ANEW: tuple[RejectReason, ...] = ("no_valid_goal", "not_evolved")
 
 @dataclass(frozen=True, slots=True)
 class ControlledOptions:
-    """What decides the tasks of a house."""
+    """Options that decide the tasks of a house."""
 
     kind: Kind = "pairs"
     seed: int = 0
     per_house: int = 1
     """Tasks a house: the seeds that follow `seed`."""
     rates: tuple[float, ...] = RATES
-    """Of `rates`: the probabilities."""
+    """Probabilities of the arms of `rates`."""
     parameters: GenerationParameters = field(default_factory=GenerationParameters)
     allow_unknown_assets: bool = False
 
     def __post_init__(self) -> None:
-        """Checks the values that no record checks.
+        """Check the values that no record checks.
 
         Raises:
-            InvalidArgumentError: Of a value outside its domain.
+            InvalidArgumentError: A value is outside its domain.
         """
         if self.per_house < 1:
             raise InvalidArgumentError(f"per_house = {self.per_house}: must be at least 1")
@@ -65,24 +65,24 @@ class ControlledOptions:
         return tuple(Arm(name=f"p{rate:.2f}", evolve_probability=rate) for rate in self.rates)
 
     def as_json(self) -> dict[str, Any]:
-        """As JSON, to be read by `from_json`."""
+        """Return the options as JSON, to be read by `from_json`."""
         return {**dataclasses.asdict(self), "parameters": self.parameters.model_dump(mode="json")}
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> "ControlledOptions":
-        """What `as_json` gave."""
+        """Read what `as_json` returned."""
         parameters = GenerationParameters.model_validate_json(json.dumps(values["parameters"]))
         return cls(**{**values, "parameters": parameters, "rates": tuple(values["rates"])})
 
 
 def generate_arms(house: House, options: ControlledOptions, *, seed: int) -> dict[str, Task]:
-    """A task in every arm, by the arm's name.
+    """Generate a task in every arm, by the arm's name.
 
     Where a goal cannot be one in some arm, or the house does not evolve where it must, goals and changes are drawn
     anew for all arms: no arm is chosen for what became of another.
 
     Raises:
-        TaskRejectedError: The house does not allow it; it says why.
+        TaskRejectedError: The house does not allow it; the message says why.
         HouseError: An asset is unknown, unless allowed.
     """
     failed: list[TaskRejectedError] = []
@@ -95,9 +95,9 @@ def generate_arms(house: House, options: ControlledOptions, *, seed: int) -> dic
                 raise
             failed.append(error)
     counts = Counter(error.reason for error in failed)
-    told = ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items()))
+    reasons = ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items()))
     last = failed[-1]
-    raise TaskRejectedError(house.name, last.reason, last.stage, f"{NUM_ATTEMPTS} draws: {told}; the last: {last}")
+    raise TaskRejectedError(house.name, last.reason, last.stage, f"{NUM_ATTEMPTS} draws: {reasons}; the last: {last}")
 
 
 def _draw_goals(house: House, options: ControlledOptions, seed: int, attempt: int) -> tuple[str, ...]:
@@ -117,19 +117,19 @@ def _arm(house: House, options: ControlledOptions, seed: int, attempt: int, arm:
     parameters = options.parameters.model_copy(update={"evolve_probability": arm.evolve_probability})
     given = [GivenStage(goal_id=goal) for goal in goals]
     shown = tuple(range(1, len(goals) + 1))
-    forced: tuple[int, ...] = ()
+    guided: tuple[int, ...] = ()
     if is_pair:
         given = [
             GivenStage(goal_id=goals[0]),
             GivenStage(goal_id=goals[1], is_evolved=False),
             GivenStage(goal_id=goals[0], is_evolved=arm.evolve_probability == 1.0),
         ]
-        shown, forced = (1, 2, 1), (1, 2)
+        shown, guided = (1, 2, 1), (1, 2)
     task = _task(house, options, seed, attempt, parameters, given)
     if is_pair and arm.evolve_probability == 1.0 and task.oracle(3).evolution.outcome != "evolved":
         detail = f"{task.oracle(3).evolution.outcome} ({task.oracle(3).evolution.failure})"
         raise TaskRejectedError(house.name, "not_evolved", 3, detail)
-    control = Control(arm=arm.name, attempt=attempt, forced_stages=forced, shown_goals=shown)
+    control = Control(arm=arm.name, attempt=attempt, forced_stages=guided, shown_goals=shown)
     task = dataclasses.replace(
         task,
         header=task.header.model_copy(update={"control": control}),

@@ -23,11 +23,11 @@ Kind = Literal["pairs", "rates"]
 
 
 class Arm(Record):
-    """A way in which all tasks are."""
+    """A variant in which all tasks are made."""
 
     name: Id
     evolve_probability: Probability
-    """Of each transition; of `pairs`, of the one before the evaluated stage."""
+    """Probability of each transition; of `pairs`, of the transition before the evaluated stage."""
 
 
 class ControlledRecord(Record):
@@ -52,7 +52,7 @@ class ControlledRecord(Record):
     rejections: tuple[HouseRejection, ...]
 
     def arm(self, name: str) -> Arm:
-        """An arm by its name.
+        """Return an arm by its name.
 
         Raises:
             KeyError: There is none.
@@ -61,7 +61,7 @@ class ControlledRecord(Record):
 
 
 def write_controlled(record: ControlledRecord, directory: Path) -> Path:
-    """Writes `controlled.json`, all of it or nothing.
+    """Write `controlled.json`, all of it or nothing.
 
     Raises:
         StoreError: It cannot be written.
@@ -72,7 +72,7 @@ def write_controlled(record: ControlledRecord, directory: Path) -> Path:
 
 
 def read_controlled(directory: Path) -> ControlledRecord:
-    """Reads `controlled.json`.
+    """Read `controlled.json`.
 
     Raises:
         TaskError: It is missing or malformed; it says what to do.
@@ -86,10 +86,10 @@ def read_controlled(directory: Path) -> ControlledRecord:
 
 
 def tasks_of(directory: Path, arm: str) -> Path:
-    """The folder of an arm's tasks."""
+    """Return the folder of an arm's tasks."""
     return directory / "tasks" / arm
 
 
 def run_of(directory: Path, arm: str) -> Path:
-    """The folder of an arm's run."""
+    """Return the folder of an arm's run."""
     return directory / "runs" / arm

@@ -1,4 +1,4 @@
-"""Write the report of a controlled analysis: tables, plots, pictures of telling pairs, and a page of all pairs."""
+"""Write the report of a controlled analysis: tables, plots, pictures of highlighted pairs, and a page of all pairs."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,11 +13,11 @@ from evonav.controlled.paired_maps import (
     Rollout,
     arm_words,
     change_sentence,
-    load_rollouts,
+    highlighted_pairs,
+    load_pair,
     pair_frame,
     pair_svg,
     split_words,
-    telling_pairs,
     walk_and_course,
 )
 from evonav.controlled.plots import controlled_plots
@@ -38,12 +38,12 @@ PAGE_NAME = "index.html"
 PLOT_NAMES = {"pairs": "fixed-not-fixed", "rates": "rates"}
 """Stems of the plots' files, by kind of analysis."""
 PAIRS_DIR, PICTURES_DIR = "pairs", "rollouts"
-TELLING_AGENT = "fu"
-"""Of the paper's pictures; where it was not run, the first agent that is not the baseline."""
+HIGHLIGHTED_AGENT = "fu"
+"""Agent of the paper's pictures; where it was not run, the first agent that is not the baseline."""
 
 
 def tables_of(analysis: Analysis) -> list[Table]:
-    """All tables of an analysis."""
+    """Return all tables of an analysis."""
     if analysis.record.kind == "rates":
         return rate_tables(analysis)
     return [*pair_tables(analysis), claim_table(analysis)]
@@ -53,7 +53,7 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
     """Write `tables.md`, `tables.tex` and `index.html`, and with the extra `viz` the plots as SVG, PNG and PDF.
 
     Args:
-        directory: Of the analysis; its runs may be unfinished.
+        directory: Folder of the analysis; its runs may be unfinished.
         out: Default: its folder `report`.
 
     Returns:
@@ -86,7 +86,7 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
                 css=text_of("report.css") + map_css() + plot_css(),
                 plots=plot_elements(plots),
                 tables=tables,
-                telling=_write_telling(analysis, out) if is_pairs else [],
+                highlights=_write_highlights(analysis, out) if is_pairs else [],
                 pairs=_write_pairs(analysis, out) if is_pairs else [],
                 agents=analysis.agents,
                 facts=_facts(analysis),
@@ -98,18 +98,18 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
     return path
 
 
-def _write_telling(analysis: Analysis, out: Path) -> list[dict[str, str]]:
+def _write_highlights(analysis: Analysis, out: Path) -> list[dict[str, str]]:
     """Pictures of the pairs that tell most, and where they are."""
     others = [agent for agent in analysis.agents if agent != BASELINE]
-    agent = TELLING_AGENT if TELLING_AGENT in others else next(iter(others), analysis.agents[0])
+    agent = HIGHLIGHTED_AGENT if HIGHLIGHTED_AGENT in others else next(iter(others), analysis.agents[0])
     found = []
     for before in (out / PICTURES_DIR).glob("*.svg"):  # of an earlier report, when less was known
         before.unlink()
-    for reason, key in telling_pairs(analysis, agent, per_reason=2):
+    for reason, key in highlighted_pairs(analysis, agent, per_reason=2):
         name = f"{reason}_{slug(key[0])}_{slug(agent)}.svg"
         folder = out / PICTURES_DIR
         folder.mkdir(exist_ok=True)
-        picture = pair_svg(load_rollouts(analysis, agent, key))
+        picture = pair_svg(load_pair(analysis, agent, key))
         (folder / name).write_text(picture, encoding="utf-8")
         found.append(
             {
@@ -124,7 +124,7 @@ def _write_telling(analysis: Analysis, out: Path) -> list[dict[str, str]]:
 
 
 def _write_pairs(analysis: Analysis, out: Path) -> list[dict[str, Any]]:
-    """A page a pair, and its line in the index."""
+    """Write a page for each pair, and return its line in the index."""
     keys = sorted({key for found in analysis.outcomes.values() for key in found})
     template = page_environment().get_template("controlled_pair.html.j2")
     (out / PAIRS_DIR).mkdir(exist_ok=True)
@@ -133,8 +133,8 @@ def _write_pairs(analysis: Analysis, out: Path) -> list[dict[str, Any]]:
         agents = [a for a in analysis.agents if all(key in analysis.outcomes[arm, a] for arm in analysis.arms)]
         if not agents:
             continue
-        context = _pair_context(analysis, agents, key)
-        (out / PAIRS_DIR / _page_name(key)).write_text(template.render(**context), encoding="utf-8")
+        values = _pair_values(analysis, agents, key)
+        (out / PAIRS_DIR / _page_name(key)).write_text(template.render(**values), encoding="utf-8")
         first = analysis.outcomes[analysis.arms[0], agents[0]][key].record
         cells = [
             [
@@ -150,7 +150,7 @@ def _write_pairs(analysis: Analysis, out: Path) -> list[dict[str, Any]]:
                 "task_id": key[0],
                 "page": f"{PAIRS_DIR}/{_page_name(key)}",
                 "category": first.goal.category,
-                "change": context["change"],
+                "change": values["change"],
                 "cells": cells,
             }
         )
@@ -161,16 +161,16 @@ def _page_name(key: Key) -> str:
     return f"{slug(key[0])}.html"
 
 
-def _pair_context(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[str, Any]:
-    """What the page of a pair shows: the house once, what moved once an arm, every agent over them."""
-    by_agent = {agent: load_rollouts(analysis, agent, key) for agent in agents}
-    told = by_agent[agents[0]]
-    frame = pair_frame(told)
-    here = [one.maps[key[1]] for one in told if key[1] in one.maps]
+def _pair_values(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[str, Any]:
+    """Return the contents of a pair's page: the house once, what moved once per arm, every agent over them."""
+    by_agent = {agent: load_pair(analysis, agent, key) for agent in agents}
+    pair = by_agent[agents[0]]
+    frame = pair_frame(pair)
+    here = [one.maps[key[1]] for one in pair if key[1] in one.maps]
     moving = moving_ids(here)
     shared = ground(here[0], frame, moving) if here else ""
     defs = [f'<g class="map" id="house">{shared}</g>']
-    for i, one in enumerate(told):
+    for i, one in enumerate(pair):
         stage_map = one.maps.get(key[1])
         items = [] if stage_map is None else [item for item in stage_map.objects if item.object_id in moving]
         changed = change(one.record.transition, frame, stage_map=stage_map, previous_map=one.maps.get(key[1] - 1))
@@ -187,7 +187,7 @@ def _pair_context(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[s
             "svg": Markup(f'<svg class="map" viewBox="{frame.view_box}" role="img">{drawn}</svg>'),  # noqa: S704
         }
 
-    first = told[0].record
+    first = pair[0].record
     return {
         "css": text_of("report.css") + map_css(),
         "policy": policy(None),
@@ -203,7 +203,7 @@ def _pair_context(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[s
                 "change": change_sentence(one),
                 "is_static": one.record.transition.kind == "static",
             }
-            for one in told
+            for one in pair
         ],
         "rows": [(agent, [cell(i, one) for i, one in enumerate(found)]) for agent, found in by_agent.items()],
         "commands": [f"evonav view runs/{arm} --task {key[0]}" for arm in analysis.arms],

@@ -1,4 +1,4 @@
-"""Paired rollouts: what one agent did in a house as it was, beside what it did where the house had changed."""
+"""Draw one agent in a house as it was, beside the same agent in the house after it changed."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -39,8 +39,8 @@ class Rollout:
     success_radius_m: float
 
 
-def load_rollouts(analysis: Analysis, agent: str, key: Key) -> list[Rollout]:
-    """A pair with its traces, an arm each.
+def load_pair(analysis: Analysis, agent: str, key: Key) -> list[Rollout]:
+    """Read a pair with its traces, one run per arm.
 
     Raises:
         InvalidArgumentError: There is no such pair.
@@ -60,8 +60,8 @@ def load_rollouts(analysis: Analysis, agent: str, key: Key) -> list[Rollout]:
     return found
 
 
-def telling_pairs(analysis: Analysis, agent: str, per_reason: int = 1) -> list[tuple[str, Key]]:
-    """Pairs that show what a moved target does to an agent, each with its reason, a key of `REASONS`.
+def highlighted_pairs(analysis: Analysis, agent: str, per_reason: int = 1) -> list[tuple[str, Key]]:
+    """Return pairs that show what a moved target does to an agent, each with its reason, a key of `REASONS`.
 
     Of targets that moved by more than the success radius: nearer ones are found at their old places, too. Where it was
     misled, those on whose stale entries it walked farthest come first; else the shortest ways.
@@ -82,23 +82,23 @@ def telling_pairs(analysis: Analysis, agent: str, per_reason: int = 1) -> list[t
 
 
 def write_pair(analysis: Analysis, agent: str, key: Key, path: Path) -> Path:
-    """Draws a pair into a `.svg`, `.png` or `.pdf` file.
+    """Draw a pair into a `.svg`, `.png` or `.pdf` file.
 
     Raises:
         InvalidArgumentError: There is no such pair, or the file's suffix is of no format.
         StoreError: A run cannot be read, or the file not written, or not without an extra.
     """
     check_picture(path)
-    return write_picture(pair_svg(load_rollouts(analysis, agent, key)), path)
+    return write_picture(pair_svg(load_pair(analysis, agent, key)), path)
 
 
-def pair_svg(rollouts: Sequence[Rollout]) -> str:
-    """Fixed on the left, Not Fixed on the right, the goal above and the legend below."""
-    frame = pair_frame(rollouts)
+def pair_svg(pair: Sequence[Rollout]) -> str:
+    """Draw Fixed on the left, Not Fixed on the right, the goal above and the legend below."""
+    frame = pair_frame(pair)
     map_px = round(PANEL_PX * frame.height / frame.width)
-    first = rollouts[0].record
-    width_px = GAP_PX + len(rollouts) * (PANEL_PX + GAP_PX)
-    image = rollouts[0].maps[first.stage].reference_image if first.stage in rollouts[0].maps else None
+    first = pair[0].record
+    width_px = GAP_PX + len(pair) * (PANEL_PX + GAP_PX)
+    image = pair[0].maps[first.stage].reference_image if first.stage in pair[0].maps else None
     shown = (
         ""
         if image is None
@@ -110,7 +110,7 @@ def pair_svg(rollouts: Sequence[Rollout]) -> str:
         for i, line in enumerate(text_lines(first.goal.instruction, 140, 2))
     )
     head = f'<text class="stage" x="{GAP_PX}" y="27">{escape(first.agent)}: {escape(first.goal.category)}</text>'
-    panels = join(_panel(one, frame, map_px, GAP_PX + i * (PANEL_PX + GAP_PX)) for i, one in enumerate(rollouts))
+    panels = join(_panel(one, frame, map_px, GAP_PX + i * (PANEL_PX + GAP_PX)) for i, one in enumerate(pair))
     legend, legend_px = legend_row(width_px - 2 * GAP_PX)
     top_px = HEAD_PX + map_px + FOOT_PX
     height_px = top_px + legend_px + 28
@@ -126,10 +126,10 @@ def pair_svg(rollouts: Sequence[Rollout]) -> str:
     )
 
 
-def pair_frame(rollouts: Sequence[Rollout]) -> Frame:
-    """The frame that all arms of a pair share."""
-    maps = {i: stage_map for i, one in enumerate(rollouts) for stage_map in one.maps.values()}
-    return task_frame(maps, [one.record for one in rollouts])
+def pair_frame(pair: Sequence[Rollout]) -> Frame:
+    """Return the frame that all arms of a pair share."""
+    maps = {i: stage_map for i, one in enumerate(pair) for stage_map in one.maps.values()}
+    return task_frame(maps, [one.record for one in pair])
 
 
 def _panel(rollout: Rollout, frame: Frame, map_px: int, left_px: int) -> str:
@@ -149,23 +149,23 @@ def _panel(rollout: Rollout, frame: Frame, map_px: int, left_px: int) -> str:
 
 
 def arm_words(arm: str) -> str:
-    """`Fixed`, `Not Fixed`, or the name of another arm."""
+    """Return `Fixed`, `Not Fixed`, or the name of another arm."""
     return ARM_WORDS.get(arm, arm)
 
 
 def change_sentence(rollout: Rollout) -> str:
-    """What had happened since the walk."""
-    words = change_words(rollout.record, rollout.maps)
-    return f"{words}, the target among them" if rollout.record.target.is_relocated_now else words
+    """Describe what had changed since the guided stages."""
+    text = change_words(rollout.record, rollout.maps)
+    return f"{text}, the target among them" if rollout.record.target.is_relocated_now else text
 
 
 def split_words(analysis: Analysis, agent: str, key: Key) -> str:
-    """What the pair's change touched."""
+    """Describe what the pair's change touched."""
     return SPLITS[split_of(analysis.outcomes[analysis.arms[-1], agent][key])]
 
 
 def house_drawing(rollout: Rollout, frame: Frame) -> str:
-    """The house of the evaluated stage, and what changed before."""
+    """Draw the house of the evaluated stage, and what changed before."""
     stage = rollout.record.stage
     here, before = rollout.maps.get(stage), rollout.maps.get(stage - 1)
     changed = change(rollout.record.transition, frame, stage_map=here, previous_map=before)
@@ -173,7 +173,7 @@ def house_drawing(rollout: Rollout, frame: Frame) -> str:
 
 
 def walk_and_course(rollout: Rollout, frame: Frame) -> str:
-    """The way that the agent was walked, and what it then did itself."""
+    """Draw the way that the agent was guided, and what it then did itself."""
     points = [cm(point) for walk in rollout.walks for taken in walk.trace for point in taken.path_m]
     drawn = ""
     if len(points) > 1:
@@ -184,7 +184,7 @@ def walk_and_course(rollout: Rollout, frame: Frame) -> str:
 
 
 def target_move(record: StageRecord, frame: Frame) -> str:
-    """An arrow from where the target stood to where it is, if it moved."""
+    """Draw an arrow from where the target stood to where it is, if it moved."""
     target = record.target
     if target.first_position_m is None or not target.is_relocated_now:
         return ""

@@ -13,21 +13,21 @@ from evonav.statistics import ClusterBootstrap, Interval
 
 @dataclass(frozen=True, slots=True)
 class Crossover:
-    """Where the straight line through an agent's lead over the baseline, by rate, falls to zero."""
+    """Rate at which the straight line through an agent's lead over the baseline falls to zero."""
 
     rate: float
     """May lie outside of 0 to 1; -inf: the baseline is ahead at every rate, inf: at none."""
     ci95: Interval
     """Bootstrap by house; the rate twice where houses agree, or there is but one."""
     share_within: float
-    """Of resamples, those in which it lies in 0 to 1."""
+    """Share of the resamples in which it lies in 0 to 1."""
 
     @property
     def is_found(self) -> bool:
         """Whether there is one between never and always."""
         return 0.0 <= self.rate <= 1.0
 
-    def words(self) -> str:
+    def text(self) -> str:
         """`0.62 (0.31 to >1)`, that there is none, or that these houses cannot tell."""
         low, high = self.ci95
         interval = f"({_rate_words(low)} to {_rate_words(high)})"
@@ -58,7 +58,7 @@ def by_rate(analysis: Analysis, agent: str, measure: Measure) -> list[tuple[floa
 
 
 def crossover(analysis: Analysis, agent: str, measure: Measure, *, seed: int = 0) -> Crossover | None:
-    """Where the baseline overtakes an agent; `None` without stages of both."""
+    """Estimate the rate at which the baseline overtakes an agent; `None` without stages of both."""
     keys = rate_keys(analysis, agent, BASELINE)
     if not keys or agent == BASELINE:
         return None
@@ -84,7 +84,7 @@ def crossover(analysis: Analysis, agent: str, measure: Measure, *, seed: int = 0
 
 
 def _crossing(rates: NDArray[np.float64], leads: NDArray[np.float64]) -> float:
-    """Where the line of least squares through leads falls through zero.
+    """Return the rate at which the least-squares line through the leads falls through zero.
 
     Returns:
         `inf` where it does not fall and is above zero at rate 1, `-inf` where it does not fall and is not.
@@ -127,7 +127,7 @@ def _lead_table(analysis: Analysis) -> Table:
                 _, _, lead, p = effect_cells(analysis.effect((arm, BASELINE), (arm, agent), measure, keys))
                 cells.append(f"{lead}, p {p}")
             found = crossover(analysis, agent, measure)
-            rows.append((f"{agent}, {name}", *cells, "" if found is None else found.words()))
+            rows.append((f"{agent}, {name}", *cells, "" if found is None else found.text()))
     columns = (
         "agent, measure",
         *(f"p = {arm.evolve_probability:g}" for arm in analysis.record.arms),
