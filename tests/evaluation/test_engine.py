@@ -13,6 +13,7 @@ from toy_house import write_tasks
 
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
+from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState, ErrorKind
@@ -54,6 +55,18 @@ def test_records_are_the_same_for_any_number_of_workers(tasks, tmp_path):
     for other in ("1", "2", "shuffled"):
         assert texts(tmp_path / other) == texts(tmp_path / "0")
         assert (tmp_path / other / "summary.json").read_bytes() == (tmp_path / "0" / "summary.json").read_bytes()
+
+
+def test_the_floor_plan_of_a_stage_is_made_once_for_all_agents(tasks, tmp_path, monkeypatch):
+    made = []
+    make = EpisodeSpec.floor_plan
+    monkeypatch.setattr(
+        EpisodeSpec, "floor_plan", lambda spec, stage: made.append((spec.task_id, stage)) or make(spec, stage)
+    )
+    for _ in range(2):
+        evaluate(["random-walk", "nearest-frontier", "stay-still"], tasks, tmp_path, config=CONFIG, num_workers=0)
+    with RunStore(tmp_path) as store:
+        assert sorted(made) == sorted(store.floor_plan_keys()) == [(t.task_id, k) for t in tasks for k in (1, 2, 3)]
 
 
 def test_real_records_are_the_same_for_one_and_two_workers(tmp_path):
@@ -256,6 +269,7 @@ import sys
 from pathlib import Path
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.tasks.listing import task_files
+from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.process import AgentHosting
 from evonav.component import Component
 from evonav.evaluation.run.components import Backend

@@ -4,6 +4,7 @@ from made_up_stage import entry, made_up_record, taken
 from evonav.evaluation.metrics.aggregate import COSTS, MEASURES, MEMORY, STALENESS, SUCCESS, explain
 from evonav.evaluation.metrics.navigation import summarise
 from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
+from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, StaleEntryRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.tables.metric_tables import measures_table, measures_tables
@@ -26,7 +27,7 @@ def run_dir(tmp_path):
                 "memory_at_end": None if not record.is_scored else memory(),
                 "stale_entries": (stale, unseen) * is_a,
             }
-            store.add_stage(record.model_copy(update=told), wall_s=2.0 if is_a else 4.0, cpu_s=1.0)
+            store.add_stage(encode_stage(record.model_copy(update=told), wall_s=2.0 if is_a else 4.0, cpu_s=1.0))
     return tmp_path
 
 

@@ -7,6 +7,7 @@ from made_up_stage import entry, made_up_record, taken
 
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, metrics_of, read_stage_metrics
 from evonav.evaluation.records.costs import StageCosts
+from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, MemoryRecord, MovedObjectRecord, StaleEntryRecord
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 
@@ -25,7 +26,7 @@ def memory(num_entries=4, num_right=3, num_held=2, num_seen=4, num_seen_held=1):
 def store_of(tmp_path, *records, costs=None):
     with RunStore(tmp_path, create=True) as store:
         for record in records:
-            store.add_stage(record, wall_s=2.0, cpu_s=1.0, costs=costs)
+            store.add_stage(encode_stage(record, wall_s=2.0, cpu_s=1.0, costs=costs))
     return RunStore(tmp_path)
 
 
@@ -147,6 +148,6 @@ def test_forgetting_an_episode_forgets_its_measures(tmp_path):
     with store_of(tmp_path, made_up_record(), made_up_record(stage=2), costs=StageCosts(cost_usd=1.0)) as store:
         store.forget_episode("fu", "t", 2)
         assert [row.stage for row in read_stage_metrics(store)] == [1]
-        assert [key for key, _, _ in store.encode_metrics()] == list(store.costs()) == [("fu", "t", 1)]
-        store.add_stage(made_up_record(stage=2), wall_s=1.0, cpu_s=1.0, costs=StageCosts(cost_usd=2.0))
+        assert [key for key, _, _ in store.encoded_metrics()] == list(store.costs()) == [("fu", "t", 1)]
+        store.add_stage(encode_stage(made_up_record(stage=2), wall_s=1.0, cpu_s=1.0, costs=StageCosts(cost_usd=2.0)))
         assert read_stage_metrics(store)[1].cost_usd == 2.0

@@ -16,6 +16,7 @@ from evonav.evaluation.metrics.navigation import (
     summary_json,
 )
 from evonav.evaluation.metrics.scoring import score_stage, stage_soft_spl, stage_spl
+from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 
@@ -155,9 +156,9 @@ def test_the_summary_has_verdicts_that_allow_for_the_number_of_pairs():
 def test_a_stage_is_recorded_once(tmp_path):
     (record,) = made("a", [("t", 1, True, 1.0, False)])
     with RunStore(tmp_path, create=True) as store:
-        store.add_stage(record, wall_s=1.0, cpu_s=0.5)
+        store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=0.5))
         with pytest.raises(StoreError):
-            store.add_stage(record, wall_s=1.0, cpu_s=0.5)
+            store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=0.5))
         assert list(store.records()) == [record]
         assert [brief.trace for brief in store.records(is_brief=True)] == [()]
         assert store.timings() == {("a", "t", 1): (1.0, 0.5)}

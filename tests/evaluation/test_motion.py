@@ -14,9 +14,10 @@ from evonav.agents.viewpoint import observation_point
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.motion import Planner, length_outside_m, navigate, polyline_length_m, waypoints
 from evonav.evaluation.episode.sensors import view_yaws_rad
-from evonav.evaluation.episode.spec import _turned_corners, floor_plan, room_at
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.run.components import load_case
 from evonav.sensors.observation import MapFrame
+from evonav.tasks.bundled import bundled_tasks
 from evonav.world.pose import Pose
 from evonav.world.simulator import OccupancyGrid
 
@@ -77,31 +78,24 @@ def test_the_protocol_caps_what_an_agent_may_sense():
 
 
 def test_the_floor_plan_holds_rooms_walls_and_footprints():
-    simulator = ToySimulator()
-    case = episode_spec("toy-static")
-    simulator.reset(case.stages[0].house_json, case.start)
-    plan = floor_plan(case, 1, simulator.objects)
-    assert room_at(plan, (1.0, 1.0)) == "room|1"
-    assert room_at(plan, (7.0, 1.0)) == "room|2"
-    assert room_at(plan, (9.0, 1.0)) is None
+    spec = episode_spec("toy-static")
+    house = spec.parsed_house(1)
+    assert [house.room_of(x_m, 1.0) for x_m in (1.0, 7.0, 9.0)] == ["room|1", "room|2", None]
+    plan = spec.floor_plan(1)
+    assert [room.room_id for room in plan.rooms] == ["room|1", "room|2"]
     assert len(plan.walls) == 6
-    bed = next(entry for entry in plan.objects if entry.category == "Bed")
-    corners = np.array(sorted(bed.polygon_m)).round(6)
-    assert corners.tolist() == [[5.8, 3.2], [5.8, 4.8], [7.8, 3.2], [7.8, 4.8]]
+    assert len(plan.objects) == len(house.objects)
 
 
-@given(st.floats(0.2, 3.0), st.floats(0.2, 3.0), st.floats(-180.0, 180.0))
-def test_footprints_have_the_box_of_the_body(width_m, depth_m, yaw_deg):
-    yaw_rad = math.radians(yaw_deg)
-    c, s = abs(math.cos(yaw_rad)), abs(math.sin(yaw_rad))
-    box = (width_m * c + depth_m * s, width_m * s + depth_m * c)
-    corners = np.array(_turned_corners(*box, yaw_rad))
-    assert np.ptp(corners, axis=0) == pytest.approx(box, abs=1e-6)
-    if abs(c * c - s * s) > 0.11:
-        sides = sorted(math.dist(a, b) for a, b in pairwise(corners))
-        assert sides[0] == pytest.approx(min(width_m, depth_m), abs=1e-6) or sides[-1] == pytest.approx(
-            max(width_m, depth_m), abs=1e-6
-        )
+def test_footprints_are_the_outlines_of_the_parts_to_the_millimetre():
+    with bundled_tasks() as directory:
+        spec = load_case(min(path.parent for path in directory.glob("*/task.json")))
+    plan = {item.object_id: item for item in spec.floor_plan(1).objects}
+    for object_id, _, parts in spec.parsed_house(1).footprints(allow_unknown_assets=True):
+        outlines = {tuple((round(x, 3), round(z, 3)) for x, z in outline) for outline, _, _ in parts}
+        assert set(plan[object_id].outlines_m) == outlines
+        points = np.array([point for outline, _, _ in parts for point in outline])
+        assert np.ptp(points, axis=0) == pytest.approx([plan[object_id].size_m[0], plan[object_id].size_m[2]])
 
 
 FRAME = MapFrame(rows=60, cols=60, cell_m=0.1, corner_m=(-1.0, -1.0))

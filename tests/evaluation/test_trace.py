@@ -18,6 +18,7 @@ from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
@@ -102,7 +103,7 @@ def rewrite(run_dir: Path, change):
         for record in records:
             store.forget_episode(record.agent, record.task_id, 1)
         for record in records:
-            store.add_stage(record, wall_s=0.0, cpu_s=0.0)
+            store.add_stage(encode_stage(record, wall_s=0.0, cpu_s=0.0))
 
 
 @pytest.fixture(scope="module")

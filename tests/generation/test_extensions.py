@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app
-from evonav.evaluation.records.floor_plan import transition_record
+from evonav.evaluation.records.oracle import transition_record
 from evonav.generation import GenerationParameters, generate_task
 from evonav.generation.validation import validate_task
 from evonav.house import House, bundled_houses

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import (
     ActionRecord,
     EndState,
@@ -172,8 +173,9 @@ def record_run(
         store.set_meta("num_stages", num_stages)
         store.set_meta("config", {"evonav": "0.1.0", "seed": 3, "protocol": {"success_radius_m": 1.5}})
         for record in records:
-            store.add_stage(record, wall_s=1.0, cpu_s=0.5)
-            store.add_map(stage_map(record.task_id, record.stage))
+            store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=0.5))
+            plan = stage_map(record.task_id, record.stage)
+            store.add_floor_plan(plan.task_id, plan.stage, plan.model_dump_json())
     return run_dir
 
 

@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.report.compare import wording as words
@@ -71,7 +72,7 @@ def test_another_stage_of_the_same_name_is_no_pair(tmp_path: Path) -> None:
     with RunStore(b) as store:
         store.set_meta("num_stages", {f"task-{i:02}": 2 for i in range(6)})
         for record in moved:
-            store.add_stage(record, wall_s=1.0, cpu_s=1.0)
+            store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=1.0))
     assert dict(one(a, b).dropped) == {"another stage under the same name": 2}
 
 

@@ -17,6 +17,7 @@ from evonav.controlled.paired_maps import highlighted_pairs, load_pair, pair_svg
 from evonav.controlled.plots import controlled_plots
 from evonav.controlled.rates import Crossover, _crossing, by_rate, crossover
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, TransitionRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.compare.compare import compare
@@ -44,8 +45,9 @@ def write_analysis(folder, kind, arms, outcomes, *, num_tasks=6, stages=(2,)):
             for agent, states in outcomes.items():
                 for i, state in enumerate(states[number][:num_tasks]):
                     for record in made_up(agent, i, state, is_evolved=number > 0, stages=stages):
-                        store.add_stage(record, wall_s=1.0, cpu_s=0.5)
-                        store.add_map(stage_map(record.task_id, 1 if number == 0 else record.stage))
+                        store.add_stage(encode_stage(record, wall_s=1.0, cpu_s=0.5))
+                        plan = stage_map(record.task_id, 1 if number == 0 else record.stage)
+                        store.add_floor_plan(plan.task_id, plan.stage, plan.model_dump_json())
     record = ControlledRecord(
         kind=kind,
         arms=tuple(arms),

@@ -12,6 +12,7 @@ from made_up_run import WriteRun, record_run, stage_record
 
 from evonav.errors import StoreError
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageError, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate
@@ -299,7 +300,7 @@ def test_a_report_tells_how_to_run_it_again_and_what_went_wrong(write_run: Write
         store.set_meta("task_digests", {"task-0": "f" * 64})
         (errored,) = [record for record in store.records("ftu", "task-5") if record.state is EndState.ERRORED]
         store.forget_episode("ftu", "task-5", 1)
-        store.add_stage(errored, wall_s=1.0, cpu_s=1.0, traceback=trace)
+        store.add_stage(encode_stage(errored, wall_s=1.0, cpu_s=1.0, traceback=trace))
     text = write_report(run_dir).read_text("utf-8")
     assert "evonav evaluate --agents fu,ftu --tasks &#39;my &lt;tasks&gt;&#39; --out out/run</pre>" in text
     assert "git: abc123" in text

@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 from viewer_run import MARKUP
 
 from evonav.cli import app
+from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import RunStore
 from evonav.replay.page_data import PageData, cells_text
@@ -304,7 +305,7 @@ def test_a_replay_that_differs_is_told_on_the_page(run_dir: Path, task_id: str, 
         for key, value in meta.items():
             store.set_meta(key, value)
         for record in records:
-            store.add_stage(record, wall_s=0.0, cpu_s=0.0)
+            store.add_stage(encode_stage(record, wall_s=0.0, cpu_s=0.0))
     result = CliRunner().invoke(app, ["view", str(tmp_path / "run"), "--task", task_id, "--agent", "random-walk"])
     assert result.exit_code == 0, result.output
     assert "the replay differs from the records" in result.output

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from evonav.evaluation.episode.spec import EpisodeSpec, floor_plan, room_at
+from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.world.pose import Pose
 from evonav.world.simulator import Simulator
 
@@ -28,10 +28,10 @@ def tour(case: EpisodeSpec, stage: int, simulator: Simulator, *, views_per_room:
         seed: Together with task and stage it decides what is drawn.
     """
     generator = np.random.Generator(np.random.PCG64(_seed_of(seed, case.task_id, stage)))
-    plan = floor_plan(case, stage, simulator.objects)
+    house = case.parsed_house(stage)
     rooms: dict[str, list[tuple[float, float]]] = {}
     for x_m, _, z_m in simulator.reachable_positions().tolist():
-        room = room_at(plan, (x_m, z_m))
+        room = house.room_of(x_m, z_m)
         if room is not None:
             rooms.setdefault(room, []).append((x_m, z_m))
     num_places = -(-views_per_room // VIEWS_PER_PLACE)

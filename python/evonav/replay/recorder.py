@@ -19,7 +19,7 @@ from evonav.decision.question import Question
 from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.records.convert import STALE_MARGIN_M, distance_to_box_m, entry_record, pose_record
-from evonav.evaluation.records.schema import ErrorKind, RoundRecord
+from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord
 from evonav.replay.types import (
     BLOCKED,
     EXPLORED,
@@ -136,13 +136,13 @@ class Tracer:
             self._rounds.append(self._with_belief(replace(self._pending, record=record)))
         self._pending = None
 
-    def take(self, outcome: StageOutcome) -> TracedStage:
+    def take(self, outcome: StageOutcome, floor_plan: FloorPlan | None = None) -> TracedStage:
         """The stage that just ended; one that errored in the middle of a round has that round too."""
         rounds = self._rounds
         if self._pending is not None:
             rounds = [*rounds, self._with_belief(self._pending)]
         self._rounds, self._pending = [], None
-        return TracedStage(outcome.record, outcome.floor_plan, tuple(rounds), "", (), self._fov_rad)
+        return TracedStage(outcome.record, floor_plan, tuple(rounds), "", (), self._fov_rad)
 
     def _with_belief(self, seen: TracedRound) -> TracedRound:
         if not isinstance(self.agent, InspectableAgent):

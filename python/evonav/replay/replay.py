@@ -158,7 +158,7 @@ class RunReplay:
                     perception_seed=perception_seed(self.seed, case.task_id),
                 )
                 for outcome in episode.run():
-                    traced = tracer.take(outcome)
+                    traced = tracer.take(outcome, maps.get(outcome.record.stage))
                     fov_rad = traced.fov_rad
                     yield traced
                     if outcome.record.stage == last:

@@ -69,7 +69,7 @@ class Episode:
         for stage in range(1, len(self._case.stages) + 1):
             record = self._case.blank_record(self._agent_name, stage)
             if failure is not None and failure.error is not None:
-                yield StageOutcome(as_not_run(record, failure.error, failure.stage), None, 0.0, 0.0)
+                yield StageOutcome(as_not_run(record, failure.error, failure.stage), 0.0, 0.0)
                 continue
             if is_lost:
                 memory_lost_at, is_lost = stage, False
@@ -79,7 +79,7 @@ class Episode:
             record = run.run()
             costs = stopwatch.costs(self._new_costs(run.failure))
             wall_s, cpu_s = costs.wall_s or 0.0, costs.cpu_s or 0.0
-            yield StageOutcome(record, run.plan, wall_s, cpu_s, run.traceback, costs)
+            yield StageOutcome(record, wall_s, cpu_s, run.traceback, costs)
             if run.failure is None:
                 pose = self._end_pose(stage)
             elif run.failure.is_agents:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from evonav.evaluation.records.costs import StageCosts
-from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageError, StageFailure, StageRecord
+from evonav.evaluation.records.schema import EndState, ErrorKind, StageError, StageFailure, StageRecord
 
 
 @dataclass(frozen=True, slots=True)
@@ -11,8 +11,6 @@ class StageOutcome:
     """A finished stage and its cost."""
 
     record: StageRecord
-    floor_plan: FloorPlan | None
-    """The floor plan of the stage's house; `None` when the stage never got one."""
     wall_s: float
     cpu_s: float
     traceback: str = ""

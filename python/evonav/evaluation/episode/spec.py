@@ -1,17 +1,15 @@
 """Describe a task as the evaluator runs it: its stages, targets and hidden changes."""
 
-import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from evonav.evaluation.records.floor_plan import house_map, image_uri, target_record, transition_record
+from evonav.evaluation.records.floor_plan import floor_plan_of, image_uri
+from evonav.evaluation.records.oracle import target_record, transition_record
 from evonav.evaluation.records.schema import (
     EndState,
     FloorPlan,
     GoalRecord,
-    ObjectFootprint,
     Point2,
     StageRecord,
     TargetRecord,
@@ -22,9 +20,9 @@ from evonav.tasks import Task
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.public import StageInput
 from evonav.world.pose import Pose
-from evonav.world.simulator import SceneObject
 
 THUMBNAIL_PX = 160
+"""Edge of the reference image in a floor plan."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +65,23 @@ class EpisodeSpec:
     start: Pose
     """The start pose of stage 1, from the manifest."""
     stages: tuple[StageSpec, ...] = field(repr=False)
+
+    def parsed_house(self, stage: int) -> House:
+        """Parse the house as it is in a stage (1-based).
+
+        Raises:
+            HouseError: The house is malformed.
+        """
+        return House(self.stages[stage - 1].house_json, name=self.house)
+
+    def floor_plan(self, stage: int) -> FloorPlan:
+        """Return the floor plan of a stage (1-based).
+
+        Raises:
+            HouseError: The house is malformed, or has an object of an unknown category.
+        """
+        image = image_uri(self.stages[stage - 1].public.reference_image, THUMBNAIL_PX)
+        return floor_plan_of(self.parsed_house(stage), task_id=self.task_id, stage=stage, reference_image=image)
 
     def blank_record(self, agent: str, stage: int) -> StageRecord:
         """Return the record of a stage that was not run; all other records of the stage start from it.
@@ -137,77 +152,3 @@ def unreadable_task_spec(task_id: str, num_stages: int) -> EpisodeSpec:
 
 def _guided_walk(oracle: OracleStage) -> GuidedWalk:
     return GuidedWalk(path_m=oracle.reference_path_m, end=oracle.reference_pose.pose())
-
-
-def floor_plan(case: EpisodeSpec, stage: int, objects: Sequence[SceneObject]) -> FloorPlan:
-    """A stage's house from above.
-
-    Args:
-        case: The task.
-        stage: 1-based.
-        objects: The simulator's bodies, for sizes.
-
-    Raises:
-        HouseError: The house is malformed.
-    """
-    house = House(case.stages[stage - 1].house_json, name=case.house)
-    yaws_rad = {entry.id: math.radians(entry.rotation_deg[1]) for entry in house.objects}
-    return house_map(
-        house,
-        task_id=case.task_id,
-        stage=stage,
-        objects=_footprints(yaws_rad, objects),
-        reference_image=image_uri(case.stages[stage - 1].public.reference_image, THUMBNAIL_PX),
-    )
-
-
-def room_at(plan: FloorPlan, point_m: Point2) -> str | None:
-    """The id of the room over a point (even-odd rule), or `None` outside all of them."""
-    return next((room.room_id for room in plan.rooms if _is_inside(room.polygon_m, point_m)), None)
-
-
-def _is_inside(polygon_m: Sequence[Point2], point_m: Point2) -> bool:
-    x, z = point_m
-    is_inside = False
-    for (x0, z0), (x1, z1) in zip(polygon_m, (*polygon_m[1:], polygon_m[0]), strict=True):
-        if (z0 > z) != (z1 > z) and x < x0 + (z - z0) / (z1 - z0) * (x1 - x0):
-            is_inside = not is_inside
-    return is_inside
-
-
-def _footprints(yaws_rad: Mapping[str, float], objects: Sequence[SceneObject]) -> tuple[ObjectFootprint, ...]:
-    footprints = []
-    for body in objects:
-        if body.kind != "object":
-            continue
-        x, _, z = body.centre_m
-        corners = _turned_corners(body.size_m[0], body.size_m[2], yaws_rad.get(body.id, 0.0))
-        footprints.append(
-            ObjectFootprint(
-                object_id=body.id,
-                category=body.category,
-                centre_m=body.centre_m,
-                size_m=body.size_m,
-                polygon_m=tuple((x + dx, z + dz) for dx, dz in corners),
-            )
-        )
-    return tuple(footprints)
-
-
-def _turned_corners(box_x_m: float, box_z_m: float, yaw_rad: float) -> list[Point2]:
-    """Corners of the rectangle at `yaw_rad` whose axis-aligned box is `box_x_m` by `box_z_m`, about its centre.
-
-    Near 45 degrees many rectangles share a box; there the box itself is drawn.
-    """
-    c, s = abs(math.cos(yaw_rad)), abs(math.sin(yaw_rad))
-    determinant = c * c - s * s
-    if abs(determinant) > 0.1:
-        width_m = (c * box_x_m - s * box_z_m) / determinant
-        depth_m = (c * box_z_m - s * box_x_m) / determinant
-        if width_m > 0.0 and depth_m > 0.0:
-            sin, cos = math.sin(yaw_rad), math.cos(yaw_rad)
-            corners = [(-width_m, -depth_m), (width_m, -depth_m), (width_m, depth_m), (-width_m, depth_m)]
-            # Yaw is clockwise seen from above: +z turns towards +x.
-            return [((x * cos + z * sin) / 2, (-x * sin + z * cos) / 2) for x, z in corners]
-    half_x_m, half_z_m = box_x_m / 2, box_z_m / 2
-    return [(-half_x_m, -half_z_m), (half_x_m, -half_z_m), (half_x_m, half_z_m), (-half_x_m, half_z_m)]

@@ -12,7 +12,7 @@ from evonav.evaluation.episode.oracle_baselines import OracleBaseline, Sighting
 from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.episode.sensors import Sensors, map_frame
-from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk, floor_plan, room_at
+from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk
 from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState
 from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.protocol import ProtocolConfig
@@ -22,7 +22,6 @@ from evonav.evaluation.records.schema import (
     EndState,
     EntryRecord,
     ErrorKind,
-    FloorPlan,
     MemoryRecord,
     RoundRecord,
     StageRecord,
@@ -96,7 +95,6 @@ class Stage:
         self._beliefs: Sequence[EntryBelief] | None = None
         """Of the last round, if they were asked for."""
         self._trace: list[RoundRecord] = []
-        self.plan: FloorPlan | None = None
         self.failure: ErrorKind | None = None
         """Why the stage could not be finished."""
         self.traceback = ""
@@ -132,16 +130,13 @@ class Stage:
             self._state.tracked,
             self._protocol.min_visible_px,
         )
-        self.plan = floor_plan(self._case, stage, self._simulator.objects)
-        room_id = room_at(self.plan, (self._requested.x_m, self._requested.z_m))
-        evolved_room_id = self._record.transition.room_id
         self._record = self._record.model_copy(
             update={
                 "requested_start": pose_record(self._requested),
                 "effective_start": pose_record(start),
                 "is_snapped": is_snapped,
                 "transition": self._record.transition.model_copy(
-                    update={"is_agent_in_room": evolved_room_id is not None and room_id == evolved_room_id}
+                    update={"is_agent_in_room": self._is_agent_in_evolved_room()}
                 ),
             }
         )
@@ -156,6 +151,13 @@ class Stage:
                 beliefs = self._entries()
         self._memory_at_start = None if beliefs is None else self._staleness.begin(beliefs)
         self._record = self._record.model_copy(update={"sensing": sensing_record(self._sensing)})
+
+    def _is_agent_in_evolved_room(self) -> bool:
+        room_id = self._record.transition.room_id
+        if room_id is None:
+            return False
+        house = self._case.parsed_house(self._record.stage)
+        return house.room_of(self._requested.x_m, self._requested.z_m) == room_id
 
     def _tell_goal(self) -> None:
         """Tells the agent of the task, if it does not know, and of the stage. Its sensing is held for the stage."""

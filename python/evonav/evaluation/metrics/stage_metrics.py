@@ -326,7 +326,7 @@ def _values(measures: RecordMetrics) -> dict[str, Any]:
 def _kept(store: "RunStore", agents: Sequence[str] | None) -> Iterator[_Kept]:
     """By agent, task and stage; derived anew where the store has none of this version."""
     wanted = None if agents is None else set(agents)
-    for (agent, task_id, stage), version, text in store.encode_metrics():
+    for (agent, task_id, stage), version, text in store.encoded_metrics():
         if wanted is not None and agent not in wanted:
             continue
         if version != METRICS_VERSION or text is None:

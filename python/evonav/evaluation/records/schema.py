@@ -23,7 +23,8 @@ Point3 = tuple[float, float, float]
 class _Record(BaseModel):
     """Frozen and closed: an unknown field is an error, not a surprise."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="null")
+    # Parts of a record are validated again with the whole: `model_copy` does not validate.
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="null", revalidate_instances="always")
 
 
 class EndState(str, Enum):
@@ -34,7 +35,12 @@ class EndState(str, Enum):
     ERRORED = "errored"
     NOT_RUN = "not_run"
     GUIDED = "forced"
-    """The evaluator walked and the agent looked on: nothing to score (docs/controlled.md)."""
+    """The evaluator moved the agent along a reference trajectory: there is nothing to score (docs/controlled.md)."""
+
+    @property
+    def is_scored(self) -> bool:
+        """True if the stage counts in rates."""
+        return self in (EndState.SUCCESS, EndState.FAILURE)
 
 
 class ErrorKind(str, Enum):
@@ -79,6 +85,11 @@ class StageFailure:
     kind: ErrorKind
     message: str
     traceback: str = ""
+
+    @classmethod
+    def from_values(cls, values: dict[str, Any]) -> "StageFailure":
+        """Read what `dataclasses.asdict` made of a failure, after JSON."""
+        return cls(**{**values, "kind": ErrorKind(values["kind"])})
 
 
 class PoseRecord(_Record):
@@ -315,8 +326,8 @@ class StageRecord(_Record):
 
     @property
     def is_scored(self) -> bool:
-        """Whether the stage counts in rates."""
-        return self.state in (EndState.SUCCESS, EndState.FAILURE)
+        """True if the stage counts in rates."""
+        return self.state.is_scored
 
 
 class RoomFootprint(_Record):

@@ -12,7 +12,7 @@ import sqlite3
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -20,8 +20,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from evonav.errors import StoreError
-from evonav.evaluation.metrics.stage_metrics import METRICS_VERSION, encode_metrics
-from evonav.evaluation.records.costs import StageCosts
+from evonav.evaluation.metrics.stage_metrics import METRICS_VERSION
+from evonav.evaluation.records.encoded import EncodedStage
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import SCHEMA_VERSION, EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
 from evonav.parallel.folders import is_on_network, sync_folder
@@ -165,32 +165,21 @@ class RunStore:
         rows = self._query("SELECT agent, task_id, stage, state FROM stages")
         return {(agent, task_id, stage): EndState(state) for agent, task_id, stage, state in rows}
 
-    def add_stage(
-        self,
-        record: StageRecord,
-        *,
-        wall_s: float,
-        cpu_s: float,
-        costs: StageCosts | None = None,
-        traceback: str = "",
-    ) -> None:
-        """Commits a finished stage, with the measures that are derived from it; of an errored one, with its failure.
+    def add_stage(self, stage: EncodedStage) -> None:
+        """Commit a finished stage: its record, metrics, time and costs, and the failure of an errored one.
 
         Raises:
             StoreError: The stage is already recorded, or the file cannot be written.
         """
-        key = (record.agent, record.task_id, record.stage)
+        key = stage.key
         with self._transaction(f"stage {key}: "):
-            text = record.model_dump_json()
-            self._db.execute("INSERT INTO stages VALUES (?, ?, ?, ?, ?)", (*key, record.state.value, text))
-            measures = encode_metrics(record)
-            self._db.execute("INSERT INTO measures VALUES (?, ?, ?, ?, ?)", (*key, METRICS_VERSION, measures))
-            self._db.execute("INSERT INTO timings VALUES (?, ?, ?, ?, ?)", (*key, wall_s, cpu_s))
-            if costs is not None:
-                told = {name: value for name, value in asdict(costs).items() if value is not None}
-                self._db.execute("INSERT INTO costs VALUES (?, ?, ?, ?)", (*key, _json(told)))
-            if record.state is EndState.ERRORED and record.error is not None:
-                row = (*key, record.error.kind.value, record.error.message, traceback, False)
+            self._db.execute("INSERT INTO stages VALUES (?, ?, ?, ?, ?)", (*key, stage.state.value, stage.record))
+            self._db.execute("INSERT INTO measures VALUES (?, ?, ?, ?, ?)", (*key, METRICS_VERSION, stage.metrics))
+            self._db.execute("INSERT INTO timings VALUES (?, ?, ?, ?, ?)", (*key, stage.wall_s, stage.cpu_s))
+            if stage.costs is not None:
+                self._db.execute("INSERT INTO costs VALUES (?, ?, ?, ?)", (*key, _json(stage.costs)))
+            if stage.failure is not None:
+                row = (*key, stage.failure.kind.value, stage.failure.message, stage.failure.traceback, False)
                 self._db.execute(_ADD_FAILURE, row)
 
     def add_retry(self, agent: str, task_id: str, failure: StageFailure) -> None:
@@ -198,10 +187,13 @@ class RunStore:
         what = (failure.kind.value, failure.message, failure.traceback, True)
         self._execute(_ADD_FAILURE, (agent, task_id, failure.stage, *what))
 
-    def add_map(self, floor_plan: FloorPlan) -> None:
-        """Records a stage's house from above; the first writer wins, all of them would write the same."""
-        row = (floor_plan.task_id, floor_plan.stage, floor_plan.model_dump_json())
-        self._execute("INSERT OR IGNORE INTO stage_maps VALUES (?, ?, ?)", row)
+    def add_floor_plan(self, task_id: str, stage: int, text: str) -> None:
+        """Store the floor plan of a stage, as JSON; a stored one stays, as all writers would write the same."""
+        self._execute("INSERT OR IGNORE INTO stage_maps VALUES (?, ?, ?)", (task_id, stage, text))
+
+    def floor_plan_keys(self) -> set[tuple[str, int]]:
+        """Return task and stage of every stored floor plan."""
+        return set(self._query("SELECT task_id, stage FROM stage_maps"))
 
     def forget_episode(self, agent: str, task_id: str, from_stage: int) -> None:
         """Drops an episode's stages from `from_stage` on, so that they can be run again."""
@@ -273,7 +265,7 @@ class RunStore:
         except ValidationError as error:
             raise StoreError(f"{self.path}: {error}") from error
 
-    def encode_metrics(self) -> Iterator[tuple[tuple[str, str, int], int | None, str | None]]:
+    def encoded_metrics(self) -> Iterator[tuple[tuple[str, str, int], int | None, str | None]]:
         """By agent, task and stage: the version of the measures kept beside a record, and these; `None` without."""
         query = (
             "SELECT agent, task_id, stage, version, measures FROM stages LEFT JOIN measures "

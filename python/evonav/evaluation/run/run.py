@@ -183,8 +183,8 @@ def evaluate_all(
                 resources=resources,
                 max_losses=0,  # they are counted here
             ) as pool:
-                for index, record in run_all(runs, pool, num_retries, finish):
-                    on_progress(index, runs[index].progress(record))
+                for index, stage in run_all(runs, pool, num_retries, finish):
+                    on_progress(index, runs[index].progress(stage))
         for index, run in enumerate(runs):
             if not run.jobs:
                 finish(index)
@@ -203,18 +203,23 @@ def _begun(request: RunRequest, num_workers: int, num_retries: int, retry_errore
         if retry_errored:
             _forget_errored(store, request)
         states = store.states()
-    jobs = [
-        EpisodeJob(
-            agent,
-            task.task_id,
-            str(task.path.absolute()),
-            agent_seed(config.seed, agent, task.task_id),
-            perception_seed(config.seed, task.task_id),
-        )
-        for task in request.tasks
-        for agent in request.agents
-        if any((agent, task.task_id, stage) not in states for stage in range(1, task.num_stages + 1))
-    ]
+        floor_plans = store.floor_plan_keys()
+    jobs = []
+    for task in request.tasks:
+        stages = range(1, task.num_stages + 1)
+        agents = [name for name in request.agents if any((name, task.task_id, stage) not in states for stage in stages)]
+        are_missing = any((task.task_id, stage) not in floor_plans for stage in stages)
+        jobs += [
+            EpisodeJob(
+                agent,
+                task.task_id,
+                str(task.path.absolute()),
+                agent_seed(config.seed, agent, task.task_id),
+                perception_seed(config.seed, task.task_id),
+                sends_floor_plans=are_missing and number == 0,
+            )
+            for number, agent in enumerate(agents)
+        ]
     if jobs:
         with RunStore(request.run_dir) as store:
             _claim_models(store, request)

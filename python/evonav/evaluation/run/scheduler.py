@@ -6,11 +6,12 @@ from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
 
-from evonav.evaluation.episode.outcome import StageOutcome, as_errored, as_not_run
+from evonav.evaluation.episode.outcome import as_errored, as_not_run
 from evonav.evaluation.episode.spec import EpisodeSpec, unreadable_task_spec
-from evonav.evaluation.records.schema import EndState, ErrorKind, StageFailure, StageRecord
+from evonav.evaluation.records.encoded import EncodedStage, encode_stage
+from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.worker import RETRIED, EpisodeJob, Setup, decode_event
+from evonav.evaluation.run.worker import RETRIED, EpisodeJob, Setup, decode_event, floor_plan_if_possible
 from evonav.parallel.pool import Answer, Job, Pool
 from evonav.tasks.listing import TaskFile
 
@@ -22,7 +23,8 @@ class Progress:
     num_done: int
     """Recorded stages, those of earlier calls included."""
     num_stages: int
-    latest: StageRecord | None
+    latest: EncodedStage | None
+    """The stage that was recorded last; `None` at the beginning."""
 
 
 class Run:
@@ -79,42 +81,42 @@ class Run:
             self._store.close()
         self._store = None
 
-    def progress(self, latest: StageRecord | None) -> Progress:
+    def progress(self, latest: EncodedStage | None) -> Progress:
         """How far it is."""
         return Progress(self._num_done, len(self._keys), latest)
 
-    def add(self, outcome: StageOutcome) -> bool:
-        """Commits a record, unless the same was there: a resumed episode runs its recorded stages again.
+    def add(self, stage: EncodedStage) -> bool:
+        """Commit a stage, unless the same record is stored: a resumed episode runs its recorded stages again.
 
         An agent that is not deterministic may do otherwise than recorded. Mixing two rollouts in one episode would join
         what never happened, so the newer rollout then replaces the older from that stage on.
         """
-        if outcome.floor_plan is not None:
-            self.store.add_map(outcome.floor_plan)
-        record = outcome.record
-        key = (record.agent, record.task_id, record.stage)
+        if stage.floor_plan is not None:
+            self.store.add_floor_plan(stage.task_id, stage.stage, stage.floor_plan)
+        key = stage.key
         if key in self._states:
-            if self.store.record_text(*key) == record.model_dump_json():
+            if self.store.record_text(*key) == stage.record:
                 return False
             self.store.forget_episode(*key)
             self._states = self.store.states()
             self._num_done = len(self._keys & self._states.keys())
-        self.store.add_stage(
-            record, wall_s=outcome.wall_s, cpu_s=outcome.cpu_s, traceback=outcome.traceback, costs=outcome.costs
-        )
-        self._states[key] = record.state
+        self.store.add_stage(stage)
+        self._states[key] = stage.state
         self._num_done += 1
         return True
 
-    def left_behind(self, job: EpisodeJob, failure: StageFailure) -> Iterator[StageOutcome]:
-        """The stages of a job that ended early: the first errored, the rest not run; errored or not run, never missing.
+    def left_behind(self, job: EpisodeJob, failure: StageFailure) -> Iterator[EncodedStage]:
+        """Make up the missing stages of a job that ended early: the first is errored, the rest are not run.
 
         Yields:
-            Outcomes to `add`, of the stages that have none.
+            Stages to `add`.
         """
         task = self._tasks[job.task_id]
+        plans: dict[int, FloorPlan | None] = {}
         try:
             case: EpisodeSpec = self.setup.backend.tasks.create(task.path)
+            if job.sends_floor_plans:
+                plans = {stage: floor_plan_if_possible(case, stage) for stage in range(1, task.num_stages + 1)}
         except Exception as error:  # whatever a broken file does to whatever reads it
             message = f"the task cannot be read: {type(error).__name__}: {error}"
             failure = replace(failure, kind=ErrorKind.HARNESS, message=message)
@@ -125,10 +127,10 @@ class Run:
                 continue
             blank = case.blank_record(job.agent, stage)
             if failed is None or failed.error is None:
-                failed = as_errored(blank, failure.kind, failure.message)
-                yield StageOutcome(failed, None, 0.0, 0.0, failure.traceback)
+                record = failed = as_errored(blank, failure.kind, failure.message)
             else:
-                yield StageOutcome(as_not_run(blank, failed.error, failed.stage), None, 0.0, 0.0)
+                record = as_not_run(blank, failed.error, failed.stage)
+            yield encode_stage(record, wall_s=0.0, cpu_s=0.0, traceback=failure.traceback, floor_plan=plans.get(stage))
 
 
 @dataclass(slots=True)
@@ -146,7 +148,7 @@ class _Episode:
 
 def run_all(
     runs: Sequence[Run], pool: Pool, num_retries: int, on_done: Callable[[int], None]
-) -> Iterator[tuple[int, StageRecord]]:
+) -> Iterator[tuple[int, EncodedStage]]:
     """Has all jobs of runs done and records what comes of them.
 
     Args:
@@ -156,7 +158,7 @@ def run_all(
         on_done: Called with the index of a run of which nothing is left.
 
     Yields:
-        Index of the run, and a record that was committed.
+        Index of the run, and a stage that was committed.
     """
     waiting = deque(_Episode(index, job) for index, run in enumerate(runs) for job in run.jobs)
     under_way: dict[int, _Episode] = {}
@@ -173,10 +175,10 @@ def run_all(
         if answer.is_end:
             del under_way[answer.key]
         news = _news_of(answer, run)
-        if isinstance(news, StageOutcome):
-            episode.stage = news.record.stage + 1
+        if isinstance(news, EncodedStage):
+            episode.stage = news.stage + 1
             if run.add(news):
-                yield episode.index, news.record
+                yield episode.index, news
         elif news is not None:
             failure = replace(news, stage=news.stage or episode.stage)
             if not answer.is_end:  # the worker tries again itself
@@ -187,9 +189,9 @@ def run_all(
                 waiting.appendleft(episode)
                 continue
             else:
-                for outcome in run.left_behind(episode.job, failure):
-                    if run.add(outcome):
-                        yield episode.index, outcome.record
+                for stage in run.left_behind(episode.job, failure):
+                    if run.add(stage):
+                        yield episode.index, stage
         if answer.is_end:
             run.num_left -= 1
             if run.num_left == 0:
@@ -202,7 +204,7 @@ def _note_retry(run: Run, episode: _Episode, failure: StageFailure) -> None:
     episode.stage = 1
 
 
-def _news_of(answer: Answer, run: Run) -> StageOutcome | StageFailure | None:
+def _news_of(answer: Answer, run: Run) -> EncodedStage | StageFailure | None:
     if answer.failure == "crash":
         return StageFailure(0, ErrorKind.CRASH, answer.detail)
     if answer.failure == "timeout":

@@ -19,6 +19,7 @@ from typing import Any
 
 from evonav.agents import error_text
 from evonav.agents.agent import Agent, AgentAction, Sensing
+from evonav.errors import HouseError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
@@ -27,8 +28,8 @@ from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.costs import StageCosts
-from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord, StageFailure, StageRecord
+from evonav.evaluation.records.encoded import EncodedStage, encode_stage
+from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord, StageFailure
 from evonav.evaluation.run.components import Backend, make_agent
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
@@ -79,6 +80,8 @@ class EpisodeJob:
     """The agent's."""
     perception_seed: int
     """The perception's."""
+    sends_floor_plans: bool = False
+    """Send the floor plans of the task's stages: one episode of a task does, for all agents."""
 
     def text(self, setup_text: str) -> str:
         """As a worker takes it."""
@@ -169,11 +172,11 @@ class _Heartbeat:
         self._on_round()
 
 
-def run_job(job: EpisodeJob, context: WorkerContext) -> Generator[StageOutcome | StageFailure]:
+def run_job(job: EpisodeJob, context: WorkerContext) -> Generator[EncodedStage | StageFailure]:
     """Runs an episode in this process.
 
     Yields:
-        Outcomes of the stages. After a failure that costs only the attempt, that, and the outcomes from stage 1 on
+        Finished stages. After a failure that costs only the attempt: the failure, and then the stages from stage 1 on
         again.
     """
     case = context.setup.backend.tasks.create(Path(job.path))
@@ -192,7 +195,7 @@ def run_job(job: EpisodeJob, context: WorkerContext) -> Generator[StageOutcome |
                         is_whole = False
                         yield failure
                         break
-                yield outcome
+                yield _encoded(outcome, case, sends_floor_plan=job.sends_floor_plans)
 
 
 def _attempt(case: EpisodeSpec, job: EpisodeJob, context: WorkerContext) -> Generator[StageOutcome]:
@@ -228,7 +231,7 @@ class EpisodeWork:
             context = self._context(setup_text)
             with closing(run_job(EpisodeJob(**json.loads(head)), context)) as said:
                 for news in said:
-                    yield _outcome_text(news) if isinstance(news, StageOutcome) else _failure_text(news)
+                    yield news.to_text() if isinstance(news, EncodedStage) else _failure_text(news)
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
             return _failure_text(StageFailure(0, ErrorKind.HARNESS, message, error_text.traceback_of(error)))
@@ -249,32 +252,31 @@ class EpisodeWork:
             self._contexts.popitem()[1].close()
 
 
-def decode_event(text: str) -> StageOutcome | StageFailure | None:
-    """What a job says: a stage that ended, a failure, or nothing that went wrong."""
+def decode_event(text: str) -> EncodedStage | StageFailure | None:
+    """Read an event of a job: a finished stage, a failure, or `None` for a job that ended without one."""
+    if "\n" in text:
+        return EncodedStage.from_text(text)
     values = json.loads(text)
-    if "record" in values:
-        plan, costs = values.pop("map"), values.pop("costs")
-        return StageOutcome(
-            record=StageRecord.model_validate_json(values.pop("record")),
-            floor_plan=None if plan is None else FloorPlan.model_validate_json(plan),
-            costs=None if costs is None else StageCosts(**costs),
-            **values,
-        )
-    return StageFailure(**{**values, "kind": ErrorKind(values["kind"])}) if values else None
+    return StageFailure.from_values(values) if values else None
 
 
-def _outcome_text(outcome: StageOutcome) -> str:
-    plan = outcome.floor_plan
-    return json.dumps(
-        {
-            "record": outcome.record.model_dump_json(),
-            "map": None if plan is None else plan.model_dump_json(),
-            "wall_s": outcome.wall_s,
-            "cpu_s": outcome.cpu_s,
-            "traceback": outcome.traceback,
-            "costs": None if outcome.costs is None else asdict(outcome.costs),
-        }
+def _encoded(outcome: StageOutcome, spec: EpisodeSpec, *, sends_floor_plan: bool) -> EncodedStage:
+    return encode_stage(
+        outcome.record,
+        wall_s=outcome.wall_s,
+        cpu_s=outcome.cpu_s,
+        costs=outcome.costs,
+        traceback=outcome.traceback,
+        floor_plan=floor_plan_if_possible(spec, outcome.record.stage) if sends_floor_plan else None,
     )
+
+
+def floor_plan_if_possible(spec: EpisodeSpec, stage: int) -> FloorPlan | None:
+    """Return the floor plan of a stage; `None` for a house of which none can be drawn."""
+    try:
+        return spec.floor_plan(stage)
+    except HouseError:
+        return None
 
 
 def _failure_text(failure: StageFailure) -> str:

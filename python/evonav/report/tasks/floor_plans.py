@@ -5,14 +5,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from evonav.evaluation.records.floor_plan import (
-    door_ends,
-    house_map,
-    image_uri,
-    target_record,
-    transition_record,
-    true_footprints,
-)
+from evonav.evaluation.records.floor_plan import door_ends, floor_plan_of, image_uri
+from evonav.evaluation.records.oracle import target_record, transition_record
 from evonav.evaluation.records.schema import FloorPlan, ObjectFootprint, RoomFootprint
 from evonav.house import House
 from evonav.report.maps.floor_plan import (
@@ -74,8 +68,7 @@ def task_drawing(task: Task, prefix: str = "p") -> TaskDrawing:
     for stage in range(1, task.num_stages + 1):
         house = House(task.house_json(stage), name=f"{task.task_id}/houses/stage_{stage}.json.gz")
         image = image_uri(task.reference_images[stage - 1], IMAGE_PX)
-        objects = true_footprints(house)
-        maps[stage] = house_map(house, task_id=task.task_id, stage=stage, objects=objects, reference_image=image)
+        maps[stage] = floor_plan_of(house, task_id=task.task_id, stage=stage, reference_image=image)
     moving = moving_ids(list(maps.values()))
     return TaskDrawing(task, prefix, frame_of(maps.values()), maps, door_ends(house), moving)
 

@@ -1,0 +1,113 @@
+"""Encode a finished stage once, as the text that workers send and the store keeps."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+from evonav.evaluation.metrics.stage_metrics import encode_metrics
+from evonav.evaluation.records.costs import StageCosts
+from evonav.evaluation.records.schema import EndState, FloorPlan, StageFailure, StageRecord
+
+
+@dataclass(frozen=True, slots=True)
+class EncodedStage:
+    """A finished stage as the store writes it. Nobody needs to parse its texts on the way."""
+
+    agent: str
+    task_id: str
+    stage: int
+    state: EndState
+    record: str
+    """The validated record as JSON."""
+    metrics: str
+    """The metrics of the record as JSON (`encode_metrics`)."""
+    wall_s: float
+    cpu_s: float
+    costs: Mapping[str, float] | None = None
+    """The measured costs by field of `StageCosts`; `None` if nothing was measured."""
+    failure: StageFailure | None = None
+    """The reason why the stage is errored; `None` if it is not."""
+    floor_plan: str | None = None
+    """The floor plan of the stage's house as JSON; `None` if another episode of the task sends it."""
+
+    @property
+    def key(self) -> tuple[str, str, int]:
+        """Agent, task and stage."""
+        return self.agent, self.task_id, self.stage
+
+    @property
+    def is_scored(self) -> bool:
+        """True if the stage counts in rates."""
+        return self.state.is_scored
+
+    def to_text(self) -> str:
+        """Return the stage as four lines: a header, the record, the metrics and the floor plan."""
+        header = {
+            "agent": self.agent,
+            "task_id": self.task_id,
+            "stage": self.stage,
+            "state": self.state.value,
+            "wall_s": self.wall_s,
+            "cpu_s": self.cpu_s,
+            "costs": self.costs,
+            "failure": None if self.failure is None else asdict(self.failure),
+        }
+        return "\n".join((json.dumps(header), self.record, self.metrics, self.floor_plan or ""))
+
+    @classmethod
+    def from_text(cls, text: str) -> "EncodedStage":
+        """Read a stage that `to_text` wrote; record and metrics are not parsed."""
+        first, record, metrics, floor_plan = text.split("\n")
+        header = json.loads(first)
+        failure = header["failure"]
+        return cls(
+            **{
+                **header,
+                "state": EndState(header["state"]),
+                "failure": None if failure is None else StageFailure.from_values(failure),
+            },
+            record=record,
+            metrics=metrics,
+            floor_plan=floor_plan or None,
+        )
+
+
+def encode_stage(
+    record: StageRecord,
+    *,
+    wall_s: float,
+    cpu_s: float,
+    costs: StageCosts | None = None,
+    traceback: str = "",
+    floor_plan: FloorPlan | None = None,
+) -> EncodedStage:
+    """Validate a record, derive its metrics, and encode both.
+
+    Args:
+        record: The whole record, with its trace. It may have been made by `model_copy`, which does not validate.
+        wall_s: Wall time of the stage.
+        cpu_s: CPU time of the stage.
+        costs: All costs of the stage, if they were measured.
+        traceback: The traceback of an errored stage.
+        floor_plan: The floor plan of the stage's house, if it is to be stored.
+
+    Raises:
+        ValidationError: The record is not valid.
+    """
+    valid = StageRecord.model_validate(record)
+    failure = None
+    if valid.state is EndState.ERRORED and valid.error is not None:
+        failure = StageFailure(valid.stage, valid.error.kind, valid.error.message, traceback)
+    return EncodedStage(
+        agent=valid.agent,
+        task_id=valid.task_id,
+        stage=valid.stage,
+        state=valid.state,
+        record=valid.model_dump_json(),
+        metrics=encode_metrics(valid),
+        wall_s=wall_s,
+        cpu_s=cpu_s,
+        costs=None if costs is None else {k: v for k, v in asdict(costs).items() if v is not None},
+        failure=failure,
+        floor_plan=None if floor_plan is None else floor_plan.model_dump_json(),
+    )
