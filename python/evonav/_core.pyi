@@ -723,6 +723,9 @@ def map_spec(house_json: str, *, name: str, cell_m: float) -> tuple[tuple[int, i
 
 # evolution
 
+def default_generation_parameters() -> str:
+    """Return the paper's generation parameters (JSON)."""
+
 def generate_task(
     house: House,
     *,

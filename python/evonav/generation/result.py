@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeInt
 
+from evonav.tasks.dataset import RejectReason
 from evonav.tasks.oracle import OracleFields
 from evonav.tasks.records import Id, Record
 
@@ -75,7 +76,7 @@ class GeneratedTask(Record):
 class RejectedHouse(Record):
     """The reason why a house gives no task."""
 
-    reason: Literal["too_few_rooms", "no_start", "start_not_free", "start_outside", "disconnected", "no_valid_goal"]
+    reason: RejectReason
     stage: NonNegativeInt
     """Stage at which the reason was found; 0 before the first."""
     detail: str

@@ -1,10 +1,15 @@
 """Define the generator's hyperparameters: those of the paper, and those of the extensions beyond it."""
 
-from typing import Annotated
+import json
+from typing import Annotated, Any
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
+from evonav import _core
 from evonav.tasks.records import Probability, Record
+
+# The core holds the default values, see `Parameters` in `evonav_core::generation`.
+_DEFAULTS: dict[str, Any] = json.loads(_core.default_generation_parameters())
 
 
 class Occurrence(Record):
@@ -44,38 +49,38 @@ class Extensions(Record):
 class GenerationParameters(Record):
     """The fixed hyperparameters Θ (paper, Sec. A.2), and those that the paper leaves open."""
 
-    num_stages: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (3, 4, 5)
+    num_stages: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = tuple(_DEFAULTS["num_stages"])
     """Possible numbers of stages K, drawn uniformly (the paper gives the range only)."""
-    evolve_probability: Probability = 0.5
-    visited_factor: NonNegativeFloat = 3.0
-    recently_changed_factor: NonNegativeFloat = 0.5
-    changed_room_window: PositiveInt = 1
+    evolve_probability: Probability = _DEFAULTS["evolve_probability"]
+    visited_factor: NonNegativeFloat = _DEFAULTS["visited_factor"]
+    recently_changed_factor: NonNegativeFloat = _DEFAULTS["recently_changed_factor"]
+    changed_room_window: PositiveInt = _DEFAULTS["changed_room_window"]
     """Number of transitions back in which a change counts as recent (the paper's k-2, counted by first stage)."""
-    salient_object_probability: Probability = 0.5
-    retain_group_probability: Probability = 0.4
-    full_shuffle_probability: Probability = 0.1
-    changed_room_multiplier: NonNegativeFloat = 9.0
-    previous_goal_room_multiplier: NonNegativeFloat = 0.2
-    moved_object_multiplier: NonNegativeFloat = 9.0
-    moved_children_multiplier: NonNegativeFloat = 9.0
+    salient_object_probability: Probability = _DEFAULTS["salient_object_probability"]
+    retain_group_probability: Probability = _DEFAULTS["retain_group_probability"]
+    full_shuffle_probability: Probability = _DEFAULTS["full_shuffle_probability"]
+    changed_room_multiplier: NonNegativeFloat = _DEFAULTS["changed_room_multiplier"]
+    previous_goal_room_multiplier: NonNegativeFloat = _DEFAULTS["previous_goal_room_multiplier"]
+    moved_object_multiplier: NonNegativeFloat = _DEFAULTS["moved_object_multiplier"]
+    moved_children_multiplier: NonNegativeFloat = _DEFAULTS["moved_children_multiplier"]
     """Multiplier for objects that stood on the salient object and moved with it.
 
     The paper gives 9 to "the moved object". With 1 here, too few goals are relocated (docs/dataset.md).
     """
-    goals_on_walls: bool = False
+    goals_on_walls: bool = _DEFAULTS["goals_on_walls"]
     """Whether objects on walls, which no modification moves, may be goals.
 
     The paper uses them as anchors of instructions. Without them as goals, the share of relocated goals (Sec. 3.2) is
     the published one.
     """
-    reference_min_m: PositiveFloat = 1.0
-    reference_max_m: PositiveFloat = 1.5
-    reference_image_px: Annotated[int, Field(ge=16, le=4096)] = 300
-    reference_min_visible_px: PositiveInt = 50
+    reference_min_m: PositiveFloat = _DEFAULTS["reference_min_m"]
+    reference_max_m: PositiveFloat = _DEFAULTS["reference_max_m"]
+    reference_image_px: Annotated[int, Field(ge=16, le=4096)] = _DEFAULTS["reference_image_px"]
+    reference_min_visible_px: PositiveInt = _DEFAULTS["reference_min_visible_px"]
     """Smallest number of pixels of a visible target (the paper says "visible")."""
-    relocated_min_m: NonNegativeFloat = 0.1
-    placement_tries: PositiveInt = 100
+    relocated_min_m: NonNegativeFloat = _DEFAULTS["relocated_min_m"]
+    placement_tries: PositiveInt = _DEFAULTS["placement_tries"]
     """Number of places tried for an object before it stays where it is."""
-    modification_tries: Annotated[int, Field(ge=1, le=1000)] = 3
+    modification_tries: Annotated[int, Field(ge=1, le=1000)] = _DEFAULTS["modification_tries"]
     """Number of attempts at a room's modification, with new places, before it is abandoned."""
     extensions: Extensions = Extensions()

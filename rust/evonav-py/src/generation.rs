@@ -41,7 +41,14 @@ fn generate_task<'py>(
     Ok((json, houses, images.iter().map(|image| PyBytes::new(py, image)).collect()))
 }
 
-/// Add the function to the module.
+/// Return the paper's parameters as JSON, from which Python takes its defaults.
+#[pyfunction]
+fn default_generation_parameters() -> String {
+    Parameters::default().to_json()
+}
+
+/// Add the functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(default_generation_parameters, module)?)?;
     module.add_function(wrap_pyfunction!(generate_task, module)?)
 }

@@ -95,6 +95,12 @@ impl Parameters {
         Ok(parameters)
     }
 
+    /// Write the JSON that [`Parameters::from_json`] reads.
+    pub fn to_json(&self) -> String {
+        // Only maps whose keys are not strings could fail, and there are none.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+
     /// Check every value.
     ///
     /// # Errors

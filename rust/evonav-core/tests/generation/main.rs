@@ -22,5 +22,6 @@ mod houses;
 mod overrides;
 mod relations;
 mod sampling;
+mod schema;
 mod start;
 mod task;
