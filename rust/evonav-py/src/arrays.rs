@@ -1,4 +1,4 @@
-//! Borrowing numpy arrays.
+//! Borrow numpy arrays, and create them from vectors.
 
 use evonav_core::Error;
 use numpy::{
@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 
 use crate::error;
 
-/// Return the elements and shape of a C-contiguous array; rust-numpy's own `as_slice` also takes
+/// Return the elements and shape of a C-contiguous array. rust-numpy's own `as_slice` also accepts
 /// Fortran order, which would arrive transposed.
 pub fn row_major<'a, T: Element>(
     name: &str,
@@ -23,7 +23,7 @@ pub fn row_major<'a, T: Element>(
     Ok((array.as_slice()?, [shape[0], shape[1]]))
 }
 
-/// Return the elements of a C-contiguous array to be written, of any shape.
+/// Return the elements of a C-contiguous array of any shape for writing.
 pub fn whole_mut<'a, T: Element, D: Dimension>(
     name: &str,
     array: &'a mut PyReadwriteArray<'_, T, D>,
@@ -53,7 +53,7 @@ pub fn rows<'a, T: Element, const M: usize>(
     Ok(values.as_chunks().0)
 }
 
-/// Return `(N, M)` array of `N` rows; the memory moves, nothing is copied.
+/// Create an `(N, M)` array from `N` rows; the memory moves, nothing is copied.
 pub fn rows_of<T: Element, const M: usize>(
     py: Python<'_>,
     rows: Vec<[T; M]>,
@@ -62,7 +62,7 @@ pub fn rows_of<T: Element, const M: usize>(
     image_of(py, rows.into_flattened(), shape)
 }
 
-/// Return the array of a shape, of elements in row-major order; the memory moves, nothing is
+/// Create an array of a shape from elements in row-major order; the memory moves, nothing is
 /// copied.
 pub fn image_of<T: Element, D: IntoDimension>(
     py: Python<'_>,

@@ -11,7 +11,8 @@ use crate::{error, house::House};
 /// JSON of the record, stage houses, and reference images (RGB, row by row).
 type Generated<'py> = (String, Vec<String>, Vec<Bound<'py, PyBytes>>);
 
-/// Return the units and errors: `_core.pyi` and `evonav_core::generation::generate_with_overrides`.
+/// Generate a task. Units and errors: `_core.pyi` and
+/// `evonav_core::generation::generate_with_overrides`.
 #[pyfunction]
 #[pyo3(signature = (house, *, seed, label, parameters_json, allow_unknown_assets, given_json="{}"))]
 fn generate_task<'py>(

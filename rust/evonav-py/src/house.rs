@@ -138,7 +138,7 @@ impl House {
             .collect())
     }
 
-    /// Return the position `(x, y, z)`, yaw and horizon of `metadata.agent`.
+    /// Return position `(x, y, z)`, yaw and horizon of `metadata.agent`.
     #[getter]
     fn start(&self) -> Option<((f64, f64, f64), f64, f64)> {
         let start = self.inner.start?;

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 
 use crate::{error, house::House};
 
-/// Return the units and errors: `_core.pyi` and `evonav_core::world::inspection`.
+/// Inspect a house. Units and errors: `_core.pyi` and `evonav_core::world::inspection`.
 #[pyfunction]
 #[pyo3(signature = (source, stage, *, touch_m, rest_m, allow_unknown_assets))]
 fn inspect_house(

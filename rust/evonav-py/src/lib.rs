@@ -1,4 +1,5 @@
-//! Python bindings of `evonav-core`: they convert, release the GIL and map errors, nothing else.
+//! Python bindings of `evonav-core`. They convert arguments, release the GIL and map errors, and do
+//! nothing else.
 
 mod arrays;
 mod camera;

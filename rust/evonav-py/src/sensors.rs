@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 
 use crate::{arrays, error};
 
-/// Return the cells that rays reach: free ones and blocked ones.
+/// Return the visible cells: free ones and blocked ones.
 #[pyfunction]
 #[pyo3(signature = (blocked, *, cell_m, corner_m, origin_m, yaw_rad, horizontal_fov_rad, range_m))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
@@ -41,7 +41,7 @@ fn visible_cells<'py>(
     Ok((arrays::rows_of(py, seen.free)?, arrays::rows_of(py, seen.blocked)?))
 }
 
-/// Return the detections of an instance image: their masks and their instances.
+/// Renumber an instance image; return masks and instances of the detections.
 #[pyfunction]
 #[pyo3(signature = (instances, is_detectable, *, min_area_px, max_box_fraction))]
 #[expect(clippy::type_complexity, reason = "a pair of arrays")]
@@ -62,7 +62,7 @@ fn number_instances<'py>(
     Ok((arrays::image_of(py, masks.labels, shape)?, PyArray1::from_vec(py, instances)))
 }
 
-/// Return the pixels of each instance.
+/// Count the pixels of each instance.
 #[pyfunction]
 fn instance_areas<'py>(
     py: Python<'py>,
@@ -75,7 +75,7 @@ fn instance_areas<'py>(
     Ok(PyArray1::from_vec(py, areas))
 }
 
-/// Return a row a mask: area, left, top, right, bottom.
+/// Return one row per mask: area, left, top, right, bottom.
 #[pyfunction]
 #[pyo3(signature = (masks, *, num_masks))]
 fn mask_extents<'py>(

@@ -22,7 +22,7 @@ use crate::{arrays, error};
 type Cells<'py> = Bound<'py, PyArray2<i32>>;
 type Mask<'py> = Bound<'py, PyArray2<bool>>;
 
-/// UniGoal's map seen from above.
+/// UniGoal's bird's-eye map.
 #[pyclass(module = "evonav._core")]
 struct BevMap(bev_map::BevMap);
 
@@ -263,7 +263,7 @@ fn camera(
     Camera { width_px, height_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad }
 }
 
-/// Return the pixels of an image that must be of a given size.
+/// Return the pixels of an image after checking its size.
 fn image<'a, T: numpy::Element>(
     name: &str,
     array: &'a PyReadonlyArray2<'_, T>,

@@ -1,4 +1,4 @@
-//! What an agent remembers: an occupancy map with frontiers, object entries, and snapshots.
+//! The memory of an agent: an occupancy map with frontiers, object entries, and snapshots.
 
 pub mod frontiers;
 pub mod objects;

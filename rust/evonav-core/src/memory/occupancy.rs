@@ -1,4 +1,4 @@
-//! The agent's occupancy map: what it has seen of the floor so far.
+//! The agent's occupancy map: the floor that it has seen so far.
 
 use crate::{
     Error,
@@ -7,19 +7,19 @@ use crate::{
     sensors::visible_cells::VisibleCells,
 };
 
-/// Value of a cell in [`OccupancyMap::cells`].
+/// Value of an unknown cell in [`OccupancyMap::cells`].
 pub const UNKNOWN: u8 = 0;
-/// Value of a cell in [`OccupancyMap::cells`].
+/// Value of a free cell in [`OccupancyMap::cells`].
 pub const FREE: u8 = 1;
-/// Value of a cell in [`OccupancyMap::cells`].
+/// Value of a blocked cell in [`OccupancyMap::cells`].
 pub const BLOCKED: u8 = 2;
 
-/// Seen cells whose state contradicts the map, `[row, col]`.
+/// Observed cells that contradict the map, `[row, col]`.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Conflicts {
-    /// Remembered blocked, now seen free.
+    /// Cells that were blocked in the map and are now seen free.
     pub freed: Vec<[i32; 2]>,
-    /// Remembered free, now seen blocked.
+    /// Cells that were free in the map and are now seen blocked.
     pub obstructed: Vec<[i32; 2]>,
 }
 
@@ -29,31 +29,33 @@ impl Conflicts {
         self.freed.len() + self.obstructed.len()
     }
 
-    /// Return whether nothing contradicts.
+    /// Return whether there are no contradicting cells.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 }
 
-/// Unknown, free and blocked cells, and which of them were seen from close by (*explored*).
+/// Unknown, free and blocked cells, and the cells that were seen from close by (*explored*).
 ///
-/// Cells are told only by [`OccupancyMap::integrate`]; the last observation of a cell wins. Cells
-/// that [`OccupancyMap::assume_free`] has filled in count as free until seen, and contradict nothing.
+/// Cells are observed only by [`OccupancyMap::integrate`]; the last observation of a cell counts.
+/// Cells that [`OccupancyMap::assume_free`] has filled in are free until they are seen, and
+/// contradict nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OccupancyMap {
     spec: GridSpec,
     free: BitGrid,
     blocked: BitGrid,
     explored: BitGrid,
-    /// Free by assumption, not by sight.
+    /// Cells that are free by assumption, not by observation.
     assumed: BitGrid,
 }
 
 impl OccupancyMap {
-    /// Return a map of unknown cells.
+    /// Create a map of unknown cells.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the grid has no cell, too many, or its place is not finite.
+    /// [`Error::InvalidArgument`] if the grid has no cell, too many cells, or a position that is
+    /// not finite.
     pub fn new(spec: GridSpec) -> Result<Self, Error> {
         Error::require("cell_m", spec.cell_m, "finite and > 0", |v| v.is_finite() && v > 0.0)?;
         for value in spec.corner_m {
@@ -73,7 +75,7 @@ impl OccupancyMap {
         })
     }
 
-    /// Return the shape and place.
+    /// Return the shape and position of the map.
     pub fn spec(&self) -> &GridSpec {
         &self.spec
     }
@@ -93,7 +95,7 @@ impl OccupancyMap {
         &self.explored
     }
 
-    /// Return the seen cells that contradict the map; the map stays as it is.
+    /// Return the observed cells that contradict the map; the map does not change.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a cell is off the grid.
@@ -113,10 +115,10 @@ impl OccupancyMap {
         })
     }
 
-    /// Take over what one view saw, and says what of it contradicted the map.
+    /// Add the cells that one view saw; return those that contradicted the map.
     ///
     /// # Arguments
-    /// * `origin_m` - `[x, z]` from where the cells were seen.
+    /// * `origin_m` - `[x, z]` of the place from which the cells were seen.
     /// * `explored_range_m` - seen cells whose centre is nearer than this become explored.
     ///
     /// # Errors
@@ -150,7 +152,7 @@ impl OccupancyMap {
         Ok(conflicts)
     }
 
-    /// Mark the free cells around a place explored (3D-Mem: 0.7 m around the agent after each
+    /// Mark the free cells around a place as explored (3D-Mem: 0.7 m around the agent after each
     /// move).
     ///
     /// # Errors
@@ -165,8 +167,8 @@ impl OccupancyMap {
         Ok(())
     }
 
-    /// Take the unknown cells around a place for free and explored until they are seen (3D-Mem:
-    /// 0.6 m around the agent's start, which no camera sees).
+    /// Assume that the unknown cells around a place are free and explored until they are seen
+    /// (3D-Mem: 0.6 m around the agent's start, which no camera sees).
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a number is not finite.
@@ -207,7 +209,7 @@ impl OccupancyMap {
         Ok(())
     }
 
-    /// Return a value a cell, row-major: [`UNKNOWN`], [`FREE`] or [`BLOCKED`].
+    /// Return one value per cell, row-major: [`UNKNOWN`], [`FREE`] or [`BLOCKED`].
     pub fn cells(&self) -> Vec<u8> {
         let mut cells = vec![UNKNOWN; self.spec.len()];
         for (plane, value) in [(&self.free, FREE), (&self.blocked, BLOCKED)] {

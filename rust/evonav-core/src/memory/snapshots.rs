@@ -1,4 +1,4 @@
-//! 3D-Mem's snapshots: a few of the stored views that together show every remembered object once.
+//! 3D-Mem's snapshots: a few of the stored views, which together show every remembered object once.
 
 use std::{
     cmp::Reverse,
@@ -7,26 +7,26 @@ use std::{
 
 use crate::{Error, rng::Stream};
 
-/// Starts of 2-means, of which the tightest result counts.
+/// Number of starts of 2-means; the tightest result is used.
 const NUM_STARTS: usize = 10;
-/// Of 2-means' starts.
+/// Seed of the starts of 2-means.
 const SEED: u64 = 66;
-/// Rounds of Lloyd's algorithm, at most.
+/// Largest number of rounds of Lloyd's algorithm.
 const MAX_ROUNDS: usize = 300;
 
 /// A remembered object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Located {
-    /// Of its entry.
+    /// Id of its entry.
     pub id: u64,
-    /// `[x, z]` of its middle, world frame.
+    /// Centre, `[x, z]`, world frame.
     pub centre_m: [f64; 2],
 }
 
-/// A stored view, as what was seen in it.
+/// The detections in a stored view.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Frame {
-    /// Ids of entries, each with its detection's confidence.
+    /// Ids of entries, each with the confidence of its detection.
     pub seen: Vec<(u64, f64)>,
 }
 
@@ -36,32 +36,34 @@ impl Frame {
     }
 }
 
-/// A frame, and the objects that it stands for.
+/// A frame, and the objects that it represents.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Snapshot {
     /// Index of the frame.
     pub frame: usize,
-    /// Ids of its cluster, never empty; its frame shows all of them.
+    /// Ids of the cluster's objects, never empty; the frame shows all of them.
     pub objects: Vec<u64>,
 }
 
-/// Bring snapshots up to date with what was seen since: co-visibility clustering.
+/// Update snapshots by co-visibility clustering.
 ///
-/// Objects in no snapshot, those near the agent, and all that share a snapshot with one of them are clustered anew;
-/// other snapshots stay. Clusters are found by bisection: the group with the most objects (the older one of two as
-/// large) becomes a cluster if some frame shows all of it, else 2-means splits it. Of several such frames one that was
-/// chosen before in this call is taken first, then the one that shows most objects, then the one with the largest sum
-/// of confidences, then the oldest. A cluster whose frame is a snapshot already is appended to it.
+/// Objects in no snapshot, objects near the agent, and all objects that share a snapshot with one
+/// of them are clustered anew; other snapshots stay. Clusters are found by bisection: the group
+/// with the most objects (of equals the older one) becomes a cluster if some frame shows all of it;
+/// otherwise 2-means splits it. Of several such frames, one that was chosen before in this call is
+/// preferred, then the one that shows the most objects, then the one with the largest sum of
+/// confidences, then the oldest. A cluster whose frame is already a snapshot is appended to it.
 ///
 /// # Arguments
-/// * `objects` - everything remembered, each id once.
-/// * `frames` - oldest first.
-/// * `snapshots` - as they were; what is not remembered any more, or not in their frame, drops out.
-/// * `agent_m` - `[x, z]`, world frame.
-/// * `reach_m` - objects whose middle is nearer than this are clustered anew (3D-Mem: 4.0 m).
+/// * `objects` - all remembered objects, each id once.
+/// * `frames` - stored views, oldest first.
+/// * `snapshots` - the previous snapshots; objects that are no longer remembered, or not in their
+///   frame, are removed.
+/// * `agent_m` - position of the agent, `[x, z]`, world frame.
+/// * `reach_m` - distance within which objects are clustered anew (3D-Mem: 4.0 m).
 ///
 /// # Returns
-/// Snapshots by ascending frame. Every object that some frame shows is in exactly one.
+/// Snapshots by ascending frame. Every object that some frame shows is in exactly one of them.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if a position is not finite, an id occurs twice, or a snapshot's frame does not exist.
@@ -79,12 +81,12 @@ pub fn update_snapshots(
     reach_m: f64,
 ) -> Result<Vec<Snapshot>, Error> {
     let centres = check(objects, frames, snapshots, agent_m, reach_m)?;
-    let mut kept: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
+    let mut clusters_by_frame: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
     let mut unowned: BTreeSet<u64> = centres.keys().copied().collect();
     for snapshot in snapshots {
         for &id in &snapshot.objects {
             if frames[snapshot.frame].shows(id) && unowned.remove(&id) {
-                kept.entry(snapshot.frame).or_default().push(id);
+                clusters_by_frame.entry(snapshot.frame).or_default().push(id);
             }
         }
     }
@@ -93,7 +95,7 @@ pub fn update_snapshots(
         (x - agent_m[0]).hypot(z - agent_m[1]) < reach_m
     };
     let mut input = unowned;
-    kept.retain(|_, cluster| {
+    clusters_by_frame.retain(|_, cluster| {
         let is_dissolved = cluster.iter().any(is_near);
         if is_dissolved {
             input.extend(cluster.iter().copied());
@@ -103,9 +105,9 @@ pub fn update_snapshots(
     let input: Vec<Located> =
         input.into_iter().map(|id| Located { id, centre_m: centres[&id] }).collect();
     for (frame, cluster) in clusters(&input, frames) {
-        kept.entry(frame).or_default().extend(cluster);
+        clusters_by_frame.entry(frame).or_default().extend(cluster);
     }
-    Ok(kept.into_iter().map(|(frame, objects)| Snapshot { frame, objects }).collect())
+    Ok(clusters_by_frame.into_iter().map(|(frame, objects)| Snapshot { frame, objects }).collect())
 }
 
 fn check(
@@ -134,7 +136,8 @@ fn check(
     Ok(centres)
 }
 
-/// Group of objects, each with a frame that shows all of it. What no frame shows is left out.
+/// Group objects into clusters, each with a frame that shows all of it. Objects that no frame shows
+/// are left out.
 fn clusters(objects: &[Located], frames: &[Frame]) -> Vec<(usize, Vec<u64>)> {
     let sets = FrameSets::new(objects, frames);
     let mut is_chosen = vec![false; frames.len()];
@@ -157,12 +160,12 @@ fn clusters(objects: &[Located], frames: &[Frame]) -> Vec<(usize, Vec<u64>)> {
     found
 }
 
-/// Which of the objects at hand each frame shows, a bit an object.
+/// The objects that each frame shows, one bit per object.
 struct FrameSets {
     num_words: usize,
-    /// Frames that show any, by index.
+    /// Frames that show any object, by index.
     frames: Vec<(usize, Vec<u64>)>,
-    /// Length of each frame's full list, and sum of its confidences.
+    /// Number of detections of each frame, and sum of their confidences.
     ranks: Vec<(usize, f64)>,
 }
 
@@ -173,23 +176,23 @@ impl FrameSets {
         let num_words = objects.len().div_ceil(64);
         let mut sets = Vec::new();
         for (index, frame) in frames.iter().enumerate() {
-            let mut words = vec![0_u64; num_words];
+            let mut bits = vec![0_u64; num_words];
             for bit in frame.seen.iter().filter_map(|(id, _)| bit_of.get(id)) {
-                words[bit / 64] |= 1 << (bit % 64);
+                bits[bit / 64] |= 1 << (bit % 64);
             }
-            if words.iter().any(|&word| word != 0) {
-                sets.push((index, words));
+            if bits.iter().any(|&word| word != 0) {
+                sets.push((index, bits));
             }
         }
         let rank = |frame: &Frame| {
-            // Anything that is no number must not upset the order.
+            // Values that are not finite must not break the order.
             let sum: f64 = frame.seen.iter().map(|&(_, c)| c).filter(|c| c.is_finite()).sum();
             (frame.seen.len(), sum)
         };
         Self { num_words, frames: sets, ranks: frames.iter().map(rank).collect() }
     }
 
-    /// Return the frame to stand for a group, if one shows all of it.
+    /// Return the best frame for a group, if any frame shows all of it.
     fn best(&self, group: &[usize], is_chosen: &[bool]) -> Option<usize> {
         let mut wanted = vec![0_u64; self.num_words];
         group.iter().for_each(|bit| wanted[bit / 64] |= 1 << (bit % 64));
@@ -208,17 +211,17 @@ impl FrameSets {
     }
 }
 
-/// Split points in two by 2-means: the tightest of ten results of Lloyd's algorithm.
+/// Split points in two by 2-means, using the tightest of ten results of Lloyd's algorithm.
 ///
-/// Starts are drawn as k-means++ does (Arthur & Vassilvitskii, SODA 2007), with a seed of their own, so that the same
-/// points are split alike wherever they come up.
+/// Starts are drawn as in k-means++ (Arthur & Vassilvitskii, SODA 2007) with a fixed seed, so that
+/// the same points are always split in the same way.
 ///
 /// # Arguments
-/// * `points_m` - `[x, z]`, finite.
+/// * `points_m` - points `[x, z]`, finite.
 ///
 /// # Returns
-/// Whether each point belongs to the second part. No part of two or more points is empty; points that are all in one
-/// place are halved in their order.
+/// Whether each point belongs to the second part. With two or more points no part is empty; points
+/// that are all at one place are halved in their order.
 pub fn two_means(points_m: &[[f64; 2]]) -> Vec<bool> {
     let mut stream = Stream::new(SEED, &["snapshots", "2-means"]);
     let mut best: Option<(f64, Vec<bool>)> = None;
@@ -238,7 +241,8 @@ pub fn two_means(points_m: &[[f64; 2]]) -> Vec<bool> {
     )
 }
 
-/// Return the sum of squared distances to the means, and whether each point belongs to the second.
+/// Run Lloyd's algorithm; return the sum of squared distances to the means, and whether each point
+/// belongs to the second.
 fn lloyd(points_m: &[[f64; 2]], mut means_m: [[f64; 2]; 2]) -> (f64, Vec<bool>) {
     let mut is_second = Vec::new();
     for _ in 0..MAX_ROUNDS {

@@ -1,34 +1,35 @@
-//! Errors of a depth camera, simulated.
+//! Simulate the errors of a depth camera.
 
 use crate::{Error, rng::Stream};
 
-/// How a depth camera errs; all zero and an infinite reach: not at all.
+/// The errors of a depth camera. With zeros and an infinite `max_depth_m` there are none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthNoise {
-    /// Standard deviation along the optical axis at no distance, metres.
+    /// Standard deviation along the optical axis at distance 0, metres.
     pub sigma_m: f64,
-    /// What it grows by with the square of the distance, 1/metre: disparity is what is measured.
+    /// Growth of the standard deviation with the square of the distance, 1/metre; such a camera
+    /// measures disparity.
     pub sigma_per_m: f64,
-    /// Step between two values that can be told apart, over the square of the distance, 1/metre.
+    /// Step between two distinguishable values, over the square of the distance, 1/metre.
     pub step_per_m: f64,
     /// Share of pixels without a value.
     pub dropout: f64,
     /// Share of pixels at edges without a value.
     pub edge_dropout: f64,
-    /// Planar depth beyond which there are no values, metres.
+    /// Largest planar depth that has a value, metres.
     pub max_depth_m: f64,
 }
 
-/// A pixel is at an edge if a neighbour's depth differs by more than this share of the nearer one.
+/// Share of the nearer depth by which neighbouring depths must differ at an edge.
 const EDGE_SHARE: f64 = 0.1;
-/// No value is nearer, whatever the noise.
+/// Smallest value, whatever the noise.
 const MIN_DEPTH_M: f64 = 0.01;
 
 impl DepthNoise {
     /// Check the parameters.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] naming the one outside its domain.
+    /// [`Error::InvalidArgument`] naming the first one outside its domain.
     pub fn check(&self) -> Result<(), Error> {
         let is_size = |v: f64| v.is_finite() && v >= 0.0;
         for (name, value) in [
@@ -45,14 +46,15 @@ impl DepthNoise {
     }
 }
 
-/// Return a depth image as a camera that errs would give it.
+/// Add a camera's errors to a depth image.
 ///
-/// Each pixel errs on its own: axial noise, then rounding to the nearest step. The noise is a sum
-/// of four uniform numbers (Irwin-Hall), which has no tail beyond 3.5 standard deviations.
+/// Pixels are independent: each gets axial noise and is then rounded to the nearest step. The noise
+/// is a sum of four uniform numbers (Irwin-Hall), which has no tail beyond 3.5 standard deviations.
 ///
 /// # Arguments
-/// * `depth_m` - row-major, `width_px` a row; infinite or not positive where there is none.
-/// * `stream` - what is random depends on it and on a pixel's index alone.
+/// * `depth_m` - row-major, `width_px` per row; infinite or not positive where there is none.
+/// * `stream` - source of randomness; the noise of a pixel depends only on it and on the pixel's
+///   index.
 ///
 /// # Returns
 /// The image, infinite where there is no value.
@@ -104,14 +106,14 @@ pub fn noisy_depth(
         if step_m > 0.0 {
             value_m = (value_m / step_m + 0.5) as i64 as f64 * step_m; // rounds what is positive
         }
-        // Untouched values stay the same to the bit.
+        // Values without noise stay exactly the same.
         let is_same = sigma_m == 0.0 && step_m == 0.0;
         found.push(if is_same { depth } else { value_m.max(MIN_DEPTH_M) as f32 });
     }
     Ok(found)
 }
 
-/// Return the four 12-bit uniform numbers, added and brought to mean 0 and deviation 1.
+/// Return the sum of four 12-bit uniform numbers, normalised to mean 0 and deviation 1.
 fn irwin_hall(bits: u64) -> f64 {
     let sum: u64 = (0..4).map(|part| (bits >> (12 * part)) & 0xfff).sum();
     let uniform_sum = (sum as f64 + 2.0) / 4096.0; // each taken at the middle of its step

@@ -1,51 +1,51 @@
-//! False detections: places on surfaces where something is seen that is not there.
+//! False detections: sites on surfaces where something is detected that does not exist.
 
 use crate::{Error, rng::Stream, sensors::camera::Camera};
 
-/// A place on a surface in view where something may be seen that is not there.
+/// A site on a surface in view where something may be detected that does not exist.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Site {
-    /// Row and column of the pixel nearest to the middle of the place.
+    /// Row and column of the pixel nearest to the middle of the site.
     pub pixel: [usize; 2],
-    /// Its planar depth, metres.
+    /// Planar depth of the pixel, metres.
     pub depth_m: f64,
-    /// Standard normal: the lower, the sooner something is seen here.
+    /// Standard normal number: the lower it is, the more likely is a false detection here.
     pub latent: f64,
-    /// Uniform in 0..1, the same in every view of the place: what is seen, and how large.
+    /// Uniform numbers in 0..1, the same in every view of the site, for category and size.
     pub what: [f64; 2],
-    /// Standard normal, of this view alone.
+    /// Standard normal number of this view alone.
     pub how: f64,
 }
 
-/// How places err: what lasts, and what is a view's.
+/// Parameters of sites and the sources of their randomness.
 #[derive(Debug, Clone)]
 pub struct SiteNoise {
-    /// Edge of the places, which are cells of a grid in the world, metres.
+    /// Edge length of the sites, which are cells of a grid in the world, metres.
     pub cell_m: f64,
-    /// Rows and columns between the pixels that are looked at.
+    /// Spacing of the pixels that are sampled, along rows and columns.
     pub stride_px: usize,
-    /// Correlation of a place's latents in two views, 0 to 1.
+    /// Correlation of a site's latents in two views, 0 to 1.
     pub persistence: f64,
-    /// What lasts is drawn from here, by place.
+    /// Source of the numbers that are the same in every view, by site.
     pub lasting: Stream,
-    /// What does not is drawn from here, by place.
+    /// Source of the numbers of one view, by site.
     pub passing: Stream,
 }
 
-/// Place on the surfaces in view, with what is random of each: it depends on streams and place
-/// alone, so that what is seen by mistake is seen there again.
+/// Find the sites on the surfaces in view and draw their random numbers. These depend only on the
+/// streams and the site, so that a false detection occurs again at the same site.
 ///
 /// # Arguments
-/// * `depth_m` - of the camera's image.
+/// * `depth_m` - depth image of the camera.
 ///
 /// # Returns
-/// Sites by cell.
+/// Sites in the order of their cells.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if the image's size is not the camera's, or a parameter is outside its domain.
 ///
 /// # Complexity
-/// O(n log n) in the pixels that are looked at.
+/// O(n log n) for n sampled pixels.
 pub fn surface_sites(
     depth_m: &[f32],
     camera: &Camera,
@@ -62,7 +62,7 @@ pub fn surface_sites(
     for row in (noise.stride_px / 2..camera.height_px).step_by(noise.stride_px) {
         for col in (noise.stride_px / 2..camera.width_px).step_by(noise.stride_px) {
             let depth = f64::from(depth_m[row * camera.width_px + col]);
-            // Beyond what houses are, cells would not fit their numbers.
+            // Far beyond the size of houses, cell indices would overflow.
             if !(depth > 0.0 && depth < 1e4) {
                 continue;
             }
@@ -95,17 +95,17 @@ pub fn surface_sites(
 pub struct Blob {
     /// Row and column of its middle pixel.
     pub pixel: [usize; 2],
-    /// Half its height and half its width, pixels.
+    /// Half the height and half the width, pixels.
     pub radii_px: [f64; 2],
-    /// Number that its pixels get.
+    /// Number written to its pixels.
     pub number: i32,
 }
 
-/// Paint blobs, one after another, each over the pixels of its surface alone: those with the same
+/// Paint blobs, one after another. Each covers only pixels of its own surface: those with the same
 /// value in `surfaces` as its middle.
 ///
 /// # Arguments
-/// * `masks` - row-major, `width_px` a row; changed.
+/// * `masks` - row-major, `width_px` per row; modified.
 /// * `surfaces` - instance of each pixel.
 ///
 /// # Errors

@@ -1,14 +1,14 @@
-//! Masks as a detector that errs gives them: cut, split, too small or too large.
+//! Distort masks as an imperfect detector does: cut, split, too small or too large.
 
 use crate::{Error, perception::mask_image::MaskImage};
 
-/// Largest margin that a mask may gain or lose.
+/// Largest margin by which a mask may grow or shrink.
 pub const MAX_MARGIN_PX: f64 = 32.0;
 
-/// What becomes of a mask.
+/// The changes of one mask.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaskChange {
-    /// Its number afterwards; negative if it is not detected.
+    /// Number of the mask afterwards; negative if it is not detected.
     pub becomes: i32,
     /// Number of the part at or past `split_px`; the same as `becomes` if it stays in one piece.
     pub rest_becomes: i32,
@@ -16,14 +16,15 @@ pub struct MaskChange {
     pub is_split_by_col: bool,
     /// First column, or row, of the rest.
     pub split_px: i32,
-    /// Pixels that it gains beyond its outline, over whatever is there, or loses within it if negative.
+    /// Margin by which it grows over its surroundings, or shrinks if negative.
     pub margin_px: f64,
-    /// Rows and columns `[top, left, bottom, right]` that it is cut to, the last two one past the end.
+    /// Rows and columns `[top, left, bottom, right]` to which it is cut; the last two are one past
+    /// the end.
     pub crop_px: [i32; 4],
 }
 
 impl MaskChange {
-    /// Return no change, but for the number.
+    /// Create a change of nothing but the number.
     pub fn renamed(number: i32) -> Self {
         Self {
             becomes: number,
@@ -36,18 +37,19 @@ impl MaskChange {
     }
 }
 
-/// Return the masks as a detector that errs would give them.
+/// Apply changes to masks.
 ///
-/// A pixel is lost to a mask that shrinks if a pixel outside of the mask (the image's border is
-/// none) is within its margin, centre to centre. A pixel is gained by the mask that grows and has
-/// the nearest pixel within its margin, the lower number among equals. Then masks are cut and renamed.
+/// A shrinking mask loses a pixel if a pixel outside of the mask is within its margin, centre to
+/// centre; the image's border does not count as outside. A pixel is gained by the growing mask that
+/// has the nearest pixel within its margin, of equals the one with the lower number. Then masks are
+/// cut and renumbered.
 ///
 /// # Arguments
-/// * `masks` - row-major, `width_px` a row; negative where nothing is.
-/// * `changes` - by mask.
+/// * `masks` - row-major, `width_px` per row; negative where nothing is.
+/// * `changes` - the change of each mask.
 ///
 /// # Returns
-/// The image afterwards, -1 where nothing is.
+/// The changed image, -1 where nothing is.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if the image is not whole rows or holds a number without a change,
@@ -68,12 +70,13 @@ pub fn distort_masks(
     }
     let change_of = |mask: i32| usize::try_from(mask).ok().and_then(|mask| changes.get(mask));
     let mut found = masks.to_vec();
-    // Squared distance to the pixel that a gained pixel was gained from.
+    // Squared distance to the pixel from which each gained pixel was gained.
     let mut from = vec![u32::MAX; masks.len()];
     let has_margins = changes.iter().any(|change| change.margin_px != 0.0);
     for index in outline_px(masks, width_px).filter(|_| has_margins) {
         let mask = masks[index];
-        // Of a pixel outside: what the masks beside it lose to it. Losing twice is losing once.
+        // Masks beside a pixel outside of them lose pixels to it. A pixel that is lost twice is
+        // lost once.
         for other in image.beside(index).into_iter().flatten() {
             let loser = masks[other];
             let Some(change) = change_of(loser).filter(|c| loser != mask && c.margin_px < 0.0)
@@ -86,13 +89,13 @@ pub fn distort_masks(
                 }
             });
         }
-        // Of a pixel on an outline: what its mask gains.
+        // A growing mask gains pixels around each pixel of its outline.
         let Some(change) = change_of(mask).filter(|c| c.becomes >= 0 && c.margin_px > 0.0) else {
             continue;
         };
         image.around(index, change.margin_px, |near, square| {
-            let held = if from[near] == u32::MAX { i32::MAX } else { found[near] };
-            if masks[near] != mask && (square, mask) < (from[near], held) {
+            let gained_by = if from[near] == u32::MAX { i32::MAX } else { found[near] };
+            if masks[near] != mask && (square, mask) < (from[near], gained_by) {
                 (from[near], found[near]) = (square, mask);
             }
         });
@@ -112,17 +115,17 @@ pub fn distort_masks(
             let split_col = if change.is_split_by_col { change.split_px } else { i32::MAX };
             let is_in = (top..bottom).contains(&row);
             for (col, pixel) in (first..end).zip(run) {
-                let is_kept = is_in && (left..right).contains(&col);
+                let is_inside = is_in && (left..right).contains(&col);
                 let is_first = !is_rest && col < split_col;
                 let number = if is_first { change.becomes } else { change.rest_becomes };
-                *pixel = if is_kept { number.max(-1) } else { -1 };
+                *pixel = if is_inside { number.max(-1) } else { -1 };
             }
         }
     }
     Ok(found)
 }
 
-/// Return the pixels with a pixel of something else beside them, above or below.
+/// Return the pixels that have a different pixel beside, above or below them.
 fn outline_px(masks: &[i32], width_px: usize) -> impl Iterator<Item = usize> {
     (0..masks.len()).step_by(width_px).flat_map(move |start| {
         let row = &masks[start..start + width_px];

@@ -1,8 +1,8 @@
-//! A checked image of masks.
+//! Images of masks: validation and neighbouring pixels.
 
 use crate::{Error, sensors::instance_masks::runs};
 
-/// A checked image of masks.
+/// The size of a validated image of masks.
 pub(super) struct MaskImage {
     width_px: usize,
     height_px: usize,
@@ -32,7 +32,7 @@ impl MaskImage {
         ]
     }
 
-    /// Call back with each pixel within a radius, and its squared distance.
+    /// Call `call` with each pixel within a radius and its squared distance.
     pub fn around(&self, index: usize, radius_px: f64, mut call: impl FnMut(usize, u32)) {
         let (row, col) = (index / self.width_px, index % self.width_px);
         let reach = radius_px as usize;

@@ -1,28 +1,29 @@
-//! Outlines of masks, and how much of them is cut by something nearer.
+//! Measure the outlines of masks, and how much of them is cut by nearer surfaces.
 
 use crate::{Error, perception::mask_image::MaskImage};
 
-/// A mask's outline against the depth around it.
+/// The outline of a mask compared with the depth around it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outline {
-    /// Sides of its pixels with no pixel of the mask on the other side.
+    /// Number of sides of its pixels with no pixel of the mask on the other side.
     pub num_sides: usize,
-    /// Those of them where it is not its own: something nearer begins there, or the image ends.
+    /// Number of those sides where the outline is cut: something nearer begins there, or the image
+    /// ends.
     pub num_cut: usize,
     /// Mean planar depth of its pixels that have one, metres; infinite if none has.
     pub mean_depth_m: f64,
 }
 
-/// Return the outline of each mask, and how much of it is cut by something nearer or by the image's
-/// border: a cheap sign of occlusion that needs no second rendering and no box.
+/// Measure the outline of each mask, and how much of it is cut by something nearer or by the
+/// image's border. This is a cheap indication of occlusion that needs no second rendering.
 ///
-/// Something is nearer if its depth is less by more than 5 cm and 5% of the mask's own; what an
-/// object stands on, and meets at its foot, is not.
+/// Something is nearer if its depth is smaller by more than 5 cm and 5% of the mask's own. The
+/// surface on which an object stands is not nearer where they meet.
 ///
 /// # Arguments
-/// * `masks` - row-major, `width_px` a row; negative where nothing is.
-/// * `depth_m` - of the same pixels.
-/// * `num_masks` - masks count from 0 to one less.
+/// * `masks` - row-major, `width_px` per row; negative where nothing is.
+/// * `depth_m` - depth of the same pixels.
+/// * `num_masks` - masks are numbered from 0 to one less than this.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if the images differ in size, are not whole rows, or hold a larger number.

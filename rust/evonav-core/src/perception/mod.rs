@@ -1,4 +1,4 @@
-//! What stands between a rendered frame and an agent: simulated errors, and a small detector.
+//! Perception between a rendered frame and an agent: simulated errors, and a small detector.
 
 pub mod depth_noise;
 pub mod false_detections;

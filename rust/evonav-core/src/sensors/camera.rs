@@ -1,11 +1,11 @@
-//! The pinhole camera: AI2-THOR's, square pixels, no distortion.
+//! The pinhole camera of AI2-THOR: square pixels, no distortion.
 
 use crate::{
     Error,
     geometry::{Mat3, Pose, Vec2, Vec3, add, rotate, sub},
 };
 
-/// Most pixels an image may have along a side.
+/// Largest number of pixels along a side of an image.
 pub const MAX_SIDE_PX: usize = 8192;
 
 /// A pinhole camera somewhere in the world.
@@ -38,16 +38,15 @@ pub struct Camera {
     pub vertical_fov_rad: f64,
     /// Optical centre, world frame.
     pub position_m: Vec3,
-    /// 0 along +z, growing towards +x.
+    /// Heading: 0 along +z, growing towards +x.
     pub yaw_rad: f64,
     /// Pitch; positive looks down.
     pub horizon_rad: f64,
 }
 
 impl Camera {
-    /// Return the camera of an agent: above `pose`, `height_m` over the floor (houses have one
-    /// floor, at y = 0, so the pose's own height, 0.9 m in AI2-THOR and 0 elsewhere, does not
-    /// matter).
+    /// Create the camera of an agent at `pose`, `height_m` over the floor. Houses have one floor,
+    /// at y = 0, so the pose's own height, 0.9 m in AI2-THOR and 0 elsewhere, does not matter.
     pub fn at(pose: &Pose, image_px: [usize; 2], vertical_fov_rad: f64, height_m: f64) -> Self {
         let [x, _, z] = pose.position_m;
         Self {
@@ -89,7 +88,8 @@ impl Camera {
         [self.width_px as f64 / 2.0, self.height_px as f64 / 2.0]
     }
 
-    /// Return the rows are the camera's right, down and forward axes in the world frame.
+    /// Return the rotation from world to camera; its rows are the camera's right, down and forward
+    /// axes in the world frame.
     pub fn camera_from_world(&self) -> Mat3 {
         let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
         let (sin_pitch, cos_pitch) = self.horizon_rad.sin_cos();
@@ -100,7 +100,7 @@ impl Camera {
         ]
     }
 
-    /// Return `[u, v, depth_m]` of a world point: image coordinates in pixels and planar depth.
+    /// Project a world point to `[u, v, depth_m]`: image coordinates in pixels and planar depth.
     ///
     /// # Returns
     /// `None` for points that are not in front of the camera; the image's borders are not checked.
@@ -111,13 +111,13 @@ impl Camera {
         (z > 0.0).then_some([centre_u + scale * x, centre_v + scale * y, z])
     }
 
-    /// Return the world point at planar depth `depth_m` behind image coordinates `[u, v]`; a
-    /// pixel's own are `[col + 0.5, row + 0.5]`. The inverse of [`Self::project`].
+    /// Return the world point at planar depth `depth_m` behind image coordinates `[u, v]`: the
+    /// inverse of [`Self::project`]. The coordinates of a pixel are `[col + 0.5, row + 0.5]`.
     pub fn unproject(&self, image_px: Vec2, depth_m: f64) -> Vec3 {
         add(self.position_m, self.ray(image_px).map(|d| d * depth_m))
     }
 
-    /// Return the world points behind a whole depth image, row-major; not finite where its depth is
+    /// Return the world points behind a whole depth image, row-major; not finite where the depth is
     /// not.
     ///
     /// # Errors
@@ -132,7 +132,7 @@ impl Camera {
         Ok(points.map(|(i, &depth)| self.unproject(centre(i), f64::from(depth))).collect())
     }
 
-    /// Return [`Self::project`] of many points; NaN for those that are not in front of the camera.
+    /// Project many points as [`Self::project`]; NaN for those that are not in front of the camera.
     ///
     /// # Errors
     /// As [`Self::check`].
@@ -154,15 +154,15 @@ impl Camera {
 /// AI2-THOR's clip planes ("cameraNearPlane", "cameraFarPlane" of its `Initialize`).
 pub const CLIP_M: [f64; 2] = [0.1, 20.0];
 
-/// What a renderer draws: a camera, and what Unity's cameras have besides.
+/// The view that a renderer draws: a camera with the additional properties of Unity's cameras.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// Size, place and direction; its field of view is not used by an orthographic view.
+    /// Size, position and direction. An orthographic view does not use the field of view.
     pub camera: Camera,
     /// Planar depths `[near, far]` between which surfaces are drawn.
     pub clip_m: Vec2,
-    /// Turn about the optical axis, before all others: Unity's z rotation, which turns the image's
-    /// right side up.
+    /// Turn about the optical axis, applied before all others: Unity's z rotation, which turns the
+    /// right side of the image up.
     pub roll_rad: f64,
     /// Half of the image's height in the world for an orthographic view (Unity's
     /// `orthographicSize`); `None` for a perspective one.
@@ -198,7 +198,8 @@ impl View {
         )
     }
 
-    /// Return the rows are the image's right, down and forward axes in the world frame.
+    /// Return the rotation from world to image; its rows are the image's right, down and forward
+    /// axes in the world frame.
     pub fn axes(&self) -> Mat3 {
         let [right, down, forward] = self.camera.camera_from_world();
         let (sin, cos) = self.roll_rad.sin_cos();

@@ -1,17 +1,17 @@
-//! Ground-truth perception: the simulator's instance image as anonymous detections.
+//! Instance images of the simulator as anonymous detections.
 
 use crate::Error;
 
-/// What counts as a detection.
+/// The smallest and largest masks that count as detections.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaskFilter {
-    /// Fewest pixels of a mask.
+    /// Smallest number of pixels of a mask.
     pub min_area_px: usize,
-    /// Largest part of the image that a mask's bounding box may cover.
+    /// Largest share of the image that a mask's bounding box may cover.
     pub max_box_fraction: f64,
 }
 
-/// An instance image renumbered.
+/// A renumbered instance image.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Masks {
     /// Detection of each pixel, -1 where none.
@@ -20,12 +20,12 @@ pub struct Masks {
     pub instances: Vec<usize>,
 }
 
-/// Renumber an instance image: detections count up in the order of their first pixel, so their
-/// numbers say nothing about which instance they are.
+/// Renumber an instance image. Detections are numbered in the order of their first pixel, so their
+/// numbers do not reveal the instances.
 ///
 /// # Arguments
 /// * `image` - row-major, `width_px` a row; 0 where nothing is, else 1 + index into `is_detectable`.
-/// * `is_detectable` - by instance, whether it may be detected (walls may not).
+/// * `is_detectable` - whether each instance may be detected (walls may not).
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if the image is not whole rows, holds a number outside the table, or the filter is not a number.
@@ -82,20 +82,20 @@ pub fn number_instances(
     Ok(Masks { labels, instances: order })
 }
 
-/// Return how many pixels each instance has: what an evaluator takes for in view.
+/// Count the pixels of each instance, by which an evaluator decides what is in view.
 ///
 /// # Arguments
 /// * `image` - 0 where nothing is, else 1 + index of the instance.
-/// * `num_instances` - in the caller's table.
+/// * `num_instances` - number of instances in the caller's table.
 ///
 /// # Returns
-/// Pixels, by instance.
+/// Number of pixels by instance.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if the image holds a number outside the table.
 ///
 /// # Complexity
-/// O(pixels), one pass; a run of equal pixels is added at once.
+/// O(pixels), one pass; a run of equal pixels is added in one step.
 pub fn instance_areas(image: &[i32], num_instances: usize) -> Result<Vec<i64>, Error> {
     let mut areas = vec![0; num_instances + 1];
     for run in image.chunk_by(|a, b| a == b) {
@@ -113,7 +113,7 @@ pub fn instance_areas(image: &[i32], num_instances: usize) -> Result<Vec<i64>, E
 ///
 /// # Arguments
 /// * `masks` - row-major, `width_px` a row; negative where nothing is.
-/// * `num_masks` - masks count from 0 to one less.
+/// * `num_masks` - masks are numbered from 0 to one less than this.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if the image is not whole rows, or holds a larger number.
@@ -141,7 +141,7 @@ pub fn mask_extents(
     Ok(extents)
 }
 
-/// Return the stretches of equal pixels, each with the place of its first and one past its last.
+/// Return the runs of equal pixels: value, index of the first pixel, and index after the last.
 pub(crate) fn runs(pixels: &[i32]) -> impl Iterator<Item = (i32, [usize; 2])> {
     let mut end = 0;
     pixels.chunk_by(|a, b| a == b).map(move |run| {
@@ -165,7 +165,7 @@ pub struct Extent {
 impl Extent {
     const EMPTY: Self = Self { area_px: 0, rows: [0; 2], cols: [0; 2] };
 
-    /// Add part of a row that is no higher than those before.
+    /// Add part of a row; rows must come in ascending order.
     fn add(&mut self, row: usize, cols: [usize; 2]) {
         *self = if self.area_px == 0 {
             Self { area_px: cols[1] - cols[0], rows: [row, row + 1], cols }

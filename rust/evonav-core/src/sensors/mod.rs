@@ -1,4 +1,4 @@
-//! What a camera at a pose perceives.
+//! Cameras and what they perceive: images, rays, visible cells and bodies, masks and points.
 
 pub mod camera;
 pub mod instance_masks;

@@ -1,4 +1,5 @@
-//! Single rays through a scene: line of sight and picking. Whole images are [`crate::sensors::raster`]'s.
+//! Cast single rays through a scene, for line of sight and picking; [`crate::sensors::raster`]
+//! draws whole images.
 
 use parry3d_f64::{
     bounding_volume::Aabb,
@@ -12,7 +13,7 @@ use crate::{
     world::mesh::{Face, SceneMesh, dot},
 };
 
-/// How far outside of an edge a ray still hits: neighbours leave no gap between them.
+/// Distance outside of an edge at which a ray still hits, so that neighbouring faces leave no gap.
 const EDGE_M: f64 = 1e-9;
 
 /// A bounding volume hierarchy over the parts of a mesh.
@@ -21,10 +22,10 @@ pub struct RayCaster {
     bvh: Bvh,
 }
 
-/// Where a ray ends.
+/// The surface that a ray meets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Multiple of the ray's direction.
+    /// Distance as a multiple of the ray's direction.
     pub distance: f64,
     /// Index of the body in the scene.
     pub body: usize,
@@ -42,10 +43,10 @@ impl RayCaster {
         Self { bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes) }
     }
 
-    /// Return the first surface that a ray meets, within `max_distance` multiples of `direction`.
+    /// Find the first surface that a ray meets within `max_distance` multiples of `direction`.
     ///
-    /// As in images, faces are seen from outside only: a ray that starts inside a part leaves it
-    /// unhindered.
+    /// As in images, faces are visible only from outside: a ray that starts inside a part leaves it
+    /// without a hit.
     ///
     /// # Returns
     /// `None` if nothing is met, or a number is not finite.
@@ -73,9 +74,8 @@ impl RayCaster {
         Some(Hit { distance, body: mesh.parts[part as usize].body as usize })
     }
 
-    /// Return whether nothing stands between two points, bodies for which `ignores` holds left
-    /// aside (an object is not in the way of a look at itself). Points that are not finite see
-    /// nothing.
+    /// Return whether nothing is between two points. Bodies for which `ignores` is true do not
+    /// count: an object does not hide itself. The result is false for points that are not finite.
     pub fn is_visible(
         &self,
         mesh: &SceneMesh,
@@ -98,7 +98,7 @@ impl RayCaster {
     }
 }
 
-/// Return where a ray enters a part, if nearer than `nearest`.
+/// Return the distance at which a ray enters a part, if it is less than `nearest`.
 fn enter(
     mesh: &SceneMesh,
     part: usize,
@@ -111,7 +111,7 @@ fn enter(
     let distance_to = |face: &Face| {
         let slope = dot(face.normal, direction);
         let distance = (face.offset_m - dot(face.normal, origin_m)) / slope;
-        // `slope` is negative where the ray runs into the face.
+        // `slope` is negative if the ray runs into the face.
         let is_ahead = slope < 0.0 && distance >= 0.0 && distance < nearest;
         let point_m = add(origin_m, direction.map(|d| d * distance));
         (is_ahead && contains(mesh.corners_of(face), vertices_m, face.normal, point_m))

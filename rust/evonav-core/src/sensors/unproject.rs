@@ -1,33 +1,33 @@
-//! Depth images back to points.
+//! Convert depth images to points.
 
 use crate::{
     Error,
     sensors::{camera::Camera, instance_masks::runs},
 };
 
-/// A point in the world frame. Single precision: 8 micrometres at 100 m.
+/// A point in the world frame, in single precision: 8 micrometres at 100 m.
 pub type Point = [f32; 3];
 
-/// A depth image and what was detected in it.
+/// A depth image and the detections in it.
 #[derive(Debug, Clone, Copy)]
 pub struct MaskedDepth<'a> {
-    /// Where and how the image was taken.
+    /// Camera of the image.
     pub camera: &'a Camera,
     /// Planar depth, row-major, metres; infinite or not positive where there is none.
     pub depth_m: &'a [f32],
-    /// Detection of each pixel, negative where none.
+    /// Detection of each pixel, negative if none.
     pub masks: &'a [i32],
 }
 
 /// Return the points behind the pixels of each detection.
 ///
 /// # Arguments
-/// * `num_detections` - masks count from 0 to one less.
-/// * `max_points` - a mask with more pixels with a depth is thinned to every n-th of them, evenly
-///   in row-major order, so that at most this many remain (3D-Mem: about 5,000).
+/// * `num_detections` - masks are numbered from 0 to one less than this.
+/// * `max_points` - largest number of points of a mask. A mask with more pixels that have a depth
+///   is thinned to every n-th of them in row-major order (3D-Mem: about 5,000).
 ///
 /// # Returns
-/// A list a detection, in row-major order of the pixels.
+/// A list of points for each detection, in row-major order of the pixels.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if an image's size is not the camera's, a depth is NaN, a mask's

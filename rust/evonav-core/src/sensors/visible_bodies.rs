@@ -1,4 +1,4 @@
-//! Which bodies AI2-THOR calls *visible* to an agent: near, in the picture, and not hidden.
+//! Find the bodies that AI2-THOR calls *visible* to an agent: near, in the image, and not hidden.
 
 use crate::{
     Error,
@@ -11,32 +11,32 @@ use crate::{
     },
 };
 
-/// Pitch of the points on large faces.
+/// Spacing of the points on large faces.
 const PITCH_M: f64 = 0.3;
-/// Most points along a side of a face.
+/// Largest number of points along a side of a face.
 const MAX_POINTS_A_SIDE: f64 = 20.0;
-/// Where the points at corners lie between the middle of the face, 0, and the corner, 1.
+/// Position of the points at corners between the middle of the face, 0, and the corner, 1.
 const INSIDE: f64 = 0.96;
-/// Most points of a body.
+/// Largest number of points of a body.
 const MAX_POINTS: usize = 200;
-/// AI2-THOR casts its rays this far beyond the point.
+/// Distance beyond the point to which AI2-THOR casts its rays.
 const BEYOND_M: f64 = 0.5;
 
-/// Return the bodies that an agent sees by AI2-THOR's rule (`visibilityScheme` "Collider", its
-/// default): something of the body is within `max_distance_m` of the agent's axis on the ground
-/// plane, and one of its visibility points is inside the picture with nothing else before it.
+/// Return the bodies that an agent sees by AI2-THOR's default rule (`visibilityScheme` "Collider"):
+/// a part of the body is within `max_distance_m` of the agent's axis on the ground plane, and one
+/// of its visibility points is inside the image with nothing else in front of it.
 ///
-/// The points themselves may be farther away than `max_distance_m`, as AI2-THOR's may. Ceilings
-/// are left out: AI2-THOR knows no objects there.
+/// The points themselves may be farther away than `max_distance_m`, as in AI2-THOR. Ceilings are
+/// left out, because AI2-THOR has no objects there.
 ///
 /// # Arguments
-/// * `scene`, `mesh`, `rays` - one house, and what was built of it.
-/// * `view` - where the picture is taken; its clip planes do not count.
+/// * `scene`, `mesh`, `rays` - a house's scene, and mesh and ray caster built from it.
+/// * `view` - view of the image; its clip planes do not count.
 /// * `agent_m` - `[x, z]` of the agent's axis.
 /// * `max_distance_m` - AI2-THOR's `visibilityDistance`.
 ///
 /// # Returns
-/// Indices of bodies, rising.
+/// Indices of bodies, ascending.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] as [`View::check`], or if `agent_m` or `max_distance_m` is not
@@ -47,7 +47,7 @@ const BEYOND_M: f64 = 0.5;
 ///
 /// # Source
 /// `GetAllVisibleSimObjPhysicsCollider` and `CheckIfVisibilityPointInViewport` of AI2-THOR's
-/// `BaseFPSAgentController`. AI2-THOR's points are part of its assets; ours are
+/// `BaseFPSAgentController`. AI2-THOR's points are part of its assets; here they are
 /// [`visibility_points`].
 pub fn visible_bodies(
     scene: &Scene,
@@ -94,11 +94,11 @@ fn is_near(scene: &Scene, index: usize, axis_m: Vec2, reach_m: f64) -> bool {
 }
 
 /// Return the points by which a body is seen: on a grid of about 0.3 m over its four-sided faces,
-/// in the middle of all others, and just inside the corners of all. Of more than 200 every second,
-/// third ... is taken.
+/// in the middle of all other faces, and just inside the corners of all. If there are more than
+/// 200, every second, third ... is used.
 ///
-/// The corners matter for what the border of the picture or a body before it cuts: 4 of 14 objects
-/// that AI2-THOR is recorded to call visible show no middle of a face.
+/// The corners matter for bodies that the image's border or another body cuts: 4 of 14 objects that
+/// AI2-THOR calls visible in recordings do not show the middle of any face.
 pub fn visibility_points(mesh: &SceneMesh, body: usize) -> Vec<Vec3> {
     let body = body as u32;
     let from = mesh.parts.partition_point(|part| part.body < body);
@@ -120,14 +120,14 @@ pub fn visibility_points(mesh: &SceneMesh, body: usize) -> Vec<Vec3> {
     points_m.into_iter().step_by(step).collect()
 }
 
-/// Return the points of a face just inside its corners.
+/// Add the points of a face just inside its corners.
 fn push_corners(points_m: &mut Vec<Vec3>, count: usize, at: impl Fn(usize) -> Vec3) {
     let middle_m = weighted((0..count).map(|i| (1.0 / count as f64, at(i))));
     let inside = |i| weighted([(INSIDE, at(i)), (1.0 - INSIDE, middle_m)].into_iter());
     points_m.extend((0..count).map(inside));
 }
 
-/// Return the centres of the cells of a grid over a face with four corners.
+/// Add the centres of the cells of a grid over a face with four corners.
 fn push_grid(points_m: &mut Vec<Vec3>, [a, b, c, d]: [Vec3; 4]) {
     let count = |from: Vec3, to: Vec3| {
         let length_m = sub(to, from).map(|v| v * v).iter().sum::<f64>().sqrt();

@@ -1,10 +1,10 @@
-//! Visibility on an occupancy grid: what an agent may learn of the oracle's map from one pose.
+//! Visibility on an occupancy grid: the cells of the oracle's map that an agent sees from one pose.
 
 use std::f64::consts::{FRAC_PI_2, SQRT_2, TAU};
 
 use crate::{Error, geometry::Vec2, grid::GridSpec};
 
-/// Cells that rays from one place reach, `[row, col]`, each list in row-major order.
+/// The cells that rays from one place reach, `[row, col]`, each list in row-major order.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct VisibleCells {
     /// Free cells that a ray enters.
@@ -13,32 +13,34 @@ pub struct VisibleCells {
     pub blocked: Vec<[i32; 2]>,
 }
 
-/// Beams narrower than this (as a part of a quadrant) see nothing: they are rounding, not sight.
+/// Width, as a share of a quadrant, below which a beam is due to rounding and sees nothing.
 const MIN_BEAM: f64 = 1e-9;
-/// An origin on the border of its cell is moved this far inside, in cells.
+/// Distance, in cells, by which an origin on the border of its cell is moved inside.
 const BORDER: f64 = 1e-6;
 
 /// Return the cells that the rays of a planar field of view reach.
 ///
-/// Every direction is cast, not a sample of them: a cell is visible if a beam of non-zero width
-/// enters it within `range_m` and crosses no blocked cell before. The cell of the origin is
-/// always visible and never in the way, so an agent that touches an obstacle is not blind.
+/// Every direction is cast, not a sample of directions: a cell is visible if a beam of non-zero
+/// width enters it within `range_m` and crosses no blocked cell before. The cell of the origin is
+/// always visible and never blocks the view, so an agent that touches an obstacle is not blind.
 ///
 /// # Arguments
-/// * `blocked` - occupancy, row-major, shape `(spec.rows, spec.cols)`; non-zero is blocked. What lies off the grid is opaque.
+/// * `blocked` - occupancy, row-major, shape `(spec.rows, spec.cols)`; non-zero is blocked.
+///   Everything outside the grid is opaque.
 /// * `origin_m` - `[x, z]`, world frame.
 /// * `yaw_rad` - middle of the field of view; 0 along +z, growing towards +x.
-/// * `horizontal_fov_rad` - its width, at most a full turn.
-/// * `range_m` - reach, to the point where a ray enters a cell.
+/// * `horizontal_fov_rad` - width of the field of view, at most a full turn.
+/// * `range_m` - largest distance of the point at which a ray enters a cell.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if `blocked` is not as large as the grid, the origin is off the
 /// grid, or a number is not finite or outside its domain.
 ///
 /// # Complexity
-/// O(cells within range), each touched once a quadrant. The cells at one Manhattan distance split
+/// O(cells within range), each visited once per quadrant. The cells at one Manhattan distance split
 /// a quadrant's directions into equal parts of `v / (u + v)`, and a ray crosses the distances in
-/// order, so sight is a sorted list of beams from which blocked cells are cut, distance by distance.
+/// order. So the visible directions are a sorted list of beams, from which blocked cells are cut
+/// distance by distance.
 pub fn visible_cells(
     blocked: &[u8],
     spec: &GridSpec,
@@ -83,7 +85,7 @@ fn beams_in_quadrant(quadrant: u8, first_rad: f64, fov_rad: f64) -> Vec<Beam> {
         let (sin, cos) = (angle_rad - low).sin_cos();
         (sin / (sin + cos)).clamp(0.0, 1.0)
     };
-    // The field may pass a full turn, so look at the quadrant one turn on as well.
+    // The field may pass a full turn, so the quadrant one turn further is used as well.
     let mut beams: Vec<Beam> = [0.0, TAU]
         .into_iter()
         .filter_map(|turn| {
@@ -100,12 +102,13 @@ fn beams_in_quadrant(quadrant: u8, first_rad: f64, fov_rad: f64) -> Vec<Beam> {
 struct Quadrant {
     /// `[row, col]` step of one cell along u and along v.
     steps: [[i64; 2]; 2],
-    /// How far the origin lies inside its cell along u and along v, in cells.
+    /// Distance of the origin from the near side of its cell along u and along v, in cells.
     inside: [f64; 2],
 }
 
 impl Quadrant {
-    /// Return `offset`: the origin in its cell along rows and columns, in cells.
+    /// Create a quadrant; `offset` is the origin's position in its cell along rows and columns, in
+    /// cells.
     fn new(quadrant: u8, offset: [f64; 2]) -> Self {
         let (up, right, down, left) = ([1, 0], [0, 1], [-1, 0], [0, -1]);
         let steps = match quadrant {
@@ -137,7 +140,8 @@ impl Quadrant {
         if (u + 1.0) * (u + 1.0) + (v + 1.0) * (v + 1.0) <= range2 {
             return true;
         }
-        // The nearest point of entry is the near corner, or at the beam's edge closest to it.
+        // The nearest point of entry is the near corner, or the point on the beam's edge closest to
+        // it.
         let side = if u + v > 0.0 { (v / (u + v)).clamp(beam[0], beam[1]) } else { beam[0] };
         let along_u = if u > 0.0 { u / (1.0 - side) } else { 0.0 };
         let along_v = if v > 0.0 { v / side } else { 0.0 };
@@ -146,7 +150,7 @@ impl Quadrant {
     }
 }
 
-/// What has been seen, in a window around the origin.
+/// The cells seen so far, in a window around the origin.
 struct View<'a> {
     blocked: &'a [u8],
     spec: &'a GridSpec,
@@ -178,8 +182,8 @@ impl<'a> View<'a> {
         view
     }
 
-    /// Return whether a cell lets no ray pass; what lies outside the window lies off the grid or
-    /// out of range.
+    /// Return whether a cell lets no ray pass. Cells outside the window are off the grid or out of
+    /// range.
     fn is_opaque(&self, cell: [i64; 2]) -> bool {
         match self.window_index(cell) {
             Some(_) => self.blocked[cell[0] as usize * self.spec.cols + cell[1] as usize] != 0,
@@ -208,7 +212,7 @@ impl<'a> View<'a> {
             if beams.is_empty() {
                 return;
             }
-            // Side of cell j that it shares with cell j - 1 of the ring.
+            // The side of cell j that it shares with cell j - 1 of the ring.
             let total = (ring + 1) as f64 - quadrant.inside[0] - quadrant.inside[1];
             let per_cell = 1.0 / total;
             let side = |j: usize| match j {
@@ -240,7 +244,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Mark the cell seen if it lies within range; whether it stops the beam.
+    /// Mark a cell as seen if it lies within range; return whether it stops the beam.
     fn reach(&mut self, quadrant: &Quadrant, at: [usize; 2], beam: Beam) -> bool {
         let cell = [0, 1].map(|axis| {
             self.own[axis] as i64

@@ -1,25 +1,25 @@
-//! An agent's discrete actions, as `evonav.world.embedded` carries them out, to the bit.
+//! An agent's discrete actions, with exactly the results of `evonav.world.embedded`.
 
 use crate::{Error, geometry::Pose, simulator::EmbeddedSimulator};
 
-/// Angles of poses are whole multiples of this part of a degree (docs/world.md, "Angles").
+/// Number of steps per degree to which angles of poses are rounded (docs/world.md, "Angles").
 const PARTS_PER_DEG: f64 = 1e4;
 
 /// A discrete action.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Straight ahead by the length of a step.
+    /// Move straight ahead by the length of a step.
     MoveForward,
-    /// Counter-clockwise seen from above.
+    /// Turn counter-clockwise seen from above.
     TurnLeft,
-    /// Clockwise seen from above.
+    /// Turn clockwise seen from above.
     TurnRight,
-    /// Nothing; it ends a stage, which is not the simulator's business.
+    /// Do nothing. It ends a stage, which the simulator does not handle.
     Stop,
 }
 
 impl Action {
-    /// Return the action of a number: 0 to 3, in the order of the variants.
+    /// Return the action with a number: 0 to 3, in the order of the variants.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] for any other number.
@@ -34,7 +34,7 @@ impl Action {
     }
 }
 
-/// The size of discrete actions.
+/// The sizes of discrete actions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Strides {
     /// Length of a step ahead.
@@ -43,7 +43,7 @@ pub struct Strides {
     pub turn_rad: f64,
 }
 
-/// Return where an action takes an agent; `None` when it collides.
+/// Return the pose after an action; `None` if the agent collides.
 pub fn act(
     world: &EmbeddedSimulator,
     pose: &Pose,
@@ -67,8 +67,8 @@ pub fn act(
     }
 }
 
-/// Return the pose of an agent set down at `[x, z]`, looking along `yaw_rad`; `None` where it does
-/// not fit.
+/// Return the pose of an agent that is put at `[x, z]`, looking along `yaw_rad`; `None` if it does
+/// not fit there.
 pub fn set_down(
     world: &EmbeddedSimulator,
     pose: &Pose,
@@ -83,17 +83,17 @@ pub fn set_down(
     })
 }
 
-/// Return a yaw in `[0, 2 pi)`, rounded to 1e-4 degrees: `evonav.world.pose.canonical_yaw_rad`.
+/// Bring a yaw into `[0, 2 pi)` and round it to 1e-4 degrees, as
+/// `evonav.world.pose.canonical_yaw_rad`.
 pub fn canonical_yaw_rad(yaw_rad: f64) -> f64 {
     rounded_deg(yaw_rad.to_degrees().rem_euclid(360.0)).rem_euclid(360.0).to_radians()
 }
 
-/// Return the double nearest to a decimal of four places, which is the one nearest to `angle_deg`:
-/// what Python's `round(angle_deg, 4)` gives.
+/// Round to four decimals exactly as Python's `round(angle_deg, 4)`.
 fn rounded_deg(angle_deg: f64) -> f64 {
     let parts = angle_deg * PARTS_PER_DEG;
     let whole = parts.round_ties_even();
-    // Scaling rounds too: only digits tell on which side of a half an angle lies that is near one.
+    // Scaling rounds too: near a half, only the digits show on which side of it an angle lies.
     if ((parts - whole).abs() - 0.5).abs() < 1e-6 {
         return format!("{angle_deg:.4}").parse().unwrap_or(angle_deg) + 0.0;
     }

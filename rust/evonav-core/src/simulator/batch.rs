@@ -1,7 +1,7 @@
-//! Many agents, each in a house of its own or in one shared with others, stepped and drawn at once.
+//! Many agents, each in its own house or in a shared one, that are stepped and rendered together.
 //!
-//! What an agent of a batch does and sees is what it would do and see alone, to the bit, however
-//! many threads there are: agents share houses, which do not change, and nothing else.
+//! Actions and images of an agent in a batch are exactly those of an agent alone, whatever the
+//! number of threads: agents share only houses, which do not change.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -21,59 +21,61 @@ use crate::{
     },
 };
 
-/// Most agents of a batch, and most threads.
+/// Largest number of agents of a batch, and of threads.
 const MAX_SLOTS: usize = 1 << 16;
 
-/// What all agents of a batch have in common.
+/// The settings of all agents of a batch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatchConfig {
-    /// Columns and rows of images: those of every house's camera.
+    /// Columns and rows of images, the same as those of every house's camera.
     pub image_px: [usize; 2],
-    /// What pixels without a surface get for a depth.
+    /// Depth of pixels without a surface.
     pub empty_depth_m: f32,
-    /// Size of discrete actions.
+    /// Sizes of discrete actions.
     pub strides: Strides,
-    /// Spacing of the positions among which the nearest reachable one is taken where a target is cut off.
+    /// Spacing of the positions from which the nearest reachable one is used if a target cannot be
+    /// reached.
     pub grid_m: f64,
-    /// Which masks count in images of labels.
+    /// Masks that count in images of labels.
     pub mask_filter: MaskFilter,
-    /// Threads that step and draw, 1 for the caller's own.
+    /// Number of threads that step and render; 1 for the caller's own.
     pub num_threads: usize,
 }
 
-/// What came of a step, by agent.
+/// The result of a step of one agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stepped {
-    /// Whether the action was carried out; its pose is the old one if not.
+    /// Whether the action was carried out; otherwise the pose did not change.
     pub is_success: bool,
-    /// [`Slot::distance_m`] after it.
+    /// Value of [`Slot::distance_m`] after the step.
     pub distance_m: f64,
 }
 
-/// Where a batch's images go: each is one after the other by agent, row-major, or not wanted.
+/// The arrays for a batch's images: agent after agent, row-major; `None` if not rendered.
 #[derive(Debug, Default)]
 pub struct Images<'a> {
-    /// `(B, H, W)` planar z in metres.
+    /// Planar depth in metres, `(B, H, W)`.
     pub depth_m: Option<&'a mut [f32]>,
-    /// `(B, H, W, 3)` sRGB.
+    /// Colours, sRGB, `(B, H, W, 3)`.
     pub rgb: Option<&'a mut [u8]>,
-    /// `(B, H, W)` labels of the bodies.
+    /// Labels of the bodies, `(B, H, W)`.
     pub labels: Option<&'a mut [u8]>,
 }
 
-/// Many agents.
+/// A batch of agents.
 #[derive(Debug)]
 pub struct Batch {
     config: BatchConfig,
     slots: Vec<Option<Slot>>,
-    /// `None` for one thread: the caller's.
+    /// Threads; `None` for the caller's thread alone.
     pool: Option<ThreadPool>,
-    /// Working memory, one a thread.
+    /// Working memory, one per thread.
     frames: Vec<Mutex<FrameBuffer>>,
 }
 
 impl Batch {
-    /// Return a batch of `num_slots` agents that are nowhere yet: [`Self::place`] is next.
+    /// Create a batch of `num_slots` agents that are in no house yet: [`Self::place`] puts them
+    /// there.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there are no agents or no threads, or too many;
@@ -101,12 +103,12 @@ impl Batch {
         self.slots.len()
     }
 
-    /// Return what all agents have in common.
+    /// Return the settings of all agents.
     pub fn config(&self) -> &BatchConfig {
         &self.config
     }
 
-    /// Put an agent into a house; its pose is taken as it is.
+    /// Put an agent into a house; its pose is not changed.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there is no such agent, or the house has another image size or
@@ -125,7 +127,7 @@ impl Batch {
         Ok(())
     }
 
-    /// Give an agent a goal, or takes it away.
+    /// Set or remove the goal of an agent.
     ///
     /// # Errors
     /// As [`Self::slot`].
@@ -138,20 +140,21 @@ impl Batch {
     /// Return an agent.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if there is no such agent; [`Error::Simulation`] if it is nowhere.
+    /// [`Error::InvalidArgument`] if there is no such agent; [`Error::Simulation`] if it is in no
+    /// house.
     pub fn slot(&self, index: usize) -> Result<&Slot, Error> {
         let slot = self.slots.get(index).ok_or_else(|| no_slot(index, self.slots.len()))?;
         slot.as_ref().ok_or_else(|| nowhere(index))
     }
 
-    /// Carry out one action an agent; one that collides leaves its agent where it is.
+    /// Carry out one action of each agent; an agent that would collide stays where it is.
     ///
     /// # Arguments
-    /// * `actions` - by agent, a number of [`Action::of`].
+    /// * `actions` - numbers of [`Action::of`], by agent.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the actions are not one an agent, or one is none;
-    /// [`Error::Simulation`] if an agent is nowhere. No agent has moved then.
+    /// [`Error::InvalidArgument`] if the number of actions is not that of the agents, or an action
+    /// does not exist; [`Error::Simulation`] if an agent is in no house. Then no agent has moved.
     ///
     /// # Complexity
     /// O(obstacles near) an agent, O(nodes of the visibility graph) for its distance.
@@ -172,15 +175,17 @@ impl Batch {
         Ok(each(pool, slots.into_iter().zip(actions).collect(), one))
     }
 
-    /// Return the shortest paths to one target an agent, and where a target is cut off, to the
-    /// position nearest to it that the agent could reach along a grid when one first was.
+    /// Return the shortest path of each agent to its target. If a target cannot be reached, the
+    /// path leads to the nearest position that the agent could reach along a grid when this first
+    /// happened.
     ///
     /// # Returns
-    /// By agent, corners, both ends included; empty where there is no way, or `target_m` is `None`.
+    /// Corners of each path, including both ends; empty if there is no path, or the target is
+    /// `None`.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the targets are not one an agent; [`Error::Simulation`] if an
-    /// agent is nowhere.
+    /// [`Error::InvalidArgument`] if the number of targets is not that of the agents;
+    /// [`Error::Simulation`] if an agent is in no house.
     pub fn plan(&mut self, targets_m: &[Option<Vec2>]) -> Result<Vec<Vec<Vec2>>, Error> {
         self.require_one_each("targets_m", targets_m.len())?;
         let grid_m = self.config.grid_m;
@@ -194,7 +199,7 @@ impl Batch {
             .collect()
     }
 
-    /// Return [`Self::plan`] of one agent.
+    /// Return the shortest path of one agent, as [`Self::plan`].
     ///
     /// # Errors
     /// As [`Self::slot`].
@@ -203,13 +208,13 @@ impl Batch {
         self.placed_mut(index)?.plan(target_m, grid_m)
     }
 
-    /// Set an agent down at points in turn, as far as it fits.
+    /// Put an agent at points in turn, until it does not fit.
     ///
     /// # Arguments
-    /// * `stops` - `[x, z]` and yaw of each.
+    /// * `stops` - `[x, z]` and yaw of each point.
     ///
     /// # Returns
-    /// How many points it came to.
+    /// Number of points at which it was put.
     ///
     /// # Errors
     /// As [`Self::slot`].
@@ -224,14 +229,14 @@ impl Batch {
         Ok(stops.len())
     }
 
-    /// Return what every agent sees.
+    /// Render the views of all agents.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if an array is not of the batch's size, or a house's labels or
-    /// camera cannot be used; [`Error::Simulation`] if an agent is nowhere.
+    /// [`Error::InvalidArgument`] if an array does not have the batch's size, or a house's labels
+    /// or camera cannot be used; [`Error::Simulation`] if an agent is in no house.
     ///
     /// # Complexity
-    /// That of [`crate::sensors::raster::render_view`], an agent.
+    /// That of [`crate::sensors::raster::render_view`] for each agent.
     pub fn render(&self, images: Images<'_>) -> Result<(), Error> {
         let slots: Vec<&Slot> =
             (0..self.slots.len()).map(|index| self.slot(index)).collect::<Result<_, _>>()?;
@@ -248,9 +253,9 @@ impl Batch {
     }
 
     fn draw(&self, slot: &Slot, images: Images<'_>) -> Result<(), Error> {
-        // Of another pool's thread, if a single agent is drawn in one.
+        // The index may be that of another pool's thread, if a single agent is rendered in one.
         let thread = rayon::current_thread_index().unwrap_or(0) % self.frames.len();
-        // Its content is overwritten: a thread that panicked has left nothing that matters.
+        // The content is overwritten, so a thread that panicked has left nothing that matters.
         let mut frame = self.frames[thread].lock().unwrap_or_else(PoisonError::into_inner);
         let want = Want { rgb: images.rgb.is_some(), instances: images.labels.is_some() };
         slot.world.render(&slot.world.view(&slot.pose), want, &mut frame)?;
@@ -292,13 +297,13 @@ impl Batch {
     }
 }
 
-/// Return all agents, if none is nowhere.
+/// Return all agents, if every one is in a house.
 fn placed(slots: &mut [Option<Slot>]) -> Result<Vec<&mut Slot>, Error> {
     let slots = slots.iter_mut().enumerate();
     slots.map(|(index, slot)| slot.as_mut().ok_or_else(|| nowhere(index))).collect()
 }
 
-/// Return an image's share of an array for each agent.
+/// Split an array into the images of the agents.
 fn parts<'a, T>(
     name: &str,
     array: Option<&'a mut [T]>,
@@ -313,7 +318,7 @@ fn parts<'a, T>(
     Ok(array.chunks_exact_mut(num_elements).map(Some).collect())
 }
 
-/// Do every job, in the pool's threads if there is one; results are in the jobs' order.
+/// Run every job, in the pool's threads if there is a pool; results are in the jobs' order.
 fn each<T: Send, U: Send>(
     pool: Option<&ThreadPool>,
     jobs: Vec<T>,

@@ -8,38 +8,39 @@ use crate::{
     simulator::{EmbeddedSimulator, geodesic_field::GeodesicField},
 };
 
-/// Every target of a task has a free place this near that can be reached.
+/// Distance from every target of a task within which there is a reachable free place.
 const FULL_REACH_M: f64 = 1.5;
 
-/// Free cells that are tried for an agent that no path leads from.
+/// Number of free cells that are tried for an agent from which no path leads.
 const MAX_TRIES: usize = 16;
 
-/// Of the occupancy whose free cells are tried: the simulators' default.
+/// Cell size of the occupancy whose free cells are tried: the simulators' default.
 const OCCUPANCY_CELL_M: f64 = 0.1;
 
-/// An agent, and where it is.
+/// An agent and its house.
 #[derive(Debug, Clone)]
 pub struct Slot {
-    /// Its house.
+    /// House of the agent.
     pub world: Arc<EmbeddedSimulator>,
     pub(super) pose: Pose,
-    /// By body of the house, what its pixels get in images of labels; 0: nothing.
+    /// Label of each body in images of labels; 0 for none.
     pub labels: Arc<[u8]>,
-    /// Distances to its goal; see [`Batch::aim`](crate::simulator::batch::Batch::aim).
+    /// Distances to the agent's goal; see [`Batch::aim`](crate::simulator::batch::Batch::aim).
     pub(super) field: Option<Arc<GeodesicField>>,
-    /// The distance from where it stands, if it was asked for there.
+    /// Distance to the goal from the present position, if it was computed.
     pub(super) known_m: Option<f64>,
-    /// Positions that could be reached when a target was first cut off; see [`Batch::plan`](crate::simulator::batch::Batch::plan).
+    /// Positions that could be reached when a target first could not; see
+    /// [`Batch::plan`](crate::simulator::batch::Batch::plan).
     reachable_m: Option<Vec<Vec2>>,
 }
 
 impl Slot {
-    /// Return an agent in a house, without a goal.
+    /// Create an agent in a house, without a goal.
     pub fn new(world: Arc<EmbeddedSimulator>, pose: Pose, labels: Arc<[u8]>) -> Self {
         Self { world, pose, labels, field: None, known_m: None, reachable_m: None }
     }
 
-    /// Return where it stands and looks.
+    /// Return the agent's pose.
     pub fn pose(&self) -> Pose {
         self.pose
     }
@@ -65,9 +66,9 @@ impl Slot {
         self.pose = pose;
     }
 
-    /// Return the corners of the shortest path to a point, or to the reachable position nearest to
-    /// it where it is cut off; empty if there is none. Where steps of the grid reach nothing near,
-    /// free cells of the house's occupancy are tried, nearest first.
+    /// Return the corners of the shortest path to a point, or to the nearest reachable position if
+    /// the point cannot be reached; empty if there is none. If steps along the grid reach nothing
+    /// near, free cells of the house's occupancy are tried, nearest first.
     pub(super) fn plan(&mut self, target_m: Vec2, grid_m: f64) -> Result<Vec<Vec2>, Error> {
         let (navigation, here_m) = (self.world.navigation(), self.point_m());
         if let Some(path_m) = navigation.shortest_path(here_m, target_m) {
@@ -96,7 +97,7 @@ impl Slot {
         Ok(path_m.unwrap_or_default())
     }
 
-    /// Return the middles of the cells that the agent's body reaches from the house's start,
+    /// Return the centres of the cells that the agent's body reaches from the house's start,
     /// row-major.
     fn free_centres_m(&self) -> Result<Vec<Vec2>, Error> {
         let (spec, cells) = self.world.occupancy(OCCUPANCY_CELL_M)?;

@@ -1,4 +1,4 @@
-//! One house, instantiated: what an agent can see and where it can go.
+//! The embedded simulator of one house.
 
 use std::sync::OnceLock;
 
@@ -21,13 +21,13 @@ use crate::{
     },
 };
 
-/// Pitch at which a free place is looked for when the house's own start is blocked.
+/// Spacing of the places that are tried if the house's own start is blocked.
 const SEARCH_PITCH_M: f64 = 0.25;
 
-/// Yaw and horizon in houses that name no start: ProcTHOR's usual horizon.
+/// Yaw and horizon in houses without a start: ProcTHOR's usual horizon.
 const DEFAULT_LOOK_DEG: [f64; 2] = [0.0, 30.0];
 
-/// The agent's camera and body, and what to do about unknown assets.
+/// The agent's camera and body, and the treatment of unknown assets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimulatorConfig {
     /// Columns and rows of images.
@@ -36,17 +36,17 @@ pub struct SimulatorConfig {
     pub vertical_fov_rad: f64,
     /// Planar depths `[near, far]` between which surfaces are drawn.
     pub clip_m: [f64; 2],
-    /// Optical centre over the floor.
+    /// Height of the optical centre over the floor.
     pub camera_height_m: f64,
-    /// What collides.
+    /// Body of the agent.
     pub agent: AgentBody,
-    /// Assets that the catalogue does not hold.
+    /// Treatment of assets that the catalogue does not contain.
     pub unknown: UnknownAssets,
 }
 
-/// A house with everything derived from it: bodies, surfaces, free space.
+/// A house with its bodies, surfaces and free space.
 ///
-/// Holds no state of an agent, so one simulator may serve many threads.
+/// It has no state of an agent, so several threads may share one simulator.
 #[derive(Debug)]
 pub struct EmbeddedSimulator {
     house: House,
@@ -70,7 +70,8 @@ impl EmbeddedSimulator {
         Self::assemble(house, config, scene, navigation)
     }
 
-    /// Return this house after a change, as a new simulator; only what moved is built again.
+    /// Apply a change; return the simulator of the changed house. Only moved objects are built
+    /// anew.
     ///
     /// # Errors
     /// Those of [`House::apply`] and [`Self::new`].
@@ -82,7 +83,7 @@ impl EmbeddedSimulator {
         let (catalogue, unknown) = (Catalogue::bundled(), self.config.unknown);
         let scene = match changed {
             Some(changed) => self.scene.rebuild(&house, catalogue, unknown, &changed)?,
-            // Something that is no object changed: a door, and `rebuild` keeps the structure.
+            // A door changed, which is not an object; `rebuild` reuses the structure.
             None => Scene::build(&house, catalogue, unknown)?,
         };
         let navigation = self.navigation.with_scene(&scene)?;
@@ -103,7 +104,7 @@ impl EmbeddedSimulator {
         Ok(simulator)
     }
 
-    /// Return the house file.
+    /// Return the house.
     pub fn house(&self) -> &House {
         &self.house
     }
@@ -113,12 +114,12 @@ impl EmbeddedSimulator {
         self.config.image_px
     }
 
-    /// Return the everything in the house, in instance order.
+    /// Return all bodies of the house, in instance order.
     pub fn bodies(&self) -> &[Body] {
         &self.scene.bodies
     }
 
-    /// Return the bodies and their bounds.
+    /// Return the scene: the bodies and their bounds.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -134,14 +135,14 @@ impl EmbeddedSimulator {
     }
 
     /// Return the house's own start pose, moved to the nearest place where the agent fits; the
-    /// middle of a house that names none.
+    /// middle of the house if it has no start.
     pub fn start(&self) -> Pose {
         let given = self.house.start.map(|start| [start.yaw_deg, start.horizon_deg]);
         let [yaw_rad, horizon_rad] = given.unwrap_or(DEFAULT_LOOK_DEG).map(f64::to_radians);
         Pose { position_m: self.body_position_m(self.start_m), yaw_rad, horizon_rad }
     }
 
-    /// Return AI2-THOR's agent position over a point of the floor: the middle of the body.
+    /// Return AI2-THOR's agent position, the middle of the body, over a point of the floor.
     pub fn body_position_m(&self, point_m: Vec2) -> Vec3 {
         [point_m[0], self.config.agent.height_m / 2.0, point_m[1]]
     }
@@ -152,12 +153,12 @@ impl EmbeddedSimulator {
         Camera::at(pose, image_px, vertical_fov_rad, camera_height_m)
     }
 
-    /// Return what the camera of an agent at `pose` draws.
+    /// Return the view of an agent at `pose`.
     pub fn view(&self, pose: &Pose) -> View {
         View { clip_m: self.config.clip_m, ..View::from(self.camera(pose)) }
     }
 
-    /// Return what any camera sees, the agent's ([`Self::view`]) or another.
+    /// Render the view of any camera, the agent's ([`Self::view`]) or another.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] as [`View::check`].
@@ -165,7 +166,7 @@ impl EmbeddedSimulator {
         render_view(&self.mesh, view, want, out)
     }
 
-    /// Return whether an agent fits at `[x, z]` and can walk there from the house's start.
+    /// Return whether an agent fits at `[x, z]` and can move there from the house's start.
     pub fn is_reachable(&self, point_m: Vec2) -> bool {
         self.navigation.is_connected(self.start_m, point_m)
     }
@@ -180,7 +181,7 @@ impl EmbeddedSimulator {
         Ok((spec, self.navigation.occupancy(&spec, self.start_m)?))
     }
 
-    /// Return whether nothing is between two points but the bodies in `ignored` (indices).
+    /// Return whether nothing is between two points except the bodies in `ignored` (indices).
     pub fn is_visible(&self, from_m: Vec3, to_m: Vec3, ignored: &[usize]) -> bool {
         self.rays().is_visible(&self.mesh, from_m, to_m, |body| ignored.contains(&body))
     }

@@ -1,4 +1,4 @@
-//! Distances to one goal from anywhere in a house, computed once.
+//! Distances to one goal from anywhere in a house, computed in advance.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use crate::{
     Error, geometry::Vec2, simulator::EmbeddedSimulator, world::navigation::DistanceField,
 };
 
-/// Shortest distances to one point of a house, and the house they hold in.
+/// Shortest distances to one point of a house, with the house.
 ///
 /// # Examples
 /// ```
@@ -26,7 +26,7 @@ pub struct GeodesicField {
 }
 
 impl GeodesicField {
-    /// Return the distances to `source_m`, or to the free point nearest to it.
+    /// Compute the distances to `source_m`, or to the free point nearest to it.
     ///
     /// # Errors
     /// [`Error::Simulation`] if no free point is near.
@@ -37,7 +37,7 @@ impl GeodesicField {
         Ok(Self { world, field })
     }
 
-    /// Return the length of the shortest path from a point, infinite where there is none.
+    /// Return the length of the shortest path from a point, infinite if there is none.
     pub fn distance_m(&self, point_m: Vec2) -> f64 {
         self.world.navigation().field_distance_m(&self.field, point_m)
     }

@@ -1,4 +1,4 @@
-//! One house, instantiated: what an agent can see and where it can go.
+//! The simulator: one house in which agents see and move, and batches of agents.
 
 pub mod actions;
 pub mod batch;

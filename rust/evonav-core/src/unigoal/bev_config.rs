@@ -2,26 +2,27 @@
 
 use crate::{Error, geometry::Vec2, grid::MAX_CELLS};
 
-/// What counts as what in a [`BevMap`](crate::unigoal::bev_map::BevMap) (UniGoal's constants).
+/// Parameters of a [`BevMap`](crate::unigoal::bev_map::BevMap); the defaults are UniGoal's
+/// constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BevConfig {
-    /// Edge of the map.
+    /// Edge length of the map.
     pub size_m: f64,
-    /// Edge of a cell and of a voxel.
+    /// Edge length of a cell and of a voxel.
     pub cell_m: f64,
-    /// Depth and width of the block of voxels before the camera.
+    /// Depth and width of the block of voxels in front of the camera.
     pub block_m: f64,
     /// Heights `[lowest, highest]` of the block over the floor.
     pub heights_m: Vec2,
-    /// Surfaces from this height on are obstacles ...
+    /// Smallest height of an obstacle.
     pub obstacle_min_m: f64,
-    /// ... up to this much over the camera.
+    /// Largest height of an obstacle above the camera.
     pub obstacle_above_camera_m: f64,
-    /// Depths beyond this are no measurements.
+    /// Largest depth that counts as a measurement.
     pub max_depth_m: f64,
-    /// Pixels from one that is used to the next, along rows and columns.
+    /// Spacing of the pixels that are used, along rows and columns.
     pub stride_px: usize,
-    /// Points of a category in a cell that make it certain.
+    /// Number of points of a category in a cell that make the category certain.
     pub category_points: u8,
 }
 

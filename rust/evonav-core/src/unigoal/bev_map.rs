@@ -1,4 +1,4 @@
-//! UniGoal's map seen from above: obstacles, explored cells and categories, fused by maximum.
+//! UniGoal's bird's-eye map: obstacles, explored cells and categories, fused by maximum.
 
 use crate::{
     Error,
@@ -9,7 +9,7 @@ use crate::{
     },
 };
 
-/// What one task has shown so far. Nothing that was seen is ever taken back.
+/// The bird's-eye map of one task. Cells that were once seen are never cleared.
 #[derive(Debug, Clone)]
 pub struct BevMap {
     spec: GridSpec,
@@ -18,15 +18,16 @@ pub struct BevMap {
     explored: BitGrid,
     visited: BitGrid,
     collisions: BitGrid,
-    /// Points in a cell, at most `category_points`; empty until the category is first seen.
+    /// Number of points in each cell by category, at most `category_points`; empty until the
+    /// category is first seen.
     categories: Vec<Vec<u8>>,
-    /// First and last row and column of what is explored or visited.
+    /// First and last row and column of the explored and visited cells.
     known: Option<[[usize; 2]; 2]>,
     block: Block,
 }
 
 impl BevMap {
-    /// Return a map of nothing, centred on `centre_m`.
+    /// Create an empty map centred on `centre_m`.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] as [`BevConfig::check`], if the centre is not finite, or for more
@@ -54,12 +55,12 @@ impl BevMap {
         })
     }
 
-    /// Return the shape and place.
+    /// Return the shape and position of the map.
     pub fn spec(&self) -> &GridSpec {
         &self.spec
     }
 
-    /// Return the cells where something was once seen that stands in the way.
+    /// Return the cells where an obstacle was seen.
     pub fn obstacles(&self) -> &BitGrid {
         &self.obstacles
     }
@@ -74,7 +75,7 @@ impl BevMap {
         &self.visited
     }
 
-    /// Return the cells that moves have failed at.
+    /// Return the cells at which moves have failed.
     pub fn collisions(&self) -> &BitGrid {
         &self.collisions
     }
@@ -95,12 +96,13 @@ impl BevMap {
         Ok(counts.iter().map(|&count| f32::from(count) / most).collect())
     }
 
-    /// Add what one view shows.
+    /// Add one view to the map.
     ///
-    /// A point spreads over the eight voxels around it. A cell is explored if its column of voxels
-    /// has a point at any height, an obstacle if it has one between `obstacle_min_m` and the
-    /// camera, or one below `-obstacle_min_m` and none around the floor (a hole); half a point is
-    /// one. Points outside the block before the camera do not count.
+    /// A point is distributed over the eight voxels around it. A cell is explored if its column of
+    /// voxels has a point at any height. It is an obstacle if it has a point between
+    /// `obstacle_min_m` and the camera, or one below `-obstacle_min_m` and none around the floor (a
+    /// hole). Half a point counts as one. Points outside the block in front of the camera do not
+    /// count.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the images are not of the camera's size, a category is out of
@@ -130,15 +132,15 @@ impl BevMap {
             }
             for (cell, count) in block.count_category(category, &spec) {
                 let count = count.min(u32::from(self.config.category_points)) as u8;
-                let kept = &mut counts[spec.index(cell)];
-                *kept = count.max(*kept);
+                let stored = &mut counts[spec.index(cell)];
+                *stored = count.max(*stored);
             }
         }
         self.block = block;
         Ok(())
     }
 
-    /// Mark the cells of a straight way visited; what lies off the map is left out.
+    /// Mark the cells of a straight path as visited; cells off the map are left out.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if a number is not finite.
@@ -159,7 +161,7 @@ impl BevMap {
         Ok(())
     }
 
-    /// Mark cells that a move failed at; those off the map are left out.
+    /// Mark cells at which a move failed; those off the map are left out.
     pub fn collide(&mut self, cells: &[[usize; 2]]) {
         cells.iter().for_each(|cell| self.collisions.insert(cell[0], cell[1]));
     }
@@ -172,7 +174,7 @@ impl BevMap {
         }
     }
 
-    /// Return the cell of a place.
+    /// Return the cell of a point.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if it is off the map.
@@ -181,9 +183,9 @@ impl BevMap {
         self.spec.cell_of(point_m).ok_or_else(off)
     }
 
-    /// Return the cells that a path may cross: all but obstacles grown by `radius` cells; where the
-    /// agent has been is free, where a move failed is not, and the 3 x 3 cells around the agent
-    /// are.
+    /// Return the cells that a path may cross: all but obstacles grown by `radius` cells. Visited
+    /// cells are free, cells at which a move failed are not, and the 3 x 3 cells around the agent
+    /// are free.
     pub fn traversable(&self, agent: [usize; 2], radius: usize) -> BitGrid {
         let mut blocked = dilate_disk(&self.obstacles, radius);
         blocked.subtract(&self.visited);
@@ -208,16 +210,16 @@ impl BevMap {
             }
         }
         let first = low.map(|v| v.saturating_sub(margin));
-        let sides = [self.spec.rows, self.spec.cols];
-        let end = [0, 1].map(|i| high[i].saturating_add(margin + 1).min(sides[i]));
+        let shape = [self.spec.rows, self.spec.cols];
+        let end = [0, 1].map(|i| high[i].saturating_add(margin + 1).min(shape[i]));
         Window { first, shape: [0, 1].map(|i| end[i].saturating_sub(first[i])) }
     }
 
-    /// Return the cells that the marked pixels of a view lie in, each once, row-major; off-map ones
+    /// Return the cells of the marked pixels of a view, each once, row-major; cells off the map are
     /// left out.
     ///
     /// # Errors
-    /// As [`Self::integrate`], for a mask of another size.
+    /// As [`Self::integrate`], and for a mask of another size.
     pub fn cells_of(&self, view: &DepthView<'_>, mask: &[bool]) -> Result<Vec<[i32; 2]>, Error> {
         view.check(self.categories.len())?;
         Error::require("mask", mask.len(), "one value a pixel", |n| n == view.depth_m.len())?;

@@ -1,25 +1,26 @@
-//! What a move that did not get anywhere tells about the floor ahead.
+//! The cells ahead that are marked as blocked after a move that failed.
 
 use crate::{
     geometry::{Pose, Vec2},
     grid::GridSpec,
 };
 
-/// A strip of cells before the agent.
+/// A strip of cells in front of the agent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Strip {
-    /// Cells from the agent to the strip.
+    /// Number of cells from the agent to the strip.
     pub start: usize,
-    /// Cells along the heading.
+    /// Number of cells along the heading.
     pub length: usize,
-    /// Cells across.
+    /// Number of cells across the heading.
     pub width: usize,
 }
 
-/// Return the cells of the map that a strip covers (UniGoal marks them blocked when a move fails).
+/// Return the cells of the map that a strip covers; UniGoal marks them as blocked when a move
+/// fails.
 ///
 /// # Returns
-/// `[row, col]`, nearest first, some perhaps twice; what lies off the map is left out.
+/// Cells `[row, col]`, nearest first, some perhaps twice; cells off the map are left out.
 pub fn strip_cells(spec: &GridSpec, pose: &Pose, strip: Strip) -> Vec<[usize; 2]> {
     let (sin, cos) = pose.yaw_rad.sin_cos();
     let [x, _, z] = pose.position_m;

@@ -2,14 +2,14 @@
 
 use crate::{Error, sensors::camera::Camera};
 
-/// A depth image, and perhaps a category for each pixel.
+/// A depth image, with an optional category for each pixel.
 #[derive(Debug, Clone, Copy)]
 pub struct DepthView<'a> {
-    /// Where it was taken; heights count from the floor.
+    /// Camera of the image; heights are relative to the floor.
     pub camera: Camera,
     /// Planar depth, row-major.
     pub depth_m: &'a [f32],
-    /// Category index of each pixel, -1 for none.
+    /// Category index of each pixel, -1 if none.
     pub categories: Option<&'a [i32]>,
 }
 

@@ -1,4 +1,4 @@
-//! Where to explore: frontier cells, scored by how near they are.
+//! Choose where to explore: frontier cells, scored by their distance.
 
 use crate::{
     grid::{bits::BitGrid, dilate::dilate_disk},
@@ -8,20 +8,20 @@ use crate::{
     },
 };
 
-/// What counts as a frontier, and how frontiers are weighed (UniGoal's constants).
+/// Parameters of frontiers and their scores; the defaults are UniGoal's constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExploreConfig {
-    /// Obstacles are grown by this many cells before frontiers are sought.
+    /// Number of cells by which obstacles are grown to find frontiers.
     pub frontier_obstacle_radius: usize,
-    /// Fewest cells of a frontier.
+    /// Smallest number of cells of a frontier.
     pub min_cells: usize,
-    /// Nearer frontiers do not count.
+    /// Smallest distance of a frontier.
     pub min_distance_m: f64,
-    /// Distances beyond `min_distance_m` count up to this.
+    /// Distance beyond `min_distance_m` up to which distances change the score.
     pub span_m: f64,
-    /// Obstacles are grown by this many cells for paths.
+    /// Number of cells by which obstacles are grown for paths.
     pub path_obstacle_radius: usize,
-    /// Paths may leave the known part of the map by this many cells.
+    /// Number of cells by which paths may leave the known part of the map.
     pub margin: usize,
 }
 
@@ -38,21 +38,21 @@ impl Default for ExploreConfig {
     }
 }
 
-/// A frontier cell, as it was weighed.
+/// A frontier cell with its score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScoredCell {
-    /// `[row, col]`.
+    /// The cell, `[row, col]`.
     pub cell: [usize; 2],
-    /// Way from the agent.
+    /// Length of the path from the agent.
     pub distance_m: f64,
-    /// Way from the mid-term goal, if there is one.
+    /// Length of the path from the mid-term goal, if there is one.
     pub goal_distance_m: Option<f64>,
-    /// 10 for the nearest frontiers to 0 for those 10 m farther; up to 1 more near the goal.
+    /// Score: 10 for the nearest frontiers to 0 for those 10 m farther; up to 1 more near the goal.
     pub score: f64,
 }
 
-/// Return the explored cells off obstacles that touch unknown ones, in 8-connected groups of some
-/// size.
+/// Return the explored cells away from obstacles that touch unknown cells, in 8-connected groups of
+/// at least `min_cells`.
 pub fn frontier_cells(map: &BevMap, config: &ExploreConfig) -> BitGrid {
     let near_obstacles = dilate_disk(map.obstacles(), config.frontier_obstacle_radius);
     let mut free = map.explored().clone();
@@ -67,7 +67,7 @@ pub fn frontier_cells(map: &BevMap, config: &ExploreConfig) -> BitGrid {
 
 /// Return the 8-connected groups of at least `min_cells` cells.
 pub fn keep_large(mut cells: BitGrid, min_cells: usize) -> BitGrid {
-    let mut kept = BitGrid::new(cells.rows(), cells.cols());
+    let mut large = BitGrid::new(cells.rows(), cells.cols());
     let all: Vec<[usize; 2]> = cells.cells().collect();
     for first in all {
         if !cells.get(first[0], first[1]) {
@@ -88,18 +88,18 @@ pub fn keep_large(mut cells: BitGrid, min_cells: usize) -> BitGrid {
             }
         }
         if group.len() >= min_cells {
-            group.iter().for_each(|cell| kept.insert(cell[0], cell[1]));
+            group.iter().for_each(|cell| large.insert(cell[0], cell[1]));
         }
     }
-    kept
+    large
 }
 
-/// Return the frontier cell to explore from `agent`, mostly the nearest; `goal` decides among those
-/// about as near.
+/// Choose the frontier cell to explore from `agent`: mostly the nearest; `goal` decides among cells
+/// at similar distances.
 ///
 /// # Returns
-/// `None` if no frontier can be reached that is far enough away; of equals the first in row-major
-/// order.
+/// The best cell, of equals the first in row-major order; `None` if no frontier that is far enough
+/// away can be reached.
 ///
 /// # Source
 /// UniGoal: score 10 - (clip(d, 0, 11.2) - 1.2), plus 1 - (clip(dg, 0, 11.2) - 1.2) / 10.

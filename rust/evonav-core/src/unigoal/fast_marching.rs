@@ -1,4 +1,4 @@
-//! Distances around obstacles by fast marching.
+//! Compute distances around obstacles by fast marching.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -7,14 +7,14 @@ use crate::grid::bits::BitGrid;
 /// A rectangle of cells of a larger grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Window {
-    /// `[row, col]` of its first cell.
+    /// First cell, `[row, col]`.
     pub first: [usize; 2],
-    /// Rows and columns.
+    /// Number of rows and columns.
     pub shape: [usize; 2],
 }
 
 impl Window {
-    /// Return the place of a cell in row-major storage of the window; `None` outside.
+    /// Return the index of a cell in row-major storage of the window; `None` if it is outside.
     pub fn index(&self, cell: [usize; 2]) -> Option<usize> {
         let row = cell[0].checked_sub(self.first[0])?;
         let col = cell[1].checked_sub(self.first[1])?;
@@ -25,30 +25,30 @@ impl Window {
 /// Distances from the seeds of [`march`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Field {
-    /// What `distances` covers.
+    /// Window that `distances` covers.
     pub window: Window,
-    /// In cells, row-major; infinite where the front did not come.
+    /// Distances in cells, row-major; infinite for cells that the front did not reach.
     pub distances: Vec<f32>,
-    /// The last cell that the front came to.
+    /// Last cell that the front reached.
     pub last: Option<[usize; 2]>,
 }
 
 impl Field {
-    /// Return the distance of a cell in cells; infinite outside the window and where the front did
-    /// not come.
+    /// Return the distance of a cell in cells; infinite outside the window and for cells that the
+    /// front did not reach.
     pub fn at(&self, cell: [usize; 2]) -> f32 {
         self.window.index(cell).map_or(f32::INFINITY, |index| self.distances[index])
     }
 }
 
-/// When a front may stop.
+/// The condition on which a front stops.
 #[derive(Debug, Clone, Copy)]
 pub enum Until<'a> {
-    /// When there is nowhere left to go.
+    /// All cells that can be reached are reached.
     Never,
-    /// When it has reached all of these cells.
+    /// All of these cells are reached.
     All(&'a [[usize; 2]]),
-    /// When it has reached one of these cells.
+    /// One of these cells is reached.
     Any(&'a BitGrid),
 }
 
@@ -56,14 +56,14 @@ const WALL: u8 = 0;
 const FAR: u8 = 1;
 const ACCEPTED: u8 = 2;
 
-/// Return the distances from the nearest seed over passable cells: the eikonal equation by
-/// second-order upwind differences, cells accepted in the order of their distance.
+/// Compute the distances from the nearest seed over passable cells. The eikonal equation is solved
+/// by second-order upwind differences; cells are accepted in the order of their distance.
 ///
 /// # Arguments
 /// * `passable` - cells that the front may cross.
 /// * `seeds` - cells at distance 0, of the same grid; they need not be passable.
-/// * `window` - the front stays inside; clipped to the grid.
-/// * `until` - when to stop; what lies farther stays infinite.
+/// * `window` - window in which the front stays; it is clipped to the grid.
+/// * `until` - condition on which the front stops; the distances of farther cells stay infinite.
 ///
 /// # Returns
 /// Distances in cells.
@@ -142,7 +142,8 @@ struct Front {
     states: Vec<u8>,
     distances: Vec<f32>,
     is_end: Vec<bool>,
-    /// Distance bits above, index below: floats that are not negative sort as their bits.
+    /// Entries with the bits of the distance above the index: floats that are not negative sort
+    /// like their bits.
     queue: BinaryHeap<Reverse<u64>>,
 }
 
@@ -182,7 +183,7 @@ impl Front {
         [0, 1].map(|i| cell[i] - PAD + self.window.first[i])
     }
 
-    /// Mark the cells to stop at, and says how many of them have to be reached.
+    /// Mark the cells at which the front stops; return how many of them must be reached.
     fn aim(&mut self, until: Until<'_>) -> Option<usize> {
         let ends: Vec<usize> = match until {
             Until::Never => return None,
@@ -204,8 +205,8 @@ impl Front {
         self.queue.push(Reverse(u64::from(distance.to_bits()) << 32 | index as u64));
     }
 
-    /// Return the seeds at 0, and their diagonal neighbours at their true distance: upwind
-    /// differences alone would put them at 1.71.
+    /// Set the seeds to 0, and their diagonal neighbours to their true distance: upwind differences
+    /// alone would give 1.71.
     fn seed(&mut self, seeds: &BitGrid) {
         let indices: Vec<usize> = seeds.cells().filter_map(|cell| self.padded(cell)).collect();
         for &index in &indices {
@@ -225,7 +226,7 @@ impl Front {
         }
     }
 
-    /// Bring a cell's distance up to date with its accepted neighbours.
+    /// Update a cell's distance from its accepted neighbours.
     fn update(&mut self, index: usize) {
         if self.states[index] != FAR {
             return;
@@ -238,8 +239,8 @@ impl Front {
         }
     }
 
-    /// Return the along one axis: weight and offset of `weight * (d - offset)^2`, and the plain
-    /// neighbour.
+    /// Return the upwind term along one axis: weight and offset of `weight * (d - offset)^2`, and
+    /// the neighbour's distance.
     fn upwind(&self, index: usize, step: isize) -> Option<Term> {
         let side = |step: isize| {
             let near = index.wrapping_add_signed(step);
@@ -278,8 +279,8 @@ struct Term {
     near: f32,
 }
 
-/// Return the larger root of `sum weight * (d - offset)^2 = 1`, not below a neighbour it is taken
-/// from.
+/// Return the larger root of `sum weight * (d - offset)^2 = 1`; it is not below the neighbours from
+/// which it is computed.
 fn solve(terms: [Option<Term>; 2]) -> f32 {
     let alone = |term: Term| term.offset + 1.0 / term.weight.sqrt();
     match terms {
@@ -291,7 +292,7 @@ fn solve(terms: [Option<Term>; 2]) -> f32 {
             let gap = a.offset - b.offset;
             let rest = 1.0 - a.weight * b.weight / sum * gap * gap;
             let both = mean + (rest.max(0.0) / sum).sqrt();
-            // A root below a neighbour would run against the front: one side alone it is.
+            // A root below a neighbour would run against the front, so a single axis is used then.
             if rest < 0.0 || both < a.near.max(b.near) { alone(a).min(alone(b)) } else { both }
         }
     }

@@ -1,5 +1,5 @@
 //! UniGoal's geometry: a bird's-eye map fused from depth, distances by fast marching, exploration
-//! targets, short-term goals and what collisions teach.
+//! targets, path planning, and cells blocked after collisions.
 
 pub mod bev_config;
 pub mod bev_map;

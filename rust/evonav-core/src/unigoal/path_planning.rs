@@ -1,4 +1,4 @@
-//! The next few cells of a path, read off a distance field.
+//! Plan paths: distances to a goal, and a short-term goal on the way to it.
 
 use crate::{
     Error,
@@ -10,28 +10,29 @@ use crate::{
     },
 };
 
-/// A cell to head for.
+/// The cell that the agent should move to next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShortTermGoal {
-    /// `[row, col]`.
+    /// The cell, `[row, col]`.
     pub cell: [usize; 2],
-    /// How much nearer to the goal it is than the agent, in cells.
+    /// Difference between the agent's and the cell's distance to the goal, in cells.
     pub gain: f32,
 }
 
 /// Return the cell on a circle around the agent that is nearest to the goal by `field`.
 ///
-/// A cell that gains more than 1.5 times its straight distance lies beyond a wall that is thinner
-/// than the circle is wide; it is passed over (as in UniGoal).
+/// A cell that gains more than 1.5 times its straight distance is beyond a wall that is thinner
+/// than the circle is wide; it is skipped, as in UniGoal.
 ///
 /// # Arguments
-/// * `field` - distances to the goal, at least at the agent and nearer ones.
-/// * `position` - `[row, col]` of the agent in cells, fractions counted from a cell's lower corner.
-/// * `radius` - of the circle, in cells; cells farther than `radius - 1` and up to `radius` are on it.
+/// * `field` - distances to the goal, at least up to the agent's.
+/// * `position` - `[row, col]` of the agent in cells; fractions count from a cell's lower corner.
+/// * `radius` - radius of the circle, in cells; cells farther than `radius - 1` and up to `radius`
+///   are on it.
 ///
 /// # Returns
-/// `None` if no cell of the circle is nearer to the goal than the agent's own, or the goal cannot
-/// be reached from there; of equals the first in row-major order.
+/// The best cell, of equals the first in row-major order; `None` if no cell of the circle is nearer
+/// to the goal than the agent's own, or the goal cannot be reached from there.
 pub fn short_term_goal(field: &Field, position: [f64; 2], radius: usize) -> Option<ShortTermGoal> {
     let cell = position.map(f64::floor);
     if position.iter().any(|p| !p.is_finite() || *p < 0.0) {
@@ -63,16 +64,16 @@ pub fn short_term_goal(field: &Field, position: [f64; 2], radius: usize) -> Opti
     best
 }
 
-/// How [`plan`] looks for a way (UniGoal's constants).
+/// Parameters of [`plan`]; the defaults are UniGoal's constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlanConfig {
-    /// Obstacles are grown by this many cells.
+    /// Number of cells by which obstacles are grown.
     pub obstacle_radius: usize,
-    /// Paths may leave the known part of the map by this many cells.
+    /// Number of cells by which paths may leave the known part of the map.
     pub margin: usize,
-    /// Radius in cells of the circle that the short-term goal lies on ...
+    /// Radius, in cells, of the circle on which the short-term goal lies.
     pub circle: usize,
-    /// ... and of the one that is tried where the first has none.
+    /// Radius, in cells, of the circle that is tried if the first has no short-term goal.
     pub small_circle: usize,
 }
 
@@ -82,24 +83,24 @@ impl Default for PlanConfig {
     }
 }
 
-/// A way to a goal, as far as the agent needs it.
+/// The part of a path to a goal that the agent needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan {
-    /// Length of the way to the nearest goal cell; `None` if there is none.
+    /// Length of the path to the nearest goal cell; `None` if there is none.
     pub distance_m: Option<f64>,
     /// Straight distance to the nearest goal cell's centre; infinite if no goal is on the map.
     pub straight_m: f64,
-    /// `[x, z]` to head for: without a way to the goal, on the way to the reachable place nearest
-    /// to it. `None` on the goal or at that place.
+    /// Point `[x, z]` to move to. Without a path to the goal it is on the path to the reachable
+    /// cell nearest to the goal. `None` if the agent is at the goal or at that cell.
     pub short_term_m: Option<Vec2>,
 }
 
-/// Find the way from a place to the nearest of some goal cells.
+/// Plan a path from a point to the nearest of some goal cells.
 ///
 /// # Arguments
-/// * `agent_m` - `[x, z]`, on the map.
-/// * `goals` - `[row, col]`; those off the map are left out.
-/// * `goal_radius` - goal cells are grown by this many cells; they count as passable.
+/// * `agent_m` - position of the agent, `[x, z]`, on the map.
+/// * `goals` - goal cells, `[row, col]`; those off the map are left out.
+/// * `goal_radius` - number of cells by which goal cells are grown; they are passable.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if the agent is off the map.
@@ -147,7 +148,7 @@ pub fn plan(
     })
 }
 
-/// Return the cell that a way leads to and that is nearest to some goals.
+/// Return the reachable cell that is nearest to some goals.
 fn nearest_reachable(
     passable: &BitGrid,
     agent: [usize; 2],

@@ -1,4 +1,4 @@
-//! A view's points spread over the columns of a block of voxels.
+//! Distribute a view's points over the columns of a block of voxels.
 
 use crate::{
     geometry::Vec2,
@@ -6,7 +6,8 @@ use crate::{
     unigoal::{bev_config::BevConfig, depth_view::DepthView},
 };
 
-/// Points in a column of voxels, by height; each point counts by its nearness to a voxel's centre.
+/// The weights of points in a column of voxels, by height; a point counts by its nearness to a
+/// voxel's centre.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Column {
     below: f32,
@@ -15,31 +16,32 @@ pub struct Column {
     above: f32,
 }
 
-/// Half a point, rounded, is one.
+/// Weight from which a sum of points counts as a point.
 const A_POINT: f32 = 0.5;
 
 impl Column {
-    /// Return the something at any height.
+    /// Return whether the column has a point at any height.
     pub fn is_explored(self) -> bool {
         self.below + self.floor + self.obstacle + self.above >= A_POINT
     }
 
-    /// Return the something between the lowest obstacle and the camera, or a hole in the floor.
+    /// Return whether the column has a point between the lowest obstacle and the camera, or a hole
+    /// in the floor.
     pub fn is_obstacle(self) -> bool {
         let is_hole = self.below >= A_POINT && self.floor < A_POINT;
         self.obstacle >= A_POINT || is_hole
     }
 }
 
-/// Columns around the field of view, aligned with the map; scratch memory that is kept.
+/// The columns around the field of view, aligned with the map; the memory is reused.
 ///
-/// Only sums over heights are asked for, so voxels need not be kept apart: a point goes to the four
-/// columns around it, and at both levels around it to what they count as.
+/// Only sums over heights are needed, so voxels are not stored separately: a point adds to the four
+/// columns around it, and there to the height ranges of the two levels around it.
 #[derive(Debug, Clone, Default)]
 pub struct Block {
-    /// `[row, col]` of the map that column (0, 0) stands on; may be negative.
+    /// Cell `[row, col]` of the map on which column (0, 0) stands; may be negative.
     first: [i64; 2],
-    /// Columns along an edge.
+    /// Number of columns along an edge.
     side: usize,
     columns: Vec<Column>,
     points: Vec<Point>,
@@ -48,14 +50,14 @@ pub struct Block {
 /// A point among the columns.
 #[derive(Debug, Clone, Copy)]
 struct Point {
-    /// `[row, col]` from the first column's centre, in cells.
+    /// Position `[row, col]` relative to the first column's centre, in cells.
     at: [f32; 2],
-    /// Shares of its weight below, around and over the floor, and over the camera.
+    /// Shares of its weight below the floor, around the floor, above it, and above the camera.
     shares: [f32; 4],
     category: i32,
 }
 
-/// First voxel levels of floor and obstacles, and the first over the obstacles.
+/// The first voxel levels of the floor, of obstacles, and above the obstacles.
 #[derive(Debug, Clone, Copy)]
 struct Levels {
     low_m: f64,
@@ -64,7 +66,7 @@ struct Levels {
 }
 
 impl Levels {
-    /// Return the voxel centres are at whole multiples of a cell over the lowest height.
+    /// Compute the levels; voxel centres are at whole multiples of a cell above the lowest height.
     fn new(config: &BevConfig, camera_height_m: f64) -> Self {
         let (low_m, per_m) = (config.heights_m[0], 1.0 / config.cell_m);
         let level = |height_m: f64| ((height_m - low_m) * per_m + 1e-6).floor() as i64;
@@ -91,7 +93,7 @@ impl Levels {
 }
 
 impl Block {
-    /// Take a view's points, and counts them in each column.
+    /// Collect a view's points and add them to their columns.
     pub fn fill(&mut self, view: &DepthView<'_>, spec: &GridSpec, config: &BevConfig) {
         self.place(view, spec, config);
         self.collect(view, spec, config);
@@ -126,7 +128,7 @@ impl Block {
         found
     }
 
-    /// Return the points of a category among the obstacles of each cell, rounded.
+    /// Count the points of a category among the obstacles of each cell, rounded.
     pub fn count_category(&self, category: usize, spec: &GridSpec) -> Vec<([usize; 2], u32)> {
         let mut counts = vec![0.0_f32; self.columns.len()];
         for point in &self.points {
@@ -150,7 +152,7 @@ impl Block {
         (row < spec.rows && col < spec.cols).then_some([row, col])
     }
 
-    /// Lay the columns around the block before the camera, whichever way it is turned.
+    /// Place the columns around the block in front of the camera, whatever its heading.
     fn place(&mut self, view: &DepthView<'_>, spec: &GridSpec, config: &BevConfig) {
         let [camera_x, _, camera_z] = view.camera.position_m;
         let (sin, cos) = view.camera.yaw_rad.sin_cos();
@@ -166,18 +168,19 @@ impl Block {
         self.first = [1, 0].map(|axis: usize| {
             ((low_m[axis] - spec.corner_m[axis]) / config.cell_m).floor() as i64 - 2
         });
-        // The block's diagonal, and a rim for what spreads.
+        // The block's diagonal, and a margin for points that are distributed.
         self.side = (2.0_f64.sqrt() * config.block_m / config.cell_m).ceil() as usize + 6;
     }
 
-    /// Return the points of every `stride_px`-th pixel that lie in the block before the camera.
+    /// Collect the points of every `stride_px`-th pixel that lie in the block in front of the
+    /// camera.
     fn collect(&mut self, view: &DepthView<'_>, spec: &GridSpec, config: &BevConfig) {
         let camera = &view.camera;
         let [camera_x, camera_y, camera_z] = camera.position_m;
         let (sin, cos) = camera.yaw_rad.sin_cos();
         let levels = Levels::new(config, camera_y);
         let per_m = 1.0 / config.cell_m;
-        // Place of the camera among the columns; a column's centre is a whole number.
+        // The position of the camera among the columns; a column's centre is a whole number.
         let origin = [
             (camera_z - spec.corner_m[1]) * per_m - self.first[0] as f64 - 0.5,
             (camera_x - spec.corner_m[0]) * per_m - self.first[1] as f64 - 0.5,

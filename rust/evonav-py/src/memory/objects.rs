@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 
 use crate::{arrays, error};
 
-/// An object entry as it was when asked for.
+/// An object entry at the time of the call that returned it.
 #[pyclass(frozen, get_all, module = "evonav._core")]
 struct ObjectEntry {
     id: u64,
@@ -47,7 +47,7 @@ impl ObjectEntry {
     }
 }
 
-/// What was detected, gathered into lasting entries.
+/// Detections merged into lasting entries.
 #[pyclass(module = "evonav._core")]
 struct ObjectMap(objects::ObjectMap);
 
@@ -211,7 +211,7 @@ impl ObjectMap {
     }
 }
 
-/// The arrays of one view, as Python lends them.
+/// The arrays of one view, borrowed from Python.
 struct ViewArrays<'py> {
     depth_m: PyReadonlyArray2<'py, f32>,
     masks: PyReadonlyArray2<'py, i32>,
@@ -220,7 +220,7 @@ struct ViewArrays<'py> {
     features: Option<PyReadonlyArray2<'py, f32>>,
 }
 
-/// The same as slices, which may leave the interpreter.
+/// The same arrays as slices, which can be used without the interpreter.
 struct ViewSlices<'a> {
     camera: Camera,
     depth_m: &'a [f32],
@@ -231,7 +231,7 @@ struct ViewSlices<'a> {
 }
 
 impl ViewArrays<'_> {
-    /// Return the image is as large as `masks`.
+    /// Return the view as slices; the image has the size of `masks`.
     fn view(&self, pose: Pose, vertical_fov_rad: f64) -> PyResult<ViewSlices<'_>> {
         let (masks, [height_px, width_px]) = arrays::row_major("masks", &self.masks)?;
         let (depth_m, depth_shape) = arrays::row_major("depth_m", &self.depth_m)?;

@@ -12,7 +12,7 @@ use crate::{arrays, error};
 
 type Cells<'py> = Bound<'py, PyArray2<i32>>;
 
-/// A place to explore from.
+/// A frontier: a place from which to explore.
 #[pyclass(frozen, module = "evonav._core")]
 struct Frontier(frontiers::Frontier);
 

@@ -26,13 +26,13 @@ impl MiniNetwork {
         py.detach(|| Network::read(weights)).map(Self).map_err(error::to_py)
     }
 
-    /// Return what it tells apart.
+    /// Return the classes that it distinguishes.
     #[getter]
     fn classes(&self) -> Vec<String> {
         self.0.classes().to_vec()
     }
 
-    /// Return the logits of each cell.
+    /// Compute the logits of each cell.
     fn logits<'py>(
         &self,
         py: Python<'py>,
@@ -48,7 +48,7 @@ impl MiniNetwork {
         arrays::image_of(py, logits.values, shape)
     }
 
-    /// Return the masks, classes and confidences.
+    /// Detect instances; return masks, classes and confidences.
     #[pyo3(signature = (rgb, depth_m, horizon_rad, *, min_cells, min_confidence, colour=0.02, depth=8.0, place=0.5))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of the Python function")]
     #[expect(clippy::type_complexity, reason = "a triple of arrays")]
@@ -80,7 +80,7 @@ impl MiniNetwork {
     }
 }
 
-/// Return the pixels, depths, width and height of a picture.
+/// Return pixels, depths, width and height of an image.
 fn picture<'a>(
     rgb: &'a PyReadonlyArray3<'_, u8>,
     depth_m: &'a PyReadonlyArray2<'_, f32>,

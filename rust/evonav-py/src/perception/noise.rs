@@ -19,7 +19,7 @@ fn stream(seed: u64, labels: &[String]) -> Stream {
     Stream::new(seed, &labels.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// Return the standard normals, a row a stream.
+/// Draw standard normal numbers, one row per stream.
 #[pyfunction]
 #[pyo3(signature = (seed, labels, *, num_draws))]
 fn draw_normals(
@@ -35,7 +35,7 @@ fn draw_normals(
     arrays::image_of(py, drawn.collect(), [labels.len(), num_draws])
 }
 
-/// Return a row a mask: sides of its outline, those that are cut, mean depth.
+/// Return one row per mask: sides of its outline, cut sides, mean depth.
 #[pyfunction]
 #[pyo3(signature = (masks, depth_m, *, num_masks))]
 fn mask_outlines<'py>(
@@ -53,7 +53,7 @@ fn mask_outlines<'py>(
     arrays::rows_of(py, outlines.into_iter().map(row).collect())
 }
 
-/// Return the masks that shrink, grow, are cut, split and renamed.
+/// Shrink, grow, cut, split and renumber masks.
 #[pyfunction]
 fn distort_masks<'py>(
     py: Python<'py>,
@@ -82,7 +82,7 @@ fn distort_masks<'py>(
     arrays::image_of(py, found, shape)
 }
 
-/// Places in view where something may be seen that is not there.
+/// Find the sites in view where something may be detected that does not exist.
 #[pyfunction]
 #[pyo3(signature = (
     depth_m, *, vertical_fov_rad, position_m, yaw_rad, horizon_rad,
@@ -133,7 +133,7 @@ fn paint_blobs(
     let masks = arrays::whole_mut("masks", &mut masks)?;
     let (surfaces, _) = arrays::row_major("surfaces", &surfaces)?;
     let rows = arrays::rows("blobs", &blobs)?.iter().zip(arrays::rows("radii_px", &radii_px)?);
-    // Negative places become places outside the image, which the core refuses.
+    // Negative positions become positions outside the image, which the core rejects.
     let blobs: Vec<_> = rows
         .map(|(&[row, col, number], &radii_px)| false_detections::Blob {
             pixel: [row, col].map(|px| usize::try_from(px).unwrap_or(usize::MAX)),
@@ -144,7 +144,7 @@ fn paint_blobs(
     false_detections::paint_blobs(masks, surfaces, width_px, &blobs).map_err(error::to_py)
 }
 
-/// A depth image as a camera that errs would give it.
+/// Add a camera's errors to a depth image.
 #[pyfunction]
 #[pyo3(signature = (
     depth_m, *, sigma_m, sigma_per_m, step_per_m, dropout, edge_dropout, max_depth_m, seed, labels,

@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 
 use crate::{arrays, error, simulator::embedded::PyEmbeddedSimulator};
 
-/// By agent, whether its action was carried out, and its distance.
+/// Whether each agent's action was carried out, and its distance.
 type Stepped<'py> = (Bound<'py, PyArray1<bool>>, Bound<'py, PyArray1<f64>>);
 
 #[pyclass(name = "GeodesicField", module = "evonav._core", frozen)]
@@ -90,7 +90,7 @@ impl PyBatchSimulator {
         self.core.aim(slot, field).map_err(error::to_py)
     }
 
-    /// Return the corners of a path of one agent.
+    /// Return the corners of the path of one agent.
     fn plan_one(
         &mut self,
         py: Python<'_>,
@@ -133,7 +133,7 @@ impl PyBatchSimulator {
         self.core.slot(slot).map(Slot::distance_m).map_err(error::to_py)
     }
 
-    /// Return `(B, 5)`: x, y, z, yaw and horizon.
+    /// Return the poses, `(B, 5)`: x, y, z, yaw and horizon.
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let rows = (0..self.core.num_slots()).map(|index| {
             let Pose { position_m: [x_m, y_m, z_m], yaw_rad, horizon_rad } =

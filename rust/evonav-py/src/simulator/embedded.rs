@@ -42,7 +42,7 @@ type BodyRecord = (String, String, &'static str, Vec3, Vec3);
 #[pyclass(name = "EmbeddedSimulator", module = "evonav._core", frozen)]
 pub struct PyEmbeddedSimulator {
     pub core: Arc<EmbeddedSimulator>,
-    /// Working memory of the renderer; a second thread that finds it taken makes its own.
+    /// Working memory of the renderer. A second thread that finds it in use creates its own.
     buffer: Mutex<FrameBuffer>,
 }
 
@@ -84,7 +84,7 @@ impl PyEmbeddedSimulator {
             .map_err(error::to_py)
     }
 
-    /// Return a simulator of this house after a `HouseDelta` (JSON).
+    /// Apply a `HouseDelta` (JSON); return the simulator of the changed house.
     fn apply(&self, py: Python<'_>, delta_json: &str) -> PyResult<Self> {
         let delta: HouseDelta = HouseDelta::from_json(delta_json).map_err(error::to_py)?;
         py.detach(|| self.core.apply(&delta)).map(Self::from).map_err(error::to_py)
@@ -98,7 +98,8 @@ impl PyEmbeddedSimulator {
         self.core.bodies().iter().map(body_record).collect()
     }
 
-    /// Return the `HouseDelta` of a `SpawnRequest` (both JSON), and the ids of what found no place.
+    /// Carry out a `SpawnRequest`; return the `HouseDelta` (both JSON) and the ids of the objects
+    /// that found no place.
     fn random_spawn(&self, py: Python<'_>, request_json: &str) -> PyResult<(String, Vec<String>)> {
         let (house, scene) = (self.core.house(), self.core.scene());
         py.detach(|| {
@@ -110,7 +111,7 @@ impl PyEmbeddedSimulator {
         .map_err(error::to_py)
     }
 
-    /// Return the `HouseDelta` (JSON) that brings down what hangs in the air.
+    /// Return the `HouseDelta` (JSON) that lets objects that hang in the air fall.
     fn settled(&self, py: Python<'_>) -> PyResult<String> {
         let (house, scene) = (self.core.house(), self.core.scene());
         py.detach(|| settled(house, Catalogue::bundled(), UnknownAssets::CategoryDefault, scene))
@@ -118,7 +119,7 @@ impl PyEmbeddedSimulator {
             .map_err(error::to_py)
     }
 
-    /// Return the position, yaw and horizon.
+    /// Return position, yaw and horizon of the start pose.
     fn start(&self) -> (Vec3, f64, f64) {
         let Pose { position_m, yaw_rad, horizon_rad } = self.core.start();
         (position_m, yaw_rad, horizon_rad)
@@ -164,7 +165,7 @@ impl PyEmbeddedSimulator {
         self.images(py, &view, Want { rgb, instances })
     }
 
-    /// Indices of the bodies that AI2-THOR calls visible.
+    /// Return the indices of the bodies that AI2-THOR calls visible.
     #[pyo3(signature = (
         *, image_px, vertical_fov_rad, position_m, yaw_rad, horizon_rad, roll_rad, half_height_m,
         agent_m, max_distance_m
@@ -269,8 +270,8 @@ impl PyEmbeddedSimulator {
         let (depth, colours, ids) = py
             .detach(|| {
                 let mut spare = FrameBuffer::default();
-                let mut kept = self.buffer.try_lock().ok();
-                let buffer = kept.as_deref_mut().unwrap_or(&mut spare);
+                let mut shared = self.buffer.try_lock().ok();
+                let buffer = shared.as_deref_mut().unwrap_or(&mut spare);
                 self.core.render(view, want, buffer)?;
                 Ok(buffer.take())
             })
@@ -310,8 +311,9 @@ fn map_spec(py: Python<'_>, house_json: &str, name: &str, cell_m: f64) -> PyResu
 
 /// Add class and function to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    // Images are freed as often as they are made. Having seen one block of this size freed, glibc
-    // keeps that much memory instead of returning it, and getting it back costs a third of a frame.
+    // Images are freed as often as they are created. After one block of this size was freed, glibc
+    // keeps that much memory instead of returning it to the system; getting it back takes a third
+    // of a frame.
     drop(std::hint::black_box(vec![0_u8; 1 << 24]));
     module.add_class::<PyEmbeddedSimulator>()?;
     module.add_function(wrap_pyfunction!(map_spec, module)?)

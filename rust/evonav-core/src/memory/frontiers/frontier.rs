@@ -4,22 +4,22 @@ use std::f64::consts::TAU;
 
 use crate::{Error, geometry::Vec2};
 
-/// When free cells are a frontier, and where to look at it from.
+/// Parameters of frontiers and of their view positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrontierConfig {
-    /// Fewest cells of a region.
+    /// Smallest number of cells of a region.
     pub min_cells: usize,
-    /// When there is no such region, groups of at least so many unknown cells beside free ones are
-    /// frontiers, each looked at from close by; 0 for never, as in 3D-Mem, where a glimpse of a
-    /// room past a door is too small a region and the room stays undiscovered.
+    /// Smallest number of unknown cells beside free ones that form a frontier when there is no
+    /// region; it is viewed from close by. 0 disables this, as in 3D-Mem, where a room that is
+    /// barely visible through a door is too small a region and stays undiscovered.
     pub min_border_cells: usize,
-    /// A region that spans more than this, seen from the agent, is split.
+    /// Largest angle that a region spans, seen from the agent; wider regions are split.
     pub max_span_rad: f64,
-    /// A view position keeps this far from obstacles where it can ...
+    /// Preferred distance of a view position from obstacles.
     pub clearance_m: f64,
-    /// ... by moving away from them in steps of this ...
+    /// Length of the steps by which a view position moves away from obstacles.
     pub push_step_m: f64,
-    /// ... this far at most.
+    /// Largest distance by which a view position moves.
     pub max_push_m: f64,
 }
 
@@ -57,13 +57,13 @@ impl FrontierConfig {
 /// A place to explore from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frontier {
-    /// Counts up; never used twice for one map.
+    /// Id: ascending, never used twice for one map.
     pub id: u64,
-    /// `[x, z]` where to stand.
+    /// View position, `[x, z]`.
     pub position_m: Vec2,
-    /// Where to look: from the agent, as it stood when the frontier was made, to the region; for
-    /// the last resort ([`FrontierConfig::min_border_cells`]), from `position_m`.
+    /// Viewing direction: from the agent's position when the frontier was created to the region;
+    /// from `position_m` for frontiers by [`FrontierConfig::min_border_cells`].
     pub direction_rad: f64,
-    /// `[row, col]` of the region, row-major.
+    /// Cells `[row, col]` of the region, row-major.
     pub cells: Vec<[i32; 2]>,
 }

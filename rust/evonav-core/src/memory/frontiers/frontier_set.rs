@@ -1,9 +1,9 @@
-//! Frontiers: where the known floor ends and exploring may go on, by 3D-Mem's rules.
+//! Find frontiers and follow them from one update to the next.
 //!
-//! The free cells seen from afar but not from close by, well inside the unexplored, form regions;
-//! the border of the explored, next to a region, is where to stand and look. Parameters and rules are those
-//! of 3D-Mem (Yang et al., CVPR 2025), restated; where its code draws random numbers ours does not,
-//! and a region's direction is the circular mean, which has no wrap to handle.
+//! Free cells that were seen from afar but not from close by, surrounded by unexplored cells, form
+//! regions; view positions are on the border of the explored floor next to a region. Parameters and
+//! rules are those of 3D-Mem (Yang et al., CVPR 2025), with two differences: no random numbers are
+//! drawn, and a region's direction is the circular mean, which needs no handling of wrap-around.
 
 use crate::{
     Error,
@@ -19,12 +19,13 @@ use crate::{
     },
 };
 
-/// The frontiers of a map and their ids, kept from one update to the next.
+/// The frontiers of a map, whose ids persist from one update to the next.
 #[derive(Debug, Clone, Default)]
 pub struct Frontiers {
     list: Vec<Frontier>,
     next_id: u64,
-    /// Whether the list holds borders, for want of regions ([`FrontierConfig::min_border_cells`]).
+    /// Whether the list contains borders because there are no regions
+    /// ([`FrontierConfig::min_border_cells`]).
     is_last_resort: bool,
     given_up: Option<BitGrid>,
     last_agent_m: Option<Vec2>,
@@ -37,15 +38,15 @@ impl Frontiers {
         &self.list
     }
 
-    /// Drop all frontiers. Ids go on counting.
+    /// Remove all frontiers. Ids are not used again.
     pub fn clear(&mut self) {
         self.list.clear();
         self.given_up = None;
         self.num_stands = 0;
     }
 
-    /// Bring the frontiers up to date with the map. A frontier whose region has hardly changed
-    /// keeps its id, position and direction.
+    /// Update the frontiers for the present map. A frontier whose region has hardly changed keeps
+    /// its id, position and direction.
     ///
     /// # Errors
     /// As [`extract`].
@@ -79,9 +80,9 @@ impl Frontiers {
         Ok(&self.list)
     }
 
-    /// Return the unknown cells that the agent did not get to see from the place meant for it, or
-    /// from as near as it could get (it went nowhere since the last update), it will not see at
-    /// all. An agent that goes nowhere twice cannot get to the nearest place.
+    /// Give up unknown cells that the agent cannot see: those that it did not see from the view
+    /// position, or from as near as it could get (it did not move since the last update). An agent
+    /// that does not move twice cannot reach the nearest view position.
     fn give_up(&mut self, map: &OccupancyMap, agent_m: Vec2) {
         let is_standing = self.last_agent_m.is_some_and(|last| distance_2d_m(last, agent_m) < 0.1);
         self.num_stands = if is_standing { self.num_stands + 1 } else { 0 };
@@ -104,13 +105,14 @@ impl Frontiers {
     }
 }
 
-/// Return the frontiers of a map, without a history.
+/// Find the frontiers of a map without a history.
 ///
 /// # Arguments
-/// * `agent_m` - `[x, z]`; frontiers lie on the free floor that is connected to it.
+/// * `agent_m` - position of the agent, `[x, z]`; frontiers lie on the free floor connected to it.
 ///
 /// # Returns
-/// Frontiers in the order of their regions' first cells (row-major; the parts of a split region by angle), ids from 0.
+/// Frontiers in the order of their regions' first cells (row-major; the parts of a split region by
+/// angle), with ids from 0.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if a number is not finite or outside its domain.
@@ -126,51 +128,52 @@ pub fn extract(
     frontiers.update(map, agent_m, config)?;
     Ok(frontiers.list)
 }
-/// Return the old frontiers that stay, and the regions that become new ones.
+/// Compare old frontiers with regions: return the frontiers that stay, and the regions that become
+/// new ones.
 fn reconcile(
     old: Vec<Frontier>,
     regions: Vec<Vec<[i32; 2]>>,
     config: &FrontierConfig,
 ) -> (Vec<Frontier>, Vec<Vec<[i32; 2]>>) {
     let mut is_taken = vec![false; regions.len()];
-    let mut is_kept = vec![false; old.len()];
+    let mut is_staying = vec![false; old.len()];
     let overlaps: Vec<Vec<Overlap>> = old
         .iter()
         .map(|frontier| regions.iter().map(|r| Overlap::new(&frontier.cells, r)).collect())
         .collect();
     for (i, row) in overlaps.iter().enumerate() {
-        // The same region, give or take a few cells.
+        // The region is the same except for a few cells.
         if let Some(j) = (0..regions.len()).find(|&j| !is_taken[j] && row[j].is_same()) {
-            (is_kept[i], is_taken[j]) = (true, true);
+            (is_staying[i], is_taken[j]) = (true, true);
             continue;
         }
-        // The region fell into parts that together are still it.
+        // The region was split into parts that together are still the same region.
         let parts: Vec<usize> =
             (0..regions.len()).filter(|&j| !is_taken[j] && row[j].iou() > 0.02).collect();
         let total: f64 = parts.iter().map(|&j| row[j].iou()).sum();
         if parts.len() >= 2 && total > 0.95 && total <= 1.0 {
-            is_kept[i] = true;
+            is_staying[i] = true;
             parts.iter().for_each(|&j| is_taken[j] = true);
         }
     }
-    // Old regions that grew together.
+    // Old regions may have merged into one.
     for (j, region) in regions.iter().enumerate() {
         if is_taken[j] {
             continue;
         }
         let parts: Vec<usize> =
-            (0..old.len()).filter(|&i| !is_kept[i] && overlaps[i][j].iou() > 0.02).collect();
+            (0..old.len()).filter(|&i| !is_staying[i] && overlaps[i][j].iou() > 0.02).collect();
         let total: f64 = parts.iter().map(|&i| overlaps[i][j].iou()).sum();
         let num_cells: usize = parts.iter().map(|&i| old[i].cells.len()).sum();
         let ratio = num_cells.min(region.len()) as f64 / num_cells.max(region.len()) as f64;
         if parts.len() >= 2 && total > 0.95 && total <= 1.0 && ratio > 0.95 {
             is_taken[j] = true;
-            parts.iter().for_each(|&i| is_kept[i] = true);
+            parts.iter().for_each(|&i| is_staying[i] = true);
         }
     }
-    let kept: Vec<Frontier> =
-        old.into_iter().zip(is_kept).filter(|(_, keep)| *keep).map(|(f, _)| f).collect();
-    let is_covered = |cell: &[i32; 2]| kept.iter().any(|f| f.cells.binary_search(cell).is_ok());
+    let staying: Vec<Frontier> =
+        old.into_iter().zip(is_staying).filter(|(_, keep)| *keep).map(|(f, _)| f).collect();
+    let is_covered = |cell: &[i32; 2]| staying.iter().any(|f| f.cells.binary_search(cell).is_ok());
     let fresh = regions.into_iter().zip(is_taken).filter(|(_, taken)| !taken).filter_map(
         |(mut region, _)| {
             let num_before = region.len();
@@ -179,10 +182,10 @@ fn reconcile(
         },
     );
     let fresh = fresh.collect();
-    (kept, fresh)
+    (staying, fresh)
 }
 
-/// How two regions (cells in row-major order) share cells.
+/// The numbers of cells that two regions (in row-major order) share and have together.
 struct Overlap {
     shared: usize,
     either: usize,

@@ -1,4 +1,4 @@
-//! Frontiers: where the known floor ends and exploring may go on, by 3D-Mem's rules.
+//! Frontiers: places at which the known floor ends and exploration can continue, by 3D-Mem's rules.
 
 mod frontier;
 mod frontier_set;

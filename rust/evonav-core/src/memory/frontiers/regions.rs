@@ -1,4 +1,4 @@
-//! Regions of a map that are frontiers.
+//! Find the regions of a map that are frontiers.
 
 use std::f64::consts::{PI, TAU};
 
@@ -16,7 +16,7 @@ use crate::{
 pub(crate) struct Found {
     pub(crate) regions: Vec<Vec<[i32; 2]>>,
     pub(crate) edges: BitGrid,
-    /// Whether these are borders of the known, for want of regions.
+    /// Whether these are borders of the known floor, because there are no regions.
     pub(crate) is_last_resort: bool,
 }
 
@@ -56,8 +56,8 @@ pub(crate) fn find_regions(
     Ok(Found { regions, edges, is_last_resort: true })
 }
 
-/// Return the unknown cells beside island cells (4 neighbours), less those given up, and the island
-/// cells beside them.
+/// Return the unknown cells beside island cells (4 neighbours), without those given up, and the
+/// island cells beside them.
 fn borders(map: &OccupancyMap, island: &BitGrid, given_up: Option<&BitGrid>) -> (BitGrid, BitGrid) {
     let (rows, cols) = (island.rows(), island.cols());
     let (mut unknown, mut edges) = (BitGrid::new(rows, cols), BitGrid::new(rows, cols));
@@ -79,7 +79,7 @@ fn borders(map: &OccupancyMap, island: &BitGrid, given_up: Option<&BitGrid>) -> 
     (unknown, edges)
 }
 
-/// Return the cells grouped with their 8 neighbours, in the order of the first cells, each
+/// Group cells with their 8 neighbours; groups are in the order of their first cells, each
 /// row-major.
 fn groups(mut cells: BitGrid) -> Vec<Vec<[i32; 2]>> {
     let mut groups = Vec::new();
@@ -146,7 +146,7 @@ fn island(map: &OccupancyMap, agent_m: Vec2, seeds: &[[i32; 2]]) -> BitGrid {
 }
 
 /// Return the island cells whose 8 neighbours are all unexplored, and those with 4 to 6 unexplored
-/// ones. What lies off the map counts as explored.
+/// neighbours. Cells off the map count as explored.
 fn split_by_unexplored_neighbours(island: &BitGrid, explored: &BitGrid) -> (BitGrid, BitGrid) {
     let (rows, cols) = (island.rows(), island.cols());
     let (mut inner, mut edges) = (BitGrid::new(rows, cols), BitGrid::new(rows, cols));
@@ -155,7 +155,7 @@ fn split_by_unexplored_neighbours(island: &BitGrid, explored: &BitGrid) -> (BitG
         Some(&bits) => !bits & explored.word_mask(word),
         None => 0,
     };
-    // The word, and the same shifted so that each bit holds its left and its right neighbour.
+    // The word, and the word shifted so that each bit is its left or its right neighbour.
     let neighbours = |row: usize, word: usize| {
         let here = unexplored(row, word);
         let before = if word > 0 { unexplored(row, word - 1) } else { 0 };
@@ -189,7 +189,7 @@ fn add3([a, b, c]: [u64; 3]) -> (u64, u64) {
     (a ^ b ^ c, (a & b) | (c & (a ^ b)))
 }
 
-/// Split a region that spans a wide angle around the agent, by k-means on the angle.
+/// Split a region that spans a wide angle around the agent, by k-centres on the angle.
 fn split_wide(
     map: &OccupancyMap,
     agent_m: Vec2,
@@ -224,7 +224,8 @@ fn offset_m(map: &OccupancyMap, agent_m: Vec2, cell: &[i32; 2]) -> Vec2 {
     [centre_m[0] - agent_m[0], centre_m[1] - agent_m[1]]
 }
 
-/// Return the mean direction of cells seen from the agent, as a vector.
+/// Return the sum of the directions of cells seen from the agent, which points in the mean
+/// direction.
 pub(crate) fn mean_direction(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Vec2 {
     cells.iter().fold([0.0; 2], |sum, cell| {
         let [x, z] = offset_m(map, agent_m, cell);
@@ -233,7 +234,7 @@ pub(crate) fn mean_direction(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2
     })
 }
 
-/// Return whether cells surely span no more than an angle: without an arc tangent a cell.
+/// Return whether cells surely span at most an angle, without an arc tangent for each cell.
 fn is_narrow(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]], max_span_rad: f64) -> bool {
     let ahead = mean_direction(map, agent_m, cells);
     let (mut low, mut high) = (0.0_f64, 0.0_f64);
@@ -249,8 +250,8 @@ fn is_narrow(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]], max_span_rad
     high.atan() - low.atan() <= max_span_rad
 }
 
-/// Return the angles of cells seen from the agent (0 along +z, growing towards +x), cut at the
-/// widest gap so that neighbours do not lie a turn apart.
+/// Return the angles of cells seen from the agent (0 along +z, growing towards +x), unwrapped at
+/// the widest gap so that neighbours do not differ by a turn.
 fn unwrapped_angles(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Vec<f64> {
     let mut angles: Vec<f64> = cells
         .iter()
@@ -282,14 +283,14 @@ fn unwrapped_angles(map: &OccupancyMap, agent_m: Vec2, cells: &[[i32; 2]]) -> Ve
     angles
 }
 
-/// Return the borders between the `num_parts` clusters of one-dimensional k-means, started evenly
+/// Return the borders between the `num_parts` clusters of one-dimensional k-centres, started evenly
 /// spread.
 fn k_means_limits(values: &[f64], low: f64, high: f64, num_parts: usize) -> Vec<f64> {
-    let mut means: Vec<f64> =
+    let mut centres: Vec<f64> =
         (0..num_parts).map(|i| low + (high - low) * (i as f64 + 0.5) / num_parts as f64).collect();
     let mut limits = Vec::new();
     for _ in 0..100 {
-        let middle: Vec<f64> = means.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
+        let middle: Vec<f64> = centres.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect();
         if middle == limits {
             break;
         }
@@ -299,7 +300,7 @@ fn k_means_limits(values: &[f64], low: f64, high: f64, num_parts: usize) -> Vec<
             let sum = &mut sums[limits.partition_point(|&limit| limit <= value)];
             *sum = (sum.0 + value, sum.1 + 1.0);
         }
-        for (mean, (sum, count)) in means.iter_mut().zip(sums) {
+        for (mean, (sum, count)) in centres.iter_mut().zip(sums) {
             if count > 0.0 {
                 *mean = sum / count;
             }

@@ -1,4 +1,4 @@
-//! Where to stand and look at a frontier's region.
+//! Choose the position from which to view a frontier's region.
 
 use crate::{
     geometry::{Vec2, distance_2d_m},
@@ -9,7 +9,7 @@ use crate::{
     },
 };
 
-/// Give a region its direction and view position.
+/// Create the frontier of a region: its direction and view position.
 pub(crate) fn place(
     map: &OccupancyMap,
     edges: &BitGrid,
@@ -25,7 +25,7 @@ pub(crate) fn place(
     if candidates.is_empty() {
         candidates = edges.cells().collect();
     }
-    // The five cells that lie best in that direction, then the one nearest to the agent.
+    // Of the five cells that lie best in that direction, the one nearest to the agent is used.
     let mut ranked: Vec<(f64, f64, [usize; 2])> = candidates
         .into_iter()
         .map(|cell| {
@@ -44,8 +44,8 @@ pub(crate) fn place(
     Frontier { id, position_m, direction_rad, cells }
 }
 
-/// Put a viewpoint right beside a region of unknown cells, on the nearest border cell, and looks at
-/// it.
+/// Create the frontier of a group of unknown cells: the view position is on the nearest border
+/// cell, right beside the group.
 pub(crate) fn place_at_border(
     map: &OccupancyMap,
     edges: &BitGrid,
@@ -80,8 +80,8 @@ fn edges_beside(edges: &BitGrid, cells: &[[i32; 2]]) -> Vec<[usize; 2]> {
     let low = low.map(|i| i.saturating_sub(2));
     let rows = low[0]..(high[0] + 3).min(edges.rows());
     rows.flat_map(|row| {
-        let words = edges.row(row).iter().enumerate().skip(low[1] / 64);
-        words
+        let row_words = edges.row(row).iter().enumerate().skip(low[1] / 64);
+        row_words
             .take((high[1] + 2) / 64 - low[1] / 64 + 1)
             .flat_map(move |(index, &word)| ones(word).map(move |bit| [row, index * 64 + bit]))
     })
@@ -89,7 +89,8 @@ fn edges_beside(edges: &BitGrid, cells: &[[i32; 2]]) -> Vec<[usize; 2]> {
     .collect()
 }
 
-/// Move a point away from the nearest obstacle while that gains clearance and stays on free floor.
+/// Move a point away from the nearest obstacle while its clearance grows and it stays on free
+/// floor.
 fn push_away(map: &OccupancyMap, mut point_m: Vec2, config: &FrontierConfig) -> Vec2 {
     let mut moved_m = 0.0;
     while let Some((obstacle_m, clearance_m)) = nearest_blocked(map, point_m, config.clearance_m)

@@ -1,4 +1,4 @@
-//! Cleaning point clouds.
+//! Clean point clouds.
 
 use std::borrow::Cow;
 
@@ -10,7 +10,7 @@ use crate::{
     sensors::unproject::Point,
 };
 
-/// Return a detection's points cleaned, and the box around them; `None` if too little is left.
+/// Clean a detection's points; return them with the box around them, or `None` if too few are left.
 pub(crate) fn clean(points: &[Point], config: &ObjectMapConfig) -> Option<(Vec<Point>, Aabb)> {
     if points.len() < config.min_points {
         return None;
@@ -22,12 +22,12 @@ pub(crate) fn clean(points: &[Point], config: &ObjectMapConfig) -> Option<(Vec<P
         _ => filtered,
     };
     let bounds_m = Aabb::of_points(cluster.iter().map(|point| point.map(f64::from)));
-    // A picture seen from the front is a plane; as a set of voxels it has a volume all the same.
+    // A picture on a wall is a plane, but as a set of voxels it has a volume.
     let volume_m3: f64 = bounds_m.size_m().iter().map(|edge| edge.max(config.voxel_m)).product();
     (volume_m3 >= config.min_box_m3).then_some((cluster, bounds_m))
 }
 
-/// Keep the largest cluster of an entry's cloud, if that leaves enough.
+/// Reduce an entry's cloud to its largest cluster, if enough points are left.
 pub(crate) fn denoise(cloud: &mut Cloud, config: &ObjectMapConfig) {
     let radius_m = config.cluster_radius_m as f32;
     let cluster = largest_cluster(cloud.points(), radius_m, config.cluster_min_points);

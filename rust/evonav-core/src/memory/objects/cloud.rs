@@ -1,4 +1,4 @@
-//! An object's point cloud, kept so that new points are matched and merged without a rebuild.
+//! An object's point cloud, indexed so that new points are matched and merged without a rebuild.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::{
     sensors::unproject::Point,
 };
 
-/// At most one point a voxel, in the order in which they came, and a table to find points near a place.
+/// Points in order of arrival, at most one per voxel, and a table to find points near a place.
 #[derive(Debug, Clone)]
 pub struct Cloud {
     points: Vec<Point>,
@@ -19,7 +19,7 @@ pub struct Cloud {
     inverse_edge: f64,
     voxels: VoxelSet,
     radius_m: f32,
-    /// First point of each cell of edge `radius_m`; `next` leads to the others.
+    /// First point of each cell with edge `radius_m`; `next` leads to the others.
     cells: Blocks<[u32; 64]>,
     next: Vec<u32>,
 }
@@ -27,11 +27,11 @@ pub struct Cloud {
 const END: u32 = u32::MAX;
 
 impl Cloud {
-    /// Return a cloud of the first point of each voxel.
+    /// Create a cloud from the first point of each voxel.
     ///
     /// # Arguments
-    /// * `voxel_m` - edge of a voxel.
-    /// * `radius_m` - within which [`Cloud::overlap`] looks.
+    /// * `voxel_m` - edge length of a voxel.
+    /// * `radius_m` - radius within which [`Cloud::overlap`] looks for points.
     pub fn new(points: &[Point], voxel_m: f64, radius_m: f32) -> Self {
         let mut cloud = Self {
             points: Vec::with_capacity(points.len()),
@@ -56,7 +56,7 @@ impl Cloud {
         &self.bounds_m
     }
 
-    /// Add the points that fall into voxels without one.
+    /// Add the points that fall into voxels without a point.
     pub fn merge(&mut self, points: &[Point]) {
         let inverse_radius = 1.0 / f64::from(self.radius_m);
         for &point in points {
@@ -71,19 +71,19 @@ impl Cloud {
         }
     }
 
-    /// Return the part of `points` with a point of this cloud nearer than the radius, 0 for no
-    /// points.
+    /// Return the share of `points` with a point of this cloud nearer than the radius, 0 if there
+    /// are no points.
     ///
     /// # Complexity
-    /// At most 27 cells a point; the boxes are compared first.
+    /// At most 27 cells per point; the boxes are compared first.
     pub fn overlap(&self, points: &[Point]) -> f64 {
         let mut finder = Finder::new(self);
         let num = points.iter().filter(|&&point| finder.has_near(point)).count();
         num as f64 / points.len().max(1) as f64
     }
 
-    /// Return whether [`Cloud::overlap`] is `enough`, which every larger overlap must be, too;
-    /// looks at no more points than it takes.
+    /// Return whether [`Cloud::overlap`] is `enough`, looking at no more points than necessary. If
+    /// an overlap is enough, every larger one must be enough too.
     pub(crate) fn overlaps(&self, points: &[Point], enough: impl Fn(f64) -> bool) -> bool {
         let share = |num: usize| num as f64 / points.len().max(1) as f64;
         let mut finder = Finder::new(self);
@@ -113,17 +113,17 @@ impl Cloud {
     }
 }
 
-/// Looks for a cloud's points near others that, one after the other, lie together.
+/// A search for a cloud's points near a sequence of neighbouring points.
 struct Finder<'a> {
     cloud: &'a Cloud,
     /// Bounds grown by the radius.
     reach_m: Aabb,
     inverse_radius: f64,
-    /// The cell that a point was in last, and the first of the cloud's points there.
+    /// Cell of the last point, and the first of the cloud's points there.
     last: (Voxel, u32),
-    /// The cell for which `beside` was filled.
+    /// Cell for which `beside` was filled.
     known: Voxel,
-    /// Cells around it with points: where they are from it, and their first.
+    /// Cells with points around it: their offset, and their first point.
     beside: Vec<(Voxel, u32)>,
 }
 
@@ -151,14 +151,14 @@ impl<'a> Finder<'a> {
             let firsts = self.cloud.cells.get(cell);
             self.last = (cell, firsts.map_or(END, |firsts| firsts[place(cell)]));
         }
-        // The point's own cell first: nearly always it decides.
+        // The point's own cell comes first: it nearly always decides.
         if self.cloud.has_near(self.last.1, point) {
             return true;
         }
         if cell != self.known {
             self.look_beside(cell);
         }
-        // Where the point lies in its cell says how near the next ones are.
+        // The point's position in its cell bounds the distance to the neighbouring cells.
         let inside =
             [0, 1, 2].map(|i| f64::from(point[i]) * self.inverse_radius - f64::from(cell[i]));
         self.beside.iter().any(|&(step, first)| {
@@ -173,7 +173,7 @@ impl<'a> Finder<'a> {
         })
     }
 
-    /// Find the points around a cell, a block at a time.
+    /// Find the points in the cells around a cell, block by block.
     fn look_beside(&mut self, cell: Voxel) {
         self.known = cell;
         self.beside.clear();
@@ -199,7 +199,7 @@ impl<'a> Finder<'a> {
     }
 }
 
-/// Return the steps -1, 0 and 1 from a coordinate, parted where a block ends.
+/// Return the steps -1, 0 and 1 from a coordinate, split where a block ends.
 fn within_blocks(coordinate: i32) -> impl Iterator<Item = Range<i32>> {
     let end = match coordinate & 3 {
         0 => 0,

@@ -5,33 +5,35 @@ use crate::Error;
 /// Parameters of the object map; the defaults are 3D-Mem's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObjectMapConfig {
-    /// Fewest pixels with a depth of a detection.
+    /// Smallest number of pixels with a depth of a detection.
     pub min_points: usize,
-    /// A mask is thinned to about this many points.
+    /// Number of points to which a mask is thinned.
     pub max_points: usize,
-    /// Smallest volume of a detection's box, whose edges count as a voxel's at least.
+    /// Smallest volume of a detection's box; each edge counts as at least a voxel's.
     pub min_box_m3: f64,
-    /// Edge of the voxels that clouds are thinned by.
+    /// Edge length of the voxels by which clouds are thinned.
     pub voxel_m: f64,
-    /// DBSCAN's radius for cleaning clouds.
+    /// Radius of DBSCAN for cleaning clouds.
     pub cluster_radius_m: f64,
-    /// DBSCAN's neighbours of a core point.
+    /// Number of neighbours of a core point of DBSCAN.
     pub cluster_min_points: usize,
-    /// Detections and unconfirmed entries farther from the agent than this, on the ground plane, do not count.
+    /// Largest distance from the agent on the ground plane at which detections and unconfirmed
+    /// entries count.
     pub max_distance_m: f64,
-    /// Two points nearer than this are the same place.
+    /// Distance below which two points count as the same place.
     pub overlap_radius_m: f64,
-    /// What visual similarity counts for beside overlap; 0 matches by overlap alone.
+    /// Weight of visual similarity relative to overlap; 0 matches by overlap alone.
     pub visual_weight: f64,
-    /// A detection joins an entry if overlap plus weighted visual similarity exceeds this.
+    /// Threshold of overlap plus weighted visual similarity above which a detection joins an entry.
     pub match_threshold: f64,
-    /// Views between two clean-ups; 0 for none.
+    /// Number of views between two clean-ups; 0 for no clean-ups.
     pub views_per_cleanup: u32,
-    /// Entries with fewer detections are dropped at a clean-up if far from the agent.
+    /// Number of detections below which a clean-up removes entries that are far from the agent.
     pub min_detections: u32,
-    /// Entries merge at a clean-up if one lies in the other by more than this part ...
+    /// Share of one entry's points in another above which a clean-up merges them, if they are
+    /// similar.
     pub merge_overlap: f64,
-    /// ... and they look alike by more than this.
+    /// Visual similarity above which a clean-up merges entries that overlap.
     pub merge_similarity: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Density clusters of a point cloud.
+//! Find density clusters of a point cloud.
 
 use std::{borrow::Cow, sync::LazyLock};
 
@@ -10,16 +10,17 @@ use crate::{
 /// Label of a point that belongs to no cluster.
 pub const NOISE: i32 = -1;
 
-/// DBSCAN (Ester, Kriegel, Sander & Xu, KDD 1996): a point with `min_points` points, itself
-/// counted, within `radius_m` is a core point; core points within `radius_m` of each other share a cluster.
+/// Label points by DBSCAN (Ester, Kriegel, Sander & Xu, KDD 1996): a point with `min_points` points
+/// within `radius_m`, itself included, is a core point; core points within `radius_m` of each other
+/// share a cluster.
 ///
 /// # Returns
-/// A cluster a point, numbered by their first core point, or [`NOISE`]. A border point within
-/// reach of several clusters takes the first, as in scikit-learn.
+/// The cluster of each point, or [`NOISE`]. Clusters are numbered in the order of their first core
+/// point. A border point within reach of several clusters belongs to the first, as in scikit-learn.
 ///
 /// # Complexity
-/// Exact, by a grid whose cells are small enough that all points of a cell are neighbours (Gunawan,
-/// 2013): close to O(points) for the surfaces of objects.
+/// The result is exact. The grid's cells are so small that all points of a cell are neighbours
+/// (Gunawan, 2013); this takes close to O(points) for the surfaces of objects.
 pub fn dbscan(points: &[Point], radius_m: f32, min_points: usize) -> Vec<i32> {
     let grid = Grid::new(points, radius_m);
     let is_core = grid.core_points(min_points);
@@ -27,8 +28,8 @@ pub fn dbscan(points: &[Point], radius_m: f32, min_points: usize) -> Vec<i32> {
     grid.label(&is_core, &clusters)
 }
 
-/// Return the points of the largest cluster (the first of equal ones), in their order; `None` if
-/// all is noise. Borrowed if they are all points.
+/// Return the points of the largest cluster (the first of equals), in their order; `None` if all
+/// points are noise. They are borrowed if they are all points.
 pub fn largest_cluster(
     points: &[Point],
     radius_m: f32,
@@ -46,14 +47,14 @@ pub fn largest_cluster(
     Some(points.iter().zip(&labels).filter(is_inside).map(|(&point, _)| point).collect())
 }
 
-/// Return the squared distance.
+/// Return the squared distance of two points.
 pub(crate) fn distance2(a: Point, b: Point) -> f32 {
     let [x, y, z] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     x * x + y * y + z * z
 }
 
-/// Points by cell. A point has mostly enough neighbours in its own cell and the first ones beside
-/// it; so cells are looked up where they are needed, and as they are needed.
+/// Points by cell. Most points have enough neighbours in their own cell and the nearest ones, so
+/// other cells are looked up only when they are needed.
 struct Grid<'a> {
     points: &'a [Point],
     radius2: f32,
@@ -63,17 +64,17 @@ struct Grid<'a> {
     starts: Vec<u32>,
     voxels: Vec<Voxel>,
     index: VoxelIndex,
-    /// Of each voxel in the index.
+    /// Slot of each voxel in the index.
     slots: Vec<usize>,
-    /// As [`HALF_STEPS`].
+    /// Steps as in [`HALF_STEPS`].
     half_steps: Vec<Step>,
 }
 
-/// From one cell to another.
+/// A step from one cell to another.
 #[derive(Debug, Clone, Copy)]
 struct Step {
     voxels: Voxel,
-    /// In the index.
+    /// Distance in the index.
     stride: isize,
 }
 
@@ -85,7 +86,8 @@ impl Step {
 
 impl<'a> Grid<'a> {
     fn new(points: &'a [Point], radius_m: f32) -> Self {
-        // A hair less than radius / sqrt(3), so that rounding cannot part the points of a cell.
+        // The edge is slightly less than radius / sqrt(3), so that rounding cannot separate the
+        // points of a cell.
         let inverse_edge = 3.0_f64.sqrt() * 1.0001 / f64::from(radius_m);
         let voxel_of_point: Vec<Voxel> =
             points.iter().map(|&point| voxel_of(point, inverse_edge)).collect();
@@ -123,7 +125,7 @@ impl<'a> Grid<'a> {
         &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
-    /// Return the cell some steps away, if points lie there.
+    /// Return the cell that is a step away, if it has points.
     fn beside(&self, cell: usize, step: Step) -> Option<usize> {
         let beside = || [0, 1, 2].map(|i| self.voxels[cell][i].saturating_add(step.voxels[i]));
         let slot = self.slots[cell].wrapping_add_signed(step.stride);
@@ -142,7 +144,7 @@ impl<'a> Grid<'a> {
 
     fn core_points(&self, min_points: usize) -> Vec<bool> {
         let mut is_core = vec![true; self.points.len()];
-        // Points of a cell that are short of neighbours, and how many they have.
+        // Points of a cell with too few neighbours so far, and their numbers of neighbours.
         let mut lacking: Vec<(u32, usize)> = Vec::new();
         for cell in 0..self.num_cells() {
             let here = self.members(cell);
@@ -165,7 +167,8 @@ impl<'a> Grid<'a> {
         is_core
     }
 
-    /// Return the cells joined by core points within the radius: a representative a cell.
+    /// Join cells that have core points within the radius of each other; return a representative
+    /// for each cell.
     fn join_cells(&self, is_core: &[bool]) -> Vec<u32> {
         let mut parents: Vec<u32> = (0..self.num_cells() as u32).collect();
         let cores = |cell: usize| {
@@ -173,7 +176,7 @@ impl<'a> Grid<'a> {
         };
         let has_core: Vec<bool> =
             (0..self.num_cells()).map(|cell| cores(cell).next().is_some()).collect();
-        // Whether two parts became one by a cell and what is a step from it.
+        // Joins a cell and the one a step away; returns whether two parts became one.
         let join = |parents: &mut [u32], cell: usize, step: Step| {
             let Some(other) = self.beside(cell, step).filter(|&other| has_core[other]) else {
                 return false;
@@ -199,8 +202,8 @@ impl<'a> Grid<'a> {
         (0..self.num_cells() as u32).map(|cell| root(&mut parents, cell)).collect()
     }
 
-    /// Join what touching cells leave apart: at every place, one of the two lies not in the largest
-    /// part.
+    /// Join the parts that touching cells leave separate. It is enough to start from cells outside
+    /// the largest part: of two cells to be joined, at least one is outside.
     fn join_rest(
         &self,
         parents: &mut [u32],
@@ -239,7 +242,7 @@ impl<'a> Grid<'a> {
         labels
     }
 
-    /// Return the first cluster among the core points around one that is none.
+    /// Return the first cluster among the core points around a point that is not a core point.
     fn border_label(&self, border: usize, is_core: &[bool], labels: &[i32]) -> i32 {
         let cell = self.cell_of[border] as usize;
         let others = std::iter::once(cell).chain(self.around(cell));
@@ -249,7 +252,7 @@ impl<'a> Grid<'a> {
     }
 }
 
-/// Return the representative of a cell; shortens the way there.
+/// Return the representative of a cell, and shorten the path to it.
 fn root(parents: &mut [u32], mut cell: u32) -> u32 {
     while parents[cell as usize] != cell {
         let parent = parents[cell as usize];
@@ -259,13 +262,13 @@ fn root(parents: &mut [u32], mut cell: u32) -> u32 {
     cell
 }
 
-/// Cells at most this many steps away an axis may hold neighbours.
+/// Largest number of steps along an axis to cells that may contain neighbours.
 const REACH: i32 = 2;
 
-/// Of [`HALF_STEPS`], those to cells that touch: at most one step away an axis.
+/// Number of [`HALF_STEPS`] that lead to touching cells, at most one step along each axis.
 const NUM_TOUCHING: usize = 13;
 
-/// One of every two opposite steps to such cells, the shortest first.
+/// One of every two opposite steps to cells within [`REACH`], the shortest first.
 static HALF_STEPS: LazyLock<Vec<Voxel>> = LazyLock::new(|| {
     let side = 2 * REACH + 1;
     let step = |i: i32| [i / (side * side), i / side % side, i % side].map(|i| i - REACH);

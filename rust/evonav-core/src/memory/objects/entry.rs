@@ -1,4 +1,4 @@
-//! One object as remembered.
+//! The memory of one object.
 
 use crate::{
     geometry::{Aabb, Vec3},
@@ -16,12 +16,12 @@ pub(crate) struct Sighting {
     pub(crate) bounds_m: Aabb,
 }
 
-/// An object entry: detections that seem to be of one object.
+/// An object entry: detections that appear to be of one object.
 #[derive(Debug, Clone)]
 pub struct Entry {
-    /// Counts up from 1.
+    /// Id, ascending from 1.
     pub id: u64,
-    /// Detections by label, in the order in which the labels came.
+    /// Number of detections by label, in the order of the labels' first detection.
     pub label_counts: Vec<(String, u32)>,
     /// Number of detections.
     pub num_detections: u32,
@@ -29,7 +29,7 @@ pub struct Entry {
     pub confidence: f32,
     /// Unit mean of the detections' features.
     pub feature: Option<Vec<f32>>,
-    /// Where its points are.
+    /// Points of the object.
     pub cloud: Cloud,
     /// Stage of the first detection.
     pub first_seen_stage: u32,
@@ -37,9 +37,9 @@ pub struct Entry {
     pub last_seen_stage: u32,
     /// View of the last detection, counted from 1 since the map began.
     pub last_seen_view: u64,
-    /// Seen or merged since the last clean-up.
+    /// Whether it was seen or merged since the last clean-up.
     pub(crate) is_changed: bool,
-    /// Its cloud has got points since the last clean-up.
+    /// Whether its cloud has got points since the last clean-up.
     pub(crate) has_grown: bool,
 }
 
@@ -66,7 +66,7 @@ impl Entry {
         }
     }
 
-    /// Return the label of most detections, of equal ones the first.
+    /// Return the label with the most detections, of equals the first.
     pub fn label(&self) -> &str {
         let best = self.label_counts.iter().rev().max_by_key(|(_, count)| *count);
         best.map_or("", |(label, _)| label)
@@ -77,12 +77,12 @@ impl Entry {
         self.cloud.bounds_m().centre_m()
     }
 
-    /// Return the edges of the box around the points.
+    /// Return the edge lengths of the box around the points.
     pub fn size_m(&self) -> Vec3 {
         self.cloud.bounds_m().size_m()
     }
 
-    /// Return the cosine of the features, or, where one has none, 1 for the same label and 0 for
+    /// Return the cosine of the features; if one has no features, 1 for the same label and 0 for
     /// another.
     pub(crate) fn similarity(&self, label: &str, feature: Option<&[f32]>) -> f64 {
         match (&self.feature, feature) {
@@ -91,8 +91,8 @@ impl Entry {
         }
     }
 
-    /// Return whether a box touches this one's grown by the radius of overlap: if not, nothing
-    /// overlaps.
+    /// Return whether a box touches this entry's box grown by the overlap radius. If it does not,
+    /// no points overlap.
     pub(crate) fn is_beside(&self, other_m: &Aabb, config: &ObjectMapConfig) -> bool {
         let mut bounds_m = *self.cloud.bounds_m();
         bounds_m.min_m = bounds_m.min_m.map(|v| v - config.overlap_radius_m);
@@ -100,7 +100,7 @@ impl Entry {
         bounds_m.intersects(other_m)
     }
 
-    /// Join a detection.
+    /// Add a detection.
     pub(crate) fn see(&mut self, sighting: Sighting, stage: u32, view: u64) {
         self.count(vec![(sighting.label, 1)], sighting.feature, 1);
         self.confidence = self.confidence.max(sighting.confidence);
@@ -109,7 +109,7 @@ impl Entry {
         self.last_seen_view = view;
     }
 
-    /// Take over points where it has none yet.
+    /// Add points to voxels without a point.
     fn grow(&mut self, points: &[Point]) {
         let num_points = self.cloud.points().len();
         self.cloud.merge(points);
@@ -117,7 +117,7 @@ impl Entry {
         self.has_grown |= self.cloud.points().len() != num_points;
     }
 
-    /// Join another entry; the id stays.
+    /// Merge another entry into this one; the id stays.
     pub(crate) fn absorb(&mut self, other: Self) {
         self.count(other.label_counts, other.feature, other.num_detections);
         self.confidence = self.confidence.max(other.confidence);
@@ -127,7 +127,7 @@ impl Entry {
         self.last_seen_view = self.last_seen_view.max(other.last_seen_view);
     }
 
-    /// Take over what so many detections say of labels and looks.
+    /// Add the labels and the mean feature of `num` detections.
     fn count(&mut self, labels: Vec<(String, u32)>, feature: Option<Vec<f32>>, num: u32) {
         for (label, count) in labels {
             match self.label_counts.iter_mut().find(|(known, _)| *known == label) {
@@ -143,8 +143,8 @@ impl Entry {
     }
 }
 
-/// Return the mean of two vectors by number of detections, of length 1 again (or as it is, if it
-/// has no length).
+/// Return the mean of two vectors, weighted by number of detections and normalised to length 1
+/// (unless its length is 0).
 fn weighted_mean(a: &[f32], num_a: u32, b: &[f32], num_b: u32) -> Vec<f32> {
     let mix = |(a, b): (&f32, &f32)| a * num_a as f32 + b * num_b as f32;
     let sum: Vec<f32> = a.iter().zip(b).map(mix).collect();

@@ -1,4 +1,4 @@
-//! Object entries: what an agent remembers of the objects that it detected.
+//! Object entries: an agent's memory of the objects that it detected.
 
 mod cleaning;
 pub mod cloud;

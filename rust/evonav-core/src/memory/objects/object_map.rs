@@ -1,8 +1,9 @@
-//! The object map: what was detected, gathered into lasting entries in the way of ConceptGraphs
-//! (Gu et al., ICRA 2024) with the parameters of 3D-Mem (Yang et al., CVPR 2025).
+//! The object map: detections are merged into lasting entries as in ConceptGraphs (Gu et al., ICRA
+//! 2024), with the parameters of 3D-Mem (Yang et al., CVPR 2025).
 //!
-//! Entries are beliefs. Nothing here knows a simulator's id, so an object that has moved becomes a
-//! new entry and the old one goes stale; taking it out is an agent's decision ([`ObjectMap::remove`]).
+//! Entries are beliefs. The map has no access to the simulator's ids, so an object that has moved
+//! becomes a new entry and the old entry becomes stale. Agents decide whether to remove it
+//! ([`ObjectMap::remove`]).
 
 use crate::{
     Error,
@@ -17,36 +18,38 @@ use crate::{
     sensors::unproject::{MaskedDepth, Point, unproject_masks},
 };
 
-/// One view's detections.
+/// The detections of one view.
 #[derive(Debug, Clone, Copy)]
 pub struct DetectedView<'a> {
-    /// Depth and masks.
+    /// Depth and masks of the view.
     pub image: MaskedDepth<'a>,
-    /// A word a detection.
+    /// Label of each detection.
     pub labels: &'a [String],
-    /// A number in 0..=1 a detection.
+    /// Confidence of each detection, in 0..=1.
     pub confidences: &'a [f32],
     /// Unit feature vectors, row-major, of equal length; empty if the perception has none.
     pub features: &'a [f32],
 }
 
-/// What an update did.
+/// The result of an update.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Update {
     /// Entry of each detection; `None` if it was filtered out.
     pub entry_ids: Vec<Option<u64>>,
-    /// Entries that the clean-up dropped.
+    /// Ids of the entries that the clean-up removed.
     pub removed: Vec<u64>,
-    /// Entries that the clean-up merged: the one that is gone, and the one that it became.
+    /// Ids of the entries that the clean-up merged: the removed one, and the one into which it was
+    /// merged.
     pub merged: Vec<[u64; 2]>,
 }
 
-/// How a detection of the present compares with an entry.
+/// A comparison of a detection with an entry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Comparison {
-    /// Part of the detection's points that lie by the entry's.
+    /// Share of the detection's points that are near the entry's points.
     pub overlap: f64,
-    /// From the detection's centroid to the middle of the entry's box; infinite if it was filtered out.
+    /// Distance from the detection's centroid to the middle of the entry's box; infinite if the
+    /// detection was filtered out.
     pub distance_m: f64,
 }
 
@@ -63,7 +66,7 @@ pub struct ObjectMap {
 }
 
 impl ObjectMap {
-    /// Return a map without entries, in stage 1.
+    /// Create a map without entries, in stage 1.
     ///
     /// # Errors
     /// As [`ObjectMapConfig::check`].
@@ -90,25 +93,25 @@ impl ObjectMap {
         self.entries.binary_search_by_key(&id, |entry| entry.id).ok().map(|i| &self.entries[i])
     }
 
-    /// Return the views integrated so far.
+    /// Return the number of views integrated so far.
     pub fn num_views(&self) -> u64 {
         self.num_views
     }
 
-    /// Start a stage: entries stay, the count of views to the next clean-up starts over.
+    /// Start a stage: entries stay, and the count of views to the next clean-up starts again.
     pub fn begin_stage(&mut self, stage: u32) {
         self.stage = stage;
         self.views_since_cleanup = 0;
     }
 
-    /// Take an entry out; whether there was one.
+    /// Remove an entry; return whether it existed.
     pub fn remove(&mut self, id: u64) -> bool {
         let num = self.entries.len();
         self.entries.retain(|entry| entry.id != id);
         self.entries.len() < num
     }
 
-    /// Forget all entries; the map is as new, ids included.
+    /// Forget all entries; ids start from 1 again.
     pub fn clear(&mut self) {
         self.entries.clear();
         self.next_id = 1;
@@ -117,8 +120,9 @@ impl ObjectMap {
         self.num_features = None;
     }
 
-    /// Take over one view: detections become clouds, each joins the entry that it resembles most or
-    /// becomes a new one; every [`ObjectMapConfig::views_per_cleanup`] views, a clean-up.
+    /// Add one view: detections become clouds, each of which joins the entry that it resembles most
+    /// or becomes a new one. Every [`ObjectMapConfig::views_per_cleanup`] views there is a
+    /// clean-up.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] naming what does not fit; the map is then unchanged.
@@ -157,8 +161,7 @@ impl ObjectMap {
         Ok(update)
     }
 
-    /// Compare the detections of a view with an entry; nothing changes. How far away a detection is
-    /// does not matter here.
+    /// Compare the detections of a view with an entry, at any distance; the map does not change.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if there is no such entry, or as [`ObjectMap::update`].
@@ -176,8 +179,8 @@ impl ObjectMap {
         Ok(self.sightings(view, f64::INFINITY)?.into_iter().map(compare).collect())
     }
 
-    /// Return the share of an object's points that each eye sees past the points of all entries and
-    /// the object's own.
+    /// Return the share of an object's points that each eye sees, where the points of all entries
+    /// and the object's own may block the view.
     ///
     /// # Errors
     /// As [`visible_shares`].
@@ -193,7 +196,7 @@ impl ObjectMap {
         visible_shares(near.map(Cloud::points).chain([targets]), targets, eyes, config)
     }
 
-    /// Return the detections as clean clouds, `None` where one is filtered out.
+    /// Convert detections to clean clouds; `None` for those that are filtered out.
     fn sightings(
         &self,
         view: &DetectedView<'_>,
@@ -219,7 +222,7 @@ impl ObjectMap {
         Ok(sightings.collect())
     }
 
-    /// Return the length of a feature, if there are features.
+    /// Check a view; return the length of its features, if it has features.
     fn check_view(&self, view: &DetectedView<'_>) -> Result<Option<usize>, Error> {
         let num = view.labels.len();
         Error::require("confidences", view.confidences.len(), "one a label", |n| n == num)?;
@@ -242,14 +245,15 @@ impl ObjectMap {
         Ok(Some(len / num))
     }
 
-    /// Return the entry, among the first `num`, that resembles a sighting most, if it does enough.
+    /// Return the entry, among the first `num`, that resembles a sighting most, if the similarity
+    /// exceeds the threshold.
     fn best_match(&self, sighting: &Sighting, num: usize) -> Option<usize> {
         let threshold = self.config.match_threshold;
         let visual = |entry: &Entry| {
             self.config.visual_weight
                 * entry.similarity(&sighting.label, sighting.feature.as_deref())
         };
-        // Even lying wholly inside any other entry could not lift it over the threshold.
+        // For all other entries, even complete overlap would not exceed the threshold.
         let candidates: Vec<(usize, f64)> = self.entries[..num]
             .iter()
             .enumerate()
@@ -257,7 +261,8 @@ impl ObjectMap {
             .map(|(index, entry)| (index, visual(entry)))
             .filter(|&(_, visual)| visual + 1.0 > threshold)
             .collect();
-        // With one candidate, as mostly, it only matters whether it resembles it enough.
+        // With a single candidate, as in most cases, it only matters whether the threshold is
+        // exceeded.
         if let [(index, visual)] = candidates[..] {
             let is_enough = |overlap| visual + overlap > threshold;
             let cloud = &self.entries[index].cloud;
@@ -284,7 +289,7 @@ impl ObjectMap {
 
     fn clean_up(&mut self, agent_m: [f64; 2], update: &mut Update) {
         let config = self.config;
-        // What was not seen since the last clean-up is as that one left it.
+        // Entries that were not seen since the last clean-up have not changed.
         for entry in self.entries.iter_mut().filter(|entry| entry.has_grown) {
             denoise(&mut entry.cloud, &config);
         }
@@ -308,7 +313,7 @@ impl ObjectMap {
         }
     }
 
-    /// Merge entries of which one lies in the other, those that do so most first.
+    /// Merge entries of which one lies in the other, those with the largest overlap first.
     fn merge_alike(&mut self, update: &mut Update) {
         let config = self.config;
         let mut pairs = Vec::new();
@@ -316,7 +321,8 @@ impl ObjectMap {
             for (j, b) in self.entries.iter().enumerate() {
                 let is_alike =
                     || a.similarity(b.label(), b.feature.as_deref()) > config.merge_similarity;
-                // Two that have not changed were not to be merged the last time, nor are they now.
+                // Two entries that have not changed were not merged the last time and need not be
+                // compared again.
                 let is_new = i != j && (a.is_changed || b.is_changed);
                 if is_new && a.is_beside(b.cloud.bounds_m(), &config) && is_alike() {
                     let points = a.cloud.points();
@@ -332,17 +338,18 @@ impl ObjectMap {
             if is_gone[i] || is_gone[j] {
                 continue;
             }
-            // The surer one stays; of equal ones the more often seen, then the older.
+            // The more confident entry stays; of equals the one with more detections, then the
+            // older one.
             let rank = |k: usize| {
                 let entry = &self.entries[k];
                 (entry.confidence, entry.num_detections, std::cmp::Reverse(k))
             };
-            let (kept, gone) = if rank(i) > rank(j) { (i, j) } else { (j, i) };
+            let (staying, gone) = if rank(i) > rank(j) { (i, j) } else { (j, i) };
             is_gone[gone] = true;
             let other = self.entries[gone].clone();
-            update.merged.push([other.id, self.entries[kept].id]);
-            self.entries[kept].absorb(other);
-            denoise(&mut self.entries[kept].cloud, &config);
+            update.merged.push([other.id, self.entries[staying].id]);
+            self.entries[staying].absorb(other);
+            denoise(&mut self.entries[staying].cloud, &config);
         }
         let mut is_gone = is_gone.into_iter();
         self.entries.retain(|_| !is_gone.next().unwrap_or(false));

@@ -1,8 +1,8 @@
-//! How much of an object can be seen from a place, by remembered points alone
-//! (MSGNav's visibility-based viewpoint decision, arXiv 2511.10376).
+//! Estimate how much of an object is visible from a place, by remembered points alone (MSGNav's
+//! visibility-based viewpoint decision, arXiv 2511.10376).
 //!
-//! The scene is the union of the clouds of all entries. Walls are in no entry, so one can see through them: a quirk
-//! of the original that is kept.
+//! The scene is the union of the clouds of all entries. Walls are in no entry, so they do not block
+//! the view; the original has the same property.
 
 use crate::{
     Error,
@@ -11,18 +11,18 @@ use crate::{
     sensors::unproject::Point,
 };
 
-/// When a sight line is open; the defaults are MSGNav's.
+/// Parameters of sight lines; the defaults are MSGNav's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SightConfig {
-    /// A scene point nearer to a sample of a line than this closes the line.
+    /// Distance of a scene point from a sample of a line below which the line is blocked.
     pub radius_m: f64,
-    /// Between two samples of a line.
+    /// Distance between two samples of a line.
     pub step_m: f64,
-    /// The first and the last stretch of a line, which are not sampled.
+    /// Length of the first and the last part of a line, which are not sampled.
     pub margin_m: f64,
-    /// A line has at most this many samples; of a longer one they lie farther apart.
+    /// Largest number of samples of a line; on longer lines they are farther apart.
     pub max_samples: usize,
-    /// A target is thinned to at most this many points, every n-th of them.
+    /// Largest number of points of a target; a larger target is thinned to every n-th point.
     pub max_targets: usize,
 }
 
@@ -43,25 +43,26 @@ impl SightConfig {
     }
 }
 
-/// Return the share of a target's points that each eye sees.
+/// Compute the share of a target's points that each eye sees.
 ///
 /// A point is seen if no sample of the line from the eye to it has a scene point within
-/// [`SightConfig::radius_m`]. Samples lie at `margin_m`, `margin_m + step_m`, ... from the eye, up to `margin_m` before
-/// the point; a line too short for one is open.
+/// [`SightConfig::radius_m`]. Samples lie at `margin_m`, `margin_m + step_m`, ... from the eye, up
+/// to `margin_m` before the point; a line that is too short for a sample is open.
 ///
 /// # Arguments
-/// * `scene` - clouds of all that may be in the way, world frame; points that are not finite are in nobody's way.
+/// * `scene` - clouds that may block the view, world frame; points that are not finite block
+///   nothing.
 /// * `targets` - points of the object, world frame.
 /// * `eyes` - `[x, y, z]` of the eyes, world frame.
 ///
 /// # Returns
-/// A number in 0..=1 an eye; 0 for a target without points.
+/// A share in 0..=1 for each eye; 0 for a target without points.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if an eye or a target is not finite or beyond 10 km, or a parameter is outside its domain.
 ///
 /// # Complexity
-/// O(scene points + eyes x targets x samples); only samples beside a scene point look at points.
+/// O(scene points + eyes x targets x samples); points are compared only with samples near them.
 pub fn visible_shares<'a>(
     scene: impl IntoIterator<Item = &'a [Point]>,
     targets: &[Point],
@@ -87,7 +88,7 @@ pub fn visible_shares<'a>(
     Ok(eyes.iter().map(share).collect())
 }
 
-/// Return the smallest box outside of which nothing is in the way of any line.
+/// Return the smallest box outside of which no point blocks a line.
 pub(crate) fn reach_m(targets: &[Point], eyes: &[Vec3], config: &SightConfig) -> Aabb {
     let ends = targets.iter().map(|p| p.map(f64::from)).chain(eyes.iter().copied());
     let mut bounds_m = Aabb::of_points(ends);
@@ -96,8 +97,8 @@ pub(crate) fn reach_m(targets: &[Point], eyes: &[Vec3], config: &SightConfig) ->
     bounds_m
 }
 
-/// Return whether no sample of a line has an obstacle by it; the end at the target first, where
-/// most are.
+/// Return whether no sample of a line is near an obstacle. Samples at the target's end are tested
+/// first, because most obstacles are there.
 fn is_open(obstacles: &Obstacles, eye: Vec3, target: Vec3, config: &SightConfig) -> bool {
     let offset: Vec3 = std::array::from_fn(|i| target[i] - eye[i]);
     let length_m = offset.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -115,16 +116,17 @@ fn is_open(obstacles: &Obstacles, eye: Vec3, target: Vec3, config: &SightConfig)
     })
 }
 
-/// Points in cells a little larger than the radius, so that what is near lies in the same cell or beside it.
+/// Points in cells slightly larger than the radius, so that near points lie in the same cell or in
+/// one beside it.
 struct Obstacles {
     radius2: f64,
     inverse_edge: f64,
-    /// Cells with points, grown by one on all sides.
+    /// Smallest index of cells with points, minus one; `high` is the largest, plus one.
     low: Voxel,
     high: Voxel,
-    /// Index into `firsts` of every cell that holds points or lies beside one that does.
+    /// Index into `ranges` of every cell that contains points or lies beside one that does.
     cells: VoxelIndex,
-    /// Where a cell's points begin and end.
+    /// Start and end of each cell's points in `points`.
     ranges: Vec<[u32; 2]>,
     points: Vec<Vec3>,
 }
@@ -169,7 +171,7 @@ impl Obstacles {
             ranges.push([end, end]);
             end += count;
         }
-        // Points by cell.
+        // Sort the points by cell.
         let mut ordered = vec![[0.0; 3]; points.len()];
         let mut is_grown = vec![false; num_occupied];
         for ((point, voxel), owner) in points.into_iter().zip(voxels).zip(owners) {
@@ -203,8 +205,8 @@ impl Obstacles {
             return false;
         }
         let Some(cell) = self.cells.get(voxel) else { return false };
-        // Its own cell first: nearly always it decides.
-        if self.holds_near(cell, place) {
+        // The own cell comes first: it nearly always decides.
+        if self.contains_near(cell, place) {
             return true;
         }
         let inside: Vec3 =
@@ -217,11 +219,12 @@ impl Obstacles {
                     _ => 0.0,
                 })
                 .sum();
-            gap2 < 1.0001 && self.cells.get(beside).is_some_and(|cell| self.holds_near(cell, place))
+            gap2 < 1.0001
+                && self.cells.get(beside).is_some_and(|cell| self.contains_near(cell, place))
         })
     }
 
-    fn holds_near(&self, cell: u32, place: Vec3) -> bool {
+    fn contains_near(&self, cell: u32, place: Vec3) -> bool {
         let [first, end] = self.ranges[cell as usize];
         self.points[first as usize..end as usize].iter().any(|point| {
             let [x, y, z] = std::array::from_fn(|i| point[i] - place[i]);

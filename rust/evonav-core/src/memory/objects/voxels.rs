@@ -1,11 +1,11 @@
-//! Cubes of space by hash: the voxel filter and the tables behind neighbour queries.
+//! Voxels by hash: the voxel filter, and the tables of neighbour queries.
 
 use crate::sensors::unproject::Point;
 
-/// Index of a cube of space, `floor(coordinate / edge)` an axis.
+/// Index of a cube of space: `floor(coordinate / edge)` along each axis.
 pub type Voxel = [i32; 3];
 
-/// Return the voxel that holds a point; far outside any house the index saturates.
+/// Return the voxel that contains a point; far outside any house the index saturates.
 pub fn voxel_of(point: Point, inverse_edge: f64) -> Voxel {
     point.map(|value| {
         let scaled = f64::from(value) * inverse_edge;
@@ -15,10 +15,11 @@ pub fn voxel_of(point: Point, inverse_edge: f64) -> Voxel {
     })
 }
 
-/// A hash table from voxels to small numbers: linear probing, keys of 21 bits an axis in one word.
+/// A hash table from voxels to small numbers: linear probing, with keys of 21 bits per axis in one
+/// word.
 #[derive(Debug, Clone)]
 pub(crate) struct VoxelTable {
-    /// Key and value; a free slot has `FREE_SLOT` as its key.
+    /// Keys and values; a free slot has the key `FREE_SLOT`.
     slots: Vec<(u64, u32)>,
     len: usize,
 }
@@ -36,8 +37,8 @@ impl VoxelTable {
         (found == key).then_some(value)
     }
 
-    /// Return the value of a voxel, to change; `value` is entered if there is none. Says whether it
-    /// was entered.
+    /// Return the value of a voxel for writing, and whether it is new: `value` is inserted if there
+    /// is none.
     pub(crate) fn entry(&mut self, voxel: Voxel, value: u32) -> (&mut u32, bool) {
         if (self.len + 1) * 2 > self.slots.len() {
             self.grow();
@@ -52,7 +53,7 @@ impl VoxelTable {
         (&mut self.slots[slot].1, is_new)
     }
 
-    /// Return where the key is, or belongs.
+    /// Return the slot of a key, or the free slot where it belongs.
     fn slot(&self, key: u64) -> usize {
         let mask = self.slots.len() - 1;
         let mut slot = (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32) as usize & mask;
@@ -73,13 +74,13 @@ impl VoxelTable {
     }
 }
 
-/// Something for each block of 4 x 4 x 4 voxels, since those of a surface lie together.
+/// A value for each block of 4 x 4 x 4 voxels, since the voxels of a surface lie together.
 #[derive(Debug, Clone)]
 pub(crate) struct Blocks<T> {
-    /// Where that of a block is.
+    /// Index in `values` of each block.
     index: VoxelTable,
     values: Vec<T>,
-    /// The block that was used last, and where its value is.
+    /// Block that was used last, and the index of its value.
     last: (Voxel, usize),
 }
 
@@ -89,12 +90,13 @@ impl<T> Blocks<T> {
         Self { index, values, last: ([i32::MAX; 3], 0) }
     }
 
-    /// Return what belongs to the block of a voxel.
+    /// Return the value of a voxel's block.
     pub(crate) fn get(&self, voxel: Voxel) -> Option<&T> {
         self.index.get(clamped(voxel).map(|i| i >> 2)).map(|index| &self.values[index as usize])
     }
 
-    /// Return the same, `new` if there is nothing yet, and the voxel's [`place`].
+    /// Return the value of a voxel's block, which is `new` if there was none, and the voxel's
+    /// [`place`].
     pub(crate) fn entry(&mut self, voxel: Voxel, new: T) -> (&mut T, usize) {
         let voxel = clamped(voxel);
         let block = voxel.map(|i| i >> 2);
@@ -109,7 +111,7 @@ impl<T> Blocks<T> {
     }
 }
 
-/// Return where a voxel is in its block: 0 to 63.
+/// Return the position of a voxel in its block: 0 to 63.
 pub(crate) fn place(voxel: Voxel) -> usize {
     let [x, y, z] = clamped(voxel).map(|i| (i & 3) as usize);
     x << 4 | y << 2 | z
@@ -124,7 +126,7 @@ impl VoxelSet {
         Self(Blocks::with_capacity(num_blocks))
     }
 
-    /// Enter a voxel; whether it was not there.
+    /// Insert a voxel; return whether it is new.
     pub(crate) fn insert(&mut self, voxel: Voxel) -> bool {
         let (bits, place) = self.0.entry(voxel, 0);
         let is_new = *bits >> place & 1 == 0;
@@ -133,7 +135,8 @@ impl VoxelSet {
     }
 }
 
-/// From voxels to small numbers: an array where the voxels are close together, else a table.
+/// A map from voxels to small numbers: an array if the voxels are close together, otherwise a
+/// table.
 #[derive(Debug, Clone)]
 pub(crate) enum VoxelIndex {
     Dense { corner: Voxel, size: [usize; 3], slots: Vec<u32> },
@@ -141,12 +144,11 @@ pub(crate) enum VoxelIndex {
 }
 
 const FREE_INDEX: u32 = u32::MAX;
-/// An array has at most this many slots a voxel entered.
+/// Largest number of slots of an array per inserted voxel.
 const SLOTS_A_VOXEL: usize = 64;
 
 impl VoxelIndex {
-    /// Return the room for these voxels, to be looked up at most `margin` steps beyond their
-    /// bounds.
+    /// Create a map for these voxels, for look-ups at most `margin` steps beyond their bounds.
     pub(crate) fn spanning(voxels: &[Voxel], margin: i32) -> Self {
         let bound = |pick: fn(i32, i32) -> i32| {
             voxels.iter().copied().reduce(|a, b| [0, 1, 2].map(|i| pick(a[i], b[i])))
@@ -169,7 +171,7 @@ impl VoxelIndex {
         self.at(self.slot(voxel), || voxel)
     }
 
-    /// Return what [`VoxelIndex::get`] says of a voxel whose slot is known.
+    /// Return the same as [`VoxelIndex::get`] for a voxel whose slot is known.
     pub(crate) fn at(&self, slot: usize, voxel: impl FnOnce() -> Voxel) -> Option<u32> {
         match self {
             Self::Dense { slots, .. } => {
@@ -179,7 +181,7 @@ impl VoxelIndex {
         }
     }
 
-    /// Return the place of a voxel in the array; 0 if there is no array.
+    /// Return the slot of a voxel in the array; 0 if there is no array.
     pub(crate) fn slot(&self, voxel: Voxel) -> usize {
         match self {
             Self::Dense { corner, size, .. } => slot_of(voxel, corner, size),
@@ -187,14 +189,14 @@ impl VoxelIndex {
         }
     }
 
-    /// Return the from a voxel's slot to that of the voxel a step away.
+    /// Return the distance from a voxel's slot to the slot of the voxel a step away.
     pub(crate) fn stride(&self, step: Voxel) -> isize {
         let Self::Dense { size, .. } = self else { return 0 };
         let [x, y, z] = step.map(|i| i as isize);
         (x * size[1] as isize + y) * size[2] as isize + z
     }
 
-    /// Return the value of a voxel; `value` is entered if there is none.
+    /// Return the value of a voxel; `value` is inserted if there is none.
     pub(crate) fn entry(&mut self, voxel: Voxel, value: u32) -> u32 {
         match self {
             Self::Dense { corner, size, slots } => {
@@ -209,7 +211,7 @@ impl VoxelIndex {
     }
 }
 
-/// Return the place of a voxel in the array with this corner.
+/// Return the slot of a voxel in the array with this corner.
 fn slot_of(voxel: Voxel, corner: &Voxel, size: &[usize; 3]) -> usize {
     let [x, y, z] = [0, 1, 2].map(|i| voxel[i].wrapping_sub(corner[i]) as usize);
     (x * size[1] + y) * size[2] + z
@@ -217,8 +219,8 @@ fn slot_of(voxel: Voxel, corner: &Voxel, size: &[usize; 3]) -> usize {
 
 const HALF: i32 = 1 << 20;
 
-/// Return the voxels within a million of the origin (10 km at 0.01 m) are told apart; beyond,
-/// indices clamp.
+/// Clamp a voxel's index: voxels within a million of the origin (10 km at 0.01 m) are
+/// distinguished.
 fn clamped(voxel: Voxel) -> Voxel {
     voxel.map(|i| i.clamp(-HALF, HALF - 1))
 }
@@ -228,8 +230,9 @@ fn key_of(voxel: Voxel) -> u64 {
     x << 42 | y << 21 | z
 }
 
-/// Return one point a voxel: the mean of those inside, in the order in which voxels are first met
-/// (Open3D's `voxel_down_sample` with voxels aligned to the world instead of the cloud).
+/// Reduce points to one per voxel, the mean of the points inside, in the order of the voxels' first
+/// points. This is Open3D's `voxel_down_sample` with voxels aligned to the world instead of the
+/// cloud.
 pub fn voxel_filter(points: &[Point], edge_m: f64) -> Vec<Point> {
     let inverse_edge = 1.0 / edge_m;
     let mut blocks = Blocks::with_capacity(points.len() / 16);

@@ -2,30 +2,31 @@
 
 use crate::Error;
 
-/// Output channels, and output pixels of a row, that the inner loop handles at once.
+/// Number of output channels that the inner loop handles at once; `TILE` is the number of output
+/// pixels of a row.
 const LANES: usize = 8;
 const TILE: usize = 4;
 
-/// An image of numbers, row-major, the channels of a pixel side by side.
+/// An image of numbers, row-major, with the channels of a pixel side by side.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tensor {
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Numbers a pixel.
+    /// Number of channels.
     pub channels: usize,
-    /// `height * width * channels` numbers.
+    /// Values, `height * width * channels` numbers.
     pub values: Vec<f32>,
 }
 
 impl Tensor {
-    /// Return an image of zeros.
+    /// Create an image of zeros.
     pub fn zeros(height: usize, width: usize, channels: usize) -> Self {
         Self { height, width, channels, values: vec![0.0; height * width * channels] }
     }
 
-    /// Add another image of the same shape, then drops what is negative.
+    /// Add another image of the same shape, then set negative values to 0.
     ///
     /// # Errors
     /// [`Error::InvalidArgument`] if the shapes differ.
@@ -39,17 +40,17 @@ impl Tensor {
         Ok(())
     }
 
-    /// Drop what is negative.
+    /// Set negative values to 0.
     pub fn relu(&mut self) {
         for value in &mut self.values {
             *value = value.max(0.0);
         }
     }
 
-    /// Return every pixel four times, cut to a size.
+    /// Double the resolution by repeating pixels, then cut to a size.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if twice the size is smaller than that.
+    /// [`Error::InvalidArgument`] if the doubled image is smaller than that size.
     pub fn doubled(&self, height: usize, width: usize) -> Result<Self, Error> {
         if height > 2 * self.height || width > 2 * self.width {
             return Err(shape_error(self, &format!("at least half of ({height}, {width})")));
@@ -64,7 +65,7 @@ impl Tensor {
         Ok(Self { height, width, channels: self.channels, values })
     }
 
-    /// Return the height, width, channels.
+    /// Return height, width and channels.
     pub fn shape(&self) -> [usize; 3] {
         [self.height, self.width, self.channels]
     }
@@ -74,26 +75,26 @@ fn shape_error(found: &Tensor, expected: &str) -> Error {
     Error::invalid("image", format!("of shape {:?}", found.shape()), expected)
 }
 
-/// What a convolution is, without its weights.
+/// The shape of a convolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConvShape {
-    /// Channels of the input.
+    /// Number of channels of the input.
     pub num_in: usize,
-    /// Channels of the output.
+    /// Number of channels of the output.
     pub num_out: usize,
-    /// Side of the window, odd; zeros lie around the image, half a window wide.
+    /// Side of the window, odd. The image is padded with zeros, half a window wide.
     pub size: usize,
-    /// Input pixels from one output pixel to the next.
+    /// Number of input pixels from one output pixel to the next.
     pub stride: usize,
-    /// Whether every channel is convolved on its own.
+    /// Whether every channel is convolved separately.
     pub is_depthwise: bool,
 }
 
 impl ConvShape {
-    /// Return the weights of such a convolution, biases aside.
+    /// Return the number of weights, without biases.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if there is no such convolution, or none of a sane size.
+    /// [`Error::InvalidArgument`] if the shape is impossible or too large.
     pub fn num_weights(&self) -> Result<usize, Error> {
         let Self { num_in, num_out, size, stride, is_depthwise } = *self;
         let is_sane = (1..=4096).contains(&num_in)
@@ -114,22 +115,23 @@ impl ConvShape {
 #[derive(Debug, Clone)]
 pub struct Conv {
     shape: ConvShape,
-    /// By block of output channels, row and column of the window, input channel; depthwise ones by
-    /// row, column, channel.
+    /// Weights by block of output channels, row and column of the window, input channel; depthwise
+    /// ones by row, column, channel.
     weights: Vec<f32>,
     bias: Vec<f32>,
 }
 
 impl Conv {
-    /// Return a convolution.
+    /// Create a convolution.
     ///
     /// # Arguments
-    /// * `shape` - of it.
-    /// * `weights` - by output channel, input channel (one if depthwise), row, column, as torch has them.
+    /// * `shape` - shape of the convolution.
+    /// * `weights` - by output channel, input channel (one if depthwise), row, column, as in torch.
     /// * `bias` - by output channel.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the shape is none, or the numbers do not fit it or are not finite.
+    /// [`Error::InvalidArgument`] if the shape is impossible, or the weights do not fit it or are
+    /// not finite.
     pub fn new(shape: ConvShape, weights: &[f32], bias: &[f32]) -> Result<Self, Error> {
         Error::require("weights", weights.len(), "as many as the shape says", {
             let num = shape.num_weights()?;
@@ -160,16 +162,16 @@ impl Conv {
         Ok(Self { shape, weights: packed, bias })
     }
 
-    /// Return what it is.
+    /// Return the shape.
     pub fn shape(&self) -> ConvShape {
         self.shape
     }
 
-    /// Return the convolves an image. Every output is its bias, then the products by row and column
-    /// of the window and input channel, added in that order.
+    /// Convolve an image. Every output is its bias plus the products by row and column of the
+    /// window and input channel, added in that order.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if the image has other channels, or no pixels.
+    /// [`Error::InvalidArgument`] if the image has a different number of channels, or no pixels.
     ///
     /// # Complexity
     /// O(output pixels x weights).
@@ -194,7 +196,7 @@ impl Conv {
         Ok(out)
     }
 
-    /// Return one row of the output, from the rows of the window.
+    /// Compute one row of the output from the rows of the window.
     fn row(&self, lines: &[&[f32]], out: &mut [f32]) {
         let ConvShape { num_in, num_out, size, stride, .. } = self.shape;
         let (step, reach) = (stride * num_in, size * num_in);
@@ -231,28 +233,28 @@ impl Conv {
     }
 }
 
-/// Add a row of the window to a tile's sums: plain arrays, which compilers turn into SIMD, as long
-/// as the function is not inlined and the sums stay in registers.
+/// Add a row of the window to a tile's sums. Compilers turn the plain arrays into SIMD as long as
+/// the function is not inlined and the sums stay in registers.
 #[inline(never)]
 fn add_products(
     sums: &mut [[f32; LANES]; TILE],
     windows: [&[f32]; TILE],
     weights: &[[f32; LANES]],
 ) {
-    let mut kept = *sums;
+    let mut registers = *sums;
     let windows = windows.map(|window| &window[..weights.len()]);
     for (i, weights) in weights.iter().enumerate() {
         let values = windows.map(|window| window[i]);
-        for (sums, value) in kept.iter_mut().zip(values) {
+        for (sums, value) in registers.iter_mut().zip(values) {
             for (sum, weight) in sums.iter_mut().zip(weights) {
                 *sum += value * weight;
             }
         }
     }
-    *sums = kept;
+    *sums = registers;
 }
 
-/// An image with zeros around it.
+/// An image padded with zeros.
 struct Padded {
     width: usize,
     channels: usize,
@@ -260,7 +262,7 @@ struct Padded {
 }
 
 impl Padded {
-    /// Return half a window of zeros on every side, and on the right as many as make `min_width`.
+    /// Pad an image with half a window of zeros on every side, and on the right up to `min_width`.
     fn new(image: &Tensor, size: usize, min_width: usize) -> Self {
         let (half, channels) = (size / 2, image.channels);
         let width = (image.width + 2 * half).max(min_width);

@@ -1,4 +1,4 @@
-//! From a picture to instances: the network, its instances, their outlines.
+//! Detect instances in an image: run the network, join cells to instances, refine their outlines.
 
 use crate::{
     Error,
@@ -8,35 +8,36 @@ use crate::{
     },
 };
 
-/// What is taken for an instance.
+/// Parameters of the detector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DetectorConfig {
-    /// Fewest cells (each of 4 x 4 pixels in a picture of 300 x 300).
+    /// Smallest number of cells of an instance (a cell has 4 x 4 pixels in an image of 300 x 300).
     pub min_cells: usize,
-    /// Least mean probability of its class.
+    /// Smallest mean probability of an instance's class.
     pub min_confidence: f32,
-    /// How pixels are given to cells.
+    /// Weights of the assignment of pixels to cells.
     pub resemblance: Resemblance,
 }
 
-/// Instances in a picture.
+/// The instances in an image.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Instances {
-    /// Instance of each pixel, -1 where none; numbered in the order of their first cell.
+    /// Instance of each pixel, -1 if none. Instances are numbered in the order of their first cell.
     pub masks: Vec<i32>,
     /// Class of each instance, an index into [`Network::classes`].
     pub classes: Vec<usize>,
-    /// In 0..=1.
+    /// Confidence of each instance, in 0..=1.
     pub confidences: Vec<f32>,
 }
 
-/// Find instances in a picture.
+/// Find instances in an image.
 ///
 /// # Arguments
-/// * `rgb`, `depth_m`, `size_px`, `horizon_rad` - as for [`input`].
+/// * `rgb`, `depth_m`, `size_px`, `horizon_rad` - the image, as for [`input`].
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] if the numbers of pixels are off, or the horizon or a threshold is not a number.
+/// [`Error::InvalidArgument`] if the numbers of pixels do not agree, or the horizon or a threshold
+/// is not a number.
 pub fn detect(
     network: &Network,
     rgb: &[u8],

@@ -1,4 +1,4 @@
-//! Instances from what the network says of cells, and their pixels in the picture.
+//! Join the network's cells to instances, and find the instances' pixels in the image.
 
 use crate::{
     Error,
@@ -8,35 +8,34 @@ use crate::{
     },
 };
 
-/// Logit of a link from which on it counts; and least cosine between the class probabilities of
-/// linked cells. With 0 and without the second, many things would be one with what they stand on:
-/// F1 on validation houses was 0.33 instead of 0.38.
+/// Smallest logit of a link that joins cells. With 0, and without [`MIN_AGREEMENT`], many objects
+/// would be joined with their support: F1 on validation houses was 0.33 instead of 0.38.
 pub const MIN_LINK: f32 = 1.0;
-/// See [`MIN_LINK`].
+/// Smallest cosine between the class probabilities of linked cells.
 pub const MIN_AGREEMENT: f32 = 0.8;
 
-/// Instances in the grid of cells.
+/// The instances in the grid of cells.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Segments {
-    /// Instance of each cell, row-major; -1 where none.
+    /// Instance of each cell, row-major; -1 if none.
     pub cells: Vec<i32>,
     /// Class of each instance.
     pub classes: Vec<usize>,
-    /// Mean probability of that class over the instance's cells.
+    /// Mean probability of the class over the instance's cells.
     pub confidences: Vec<f32>,
 }
 
-/// Join neighbouring cells that the network links into instances, and has each instance's cells
+/// Join neighbouring cells that the network links into instances, and let each instance's cells
 /// vote for its class.
 ///
-/// A cell is part of an object if a class is likelier there than the background. Two such
-/// neighbours are joined if the link between them is sure enough ([`MIN_LINK`]) and they are of
-/// like classes ([`MIN_AGREEMENT`]).
+/// A cell is part of an object if a class is more likely there than the background. Two such
+/// neighbours are joined if the link between them is strong enough ([`MIN_LINK`]) and their classes
+/// are similar ([`MIN_AGREEMENT`]).
 ///
 /// # Arguments
-/// * `logits` - by cell: background, classes, link to the right, link downwards.
-/// * `min_cells` - instances of fewer are dropped.
-/// * `min_confidence` - so are those less sure of their class.
+/// * `logits` - background, classes, link to the right and link downwards of each cell.
+/// * `min_cells` - instances with fewer cells are dropped.
+/// * `min_confidence` - instances with a smaller confidence are dropped.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] if a cell has no class, or a threshold is not a number.
@@ -68,7 +67,7 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
             }
         }
     }
-    // Instances count up in the order of their first cell.
+    // Instances are numbered in the order of their first cell.
     let mut number_of = vec![usize::MAX; cells.len()];
     let mut votes: Vec<(usize, Vec<f32>)> = Vec::new();
     let mut found = vec![usize::MAX; cells.len()];
@@ -85,7 +84,7 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
             *sum += share;
         }
     }
-    let mut kept = Segments::default();
+    let mut segments = Segments::default();
     let numbers: Vec<i32> = votes
         .iter()
         .map(|(num_cells, sums)| {
@@ -94,16 +93,17 @@ pub fn segments(logits: &Tensor, min_cells: usize, min_confidence: f32) -> Resul
             if *num_cells < min_cells || confidence.is_nan() || confidence < min_confidence {
                 return -1;
             }
-            kept.classes.push(class);
-            kept.confidences.push(confidence);
-            kept.classes.len() as i32 - 1
+            segments.classes.push(class);
+            segments.confidences.push(confidence);
+            segments.classes.len() as i32 - 1
         })
         .collect();
-    kept.cells = found.iter().map(|&number| numbers.get(number).copied().unwrap_or(-1)).collect();
-    Ok(kept)
+    segments.cells =
+        found.iter().map(|&number| numbers.get(number).copied().unwrap_or(-1)).collect();
+    Ok(segments)
 }
 
-/// Return each class's share of the softmax; the background's, which comes first, is left out.
+/// Return the softmax of the classes; the background, which comes first, is left out.
 fn shares(logits: &[f32]) -> Vec<f32> {
     let most = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     let powers: Vec<f32> = logits.iter().map(|logit| (logit - most).exp()).collect();
@@ -111,7 +111,7 @@ fn shares(logits: &[f32]) -> Vec<f32> {
     powers[1..].iter().map(|power| power / total).collect()
 }
 
-/// Return whether two cells' shares are alike.
+/// Return whether the class probabilities of two cells are similar.
 fn agree(a: &[f32], b: &[f32]) -> bool {
     let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>();
     dot(a, b) > MIN_AGREEMENT * (dot(a, a) * dot(b, b)).sqrt()
@@ -128,7 +128,7 @@ fn largest(values: &[f32]) -> usize {
     best
 }
 
-/// Sets that only grow together; the smallest member stands for a set.
+/// Disjoint sets that can be joined; the smallest member represents a set.
 struct Forest(Vec<usize>);
 
 impl Forest {
@@ -150,14 +150,14 @@ impl Forest {
     }
 }
 
-/// What makes a pixel resemble a cell.
+/// Weights of the differences between a pixel and a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resemblance {
-    /// Of a step of one in one colour channel.
+    /// Weight of a difference of one in one colour channel.
     pub colour: f32,
-    /// Of one being twice as far away as the other.
+    /// Weight of one depth being twice the other.
     pub depth: f32,
-    /// Of a cell's width between them.
+    /// Weight of a distance of one cell's width.
     pub place: f32,
 }
 
@@ -167,22 +167,22 @@ impl Default for Resemblance {
     }
 }
 
-/// Give every pixel the instance of the cell around it that it resembles most: outlines become
-/// those of the picture.
+/// Assign every pixel to the instance of the most similar cell around it, so that outlines follow
+/// those of the image.
 ///
 /// # Arguments
 /// * `cells` - instance of each cell of the network's grid.
-/// * `rgb`, `depth_m`, `size_px` - as for [`crate::perception::mini::network::input`].
-/// * `weigh` - how differences count.
+/// * `rgb`, `depth_m`, `size_px` - the image, as for [`crate::perception::mini::network::input`].
+/// * `weigh` - weights of the differences.
 ///
 /// # Returns
-/// Instance of each pixel, -1 where none.
+/// Instance of each pixel, -1 if none.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] if the numbers of cells or pixels are off.
+/// [`Error::InvalidArgument`] if the numbers of cells or pixels do not agree.
 ///
 /// # Complexity
-/// O(pixels), nine comparisons each where the cells around differ.
+/// O(pixels), with nine comparisons per pixel where the cells around differ.
 pub fn refine(
     cells: &[i32],
     rgb: &[u8],
@@ -247,12 +247,12 @@ impl Guide {
     }
 }
 
-/// Return a cell's place and the ones beside it.
+/// Return the indices of a cell and the ones beside it along one axis.
 fn around(place: usize) -> std::ops::Range<usize> {
     place.saturating_sub(1)..(place + 2).min(SIDE_CELLS)
 }
 
-/// Return the instance that all cells of a block are of.
+/// Return the instance of a block of cells, if all have the same one.
 fn same_around(
     cells: &[i32],
     rows: std::ops::Range<usize>,

@@ -1,4 +1,4 @@
-//! The detector's network, a small U-Net; `scripts/mini_net.py` is where it is trained.
+//! The detector's network, a small U-Net; `scripts/mini_net.py` defines it for training.
 
 use crate::{
     Error,
@@ -8,19 +8,19 @@ use crate::{
     },
 };
 
-/// Side of the square that pictures are resized to.
+/// Side of the square to which images are resized.
 pub const SIDE_PX: usize = 150;
-/// Side of the square of cells that the network answers for.
+/// Side of the square of cells for which the network has outputs.
 pub const SIDE_CELLS: usize = SIDE_PX / 2;
 
-/// The layers.
+/// The layers of the network.
 #[derive(Debug, Clone)]
 pub struct Network {
     classes: Vec<String>,
     stem: Conv,
     down: [Conv; 3],
     mid: [Conv; 3],
-    /// Second halves of the two lower levels' residuals.
+    /// Second convolutions of the two lower levels' residuals.
     mid_b: [Conv; 2],
     up: Conv,
     skip: [Conv; 3],
@@ -30,10 +30,10 @@ pub struct Network {
 }
 
 impl Network {
-    /// Return the network of a weights file.
+    /// Read the network from a weights file.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] naming what is wrong with the file.
+    /// [`Error::InvalidArgument`] stating the error in the file.
     pub fn read(bytes: &[u8]) -> Result<Self, Error> {
         let mut file = Weights::read(bytes)?;
         let mut take = |name, size, stride| file.take(name, size, stride, false);
@@ -50,7 +50,7 @@ impl Network {
             fuse_top: [file.take("fuse0d", 3, 1, true)?, file.take("fuse0p", 1, 1, false)?],
         };
         let network = Self { classes: file.classes, ..network };
-        // Whether layers fit each other shows when they run.
+        // Running the network shows whether the layers fit each other.
         let logits = network.run(&Tensor::zeros(SIDE_PX, SIDE_PX, 6))?;
         Error::require("weights", logits.channels, "3 outputs more than classes", |channels| {
             !network.classes.is_empty() && channels == network.classes.len() + 3
@@ -58,19 +58,19 @@ impl Network {
         Ok(network)
     }
 
-    /// Return what it tells apart, background aside.
+    /// Return the classes that it distinguishes, without the background.
     pub fn classes(&self) -> &[String] {
         &self.classes
     }
 
-    /// Return the logits of each cell: background, classes, links to the cell on the right and to
-    /// the one below.
+    /// Compute the logits of each cell: background, classes, and links to the cell on the right and
+    /// to the one below.
     ///
     /// # Arguments
-    /// * `input` - as [`input`] makes it.
+    /// * `input` - the result of [`input`].
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if a layer does not fit what comes in.
+    /// [`Error::InvalidArgument`] if a layer does not fit its input.
     pub fn run(&self, input: &Tensor) -> Result<Tensor, Error> {
         let top = relu(self.stem.run(input)?);
         let mut high = relu(self.down[0].run(&top)?);
@@ -89,7 +89,7 @@ impl Network {
         self.head.run(&y)
     }
 
-    /// Return half the resolution, then a residual of two convolutions.
+    /// Compute a level: half the resolution, then a residual of two convolutions.
     fn level(&self, level: usize, above: &Tensor) -> Result<Tensor, Error> {
         let mut y = relu(self.down[level].run(above)?);
         let more = self.mid_b[level - 1].run(&relu(self.mid[level].run(&y)?))?;
@@ -103,17 +103,17 @@ fn relu(mut image: Tensor) -> Tensor {
     image
 }
 
-/// Return a picture as the network takes it: colours, depth, height below the camera, nearness.
+/// Convert an image to the network's input: colours, depth, height below the camera, nearness.
 ///
 /// # Arguments
-/// * `rgb` - row-major, three bytes a pixel.
+/// * `rgb` - row-major, three bytes per pixel.
 /// * `depth_m` - planar z of each pixel, infinite where nothing is.
 /// * `size_px` - width and height.
-/// * `horizon_rad` - how far down the camera looks.
+/// * `horizon_rad` - pitch of the camera; positive looks down.
 ///
 /// # Errors
-/// [`Error::InvalidArgument`] if there are no pixels, not as many of either as the size says, a depth is not a number
-/// or the horizon not finite.
+/// [`Error::InvalidArgument`] if there are no pixels, their numbers do not agree with the size, a
+/// depth is not a number or the horizon is not finite.
 pub fn input(
     rgb: &[u8],
     depth_m: &[f32],
@@ -130,7 +130,7 @@ pub fn input(
     let (pixels, rows, cols) = (rgb.as_chunks::<3>().0, samples(height), samples(width));
     let mut values = Vec::with_capacity(SIDE_PX * SIDE_PX * 6);
     for (i, row) in rows.iter().enumerate() {
-        // Metres below the camera for each metre of depth, in a field of view of 90 degrees.
+        // Metres below the camera per metre of depth, in a field of view of 90 degrees.
         let below = sin + cos * ((i as f32 + 0.5) / (SIDE_PX as f32 / 2.0) - 1.0);
         for col in &cols {
             let place = row * width + col;
@@ -148,7 +148,7 @@ pub fn input(
     Ok(Tensor { height: SIDE_PX, width: SIDE_PX, channels: 6, values })
 }
 
-/// Return the pixel of a side that each of the network's pixels is.
+/// Return the image's pixel, along one side, of each of the network's pixels.
 pub fn samples(side_px: usize) -> Vec<usize> {
     (0..SIDE_PX).map(|i| (2 * i + 1) * side_px / (2 * SIDE_PX)).collect()
 }

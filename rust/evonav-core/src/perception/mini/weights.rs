@@ -1,5 +1,5 @@
-//! The file that holds a network: `EVONAVNN`, the header's length (4 bytes, little-endian), the
-//! header (JSON), then every layer's weights and biases as half-precision numbers.
+//! Read the weights file of a network: `EVONAVNN`, the header's length (4 bytes, little-endian),
+//! the header (JSON), then every layer's weights and biases as half-precision numbers.
 
 use serde::Deserialize;
 
@@ -28,10 +28,10 @@ struct LayerHeader {
     is_depthwise: bool,
 }
 
-/// What a file holds.
+/// The contents of a weights file.
 #[derive(Debug, Clone)]
 pub struct Weights {
-    /// What the network tells apart, background aside.
+    /// Classes that the network distinguishes, without the background.
     pub classes: Vec<String>,
     layers: Vec<(String, Conv)>,
 }
@@ -40,7 +40,7 @@ impl Weights {
     /// Read a file.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] naming what is wrong with it.
+    /// [`Error::InvalidArgument`] stating the error in the file.
     pub fn read(bytes: &[u8]) -> Result<Self, Error> {
         let rest = bytes
             .strip_prefix(MAGIC)
@@ -67,10 +67,10 @@ impl Weights {
         Ok(Self { classes: header.classes, layers })
     }
 
-    /// Take a layer out.
+    /// Take a layer out of the weights.
     ///
     /// # Errors
-    /// [`Error::InvalidArgument`] if it is not there or its window is another.
+    /// [`Error::InvalidArgument`] if the layer is missing or has a different window.
     pub fn take(
         &mut self,
         name: &str,
@@ -105,7 +105,7 @@ fn take_halves(rest: &mut &[u8], num: usize) -> Result<Vec<f32>, Error> {
     Ok(taken.as_chunks().0.iter().map(|&half| from_half(u16::from_le_bytes(half))).collect())
 }
 
-/// Return the number that a half-precision one (IEEE 754 binary16) is.
+/// Convert a half-precision number (IEEE 754 binary16).
 pub fn from_half(half: u16) -> f32 {
     let sign = if half >> 15 == 1 { -1.0 } else { 1.0 };
     let (exponent, fraction) = (i32::from(half >> 10 & 0x1f), f32::from(half & 0x3ff));

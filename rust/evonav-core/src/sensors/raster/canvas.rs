@@ -1,30 +1,31 @@
-//! The inner loops of the rasteriser: convex polygons into a buffer of what is nearest.
+//! The inner loops of the rasteriser: draw convex polygons into a depth buffer.
 
 use std::ops::Range;
 
 use crate::geometry::{Vec2, Vec3};
 
-/// Pixels that one step of the inner loops handles: plain arrays, which compilers turn into SIMD.
+/// Number of pixels that one step of the inner loops handles, in plain arrays, which compilers turn
+/// into SIMD.
 pub(super) const LANES: usize = 8;
 const LANE_INDEX: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
-/// Nearness (inverse depth in perspective views) and a tag (0: nothing drawn) a pixel; rows are
-/// padded to whole blocks.
+/// A depth buffer: nearness (inverse depth in perspective views) and a tag (0: nothing drawn) of
+/// each pixel. Rows are padded to whole blocks.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Canvas {
     pub width_px: usize,
     pub height_px: usize,
     pub nearness: Vec<[f32; LANES]>,
     pub tags: Vec<[u32; LANES]>,
-    /// Rows, and blocks of a row, that are drawn on.
+    /// Rows, and blocks of a row, on which is drawn.
     drawn: [Range<usize>; 2],
-    /// First pixel of the polygon at hand, and the one after its last, by row.
+    /// First pixel of the current polygon in each row; `right` has the one after its last.
     left: Vec<u32>,
     right: Vec<u32>,
 }
 
 impl Canvas {
-    /// Empty the canvas: what is no nearer than `empty` will not be drawn.
+    /// Clear the canvas. Surfaces that are not nearer than `empty` will not be drawn.
     pub fn clear(&mut self, width_px: usize, height_px: usize, empty: f32) {
         (self.width_px, self.height_px) = (width_px, height_px);
         let num_blocks = self.blocks_per_row() * height_px;
@@ -37,8 +38,8 @@ impl Canvas {
         self.drawn = [0..height_px, 0..self.blocks_per_row()];
     }
 
-    /// Empty some rows and blocks, and draws on nothing else until it is emptied again; there,
-    /// every pixel becomes what it becomes on the whole canvas.
+    /// Clear some rows and blocks, and draw only on them until the canvas is cleared again. Their
+    /// pixels get the same values as when the whole canvas is drawn.
     pub fn clear_within(
         &mut self,
         [width_px, height_px]: [usize; 2],
@@ -74,11 +75,11 @@ impl Canvas {
         self.nearness[self.row_blocks(row)].as_flattened()
     }
 
-    /// Draw a convex polygon that runs clockwise on the screen, where it is nearer than what is
-    /// there. `plane` gives the nearness, which is positive, at `[u, v]`: `plane . [u, v, 1]`.
+    /// Draw a convex polygon, clockwise on the screen, where it is nearer than the pixels drawn so
+    /// far. `plane` gives the nearness, which is positive, at `[u, v]`: `plane . [u, v, 1]`.
     ///
-    /// A pixel is covered when its centre is inside; a centre on an edge belongs to the polygon
-    /// to the right of or below that edge, so that neighbours neither overlap nor leave a gap.
+    /// A pixel is covered if its centre is inside. A centre on an edge belongs to the polygon to
+    /// the right of or below that edge, so that neighbours neither overlap nor leave a gap.
     pub fn fill(&mut self, corners_px: &[Vec2], plane: Vec3, tag: u32) {
         let rows = self.scan(corners_px);
         let blocks_per_row = self.blocks_per_row();
@@ -110,7 +111,7 @@ impl Canvas {
         }
     }
 
-    /// Set `left` and `right` for the rows that the polygon covers, and returns those.
+    /// Set `left` and `right` for the rows that the polygon covers, and return these rows.
     fn scan(&mut self, corners_px: &[Vec2]) -> Range<usize> {
         let (mut top, mut bottom) = (f64::INFINITY, f64::NEG_INFINITY);
         for corner in corners_px {
@@ -121,13 +122,13 @@ impl Canvas {
         if rows.is_empty() {
             return 0..0;
         }
-        // Rounding may leave a sliver's row without one of its two edges: then it is empty.
+        // Rounding may leave a row of a sliver without one of its two edges: then the row is empty.
         self.left[rows.clone()].fill(self.width_px as u32);
         self.right[rows.clone()].fill(0);
         let mut from = corners_px[corners_px.len() - 1];
         for &to in corners_px {
-            // Clockwise with v downwards: right edges run down. Both directions compute the same
-            // numbers, so that two polygons agree on the edge they share.
+            // Clockwise with v downwards, right edges run down. Both directions compute the same
+            // numbers, so that two polygons agree on the edge that they share.
             if to[1] > from[1] {
                 self.edge(from, to, true);
             } else if to[1] < from[1] {
@@ -138,7 +139,7 @@ impl Canvas {
         rows
     }
 
-    /// Return the rows that are drawn on with a centre between two heights.
+    /// Return the drawn rows whose centre is between two heights.
     fn rows_between(&self, top_px: f64, bottom_px: f64) -> Range<usize> {
         let [drawn, _] = &self.drawn;
         first_centre(top_px, self.height_px).max(drawn.start)
@@ -160,7 +161,7 @@ impl Canvas {
 /// `0..=size_px`.
 fn first_centre(coordinate_px: f64, size_px: usize) -> usize {
     let shifted = (coordinate_px - 0.5).clamp(0.0, size_px as f64);
-    // A ceiling by hand: baseline x86-64 has no instruction for it.
+    // The ceiling is computed by hand: baseline x86-64 has no instruction for it.
     let whole = shifted as u32;
     whole as usize + usize::from(f64::from(whole) < shifted)
 }
@@ -185,7 +186,8 @@ impl Span {
         for (block, (stored, tags)) in (self.first_drawn..).zip(nearness.iter_mut().zip(tags)) {
             let base = self.start + block as f32 * block_step;
             let candidate = in_block.map(|offset| base + offset);
-            // Where only some pixels of a block are covered, the others get what is never nearer.
+            // If only some pixels of a block are covered, the others get a value that is never
+            // nearer.
             let candidate = if block == 0 || block == self.last {
                 self.covered((block * LANES) as u32, candidate)
             } else {
@@ -204,10 +206,10 @@ impl Span {
     }
 }
 
-/// Keep the nearer of candidate and stored, lane by lane.
+/// Store the nearer of candidate and stored, lane by lane.
 ///
-/// Written on whole arrays with masks: compilers turn a conditional store into a branch, and the
-/// loop is then three times as slow.
+/// The code works on whole arrays with masks: compilers turn a conditional store into a branch,
+/// with which the loop takes three times as long.
 #[inline(always)]
 fn merge(candidate: [f32; LANES], tag: u32, stored: &mut [f32; LANES], tags: &mut [u32; LANES]) {
     let (old, old_tags) = (*stored, *tags);

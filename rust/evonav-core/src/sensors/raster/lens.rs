@@ -1,4 +1,4 @@
-//! From the world to the image: which parts are in view, and where their corners fall.
+//! Transform a scene to the image: find the parts in view, and project their corners.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use crate::{
     world::mesh::{Face, SceneMesh, dot},
 };
 
-/// Vertices of the part and corners of the face at hand.
+/// Working memory: parts in view, vertices of the current part and corners of the current face.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scratch {
     pub visible: Vec<(f64, u32)>,
@@ -18,27 +18,27 @@ pub(super) struct Scratch {
     pub polygon_px: Vec<Vec2>,
 }
 
-/// How depth and image points hang together.
+/// The relation between image points and depth.
 ///
-/// The canvas holds a *nearness*, which is linear in the image on every plane: inverse depth in a
-/// perspective view, depth taken from [`Lens::horizon_m`] in an orthographic one.
+/// The canvas stores a *nearness*, which is linear in the image on every plane: inverse depth in a
+/// perspective view, [`Lens::horizon_m`] minus depth in an orthographic one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Optics {
-    /// Pixels per metre at depth 1.
+    /// A perspective view; `focal_px` is pixels per metre at depth 1.
     Perspective { focal_px: f64 },
-    /// Pixels per metre at any depth.
+    /// An orthographic view, with the same pixels per metre at any depth.
     Orthographic { pixels_per_m: f64 },
 }
 
-/// A view, ready for use.
+/// A view, prepared for drawing.
 pub(super) struct Lens {
     axes: Mat3,
     eye_m: Vec3,
     pub optics: Optics,
     centre_px: Vec2,
     pub clip_m: Vec2,
-    /// Inward normals of near plane, far plane and the image's borders, and the least `normal . p`
-    /// of points in view.
+    /// Inward normals of near plane, far plane and the image's borders, and the smallest `normal .
+    /// p` of points in view.
     frustum: [(Vec3, f64); 6],
 }
 
@@ -51,7 +51,7 @@ impl Lens {
             None => Optics::Perspective { focal_px: view.camera.focal_px() },
             Some(half_m) => Optics::Orthographic { pixels_per_m: height_px as f64 / 2.0 / half_m },
         };
-        // A border is met where the image coordinate is its half size: `focal_px x = u z`, or
+        // A border is where the image coordinate equals half the size: `focal_px x = u z`, or
         // `pixels_per_m x = u`.
         let (scale, [slope_u, slope_v], [least_u, least_v]) = match optics {
             Optics::Perspective { focal_px } => (focal_px, [u, v], [0.0; 2]),
@@ -81,10 +81,10 @@ impl Lens {
         std::array::from_fn(|i| (0..3).map(|j| self.axes[j][i] * local[j]).sum::<f64>())
     }
 
-    /// Leave out of view what is outside some pixels or beyond a depth, in a perspective view.
+    /// Restrict a perspective view to some pixels and to a depth.
     pub fn narrow(&mut self, columns: &Range<usize>, rows: &Range<usize>, far_m: f64) {
         let Optics::Perspective { focal_px } = self.optics else { return };
-        // The first and the last pixel's outer borders, and a pixel more for rounding.
+        // The outer borders of the first and the last pixel, with one more pixel for rounding.
         let [low, high] = [[columns.start, rows.start], [columns.end, rows.end]];
         let slope = |axis: usize, at_px: f64| at_px - self.centre_px[axis];
         let low = [0, 1].map(|axis| slope(axis, low[axis] as f64 - 1.0));
@@ -101,7 +101,8 @@ impl Lens {
         }
     }
 
-    /// Depth of nearness 0 in an orthographic view: beyond the far plane, so that all is positive.
+    /// Return the depth of nearness 0 in an orthographic view. It is beyond the far plane, so that
+    /// every nearness is positive.
     pub fn horizon_m(&self) -> f64 {
         self.clip_m[1] + 1.0
     }
@@ -122,7 +123,7 @@ impl Lens {
         [self.centre_px[0] + scale * local_m[0], self.centre_px[1] + scale * local_m[1]]
     }
 
-    /// Return whether some of the box may be in view.
+    /// Return whether a part of the box may be in view.
     pub fn may_see(&self, aabb: &Aabb) -> bool {
         let (centre, size) = (sub(aabb.centre_m(), self.eye_m), aabb.size_m());
         self.frustum.iter().all(|(n, least)| {
@@ -131,7 +132,7 @@ impl Lens {
         })
     }
 
-    /// Return the parts in view, nearest first.
+    /// Collect the parts in view, nearest first.
     pub fn collect_visible(&self, mesh: &SceneMesh, visible: &mut Vec<(f64, u32)>) {
         visible.clear();
         visible.extend(
@@ -152,7 +153,8 @@ impl Lens {
         dot(forward, sub(corner, self.eye_m))
     }
 
-    /// Take a part's vertices to the camera's frame and the image; whether the near plane cuts it.
+    /// Transform a part's vertices to the camera's frame and the image; return whether the near
+    /// plane cuts the part.
     pub fn transform(&self, vertices_m: &[Vec3], scratch: &mut Scratch) -> bool {
         scratch.local_m.clear();
         scratch.projected_px.clear();
@@ -166,9 +168,9 @@ impl Lens {
         is_clipped
     }
 
-    /// Return the nearness as a function of the image point, `plane . [u, v, 1]`, and what the
-    /// shader lights the face by: the camera's distance from its plane, or the cosine between
-    /// normal and look.
+    /// Return the nearness as a function of the image point, `plane . [u, v, 1]`, and the value
+    /// from which the shader lights the face: the camera's distance from its plane, or the cosine
+    /// between normal and viewing direction.
     ///
     /// `None` for a face that is turned away, or so nearly edge-on that no pixel centre can be
     /// inside.

@@ -1,8 +1,8 @@
-//! Depth, instance and colour images of a scene: a scanline z-buffer on one thread.
+//! Render depth, instance and colour images of a scene with a scanline z-buffer on one thread.
 //!
-//! Parts of houses are convex and few-sided, so whole polygons are drawn rather than triangles,
-//! faces turned away are never drawn, and a face's inverse depth is the exact plane equation
-//! instead of an interpolation between corners. Colours come after visibility.
+//! Parts of houses are convex and have few sides. So whole polygons are drawn rather than
+//! triangles, faces turned away are never drawn, and a face's inverse depth is the exact plane
+//! equation instead of an interpolation between corners. Colours are computed after visibility.
 
 use crate::{
     Error,
@@ -18,23 +18,23 @@ use crate::{
     world::mesh::{PartMesh, SceneMesh},
 };
 
-/// Images to make besides depth.
+/// The images to render besides depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Want {
-    /// Shaded colours.
+    /// Whether to render shaded colours.
     pub rgb: bool,
-    /// Body of each pixel.
+    /// Whether to render the body of each pixel.
     pub instances: bool,
 }
 
-/// The images of one view, row-major, and the working memory to make the next without allocating.
+/// The images of one view, row-major, and working memory to render the next one without allocating.
 #[derive(Debug, Clone, Default)]
 pub struct FrameBuffer {
-    /// `(H, W)` planar z in metres, infinity where nothing is.
+    /// Planar depth in metres, `(H, W)`; infinite where nothing is.
     pub depth_m: Vec<f32>,
-    /// `(H, W)` 0 where nothing is, else body index + 1; empty if not wanted.
+    /// Body index + 1 of each pixel, `(H, W)`; 0 where nothing is. Empty if not rendered.
     pub instances: Vec<i32>,
-    /// `(H, W, 3)` sRGB; empty if not wanted.
+    /// Colours, sRGB, `(H, W, 3)`. Empty if not rendered.
     pub rgb: Vec<u8>,
     pub(super) canvas: Canvas,
     shader: Shader,
@@ -42,14 +42,14 @@ pub struct FrameBuffer {
 }
 
 impl FrameBuffer {
-    /// Hand out depth, colours and instances, as vectors of their own.
+    /// Take depth, colours and instances out as vectors of their own.
     pub fn take(&mut self) -> (Vec<f32>, Vec<u8>, Vec<i32>) {
         let Self { depth_m, rgb, instances, .. } = self;
         (std::mem::take(depth_m), std::mem::take(rgb), std::mem::take(instances))
     }
 }
 
-/// Return [`render_view`] with AI2-THOR's clip planes.
+/// Render the view of a camera with AI2-THOR's clip planes, as [`render_view`].
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] as [`Camera::check`].
@@ -64,8 +64,8 @@ pub fn render(
 
 /// Render one view into `out`.
 ///
-/// Depth has an error under 0.1 mm within 10 m. Of surfaces at equal depth the one drawn first
-/// stays; the order is a function of mesh and view alone, and so is every pixel.
+/// The error of depth is under 0.1 mm within 10 m. Of surfaces at equal depth the one drawn first
+/// stays. The order depends only on mesh and view, and so does every pixel.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] as [`View::check`].
@@ -127,7 +127,7 @@ pub(super) fn draw_part(
     }
 }
 
-/// Return the part of a polygon in front of the near plane.
+/// Clip a polygon to the part in front of the near plane.
 fn clip_near(
     corners_m: impl Iterator<Item = Vec3> + Clone,
     near_m: f64,
@@ -140,7 +140,8 @@ fn clip_near(
             clipped_m.push(a);
         }
         if (a[2] >= near_m) != (b[2] >= near_m) {
-            // From the nearer end whichever way the edge runs: neighbours get the same point.
+            // Computed from the nearer end, whatever the direction of the edge: neighbours get the
+            // same point.
             let (near, far) = if a[2] < b[2] { (a, b) } else { (b, a) };
             let t = (near_m - near[2]) / (far[2] - near[2]);
             clipped_m.push(std::array::from_fn(|i| near[i] + t * (far[i] - near[i])));
@@ -180,7 +181,7 @@ fn resolve(mesh: &SceneMesh, lens: &Lens, want: Want, out: &mut FrameBuffer) {
     }
 }
 
-/// Return the rows of padded blocks to rows of exactly the image's width.
+/// Copy rows of padded blocks to rows of exactly the image's width.
 fn unpad<T: Copy, U: Copy>(
     canvas: &Canvas,
     blocks: &[[T; LANES]],

@@ -1,8 +1,8 @@
-//! Colours after visibility.
+//! Compute colours after visibility.
 //!
-//! A face has one colour, lit from above and from one side so that the faces of a box differ. On
-//! top of that come, a pixel at a time and from depth alone: a lamp at the camera, so that walls
-//! fade with angle; darkness in concave corners and where things stand; and a thin line around
+//! A face has one colour, lit from above and from one side so that the faces of a box differ. In
+//! addition, each pixel is shaded from depth alone: by a lamp at the camera, so that walls fade
+//! with angle; by darkness in concave corners and where objects stand; and by a thin line around
 //! silhouettes.
 
 use crate::{
@@ -14,18 +14,18 @@ use crate::{
     world::mesh::{Face, dot},
 };
 
-/// Reach of the corners' darkness, as a share of the image's height.
+/// Width of the corners' darkness, as a share of the image's height.
 const CORNER_REACH: f64 = 0.012;
-/// How dark a corner becomes, and how dark a silhouette's line.
+/// Darkness of a corner; `LINE_SHADE` is that of a silhouette's line.
 const CORNER_SHADE: f32 = 0.38;
 const LINE_SHADE: f32 = 0.30;
 /// Bend in the middle of a corner of a room.
 const FULL_BEND: f32 = 0.7;
 /// Share of a face's light that comes from the camera.
 const LAMP_SHARE: f32 = 0.36;
-/// Black surfaces are drawn as bright as this, or their corners could not be seen.
+/// Brightness of black surfaces; without it their corners would be invisible.
 const BLACK: f32 = 22.0;
-/// What windows and missing walls look out on, before the lamp's share is taken off.
+/// Colour behind windows and missing walls, before the lamp's share is subtracted.
 const SKY: [f32; 3] =
     [204.0 / (1.0 - LAMP_SHARE), 222.0 / (1.0 - LAMP_SHARE), 236.0 / (1.0 - LAMP_SHARE)];
 
@@ -34,7 +34,7 @@ const SKY: [f32; 3] =
 struct LitFace {
     rgb: [f32; 3],
     /// Distance of its plane from the camera; in orthographic views the cosine between its normal
-    /// and the look at it.
+    /// and the viewing direction.
     facing: f32,
 }
 
@@ -42,20 +42,21 @@ impl LitFace {
     const SKY: Self = Self { rgb: SKY, facing: 0.0 };
 }
 
-/// Colours of the faces in view, and one row's working memory.
+/// Colours of the faces in view, and working memory for one row.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Shader {
-    /// By face tag; 0 is the background.
+    /// Lit faces by tag; 0 is the background.
     faces: Vec<LitFace>,
-    /// Of the view that `shortness` was made for.
+    /// Size of the view for which `shortness` was computed.
     size_px: [usize; 2],
     optics: Option<Optics>,
     is_orthographic: bool,
-    /// Pixels per metre, in perspective views at depth 1.
+    /// Pixels per metre; in perspective views at depth 1.
     scale_px: f32,
-    /// 1 over the length of each pixel's ray at depth 1; [`Self::level_facing`] in orthographic views.
+    /// One over the length of each pixel's ray at depth 1; see [`Self::level_facing`] for
+    /// orthographic views.
     shortness: Vec<[f32; LANES]>,
-    /// The row at hand with its ends continued.
+    /// The current row, continued at both ends.
     padded: Vec<f32>,
     light: Vec<f32>,
 }
@@ -105,7 +106,7 @@ impl Shader {
         }
     }
 
-    /// Set `light` to what corners and silhouettes leave of it in a row.
+    /// Set `light` to the light that corners and silhouettes leave in a row.
     fn darken(&mut self, canvas: &Canvas, row: usize) {
         let corner_px = ((canvas.height_px as f64 * CORNER_REACH) as usize).max(2);
         self.light.clear();
@@ -144,7 +145,7 @@ impl Shader {
         }
     }
 
-    /// Copy a row and continues it on both sides as the planes there go on.
+    /// Copy a row and continue it on both sides linearly, as the planes there continue.
     fn pad(&mut self, row: &[f32], width_px: usize, reach_px: usize) {
         let row = &row[..width_px];
         let (first, last) = (row[0], row[width_px - 1]);
@@ -156,7 +157,8 @@ impl Shader {
         self.padded.extend((1..=reach_px).map(|k| last + (last - one_but_last) * k as f32));
     }
 
-    /// Make nearness times `shortness` 1 in a row: all looks are along the axis.
+    /// Set `shortness` so that nearness times `shortness` is 1 in a row: all rays are along the
+    /// axis.
     fn level_facing(&mut self, canvas: &Canvas, row: usize) {
         let blocks = canvas.row_blocks(row);
         let nearness = &canvas.nearness[blocks.clone()];
@@ -183,9 +185,9 @@ impl Shader {
         }
     }
 
-    /// Return the colours of a block. `facing` is inverse depth over the length of the ray at depth
-    /// 1: times the camera's distance from a plane, the cosine between its normal and the look at
-    /// it. In orthographic views, where faces hold that cosine, it is 1.
+    /// Compute the colours of a block. `facing` is inverse depth over the length of the ray at
+    /// depth 1. Multiplied by the camera's distance from a plane, it is the cosine between the
+    /// plane's normal and the ray. In orthographic views, where faces contain that cosine, it is 1.
     fn colours(
         &self,
         tags: &[u32; LANES],
@@ -209,16 +211,16 @@ impl Shader {
     }
 }
 
-/// Round a number of 0 or more to the low byte of the result, 255 at most: by the mantissa of a sum
-/// with 2^23, which unlike a conversion needs no care for numbers out of range.
+/// Round a number of 0 or more to the low byte of the result, at most 255. The mantissa of a sum
+/// with 2^23 is used, which unlike a conversion needs no treatment of numbers out of range.
 fn to_byte(value: f32) -> u32 {
     (value.min(255.0) + 8_388_608.0).to_bits()
 }
 
-/// Take from `light` what `shade` makes of the bend of each pixel's surroundings.
+/// Darken `light` by the `shade` of the bend of each pixel's surroundings.
 ///
-/// Nearness is linear on a plane: the bend is how much nearer the surroundings are than a plane
-/// would be, in `unit`s and relative to the neighbours' spacing.
+/// Nearness is linear on a plane. The bend is the difference of nearness between the surroundings
+/// and a plane, in `unit`s and relative to the neighbours' spacing.
 #[inline(always)]
 fn darken_row(
     light: &mut [f32],
@@ -235,16 +237,16 @@ fn darken_row(
     }
 }
 
-/// Return the darkness in a corner. A large bend is no corner but something far behind an edge.
+/// Return the darkness in a corner. A large bend is not a corner but a surface far behind an edge.
 fn corner_shade(bend: f32) -> f32 {
     let is_corner = (1.8 - bend).clamp(0.0, 1.0);
     CORNER_SHADE * (bend / FULL_BEND).clamp(0.0, 1.0) * is_corner
 }
 
-/// Return the darkness of a line around what stands before something else.
+/// Return the darkness of a silhouette's line.
 fn line_shade(bend: f32) -> f32 {
     LINE_SHADE * (bend - 1.0).clamp(0.0, 1.0)
 }
 
-/// Where the weaker light comes from.
+/// Direction of the weaker light.
 const SIDE: Vec3 = [0.64, 0.0, 0.77];

@@ -1,4 +1,4 @@
-//! How much of one body a view shows, without drawing the rest of the view.
+//! Count the pixels of one body in a view without drawing the rest of the view.
 
 use std::ops::Range;
 
@@ -15,17 +15,18 @@ use crate::{
     world::mesh::SceneMesh,
 };
 
-/// Share of its depth by which a part must be behind a body to be left out.
+/// Share of the body's depth by which a part must be behind the body to be left out.
 const BEHIND: f64 = 1e-4;
 
-/// Return the number of pixels that [`crate::sensors::raster::render`] gives a body; `None` if they
-/// are fewer than `least_px`.
+/// Return the number of pixels of a body in the image of [`crate::sensors::raster::render`]; `None`
+/// if it is less than `least_px`.
 ///
-/// Draws the part of the image that holds the body, and of the other bodies what may be before it.
+/// Only the part of the image that contains the body is drawn, with the bodies that may be in front
+/// of it.
 ///
 /// # Arguments
 /// * `body` - index of the body.
-/// * `frame` - working memory; its images are left alone.
+/// * `frame` - working memory; its images do not change.
 ///
 /// # Errors
 /// [`Error::InvalidArgument`] as [`Camera::check`].
@@ -67,7 +68,7 @@ pub fn visible_px(
     counted(drawn.filter(|&&other| other == tag).count())
 }
 
-/// Return the columns and rows that hold a body's image, and its greatest depth; `None` if it is
+/// Return the columns and rows that contain a body's image, and its largest depth; `None` if it is
 /// out of view.
 fn box_of(
     mesh: &SceneMesh,
@@ -84,7 +85,7 @@ fn box_of(
     for part in parts.filter(|part| lens.may_see(&part.aabb)) {
         let vertices_m = &mesh.vertices_m[part.vertices.clone()];
         if lens.transform(vertices_m, &mut frame.scratch) {
-            // Cut by the near plane, it may be anywhere in the image.
+            // A part that the near plane cuts may be anywhere in the image.
             (low_px, high_px) = ([0.0; 2], size_px);
         }
         for (local_m, point_px) in frame.scratch.local_m.iter().zip(&frame.scratch.projected_px) {
