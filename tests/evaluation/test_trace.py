@@ -196,7 +196,7 @@ def test_maps_and_questions_are_those_of_the_round(fu_stages):
         col = int((step.pose.x_m - step.map.corner_m[0]) / step.map.cell_m)
         row = int((step.pose.z_m - step.map.corner_m[1]) / step.map.cell_m)
         assert step.map.cells[row, col] in (FREE, EXPLORED)
-    asked = [question for stage in stages for step in stage.rounds for question in step.asked]
+    asked = [question for stage in stages for step in stage.rounds for question in step.questions]
     assert asked
     for question in asked:
         assert (question.kind, question.outcome) == ("choose", "answered")
@@ -205,9 +205,9 @@ def test_maps_and_questions_are_those_of_the_round(fu_stages):
         named = {name for name, _, _ in question.offered}
         assert question.answer.splitlines()[0] in named
         assert all(f"{name}:" in words for name in named)
-    chosen = next(step for stage in stages for step in stage.rounds if step.asked and step.record.chosen_entry)
-    named = {name: number for name, _, number in chosen.asked[-1].offered}
-    assert named[chosen.asked[-1].answer.splitlines()[0]] == chosen.record.chosen_entry.entry_id
+    chosen = next(step for stage in stages for step in stage.rounds if step.questions and step.record.chosen_entry)
+    named = {name: number for name, _, number in chosen.questions[-1].offered}
+    assert named[chosen.questions[-1].answer.splitlines()[0]] == chosen.record.chosen_entry.entry_id
     assert chosen.record.chosen_entry.entry_id in chosen.candidate_ids
 
 

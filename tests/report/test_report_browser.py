@@ -15,7 +15,7 @@ from evonav.cli import app
 from evonav.evaluation.records.schema import EndState, StageError, StageRecord
 from evonav.replay.pages import write_episode
 from evonav.replay.replay import RunReplay
-from evonav.replay.types import TracedStage
+from evonav.replay.types import ReplayedStage
 from evonav.report import write_report
 from evonav.report.maps.stage_map import page_name
 from evonav.report.pages import run_page as html
@@ -117,14 +117,14 @@ def test_no_text_of_a_run_becomes_a_script(tmp_path: Path, has_policy: bool) -> 
 
 
 @pytest.fixture(scope="module")
-def traced(viewed_run: Path) -> list[TracedStage]:
+def traced(viewed_run: Path) -> list[ReplayedStage]:
     with bundled_tasks() as tasks:
         task_id = sorted(path.name for path in tasks.iterdir() if path.is_dir())[1]
         return list(RunReplay(viewed_run, lambda name: tasks / name).episode("fu", task_id))
 
 
 @pytest.mark.slow
-def test_no_answer_of_a_model_becomes_a_script(traced: list[TracedStage], tmp_path: Path) -> None:
+def test_no_answer_of_a_model_becomes_a_script(traced: list[ReplayedStage], tmp_path: Path) -> None:
     texts = itertools.cycle(CORPUS)
     stages = []
     for stage in traced:
@@ -137,13 +137,13 @@ def test_no_answer_of_a_model_becomes_a_script(traced: list[TracedStage], tmp_pa
                     kind=next(texts),
                     parts=((next(texts), next(texts)), ("user", next(texts))),
                 )
-                for question in step.asked * 4
+                for question in step.questions * 4
             )
             record = None
             if step.record is not None:
                 changes = {"choice": next(texts), "details": {next(texts): next(texts)}}
                 record = step.record.model_copy(update=changes)
-            rounds.append(replace(step, asked=asked, record=record, note=next(texts)))
+            rounds.append(replace(step, questions=asked, record=record, note=next(texts)))
         goal = stage.record.goal.model_copy(update={"instruction": next(texts)})
         changes = {"goal": goal, "stop_reason": next(texts)}
         stages.append(replace(stage, rounds=tuple(rounds), record=stage.record.model_copy(update=changes)))

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.replay.replay import RunReplay
-from evonav.replay.types import TracedStage
+from evonav.replay.types import ReplayedStage
 from evonav.replay.video import write_video
 from evonav.replay.video_frames import LEFTS, MAP_PX, SIZE, TOP, episode_frame, stage_frames
 from evonav.report.maps.stage_map import light_css
@@ -21,13 +21,13 @@ pytest.importorskip("resvg_py", reason="resvg is not installed")
 
 
 @pytest.fixture(scope="module")
-def stages(viewed_run: Path) -> list[TracedStage]:
+def stages(viewed_run: Path) -> list[ReplayedStage]:
     with bundled_tasks() as tasks:
         task_id = sorted(path.name for path in tasks.iterdir() if path.is_dir())[1]
         return list(RunReplay(viewed_run, lambda name: tasks / name, heading_px=396).episode("fu", task_id))
 
 
-def pictures(stages: list[TracedStage], number: int) -> list[Image.Image]:
+def pictures(stages: list[ReplayedStage], number: int) -> list[Image.Image]:
     maps = {stage.record.stage: stage.stage_map for stage in stages if stage.stage_map is not None}
     frame = episode_frame(stages, maps)
     return list(stage_frames(stages[number - 1], maps, frame, budget=9, success_radius_m=2.0))
@@ -47,7 +47,7 @@ def num_like(pixels: np.ndarray, wanted: tuple[int, int, int], tolerance: int = 
     return int((np.abs(pixels - np.array(wanted)).sum(axis=2) < tolerance).sum())
 
 
-def test_there_is_a_picture_a_round_and_one_for_the_end(stages: list[TracedStage]) -> None:
+def test_there_is_a_picture_a_round_and_one_for_the_end(stages: list[ReplayedStage]) -> None:
     for stage in stages:
         drawn = pictures(stages, stage.record.stage)
         assert len(drawn) == len(stage.rounds) + 1
@@ -56,7 +56,7 @@ def test_there_is_a_picture_a_round_and_one_for_the_end(stages: list[TracedStage
         assert len({picture.tobytes() for picture in drawn}) == len(drawn)
 
 
-def test_a_picture_holds_view_belief_and_truth(stages: list[TracedStage]) -> None:
+def test_a_picture_holds_view_belief_and_truth(stages: list[ReplayedStage]) -> None:
     drawn = pictures(stages, 2)[-2]
     view, belief, truth = (panel(drawn, left) for left in LEFTS)
     assert len(np.unique(view.reshape(-1, 3), axis=0)) > 1000  # a rendered view, not a plain field
@@ -66,7 +66,7 @@ def test_a_picture_holds_view_belief_and_truth(stages: list[TracedStage]) -> Non
     assert num_like(belief, (15, 118, 110), 60) > 30  # entries
 
 
-def test_stale_entries_are_red_in_the_agents_map_alone_where_there_are_any(stages: list[TracedStage]) -> None:
+def test_stale_entries_are_red_in_the_agents_map_alone_where_there_are_any(stages: list[ReplayedStage]) -> None:
     found = 0
     for stage in stages:
         for step, picture in zip(stage.rounds, pictures(stages, stage.record.stage), strict=False):
@@ -76,7 +76,7 @@ def test_stale_entries_are_red_in_the_agents_map_alone_where_there_are_any(stage
     assert found > 0
 
 
-def test_a_video_has_the_pictures_size_and_speed(stages: list[TracedStage], tmp_path: Path) -> None:
+def test_a_video_has_the_pictures_size_and_speed(stages: list[ReplayedStage], tmp_path: Path) -> None:
     av = pytest.importorskip("av")
     path = tmp_path / "x.mp4"
     drawn = [pictures(stages, 1), pictures(stages, 2)]

@@ -24,7 +24,7 @@ from evonav.evaluation.records.store import RunStore
 from evonav.replay.page_data import PageData, cells_text
 from evonav.replay.pages import write_episode
 from evonav.replay.replay import RunReplay
-from evonav.replay.types import TracedEntry, TracedMap, TracedRound, TracedStage, Truth
+from evonav.replay.types import ReplayedEntry, ReplayedMap, ReplayedRound, ReplayedStage, Truth
 from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import page_name
 from evonav.report.maps.svg import cm
@@ -44,7 +44,7 @@ def task_id(run_dir: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def stages(run_dir: Path, task_id: str) -> list[TracedStage]:
+def stages(run_dir: Path, task_id: str) -> list[ReplayedStage]:
     with bundled_tasks() as tasks:
         return list(RunReplay(run_dir, lambda name: tasks / name).episode("fu", task_id))
 
@@ -92,7 +92,7 @@ def test_a_map_that_did_not_change_takes_no_room() -> None:
 
 
 def test_entries_frontiers_and_maps_of_every_round_can_be_had_from_the_page(
-    pages: Path, stages: list[TracedStage], task_id: str
+    pages: Path, stages: list[ReplayedStage], task_id: str
 ) -> None:
     data = data_of(pages / page_name(task_id, "fu"))
     assert [stage["k"] for stage in data["stages"]] == [stage.record.stage for stage in stages]
@@ -127,22 +127,22 @@ def test_entries_frontiers_and_maps_of_every_round_can_be_had_from_the_page(
             assert np.array_equal(cells, step.map.cells.ravel())
 
 
-def made_up_round(number: int, truth: Truth | None, agent_map: TracedMap | None, **changes: object) -> TracedRound:
+def made_up_round(number: int, truth: Truth | None, agent_map: ReplayedMap | None, **changes: object) -> ReplayedRound:
     chosen = entry("Plate", (2.3, 0.8, 2.0), is_stale=True)
     record = stage_record("a", "t", 2, EndState.FAILURE, chosen=chosen).trace[number].model_copy(update=changes)
-    return TracedRound(record, record.pose, (), (TracedEntry(chosen, truth),), map=agent_map)
+    return ReplayedRound(record, record.pose, (), (ReplayedEntry(chosen, truth),), map=agent_map)
 
 
-def made_up_page(rounds: list[TracedRound]) -> list[dict]:
+def made_up_page(rounds: list[ReplayedRound]) -> list[dict]:
     record = stage_record("a", "t", 2, EndState.FAILURE)
     page = PageData()
-    page.add_stage(TracedStage(record, None, tuple(rounds), "", (), 1.0), {}, Frame(0, 0, 900, 400), 50)
+    page.add_stage(ReplayedStage(record, None, tuple(rounds), "", (), 1.0), {}, Frame(0, 0, 900, 400), 50)
     return json.loads(page.text())["stages"][0]["rounds"]
 
 
 def test_a_map_that_grows_begins_anew_and_one_that_stays_does_not() -> None:
-    small = TracedMap(np.full((2, 3), 2, np.uint8), 0.1, (1.0, 2.0))
-    large = TracedMap(np.array([[0, 1, 1, 1]] * 3, np.uint8), 0.1, (0.9, 1.9))
+    small = ReplayedMap(np.full((2, 3), 2, np.uint8), 0.1, (1.0, 2.0))
+    large = ReplayedMap(np.array([[0, 1, 1, 1]] * 3, np.uint8), 0.1, (0.9, 1.9))
     rounds = made_up_page([made_up_round(i, None, agent_map) for i, agent_map in enumerate((small, small, large))])
     assert [step.get("grid") for step in rounds] == [[2, 3, 10.0, 100, -200], None, [3, 4, 10.0, 90, -190]]
     assert [step["cells"] for step in rounds] == ["6C", "", "1E3B1E3B1E3B"]
@@ -161,7 +161,7 @@ def test_a_map_that_grows_begins_anew_and_one_that_stays_does_not() -> None:
     ],
 )
 def test_what_became_of_a_stale_entry(truth: Truth | None, now: object, words: str) -> None:
-    (step,) = made_up_page([made_up_round(0, truth, TracedMap(np.zeros((1, 1), np.uint8), 0.1, (0.0, 0.0)))])
+    (step,) = made_up_page([made_up_round(0, truth, ReplayedMap(np.zeros((1, 1), np.uint8), 0.1, (0.0, 0.0)))])
     assert (step["truth"], step["e"][0][9]) == (words, now)
     assert (step["kind"], step["choice"]) == ("stale", "object 7 (plate)")
 
@@ -169,7 +169,7 @@ def test_what_became_of_a_stale_entry(truth: Truth | None, now: object, words: s
 def test_a_lost_memory_is_told() -> None:
     record = stage_record("a", "t", 2, EndState.FAILURE).model_copy(update={"failed_before": (1,), "memory_lost_at": 2})
     page = PageData()
-    page.add_stage(TracedStage(record, None, (), "", (), 1.0), {}, Frame(0, 0, 900, 400), 50)
+    page.add_stage(ReplayedStage(record, None, (), "", (), 1.0), {}, Frame(0, 0, 900, 400), 50)
     (stage,) = json.loads(page.text())["stages"]
     told = "the agent failed in stage 1; its process was lost, and it began anew, without memory, in stage 2"
     assert stage["lost"] == told
@@ -181,14 +181,14 @@ def test_what_json_cannot_say_is_still_shown() -> None:
     assert step["details"] == {"cost": "inf", "list": ["nan", 1], "text": "</script><b>"}
 
 
-def test_questions_have_their_prompt_images_and_outcome(pages: Path, stages: list[TracedStage], task_id: str) -> None:
+def test_questions_have_their_prompt_images_and_outcome(pages: Path, stages: list[ReplayedStage], task_id: str) -> None:
     data = data_of(pages / page_name(task_id, "fu"))
     outcomes = []
     for shown, stage in zip(data["stages"], stages, strict=True):
         for data_round, step in zip(shown["rounds"], stage.rounds, strict=True):
-            assert len(data_round.get("q", [])) == len(step.asked)
+            assert len(data_round.get("q", [])) == len(step.questions)
             for (kind, outcome, answer, prompt, offered), question in zip(
-                data_round.get("q", []), step.asked, strict=True
+                data_round.get("q", []), step.questions, strict=True
             ):
                 outcomes.append(outcome)
                 assert (kind, answer) == (question.kind, question.answer)
@@ -208,7 +208,7 @@ def test_questions_have_their_prompt_images_and_outcome(pages: Path, stages: lis
 
 
 def test_the_evaluators_words_tell_what_became_of_the_chosen_entry(
-    pages: Path, stages: list[TracedStage], task_id: str
+    pages: Path, stages: list[ReplayedStage], task_id: str
 ) -> None:
     data = data_of(pages / page_name(task_id, "fu"))
     num_told = num_stale = 0
@@ -275,7 +275,7 @@ def test_an_agent_without_belief_has_views_and_way_alone(pages: Path, task_id: s
 
 
 def test_one_stage_and_pages_a_stage(
-    run_dir: Path, stages: list[TracedStage], task_id: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run_dir: Path, stages: list[ReplayedStage], task_id: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     arguments = ["view", str(run_dir), "--task", task_id, "--agent", "fu", "--stage", "2", "--out", str(tmp_path / "a")]
     result = CliRunner().invoke(app, arguments)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from evonav.replay.replay import RunReplay
-    from evonav.replay.types import TracedStage
+    from evonav.replay.types import ReplayedStage
 
 Task = Annotated[str | None, typer.Argument(help="Id of a task of the run; default: the most telling one.")]
 Agent = Annotated[str | None, typer.Option(help="Agent of the run; default: of the most telling episode.")]
@@ -50,7 +50,7 @@ def video(
     frame, budget = episode_frame(stages[0], maps), replay.budget(agent)
     with status("Drawing") as tell:
 
-        def pictures(one: "TracedStage"):  # type: ignore[no-untyped-def] # noqa: ANN202 - a generator of pictures
+        def pictures(one: "ReplayedStage"):  # type: ignore[no-untyped-def] # noqa: ANN202 - a generator of pictures
             for number, picture in enumerate(
                 stage_frames(one, maps, frame, budget=budget, success_radius_m=success_radius_m), 1
             ):
@@ -93,7 +93,7 @@ def _replayed(
     heading_px: int,
     *,
     keeps_depth: bool = False,
-) -> "tuple[RunReplay, str, tuple[list[TracedStage], list[TracedStage]], float]":
+) -> "tuple[RunReplay, str, tuple[list[ReplayedStage], list[ReplayedStage]], float]":
     """An episode, run again: its replay, agent, stages up to the last one asked for and those asked for, radius."""
     from evonav.errors import InvalidArgumentError
     from evonav.replay.replay import RunReplay

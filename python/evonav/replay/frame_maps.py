@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
-from evonav.replay.types import TracedEntry, TracedMap, TracedRound, TracedStage
+from evonav.replay.types import ReplayedEntry, ReplayedMap, ReplayedRound, ReplayedStage
 from evonav.report.maps.floor_plan import Frame, ground, labels
 from evonav.report.maps.svg import cm, cross, escape, join, polyline
 from evonav.report.maps.trajectory import change, ring, start_mark, target_mark
@@ -34,7 +34,7 @@ def house_layer(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame
     return below + moved + names + ring(record, frame, success_radius_m) + target_mark(record.target, frame)
 
 
-def belief_layer(stage: TracedStage, step: TracedRound, frame: Frame) -> str:
+def belief_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:
     """Return an agent's map, entries and frontiers in one round, and its way so far."""
     if step.map is None:
         return way_layer(stage, step, frame)
@@ -58,7 +58,7 @@ def belief_layer(stage: TracedStage, step: TracedRound, frame: Frame) -> str:
     return _cells(step.map) + join(entries) + join(diamonds) + way_layer(stage, step, frame)
 
 
-def truth_layer(stage: TracedStage, step: TracedRound, frame: Frame) -> str:
+def truth_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:
     """Return where the memory wrongly holds the target, and the agent's way so far."""
     wrong = []
     for entry in step.entries:
@@ -73,7 +73,7 @@ def truth_layer(stage: TracedStage, step: TracedRound, frame: Frame) -> str:
     return join(wrong) + way_layer(stage, step, frame)
 
 
-def way_layer(stage: TracedStage, step: TracedRound, frame: Frame) -> str:
+def way_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:
     """Return the start, the way of all rounds so far, where the agent goes, where it stands and what it looks at."""
     u = frame.unit
     at = cm((step.pose.x_m, step.pose.z_m))
@@ -88,7 +88,7 @@ def way_layer(stage: TracedStage, step: TracedRound, frame: Frame) -> str:
     )
 
 
-def _trail(stage: TracedStage, step: TracedRound, unit: float) -> str:
+def _trail(stage: ReplayedStage, step: ReplayedRound, unit: float) -> str:
     pieces = []
     for one in stage.rounds:
         if one.record is not None:
@@ -106,7 +106,7 @@ def _trail(stage: TracedStage, step: TracedRound, unit: float) -> str:
     return join(pieces) + f'<g class="goto" stroke-width="{0.4 * unit:.1f}">{line}{mark}</g>'
 
 
-def _entry(entry: TracedEntry, frame: Frame, *, is_candidate: bool, is_chosen: bool, is_goal: bool) -> str:
+def _entry(entry: ReplayedEntry, frame: Frame, *, is_candidate: bool, is_chosen: bool, is_goal: bool) -> str:
     belief, u = entry.record, frame.unit
     x, y = cm((belief.centre_m[0], belief.centre_m[2]))
     width, depth = (
@@ -129,7 +129,7 @@ def _entry(entry: TracedEntry, frame: Frame, *, is_candidate: bool, is_chosen: b
     return f'<g class="entry {css}" {line}><rect {box}/>{mark}</g>{tag}'
 
 
-def _cells(found: TracedMap) -> str:
+def _cells(found: ReplayedMap) -> str:
     """Return an agent's map as an image."""
     rows, cols = found.cells.shape
     picture = Image.fromarray(np.ascontiguousarray(found.cells[::-1]))

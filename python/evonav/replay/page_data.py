@@ -1,7 +1,7 @@
-"""What a viewer's page holds, made small: images once, maps as what changed in them, entries as what changed.
+"""Build the JSON of a viewer's page, made small: images once, maps and entries as what changed in them.
 
 Coordinates are page coordinates (`svg.cm`). A round's `cells` are runs `LENGTH VALUE` over the map's cells row by row:
-the length in base 36, the value a letter, `A` to `D` for the values of `TracedMap.cells`, `E` for as in the round
+the length in base 36, the value a letter, `A` to `D` for the values of `ReplayedMap.cells`, `E` for as in the round
 before; what is left of the map is as before, and before the first round all is unknown.
 """
 
@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from evonav.evaluation.records.schema import EndState, FloorPlan, RoundRecord, StageRecord
 from evonav.replay.types import (
-    TracedEntry,
-    TracedFrontier,
-    TracedMap,
-    TracedQuestion,
-    TracedRound,
-    TracedStage,
+    ReplayedEntry,
+    ReplayedFrontier,
+    ReplayedMap,
+    ReplayedQuestion,
+    ReplayedRound,
+    ReplayedStage,
     Truth,
 )
 from evonav.report.maps.floor_plan import Frame
@@ -67,7 +67,7 @@ class PageData:
             self.images.append(base64.b64encode(jpeg).decode())
         return self._image_index[jpeg]
 
-    def prompt(self, question: TracedQuestion) -> int:
+    def prompt(self, question: ReplayedQuestion) -> int:
         """Index of a prompt: texts, image indices, and `[role, text]` where it is not the user's turn."""
         parts: list[Any] = []
         for role, content in question.parts:
@@ -79,13 +79,13 @@ class PageData:
             self.prompts.append(parts)
         return self._prompt_index[key]
 
-    def add_stage(self, stage: TracedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int) -> None:
-        """Takes a stage in.
+    def add_stage(self, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int) -> None:
+        """Add a stage to the page.
 
         Args:
-            stage: As replayed.
-            maps: Of the task, by stage.
-            frame: Of its drawings.
+            stage: Replayed stage.
+            maps: Floor plans of the task, by stage.
+            frame: Frame of the page's drawings.
             budget: Rounds that the agent had.
         """
         record = stage.record
@@ -125,8 +125,8 @@ class _Rounds:
         self._frontiers: list[list[Any]] = []
         self._counters: dict[str, int] = {}
 
-    def data(self, step: TracedRound) -> dict[str, Any]:
-        """A round; keys that hold nothing, or what they held the round before, are left out."""
+    def data(self, step: ReplayedRound) -> dict[str, Any]:
+        """Return a round; keys that are empty, or equal to the round before, are left out."""
         record = step.record
         heading_rad = step.pose.yaw_rad
         found: dict[str, Any] = {
@@ -134,12 +134,12 @@ class _Rounds:
             "v": [[self._page.image(view.jpeg), _turn_deg(heading_rad, view.pose.yaw_rad)] for view in step.views],
         }
         if record is not None:
-            found |= self._told(record)
+            found |= self._decision(record)
         found["kind"] = _kind(record)
         if step.note:
             found["note"] = step.note
-        if (words := evaluator_words(self._record, step)) != "":
-            found["truth"] = words
+        if (truth := evaluator_words(self._record, step)) != "":
+            found["truth"] = truth
         if step.map is not None:
             found |= self._map(step.map)
             found |= self._changed_entries(step.entries)
@@ -148,15 +148,15 @@ class _Rounds:
                 found["f"] = self._frontiers = frontiers
         if step.candidate_ids:
             found["cand"] = list(step.candidate_ids)
-        if step.asked:
-            found["q"] = [[a.kind, a.outcome, a.answer, self._page.prompt(a), _offer_words(a)] for a in step.asked]
+        if step.questions:
+            found["q"] = [[a.kind, a.outcome, a.answer, self._page.prompt(a), _offer_words(a)] for a in step.questions]
         return found
 
-    def _told(self, record: RoundRecord) -> dict[str, Any]:
+    def _decision(self, record: RoundRecord) -> dict[str, Any]:
         action = record.action
-        words = {"navigate_to": "go to", "stop": "stop", "move": (action.action or "").lower().replace("_", " ")}
+        verbs = {"navigate_to": "go to", "stop": "stop", "move": (action.action or "").lower().replace("_", " ")}
         found: dict[str, Any] = {
-            "action": words[action.kind],
+            "action": verbs[action.kind],
             "choice": choice_words(record),
             "path": polyline(simplified([cm(point) for point in record.path_m])),
             "len": round(sum(math.dist(a, b) for a, b in pairwise(record.path_m)), 3),
@@ -182,7 +182,7 @@ class _Rounds:
             self._counters.update(counters)
         return found
 
-    def _map(self, agent_map: TracedMap) -> dict[str, Any]:
+    def _map(self, agent_map: ReplayedMap) -> dict[str, Any]:
         found: dict[str, Any] = {}
         place = (*agent_map.cells.shape, agent_map.cell_m, *agent_map.corner_m)
         if place != self._place:
@@ -195,7 +195,7 @@ class _Rounds:
         self._cells = cells
         return found
 
-    def _changed_entries(self, entries: Sequence[TracedEntry]) -> dict[str, Any]:
+    def _changed_entries(self, entries: Sequence[ReplayedEntry]) -> dict[str, Any]:
         now = {entry.record.entry_id: _entry(entry, self._record) for entry in entries}
         changed = [data for name, data in now.items() if self._entries.get(name) != data]
         gone = [name for name in self._entries if name not in now]
@@ -208,8 +208,8 @@ def _turn_deg(from_rad: float, to_rad: float) -> int:
     return round(math.degrees(math.remainder(to_rad - from_rad, math.tau)))
 
 
-def _offer_words(question: TracedQuestion) -> str:
-    """Which entries and frontiers the numbers of a prompt stand for."""
+def _offer_words(question: ReplayedQuestion) -> str:
+    """Describe which entries and frontiers the numbers of a prompt refer to."""
     offers = [
         f"{name} is {what if what == 'frontier' else noun_of(what)} #{number}"
         for name, what, number in question.offered
@@ -218,7 +218,7 @@ def _offer_words(question: TracedQuestion) -> str:
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - JSON
-    """JSON without what JSON cannot say."""
+    """Return JSON data without values that JSON cannot express."""
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     if isinstance(value, Mapping):
@@ -227,11 +227,11 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 - JSON
 
 
 def cells_text(cells: NDArray[np.uint8], before: NDArray[np.uint8]) -> str:
-    """A map as runs, see the module.
+    """Encode a map as runs, see the module.
 
     Args:
         cells: `(N,)`, values 0 to 3.
-        before: The same of the round before.
+        before: Cells of the round before, in the same format.
     """
     values = np.where(cells == before, np.uint8(_SAME), cells)
     if not len(values):
@@ -252,7 +252,7 @@ def _base36(number: int) -> str:
     return digits
 
 
-def _entry(entry: TracedEntry, record: StageRecord) -> list[Any]:
+def _entry(entry: ReplayedEntry, record: StageRecord) -> list[Any]:
     """`[id, label, x, y, width, depth, detections, stale, target, now]`; `now`: place, `"gone"` or `None`."""
     belief, truth = entry.record, entry.truth
     x, y = cm((belief.centre_m[0], belief.centre_m[2]))
@@ -275,20 +275,20 @@ def _entry(entry: TracedEntry, record: StageRecord) -> list[Any]:
     ]
 
 
-def _frontier(frontier: TracedFrontier) -> list[Any]:
+def _frontier(frontier: ReplayedFrontier) -> list[Any]:
     return [frontier.frontier_id, *cm(frontier.position_m), round(math.degrees(frontier.direction_rad))]
 
 
 def choice_words(record: RoundRecord) -> str:
-    """What was chosen, as the agent knows it."""
-    words = record.choice or record.action.kind.replace("_", " ")
+    """Return the agent's choice, as the agent names it."""
+    text = record.choice or record.action.kind.replace("_", " ")
     if record.chosen_entry is not None:
-        words += f" ({noun_of(record.chosen_entry.label)})"
-    return f"{words}, stop" if record.action.kind == "stop" else words
+        text += f" ({noun_of(record.chosen_entry.label)})"
+    return f"{text}, stop" if record.action.kind == "stop" else text
 
 
 def _kind(record: RoundRecord | None) -> str:
-    """What a round's mark in the timeline is."""
+    """Return the kind of a round's mark in the timeline."""
     if record is None:
         return "error"
     if record.action.kind == "stop":
@@ -298,8 +298,8 @@ def _kind(record: RoundRecord | None) -> str:
     return next((kind for prefix, kind in _KINDS.items() if record.choice.startswith(prefix)), "other")
 
 
-def evaluator_words(stage: StageRecord, step: TracedRound) -> str:
-    """What the evaluator knows of the entry that a round chose."""
+def evaluator_words(stage: StageRecord, step: ReplayedRound) -> str:
+    """Describe what the evaluator knows of the entry that a round chose."""
     chosen = None if step.record is None else step.record.chosen_entry
     if chosen is None:
         return ""
@@ -335,14 +335,14 @@ def _target_words(record: StageRecord) -> str:
 
 
 def _lost_words(record: StageRecord) -> str:
-    """What an earlier failure of the agent cost it."""
-    words = []
+    """Describe what an earlier failure of the agent cost it."""
+    losses = []
     if record.failed_before:
         stages = ", ".join(map(str, record.failed_before))
-        words.append(f"the agent failed in stage{'s' if len(record.failed_before) > 1 else ''} {stages}")
+        losses.append(f"the agent failed in stage{'s' if len(record.failed_before) > 1 else ''} {stages}")
     if record.memory_lost_at is not None:
-        words.append(f"its process was lost, and it began anew, without memory, in stage {record.memory_lost_at}")
-    return "; ".join(words)
+        losses.append(f"its process was lost, and it began anew, without memory, in stage {record.memory_lost_at}")
+    return "; ".join(losses)
 
 
 def _facts(record: StageRecord) -> list[list[str]]:
@@ -365,7 +365,7 @@ def _facts(record: StageRecord) -> list[list[str]]:
 
 
 def _end(record: StageRecord) -> list[int] | None:
-    """Where the stage ended: page coordinates, and whether it is a success."""
+    """Return where the stage ended in page coordinates, and whether it is a success."""
     if record.terminal is None:
         return None
     return [*cm((record.terminal.x_m, record.terminal.z_m)), int(record.state is EndState.SUCCESS)]

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.replay.page_data import PageData
-from evonav.replay.types import TracedStage
+from evonav.replay.types import ReplayedStage
 from evonav.report.maps.floor_plan import Frame, floors, furniture, item_labels, labels, structure
 from evonav.report.maps.legend import ENTRIES, legend_html
 from evonav.report.maps.stage_map import outcome_words, page_name, task_frame
@@ -30,7 +30,7 @@ _SHARED_MARKS = ("start", "end, success", "end, no success", "target", "where it
 
 @dataclass(frozen=True, slots=True)
 class StageDrawing:
-    """What of a stage's map is the same in all rounds, by layer."""
+    """Layers of a stage's map that are the same in all rounds."""
 
     number: int
     floors: Markup
@@ -50,13 +50,13 @@ class WrittenPage:
     task_id: str
     path: Path
     stages: tuple[StageRecord, ...]
-    """Without their traces."""
+    """Records without their traces."""
     differs: bool
     records_sha256: str
 
 
 def write_episode(
-    stages: Sequence[TracedStage],
+    stages: Sequence[ReplayedStage],
     out_dir: Path,
     *,
     budget: int,
@@ -64,15 +64,15 @@ def write_episode(
     only: int | None = None,
     records_sha256: str = "",
 ) -> list[WrittenPage]:
-    """Writes an episode's page, or one a stage where one would be too large.
+    """Write an episode's page, or one per stage where one would be too large.
 
     Args:
-        stages: As replayed, in order.
-        out_dir: Where to.
+        stages: Replayed stages, in order.
+        out_dir: Folder to write to.
         budget: Rounds that the agent had in a stage.
-        success_radius_m: Of the ring around the target.
+        success_radius_m: Radius of the ring around the target.
         only: The one stage to show.
-        records_sha256: Of the episode's records as stored.
+        records_sha256: Digest of the episode's records as stored.
 
     Raises:
         InvalidArgumentError: The one stage has no record.
@@ -93,7 +93,7 @@ def write_episode(
 
 
 def write_index(pages: Iterable[WrittenPage], out_dir: Path, run_name: str) -> Path:
-    """Writes `index.html`, which links to these pages and to those that were written there before.
+    """Write `index.html`, which links to these pages and to those that were written there before.
 
     Raises:
         StoreError: It cannot be written.
@@ -110,7 +110,7 @@ def write_index(pages: Iterable[WrittenPage], out_dir: Path, run_name: str) -> P
     return _save(out_dir / INDEX_NAME, template.render(name=run_name, rows=ordered, css=css, policy=policy((css,))))
 
 
-def _tabs(stages: Sequence[TracedStage], here: Sequence[TracedStage]) -> list[tuple[str, int, str, int]]:
+def _tabs(stages: Sequence[ReplayedStage], here: Sequence[ReplayedStage]) -> list[tuple[str, int, str, int]]:
     """State, number, page of those that are on another one, and index of those that are on this."""
     tabs, index = [], 0
     for stage in stages:
@@ -123,7 +123,7 @@ def _tabs(stages: Sequence[TracedStage], here: Sequence[TracedStage]) -> list[tu
 
 
 def _page(
-    stages: Sequence[TracedStage],
+    stages: Sequence[ReplayedStage],
     maps: Mapping[int, FloorPlan],
     tabs: Sequence[tuple[str, int, str, int]],
     budget: int,
@@ -150,7 +150,7 @@ def _page(
     )
 
 
-def _drawing(stage: TracedStage, maps: Mapping[int, FloorPlan], frame: Frame, radius_m: float) -> StageDrawing:
+def _drawing(stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, radius_m: float) -> StageDrawing:
     record, stage_map = stage.record, stage.stage_map
     previous = maps.get(record.stage - 1)
     ends = ""
@@ -216,7 +216,7 @@ def _legend() -> Markup:
 
 
 def _write(
-    text: str, stages: Sequence[TracedStage], out_dir: Path, only: int | None, records_sha256: str
+    text: str, stages: Sequence[ReplayedStage], out_dir: Path, only: int | None, records_sha256: str
 ) -> WrittenPage:
     first = stages[0].record
     path = _save(out_dir / page_name(first.task_id, first.agent, only), text)

@@ -24,13 +24,13 @@ from evonav.replay.types import (
     BLOCKED,
     EXPLORED,
     FREE,
-    TracedEntry,
-    TracedFrontier,
-    TracedMap,
-    TracedQuestion,
-    TracedRound,
-    TracedStage,
-    TracedView,
+    ReplayedEntry,
+    ReplayedFrontier,
+    ReplayedMap,
+    ReplayedQuestion,
+    ReplayedRound,
+    ReplayedStage,
+    ReplayedView,
     Truth,
 )
 from evonav.sensors.observation import Observation
@@ -54,8 +54,8 @@ class Loss:
     message: str
 
 
-class Tracer:
-    """Looks on as an agent runs, and keeps what it sees until `take`."""
+class Recorder:
+    """Record what an agent does and believes as it runs, until `take`."""
 
     def __init__(
         self,
@@ -66,12 +66,12 @@ class Tracer:
         *,
         keeps_depth: bool = False,
     ) -> None:
-        """Looks on.
+        """Start without rounds.
 
         Args:
             agent: The one that runs.
-            on_round: Told the stage and the round, 0-based, as they begin.
-            losses: Where the agent's process was lost, by stage: there it is not asked.
+            on_round: Called with the stage and the round, from 0, as they begin.
+            losses: Losses of the agent's process, by stage: there the agent does not act.
             heading_px: Longer edge of the heading views, where pages' own size is too small.
             keeps_depth: Keep depth images, too.
         """
@@ -89,12 +89,12 @@ class Tracer:
         self._truths: dict[tuple[str, tuple[float, float, float]], Truth | None] = {}
         self._prompt_jpegs: dict[bytes, bytes] = {}
         self._stage = 0
-        self._rounds: list[TracedRound] = []
-        self._pending: TracedRound | None = None
+        self._rounds: list[ReplayedRound] = []
+        self._pending: ReplayedRound | None = None
         self._fov_rad = 0.0
 
     def stage_begins(self, stage: int, simulator: Simulator) -> None:
-        """Takes note of where everything stands."""
+        """Record where everything stands."""
         self._stage = stage
         self._simulator = simulator
         by_category: dict[str, list[SceneObject]] = {}
@@ -107,7 +107,7 @@ class Tracer:
         self._lose(0)
 
     def round_begins(self, observation: Observation) -> None:
-        """Draws the views in colours; the agent's own stay as they are."""
+        """Draw the views in colours; the agent's own stay as they are."""
         self._on_round(self._stage, len(self._rounds))
         heading_px, side_px, quality = self._sizes
         views = []
@@ -119,10 +119,10 @@ class Tracer:
             assert rgb is not None
             jpeg = jpeg_of(rgb, heading_px if is_heading else side_px, quality)
             depth = depth_png(view.depth_m) if self._keeps_depth else None
-            views.append(TracedView(pose_record(view.pose), jpeg, depth))
+            views.append(ReplayedView(pose_record(view.pose), jpeg, depth))
             width_px, height_px = view.intrinsics.width_px, view.intrinsics.height_px
             self._fov_rad = 2 * math.atan(math.tan(view.intrinsics.vertical_fov_rad / 2) * width_px / height_px)
-        self._pending = TracedRound(None, pose_record(observation.pose), tuple(views))
+        self._pending = ReplayedRound(None, pose_record(observation.pose), tuple(views))
         self._lose(len(self._rounds))
 
     def _lose(self, num_rounds: int) -> None:
@@ -131,20 +131,20 @@ class Tracer:
             raise AgentFailedError(loss.kind, loss.message)
 
     def round_ends(self, record: RoundRecord) -> None:
-        """Asks the agent what it holds true."""
+        """Add the agent's belief to the round."""
         if self._pending is not None:
             self._rounds.append(self._with_belief(replace(self._pending, record=record)))
         self._pending = None
 
-    def take(self, outcome: StageOutcome, floor_plan: FloorPlan | None = None) -> TracedStage:
-        """The stage that just ended; one that errored in the middle of a round has that round too."""
+    def take(self, outcome: StageOutcome, floor_plan: FloorPlan | None = None) -> ReplayedStage:
+        """Return the stage that just ended; one that errored in the middle of a round has that round too."""
         rounds = self._rounds
         if self._pending is not None:
             rounds = [*rounds, self._with_belief(self._pending)]
         self._rounds, self._pending = [], None
-        return TracedStage(outcome.record, floor_plan, tuple(rounds), "", (), self._fov_rad)
+        return ReplayedStage(outcome.record, floor_plan, tuple(rounds), "", (), self._fov_rad)
 
-    def _with_belief(self, seen: TracedRound) -> TracedRound:
+    def _with_belief(self, seen: ReplayedRound) -> ReplayedRound:
         if not isinstance(self.agent, InspectableAgent):
             return seen
         try:
@@ -153,35 +153,39 @@ class Tracer:
             entries = [entry_record(entry, bodies) for entry in belief.entries]
             return replace(
                 seen,
-                entries=tuple(TracedEntry(entry, self._truth(entry.label, entry.centre_m)) for entry in entries),
+                entries=tuple(ReplayedEntry(entry, self._truth(entry.label, entry.centre_m)) for entry in entries),
                 candidate_ids=tuple(belief.candidate_ids),
-                frontiers=tuple(TracedFrontier(f.frontier_id, f.position_m, f.direction_rad) for f in belief.frontiers),
+                frontiers=tuple(
+                    ReplayedFrontier(f.frontier_id, f.position_m, f.direction_rad) for f in belief.frontiers
+                ),
                 map=_map_of(belief),
-                asked=tuple(self._question(asked) for asked in belief.queries),
+                questions=tuple(self._question(entry) for entry in belief.queries),
             )
         except Exception as error:  # a picture is not worth an episode: the page says what is missing
-            return replace(seen, note=f"the agent tells no belief: {type(error).__name__}: {error}")
+            return replace(seen, note=f"the agent's belief cannot be read: {type(error).__name__}: {error}")
 
-    def _question(self, asked: QueryLogEntry) -> TracedQuestion:
+    def _question(self, entry: QueryLogEntry) -> ReplayedQuestion:
         parts: list[tuple[str, str | bytes]] = []
-        for turn in asked.question.prompt().turns:
+        for turn in entry.question.prompt().turns:
             for part in turn.parts:
                 shown = self._shown(part.pixels) if isinstance(part, Picture) else part.text
                 parts.append((turn.role, shown))
-        answer = asked.text
-        while answer.startswith(f"{asked.outcome}: "):  # what is told of a fault begins with its name
-            answer = answer.removeprefix(f"{asked.outcome}: ")
-        return TracedQuestion(asked.question.kind, tuple(parts), answer, asked.outcome, tuple(_offered(asked.question)))
+        answer = entry.text
+        while answer.startswith(f"{entry.outcome}: "):  # the message of a fault begins with its name
+            answer = answer.removeprefix(f"{entry.outcome}: ")
+        return ReplayedQuestion(
+            entry.question.kind, tuple(parts), answer, entry.outcome, tuple(_offered(entry.question))
+        )
 
     def _shown(self, pixels: NDArray[np.uint8]) -> bytes:
-        """An image of a prompt; the same ones come again round after round."""
+        """Return an image of a prompt as JPEG; the same ones come again round after round."""
         key = hashlib.blake2b(pixels.tobytes(), person=f"{pixels.shape[1]}".encode()).digest()
         if key not in self._prompt_jpegs:
             self._prompt_jpegs[key] = jpeg_of(pixels, PROMPT_PX, QUALITY)
         return self._prompt_jpegs[key]
 
     def _truth(self, label: str, centre_m: tuple[float, float, float]) -> Truth | None:
-        """What stands where an entry is, or stood there in the latest stage in which something of its label did."""
+        """Find the object where an entry is, or the last one of its label that stood there in an earlier stage."""
         key = (label, centre_m)
         if key not in self._truths:
             self._truths[key] = self._found(label, centre_m)
@@ -202,12 +206,12 @@ class Tracer:
 
 
 def jpeg_of(pixels: NDArray[np.uint8], longest_px: int, quality: int) -> bytes:
-    """A picture as JPEG, its longer edge at most `longest_px`.
+    """Return a picture as JPEG, its longer edge at most `longest_px`.
 
     Args:
         pixels: `(H, W, 3)` RGB.
-        longest_px: Of the longer edge.
-        quality: Of JPEG, 1 to 95.
+        longest_px: Limit of the longer edge.
+        quality: Quality of the JPEG, 1 to 95.
     """
     picture = Image.fromarray(np.ascontiguousarray(pixels))
     if max(picture.size) > longest_px:
@@ -218,20 +222,20 @@ def jpeg_of(pixels: NDArray[np.uint8], longest_px: int, quality: int) -> bytes:
 
 
 def depth_png(depth_m: NDArray[np.float32]) -> bytes:
-    """Depth as a PNG of 16 bits in whole millimetres; 0 where there is none, or more than it holds (65.5 m)."""
+    """Return depth as a PNG of 16 bits in whole millimetres; 0 where there is none, or more than it holds (65.5 m)."""
     depth_mm = np.round(np.where(np.isfinite(depth_m), depth_m, 0.0) * 1000.0)
-    held = np.where((depth_mm > 0) & (depth_mm < 2**16), depth_mm, 0).astype(np.uint16)
+    millimetres = np.where((depth_mm > 0) & (depth_mm < 2**16), depth_mm, 0).astype(np.uint16)
     buffer = BytesIO()
-    Image.fromarray(held).save(buffer, "PNG")
+    Image.fromarray(millimetres).save(buffer, "PNG")
     return buffer.getvalue()
 
 
-def _map_of(belief: Belief) -> TracedMap:
+def _map_of(belief: Belief) -> ReplayedMap:
     cells = np.where(belief.cells == FREE, FREE, np.where(belief.cells == BLOCKED, BLOCKED, 0)).astype(np.uint8)
     if belief.explored is not None:
         cells[(cells == FREE) & belief.explored] = EXPLORED
     frame = belief.map_frame
-    return TracedMap(cells, frame.cell_m, frame.corner_m)
+    return ReplayedMap(cells, frame.cell_m, frame.corner_m)
 
 
 def _offered(question: Question[Any]) -> Iterator[tuple[str, str, int]]:

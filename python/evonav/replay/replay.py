@@ -1,9 +1,9 @@
-"""Runs recorded episodes again in this process, and keeps of every round what records leave out (`evonav view`).
+"""Run recorded episodes again in this process, and collect what records leave out of every round (`evonav view`).
 
-A deterministic agent does the same again, with a model's answers taken from the kept exchanges; that the new records
-equal the stored ones, byte for byte, is checked and told. Where an agent's process died or hung, the replay ends the
-stage in that round without asking the agent, and goes on with a fresh one, as the run did. What cannot be run again
-(the evaluator's own process was lost) is shown as it was recorded. Nothing here runs in an evaluation.
+A deterministic agent does the same again, with a model's answers taken from the stored ones. The new records are
+compared with the stored ones, byte for byte, and differences are reported. Where an agent's process died or hung, the
+replay ends the stage in that round without asking the agent, and goes on with a fresh one, as the run did. What cannot
+be run again (the evaluator's own process was lost) is shown as it was recorded. Nothing here runs in an evaluation.
 """
 
 import inspect
@@ -28,8 +28,8 @@ from evonav.evaluation.run.components import Backend, make_agent
 from evonav.evaluation.run.run import agent_seed, perception_seed
 from evonav.evaluation.run.settings import EXCHANGES_NAME
 from evonav.perception.weights import MODELS_VARIABLE
-from evonav.replay.recorder import Loss, Tracer
-from evonav.replay.types import TracedRound, TracedStage
+from evonav.replay.recorder import Loss, Recorder
+from evonav.replay.types import ReplayedRound, ReplayedStage
 
 
 def _near(run_dir: Path, task_id: str) -> str:
@@ -47,17 +47,17 @@ class RunReplay:
         self,
         run_dir: Path,
         task_path: Callable[[str], Path],
-        exchanges: Path | None = None,
+        response_cache: Path | None = None,
         *,
         heading_px: int | None = None,
         keeps_depth: bool = False,
     ) -> None:
-        """Reads a run's header.
+        """Read a run's header.
 
         Args:
             run_dir: A run.
             task_path: Folder of a task, by its id.
-            exchanges: Answers of a model; default: those kept in the run's folder.
+            response_cache: Stored answers of a model; default: the file in the run's folder.
             heading_px: Longer edge of the heading views; default: that of the pages of `evonav view`.
             keeps_depth: Keep depth images, too.
 
@@ -82,15 +82,15 @@ class RunReplay:
         self.backend = backend
         self._why_not = ""
         if "cache" in inspect.signature(import_callable(backend.decision.path)).parameters:
-            path = exchanges or run_dir / EXCHANGES_NAME
+            path = response_cache or run_dir / EXCHANGES_NAME
             if path.is_file():
                 decision = replace(backend.decision, host_options={"cache": str(path), "mode": "replay"})
                 self.backend = replace(backend, decision=decision)
             elif not _answers_itself(backend):
-                self._why_not = f"The model's answers were not kept: {path} not found."
+                self._why_not = f"The model's answers were not stored: {path} not found."
 
     def budget(self, agent: str) -> int:
-        """Rounds that an agent has in a stage."""
+        """Return the number of rounds that an agent has in a stage."""
         return self.protocol.budget(make_agent(agent).sensing)
 
     def episode(
@@ -100,14 +100,14 @@ class RunReplay:
         on_round: Callable[[int, int], None] = lambda _stage, _round: None,
         *,
         last_stage: int | None = None,
-    ) -> Iterator[TracedStage]:
-        """The stages of an episode that have a record.
+    ) -> Iterator[ReplayedStage]:
+        """Yield the stages of an episode that have a record.
 
         Args:
             agent: One of the run's.
             task_id: One of its tasks.
-            on_round: Told the stage and the round, 0-based, as they begin.
-            last_stage: Where to end.
+            on_round: Called with the stage and the round, from 0, as they begin.
+            last_stage: Last stage to yield; default all.
 
         Raises:
             InvalidArgumentError: The run has no record of this episode.
@@ -134,7 +134,7 @@ class RunReplay:
         stored: Mapping[int, StageRecord],
         maps: Mapping[int, FloorPlan],
         on_round: Callable[[int, int], None],
-    ) -> Iterator[TracedStage]:
+    ) -> Iterator[ReplayedStage]:
         lost = [stage for stage, record in stored.items() if _is_beyond_replay(record)]
         # Run again up to here.
         last = 0 if self._why_not else min([max(stored) + 1, *lost]) - 1
@@ -144,7 +144,7 @@ class RunReplay:
                 seed = agent_seed(self.seed, agent_name, case.task_id)
                 agent = make_agent(agent_name, self.backend.decision.create(seed))
                 losses = {stage: loss for stage in stored if (loss := _loss(stored[stage]))}
-                tracer = Tracer(agent, on_round, losses, self._heading_px, keeps_depth=self._keeps_depth)
+                recorder = Recorder(agent, on_round, losses, self._heading_px, keeps_depth=self._keeps_depth)
                 perception = self.backend.perception.create()
                 episode = Episode(
                     case,
@@ -154,32 +154,32 @@ class RunReplay:
                     perception,
                     self.protocol,
                     seed,
-                    tracer,
+                    recorder,
                     perception_seed=perception_seed(self.seed, case.task_id),
                 )
                 for outcome in episode.run():
-                    traced = tracer.take(outcome, maps.get(outcome.record.stage))
-                    fov_rad = traced.fov_rad
-                    yield traced
+                    replayed = recorder.take(outcome, maps.get(outcome.record.stage))
+                    fov_rad = replayed.fov_rad
+                    yield replayed
                     if outcome.record.stage == last:
                         break
                     if _loss(outcome.record):
-                        tracer.agent = make_agent(agent_name, self.backend.decision.create(seed))
-                        episode.replace_agent(tracer.agent)
+                        recorder.agent = make_agent(agent_name, self.backend.decision.create(seed))
+                        episode.replace_agent(recorder.agent)
         for number, record in stored.items():
             if number > last:
                 why_not = self._why_not or _why_not(record, number == last + 1)
-                yield TracedStage(record, maps.get(number), _recorded_rounds(record), why_not, (), fov_rad)
+                yield ReplayedStage(record, maps.get(number), _recorded_rounds(record), why_not, (), fov_rad)
 
 
 def _answers_itself(backend: Backend) -> bool:
-    """Whether the model is one of the user's own that is put the questions themselves: nothing of it is kept."""
+    """Return whether the user's own model answers the questions itself, so that its answers are not stored."""
     path = backend.decision.options.get("path")
     return path is not None and hasattr(load_custom_model(str(path), 0), "answer")
 
 
 def _loss(record: StageRecord) -> Loss | None:
-    """The loss of the agent's process in a stage, if there was one."""
+    """Return the loss of the agent's process in a stage, if there was one."""
     error = record.error
     if record.state is not EndState.ERRORED or error is None or error.kind not in LOSSES:
         return None
@@ -187,7 +187,7 @@ def _loss(record: StageRecord) -> Loss | None:
 
 
 def _is_beyond_replay(record: StageRecord) -> bool:
-    """Whether more than the agent was lost: a stage that was not even begun, or the simulator."""
+    """Return whether more than the agent was lost: a stage that was not even begun, or the simulator."""
     if record.state is not EndState.ERRORED or record.error is None:
         return False
     return record.error.kind is ErrorKind.SIMULATOR_LOST or (
@@ -201,12 +201,12 @@ def _why_not(record: StageRecord, is_first: bool) -> str:
     return "A stage before it cannot be run again."
 
 
-def _recorded_rounds(record: StageRecord) -> tuple[TracedRound, ...]:
-    return tuple(TracedRound(entry, entry.pose, ()) for entry in record.trace)
+def _recorded_rounds(record: StageRecord) -> tuple[ReplayedRound, ...]:
+    return tuple(ReplayedRound(entry, entry.pose, ()) for entry in record.trace)
 
 
-def _differences(stored: str | None, stage: TracedStage) -> tuple[str, ...]:
-    """Where a replayed record departs from the stored one."""
+def _differences(stored: str | None, stage: ReplayedStage) -> tuple[str, ...]:
+    """Return where a replayed record differs from the stored one."""
     if stored is None or not stage.is_replayed:
         return ()
     return record_differences(stored, stage.record.model_dump_json(), "replayed")

@@ -15,7 +15,7 @@ from PIL import Image
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.replay.page_data import choice_words, evaluator_words
-from evonav.replay.types import BLOCKED, TracedMap, TracedRound, TracedStage, TracedView
+from evonav.replay.types import BLOCKED, ReplayedMap, ReplayedRound, ReplayedStage, ReplayedView
 from evonav.report.maps.stage_map import outcome_words
 from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
@@ -24,11 +24,11 @@ SUFFIX = ".rrd"
 _ENTRY, _CANDIDATE, _CHOSEN, _STALE = (15, 118, 110), (20, 184, 166), (194, 65, 12), (209, 26, 42)
 _MOVED, _ITEM, _WALL, _GOLD, _WAY = (217, 102, 11), (152, 160, 174, 70), (59, 66, 82), (255, 201, 25), (47, 102, 203)
 _CELLS = np.array([(138, 147, 163), (207, 219, 243), (39, 48, 67), (173, 209, 246)], np.uint8)
-"""Of unknown, free, blocked and explored cells."""
+"""Colours of unknown, free, blocked and explored cells."""
 
 
 def check_recording(path: Path) -> None:
-    """Whether a recording could be written there, before the work is done.
+    """Check that a recording could be written there, before the work is done.
 
     Raises:
         InvalidArgumentError: The file's suffix is another one.
@@ -40,15 +40,15 @@ def check_recording(path: Path) -> None:
 
 
 def write_recording(
-    stages: Sequence[TracedStage], maps: Mapping[int, FloorPlan], path: Path, *, success_radius_m: float
+    stages: Sequence[ReplayedStage], maps: Mapping[int, FloorPlan], path: Path, *, success_radius_m: float
 ) -> Path:
-    """Writes an episode as a recording, with the timelines `step`, `stage` and `round`.
+    """Write an episode as a recording, with the timelines `step`, `stage` and `round`.
 
     Args:
-        stages: As replayed, in order.
-        maps: Of the task, by stage.
+        stages: Replayed stages, in order.
+        maps: Floor plans of the task, by stage.
         path: `.rrd` file.
-        success_radius_m: Of the ring around the target.
+        success_radius_m: Radius of the ring around the target.
 
     Returns:
         `path`.
@@ -90,7 +90,7 @@ class _Recorder:
         self,
         rr: Any,  # noqa: ANN401 - rerun is not there for the type checker
         stream: Any,  # noqa: ANN401
-        stage: TracedStage,
+        stage: ReplayedStage,
         maps: Mapping[int, FloorPlan],
         radius_m: float,
     ) -> None:
@@ -99,18 +99,18 @@ class _Recorder:
         self._way: list[tuple[float, float, float]] = []
 
     def record(self, step: int) -> int:
-        """Writes it from this step on; returns the step after it."""
+        """Write the stage from this step on; return the step after it."""
         record = self._stage.record
-        for index, traced in enumerate(self._stage.rounds):
+        for index, replayed in enumerate(self._stage.rounds):
             self._stream.set_time("step", sequence=step)
             self._stream.set_time("stage", sequence=record.stage)
             self._stream.set_time("round", sequence=index + 1)
             if index == 0:
                 self._begin(record)
-            self._round(traced)
+            self._round(replayed)
             step += 1
-        words = f"stage {record.stage}: {outcome_words(record)}. {sentence(record)}"
-        self._stream.log("words", self._rr.TextLog(words, level="INFO"))
+        text = f"stage {record.stage}: {outcome_words(record)}. {sentence(record)}"
+        self._stream.log("words", self._rr.TextLog(text, level="INFO"))
         return step
 
     def _begin(self, record: StageRecord) -> None:
@@ -142,16 +142,16 @@ class _Recorder:
             ),
         )
 
-    def _round(self, traced: TracedRound) -> None:
-        rr, log, record = self._rr, self._stream.log, traced.record
-        pose = traced.pose
-        for number, view in enumerate(reversed(traced.views)):
+    def _round(self, replayed: ReplayedRound) -> None:
+        rr, log, record = self._rr, self._stream.log, replayed.record
+        pose = replayed.pose
+        for number, view in enumerate(reversed(replayed.views)):
             self._view("heading" if number == 0 else f"side_{number}", view)
         at = (pose.x_m, pose.z_m, 0.05)
         log("world/agent", rr.Points3D([at], colors=[_WALL], radii=[0.15]))
-        if traced.map is not None:
-            self._map(traced.map)
-            self._memory(traced)
+        if replayed.map is not None:
+            self._map(replayed.map)
+            self._memory(replayed)
         if record is None:
             return
         path = [(x, z, 0.05) for x, z in record.path_m]
@@ -159,12 +159,12 @@ class _Recorder:
         log("world/agent/way", rr.LineStrips3D([self._way], colors=[_WAY], radii=[0.02]))
         log("world/agent/step", rr.LineStrips3D([path], colors=[_CHOSEN], radii=[0.03]))
         log("words", rr.TextLog(choice_words(record), level="INFO"))
-        for asked in traced.asked:
-            log("words/answers", rr.TextLog(f"{asked.kind}, {asked.outcome}: {asked.answer}", level="DEBUG"))
-        if words := evaluator_words(self._stage.record, traced):
-            log("words/evaluator", rr.TextLog(words, level="WARN"))
+        for question in replayed.questions:
+            log("words/answers", rr.TextLog(f"{question.kind}, {question.outcome}: {question.answer}", level="DEBUG"))
+        if text := evaluator_words(self._stage.record, replayed):
+            log("words/evaluator", rr.TextLog(text, level="WARN"))
 
-    def _view(self, name: str, view: TracedView) -> None:
+    def _view(self, name: str, view: ReplayedView) -> None:
         rr, path, pose = self._rr, f"world/agent/{name}", view.pose
         sin, cos = math.sin(pose.yaw_rad), math.cos(pose.yaw_rad)
         down, ahead = math.sin(pose.horizon_rad), math.cos(pose.horizon_rad)
@@ -181,7 +181,7 @@ class _Recorder:
             depth_mm = np.asarray(Image.open(BytesIO(view.depth_png)).resize((width, height), Image.Resampling.NEAREST))
             self._stream.log(f"{path}/depth", rr.DepthImage(depth_mm.astype(np.uint16), meter=1000.0))
 
-    def _map(self, belief: TracedMap) -> None:
+    def _map(self, belief: ReplayedMap) -> None:
         rr, log = self._rr, self._stream.log
         log("map", rr.Image(_CELLS[belief.cells[::-1]]))
         rows, cols = np.nonzero(belief.cells == BLOCKED)
@@ -190,17 +190,17 @@ class _Recorder:
         points = np.stack([x_m, z_m, np.zeros_like(x_m)], axis=1)
         log("world/map/blocked", rr.Points3D(points, colors=[(39, 48, 67)], radii=[belief.cell_m / 2]))
 
-    def _memory(self, traced: TracedRound) -> None:
+    def _memory(self, replayed: ReplayedRound) -> None:
         rr, log = self._rr, self._stream.log
-        chosen = None if traced.record is None else traced.record.chosen_entry
-        entries = [entry.record for entry in traced.entries]
+        chosen = None if replayed.record is None else replayed.record.chosen_entry
+        entries = [entry.record for entry in replayed.entries]
         colours = [
             _STALE
             if entry.is_stale
             else _CHOSEN
             if chosen is not None and entry.entry_id == chosen.entry_id
             else _CANDIDATE
-            if entry.entry_id in traced.candidate_ids
+            if entry.entry_id in replayed.candidate_ids
             else _ENTRY
             for entry in entries
         ]
@@ -213,7 +213,7 @@ class _Recorder:
                 colors=colours,
             ),
         )
-        frontiers = [(*frontier.position_m, 0.05) for frontier in traced.frontiers]
+        frontiers = [(*frontier.position_m, 0.05) for frontier in replayed.frontiers]
         log("world/memory/frontiers", rr.Points3D(frontiers, colors=[(111, 195, 255)], radii=[0.1]))
 
 

@@ -1,7 +1,7 @@
-"""A replayed episode as plain data: what `evonav.replay.recorder` tells and pages show.
+"""A replayed episode as plain data: what `evonav.replay.recorder` records and pages show.
 
-What the agent believes and what the evaluator alone knows are fields apart: `TracedEntry.truth`, `StageRecord.target`,
-`StageRecord.transition` and every `is_stale` are the evaluator's.
+What the agent believes and what only the evaluator knows are separate fields: `ReplayedEntry.truth`,
+`StageRecord.target`, `StageRecord.transition` and every `is_stale` are the evaluator's.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from evonav.evaluation.records.schema import (
 )
 
 UNKNOWN, FREE, BLOCKED, EXPLORED = 0, 1, 2, 3
-"""Values of `TracedMap.cells`; explored cells are free ones that were seen from close by."""
+"""Values of `ReplayedMap.cells`; explored cells are free ones that were seen from close by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +31,11 @@ class Truth:
     stood_in_stage: int
     """The last stage in which it stood where the entry is; the present one if the entry is not stale."""
     now_m: Point3 | None
-    """Where it stands in the present stage; `None` when it is no longer in the house."""
+    """Position in the present stage; `None` when it is no longer in the house."""
 
 
 @dataclass(frozen=True, slots=True)
-class TracedEntry:
+class ReplayedEntry:
     """An entry of the object memory in one round."""
 
     record: EntryRecord
@@ -44,7 +44,7 @@ class TracedEntry:
 
 
 @dataclass(frozen=True, slots=True)
-class TracedFrontier:
+class ReplayedFrontier:
     """A frontier in one round."""
 
     frontier_id: int
@@ -53,8 +53,8 @@ class TracedFrontier:
 
 
 @dataclass(frozen=True, slots=True)
-class TracedView:
-    """What one camera of a round saw, in colours."""
+class ReplayedView:
+    """Colour image of one camera in a round."""
 
     pose: PoseRecord
     """The camera's, as the agent was given it."""
@@ -64,22 +64,22 @@ class TracedView:
 
 
 @dataclass(frozen=True, slots=True)
-class TracedQuestion:
+class ReplayedQuestion:
     """One try at a question."""
 
     kind: str
     parts: tuple[tuple[str, str | bytes], ...]
-    """The prompt: role, and words or an image (JPEG)."""
+    """The prompt: role, and text or an image (JPEG)."""
     answer: str
-    """As it came; of a lost one, what happened."""
+    """The answer as it came; of a lost one, what happened."""
     outcome: str
     """`answered`, `invalid`, `refusal` or `lost`."""
     offered: tuple[tuple[str, str, int], ...] = ()
-    """What the prompt's numbers stand for: `("Object 0", "Sofa", 12)` or `("Frontier 1", "frontier", 7)`."""
+    """Meanings of the prompt's numbers: `("Object 0", "Sofa", 12)` or `("Frontier 1", "frontier", 7)`."""
 
 
 @dataclass(frozen=True, slots=True)
-class TracedMap:
+class ReplayedMap:
     """The agent's map in one round."""
 
     cells: NDArray[np.uint8]
@@ -90,39 +90,39 @@ class TracedMap:
 
 
 @dataclass(frozen=True, slots=True)
-class TracedRound:
-    """One round: what was seen, believed, asked and done."""
+class ReplayedRound:
+    """One round: observation, belief, questions and action."""
 
     record: RoundRecord | None
     """`None` when the stage errored in this round."""
     pose: PoseRecord
-    """When it observed."""
-    views: tuple[TracedView, ...]
+    """Pose of the agent when it observed."""
+    views: tuple[ReplayedView, ...]
     """The heading view last."""
-    entries: tuple[TracedEntry, ...] = ()
+    entries: tuple[ReplayedEntry, ...] = ()
     candidate_ids: tuple[int, ...] = ()
-    frontiers: tuple[TracedFrontier, ...] = ()
-    map: TracedMap | None = None
+    frontiers: tuple[ReplayedFrontier, ...] = ()
+    map: ReplayedMap | None = None
     """`None` for an agent that cannot be inspected."""
-    asked: tuple[TracedQuestion, ...] = ()
+    questions: tuple[ReplayedQuestion, ...] = ()
     note: str = ""
-    """Why there is no belief, where the agent should have told one."""
+    """Reason why there is no belief, where the agent should have had one."""
 
 
 @dataclass(frozen=True, slots=True)
-class TracedStage:
+class ReplayedStage:
     """One stage, run again or not."""
 
     record: StageRecord
     """The replayed one; where nothing was run again, the stored one."""
     stage_map: FloorPlan | None
-    rounds: tuple[TracedRound, ...]
+    rounds: tuple[ReplayedRound, ...]
     why_not: str
-    """Why it was not run again; empty if it was."""
+    """Reason why it was not run again; empty if it was."""
     differences: tuple[str, ...]
     """Fields in which the replay departs from what is stored, the first few; none: equal, byte for byte."""
     fov_rad: float
-    """Horizontal, of a view."""
+    """Horizontal field of view of a camera."""
 
     @property
     def is_replayed(self) -> bool:

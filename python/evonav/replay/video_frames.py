@@ -9,7 +9,7 @@ from PIL import Image
 from evonav.evaluation.records.schema import EndState, FloorPlan
 from evonav.replay.frame_maps import UNKNOWN_COLOUR, belief_layer, house_layer, truth_layer
 from evonav.replay.page_data import choice_words, evaluator_words
-from evonav.replay.types import TracedRound, TracedStage
+from evonav.replay.types import ReplayedRound, ReplayedStage
 from evonav.report.maps.files import png_of
 from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import change_words, light_css, outcome_words, task_frame
@@ -32,7 +32,7 @@ _LETTER = 0.56
 
 
 def stage_frames(
-    stage: TracedStage, maps: Mapping[int, FloorPlan], frame: Frame, *, budget: int, success_radius_m: float
+    stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, *, budget: int, success_radius_m: float
 ) -> Iterator[Image.Image]:
     """Yield a picture a round, and one of how the stage ended.
 
@@ -52,7 +52,7 @@ def stage_frames(
     yield film.end()
 
 
-def episode_frame(stages: Sequence[TracedStage], maps: Mapping[int, FloorPlan]) -> Frame:
+def episode_frame(stages: Sequence[ReplayedStage], maps: Mapping[int, FloorPlan]) -> Frame:
     """Return the frame of a task's maps."""
     return task_frame(maps, [stage.record for stage in stages])
 
@@ -61,7 +61,7 @@ class _StageFilm:
     """Draws what the pictures of a stage share once, and each round's own over it."""
 
     def __init__(
-        self, stage: TracedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int, radius_m: float
+        self, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int, radius_m: float
     ) -> None:
         film_css = (files("evonav.report") / "templates" / "film.css").read_text(encoding="utf-8")
         self._style = f"<style>{light_css(film_css)}</style>"
@@ -113,7 +113,7 @@ class _StageFilm:
         return Image.open(BytesIO(png_of(svg, background=background, has_system_fonts=False)))
 
 
-def _header(stage: TracedStage, maps: Mapping[int, FloorPlan]) -> str:
+def _header(stage: ReplayedStage, maps: Mapping[int, FloorPlan]) -> str:
     """Return agent, task and goal, and the heads of the panels."""
     record = stage.record
     agent = record.agent[-40:]
@@ -132,7 +132,7 @@ def _header(stage: TracedStage, maps: Mapping[int, FloorPlan]) -> str:
     )
 
 
-def _position(stage: TracedStage, index: int, budget: int) -> str:
+def _position(stage: ReplayedStage, index: int, budget: int) -> str:
     """Return which round it is, and how much the agent remembers in it."""
     step, record = stage.rounds[index], stage.record
     where = f"stage {record.stage} of {record.num_stages} · round {index + 1} of {len(stage.rounds)}"
@@ -146,7 +146,7 @@ def _position(stage: TracedStage, index: int, budget: int) -> str:
     )
 
 
-def _paste_views(picture: Image.Image, step: TracedRound) -> None:
+def _paste_views(picture: Image.Image, step: ReplayedRound) -> None:
     """Paste the heading view, and the others in a row below it."""
     if not step.views:
         return
@@ -166,13 +166,13 @@ def _scaled(jpeg: bytes, width: int, height: int) -> Image.Image:
     return picture.resize(size, Image.Resampling.LANCZOS)
 
 
-def _captions(stage: TracedStage, step: TracedRound) -> str:
+def _captions(stage: ReplayedStage, step: ReplayedRound) -> str:
     """Return what the round chose and why, and what the evaluator knows of it, as far as there is room."""
     top, record = 50, step.record
     choice = "error" if record is None else choice_words(record)
     lines = []
-    if step.asked:
-        last = step.asked[-1]
+    if step.questions:
+        last = step.questions[-1]
         lines.append(("caption", f"asked ({last.kind}), {last.outcome}: {last.answer}"))
     if record is not None and record.action.reason:
         lines.append(("caption", f"because: {record.action.reason}"))
@@ -189,7 +189,7 @@ def _captions(stage: TracedStage, step: TracedRound) -> str:
     return join(drawn)
 
 
-def _timeline(stage: TracedStage, index: int) -> str:
+def _timeline(stage: ReplayedStage, index: int) -> str:
     """Return a line of all rounds: what those so far chose."""
     num, drawn = len(stage.rounds), []
     gap = 1 if num < 200 else 0
