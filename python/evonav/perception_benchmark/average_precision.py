@@ -74,5 +74,5 @@ def _block(
     columns = places.reshape(num_rows, -1) - num * np.arange(num_rows)[:, None]
     padded = np.concatenate([envelope, np.zeros((num_rows, 1))], axis=1)
     columns = np.clip(columns, 0, num)
-    means = np.take_along_axis(padded, columns, axis=1).mean(axis=1)
-    return np.asarray(np.where(wanted > 0, means, np.nan))
+    at_recalls = np.take_along_axis(padded, columns, axis=1).mean(axis=1)
+    return np.asarray(np.where(wanted > 0, at_recalls, np.nan))

@@ -40,9 +40,9 @@ from evonav.world.simulator import Frame, Simulator
 
 WORK = "evonav.perception_benchmark.benchmark:make_worker"
 TASK_TIMEOUT_S = 3600.0
-"""Without a sign of life; a place of a tour is one."""
+"""Time without progress after which a task fails; each place of a tour is progress."""
 AGENT = "fu"
-"""Whom percepts are for, where that matters: models of `predicted:auto`."""
+"""Agent that percepts are for, where that matters: models of `predicted:auto`."""
 NUM_PICTURES = 4
 """Tasks that have a picture."""
 
@@ -57,17 +57,17 @@ class PerceptionSpec:
 
 @dataclass(frozen=True, slots=True)
 class TourConfig:
-    """What decides the views."""
+    """Settings that decide the views."""
 
     views_per_room: int = 12
-    """At most, rounded up to whole places."""
+    """Largest number of views in a room, rounded up to whole places."""
     num_houses: int = 2
     """Different houses of a task that are toured, its first stage's first: the memory is carried from one to the next.
     """
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Checks.
+        """Check the values.
 
         Raises:
             InvalidArgumentError: A value is outside its domain.
@@ -79,10 +79,10 @@ class TourConfig:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """What a command has done."""
+    """Result of a command."""
 
     tasks: tuple[str, ...]
-    """That have a record of every perception of the folder."""
+    """Tasks that have a record of every perception of the folder."""
     failures: tuple[tuple[str, str, str], ...]
     """Word, task and last line of what went wrong."""
 
@@ -97,11 +97,11 @@ def measure(
     num_workers: int = 1,
     on_progress: Callable[[int, int, str], None] = lambda *_: None,
 ) -> Measured:
-    """Tours the houses with every perception; called again on the same folder, does what is left.
+    """Tour the houses with every perception; called again on the same folder, tour what is missing.
 
     Args:
         specs: Perceptions; those of earlier commands stay in the folder.
-        tasks: From `evonav.tasks.listing.task_files`.
+        tasks: Files from `evonav.tasks.listing.task_files`.
         out: Holds `perception.json` and `records/`.
         config: Must be the folder's own if it holds records.
         simulator: Import path.
@@ -114,11 +114,11 @@ def measure(
         EngineError: Workers cannot be had.
     """
     config = config or TourConfig()
-    words = [spec.word for spec in specs]
+    perceptions = [spec.word for spec in specs]
     if not specs or not tasks:
         raise InvalidArgumentError(f"no {'task' if specs else 'perception'} to measure")
-    if len(set(words)) != len(words):
-        raise InvalidArgumentError(f"a perception is named twice: {', '.join(words)}")
+    if len(set(perceptions)) != len(perceptions):
+        raise InvalidArgumentError(f"a perception is named twice: {', '.join(perceptions)}")
     with writing(out):
         header = _begun(specs, tasks, out, config, simulator)
         jobs: list[tuple[PerceptionSpec, TaskFile, bool]] = [
@@ -153,26 +153,26 @@ def measure(
 def _begun(
     specs: Sequence[PerceptionSpec], tasks: Sequence[TaskFile], out: Path, config: TourConfig, simulator: str
 ) -> Header:
-    """Claims the folder; records of tasks that are others now are dropped."""
+    """Claim the folder; records of tasks that are others now are dropped."""
     identity = {"evonav": __version__, "tour": asdict(config), "simulator": simulator}
     there = read_header(out)
     options = {spec.word: {"make": spec.component.path, "options": dict(spec.component.options)} for spec in specs}
     digests = {task.task_id: task.digest for task in tasks}
-    words = [spec.word for spec in specs]
+    perceptions = [spec.word for spec in specs]
     if there is not None:
         check_same_run(there.identity, identity, out)
         for word, known in there.options.items():
             check_same_run({word: known}, {word: options.get(word, known)}, out)
-        words = [*there.words, *(word for word in words if word not in there.words)]
+        perceptions = [*there.perceptions, *(word for word in perceptions if word not in there.perceptions)]
         options = {**there.options, **options}
         for task_id, digest in digests.items():
             if there.digests.get(task_id, digest) != digest:
-                for word in there.words:
+                for word in there.perceptions:
                     record_path(out, word, task_id).unlink(missing_ok=True)
         digests = {**there.digests, **digests}
     return Header(
         identity=identity,
-        words=words,
+        perceptions=perceptions,
         options=options,
         models={} if there is None else there.models,
         tasks=[task.task_id for task in tasks],
@@ -181,7 +181,7 @@ def _begun(
 
 
 def _claim_models(header: Header, specs: Sequence[PerceptionSpec], out: Path) -> None:
-    """Notes hashes of weights and versions of libraries before anyone looks, or checks that they are the folder's."""
+    """Record hashes of weights and versions of libraries before the first view, or check that they are the folder's."""
     for spec in specs:
         found = Backend(perception=spec.component).check_perception([AGENT])
         there = header.models.setdefault(spec.word, found)
@@ -190,7 +190,7 @@ def _claim_models(header: Header, specs: Sequence[PerceptionSpec], out: Path) ->
 
 
 def make_worker(settings: str, alive: Callable[[], None]) -> Callable[[str], str]:
-    """The function from a job to its record, as `evonav.parallel.pool` calls it."""
+    """Return the function from a job to its record, as `evonav.parallel.pool` calls it."""
     values = json.loads(settings)
     config = TourConfig(**values["config"])
     simulators: Component[Simulator] = Component(values["simulator"])
@@ -217,19 +217,19 @@ def measure_task(
     has_picture: bool = False,
     alive: Callable[[], None] = lambda: None,
 ) -> TaskRecord:
-    """One perception on the houses of one task.
+    """Measure one perception on the houses of one task.
 
     Args:
         case: The task.
         perception: A fresh one.
         simulator: Is reset to each house.
-        config: Of the tour.
-        word: What the perception is called.
+        config: Settings of the tour.
+        word: Name of the perception.
         has_picture: Draw the view of the first house that shows the most objects.
         alive: Called after every place.
 
     Raises:
-        EvonavError: As the simulator, the perception and the object map tell.
+        EvonavError: The simulator, the perception or the object map fails.
     """
     rows, memory, best = Rows(), JudgedMemory(), _BestView()
     states: list[MemoryState] = []
@@ -243,7 +243,7 @@ def measure_task(
         memory.begin_stage(stage, objects)
         if states:
             states.append(memory.state(0.0))
-        looks = _checkpoints(len(places))
+        checkpoints = _checkpoints(len(places))
         for number, poses in enumerate(places, start=1):
             frames = [simulator.render(pose, rgb=perception.needs_rgb, instances=True) for pose in poses]
             image_px = frames[0].depth_m.size
@@ -253,8 +253,8 @@ def measure_task(
                 memory.look(frame, percept, truth)
                 if has_picture and stage == 1:
                     best.offer(pose, truth, percept, matched, frame)
-            if number in looks:
-                states.append(memory.state(looks[number]))
+            if number in checkpoints:
+                states.append(memory.state(checkpoints[number]))
             alive()
         num_views.append(sum(map(len, places)))
     return TaskRecord(
@@ -297,7 +297,7 @@ class _BestView:
 
 
 def _houses(case: EpisodeSpec, count: int) -> list[int]:
-    """The first stage and those after it whose house is another than the one before."""
+    """Return the first stage, and later stages whose house differs from the one before."""
     found, house = [1], case.stages[0].house_json
     for number, stage in enumerate(case.stages[1:], start=2):
         if stage.house_json != house:

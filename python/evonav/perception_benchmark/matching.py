@@ -1,9 +1,9 @@
 """Detections of one view against the objects in it: which detection is which object, by the overlap of masks.
 
-Objects that ground-truth perception would tell of are *wanted*. Smaller ones, doors and windows are *ignored* as in
-COCO: nobody has to find them, and who does is not blamed. Matching is COCO's: detections by falling confidence each
-take the free object of largest IoU. Masks of a view do not overlap, and so at most one object has more than half in
-common with a detection: with a limit of 0.5, any assignment gives the same pairs.
+Objects that ground-truth perception would report are *wanted*. Smaller ones, doors and windows are *ignored* as in
+COCO: finding one is neither required nor counted as an error. Matching is COCO's: detections by falling confidence
+each take the free object of largest IoU. Masks of a view do not overlap, and so at most one object has more than half
+in common with a detection: with a limit of 0.5, any assignment gives the same pairs.
 """
 
 from collections.abc import Sequence
@@ -20,11 +20,11 @@ from evonav.world.simulator import Frame, SceneObject
 IOU_LIMIT = 0.5
 MIN_AREA_PX = 25
 MIN_AREA_SHARE = 0.001
-"""As `GroundTruthPerception`: an object of fewer pixels, or of a smaller part of the image, is ignored."""
+"""Limit as in `GroundTruthPerception`: an object of fewer pixels, or a smaller part of the image, is ignored."""
 IGNORED_KINDS = ("door", "window")
 
 NONE, IGNORED = -1, -2
-"""In place of a partner: there is none; it is one that does not count."""
+"""Marks in place of a partner: there is none, or it does not count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class Matches:
 
 
 def true_objects(frame: Frame, objects: Sequence[SceneObject]) -> TrueObjects:
-    """What is to be found in a frame.
+    """Collect the objects that are to be found in a frame.
 
     Args:
         frame: Rendered with instances.

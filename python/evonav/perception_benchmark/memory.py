@@ -1,4 +1,4 @@
-"""How good a memory of objects a perception makes: the paper's object map, fed with a tour and judged by the house.
+"""Measure how good a memory of objects a perception makes: the paper's object map, fed with a tour, against the house.
 
 What an entry was made of is counted from its detections' pixels, which only the evaluator can see through to objects:
 so an entry in the wrong place, or with the wrong label, still has the object that it came from.
@@ -29,18 +29,18 @@ class JudgedMemory:
 
     map: ObjectMap = field(default_factory=ObjectMap)
     _votes: dict[int, Counter[str]] = field(default_factory=dict)
-    """By entry: detections by the id of the object that most of their pixels are of; "" for none."""
+    """Votes by entry: detections by the id of the object that has most of their pixels; "" for none."""
     _objects: Sequence[SceneObject] = ()
     _seen: set[str] = field(default_factory=set)
     _right_before: set[int] = field(default_factory=set)
     """Entries that were right at the end of the stage before."""
     _categories: dict[str, str] = field(default_factory=dict)
-    """By id, of every object of any stage so far."""
+    """Categories by id, of every object of any stage so far."""
     _stage: int = 0
     _num_views: int = 0
 
     def begin_stage(self, stage: int, objects: Sequence[SceneObject]) -> None:
-        """Another house, with the memory of those before.
+        """Begin another house, with the memory of those before.
 
         Args:
             stage: 1-based.
@@ -53,7 +53,7 @@ class JudgedMemory:
         self.map.begin_stage(stage)
 
     def look(self, frame: Frame, percept: Percept, truth: TrueObjects) -> None:
-        """Takes a view over."""
+        """Add a view to the memory."""
         view = View(
             pose=percept.pose,
             intrinsics=frame.intrinsics,
@@ -78,14 +78,14 @@ class JudgedMemory:
         self._num_views += 1
 
     def state(self, share: float) -> MemoryState:
-        """The memory as it is now.
+        """Return the state of the memory now.
 
         Args:
-            share: Of the stage's tour that is done.
+            share: Share of the stage's tour that is done.
         """
         beliefs = self._beliefs()
         right = self._right()
-        held = {body.id for body in held_by(right, self._bodies()) if body is not None}
+        remembered = {body.id for body in held_by(right, self._bodies()) if body is not None}
         sources = {belief.entry_id: self._source(belief.entry_id) for belief in beliefs}
         there = {body.id: body for body in self._objects}
         named = [name for name in sources.values() if name]
@@ -111,7 +111,7 @@ class JudgedMemory:
             num_objects=len(set(named)),
             num_surplus=len(named) - len(set(named)),
             num_seen=len(self._seen),
-            num_seen_held=len(self._seen & held),
+            num_seen_held=len(self._seen & remembered),
             num_stale=len((self._right_before & entry_ids) - rights),
             error_m=math.fsum(errors_m),
             num_error=len(errors_m),
@@ -137,5 +137,5 @@ class JudgedMemory:
     def _right(self) -> list[EntryBelief]:
         """Entries that an object of their label stands by."""
         beliefs = self._beliefs()
-        held = held_by(beliefs, self._bodies())
-        return [belief for belief, body in zip(beliefs, held, strict=True) if body is not None]
+        matched = held_by(beliefs, self._bodies())
+        return [belief for belief, body in zip(beliefs, matched, strict=True) if body is not None]

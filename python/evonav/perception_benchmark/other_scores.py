@@ -27,10 +27,10 @@ class Group:
 def calibration(
     houses: ClusterBootstrap, confidences: NDArray[np.float64], is_right: NDArray[np.bool_], of: NDArray[np.int64]
 ) -> tuple[dict[str, Estimate], list[tuple[float, Estimate]]]:
-    """Expected calibration error, and mean confidence and precision by tenths of confidence.
+    """Return expected calibration error, and mean confidence and precision by tenths of confidence.
 
     Args:
-        houses: Of the detections.
+        houses: Confidences of the detections.
         confidences: `(D,)` of detections that count.
         is_right: `(D,)`.
         of: `(D,)` house of each.
@@ -64,10 +64,10 @@ def depth_groups(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> lis
         all_px, lost_px, relatives, squares = (
             houses.sums(table[:, columns].sum(axis=1)) for table in (num, lost, relative, square)
         )
-        told = all_px - lost_px
+        with_depth = all_px - lost_px
         measures = {
-            "depth_relative": houses.ratio(relatives, told, int(told.sum())),
-            "depth_rmse_m": houses.ratio(squares, told, int(told.sum()), np.sqrt),
+            "depth_relative": houses.ratio(relatives, with_depth, int(with_depth.sum())),
+            "depth_rmse_m": houses.ratio(squares, with_depth, int(with_depth.sum()), np.sqrt),
             "depth_lost": houses.ratio(lost_px, all_px, int(all_px.sum())),
         }
         return Group(name, measures)
@@ -90,7 +90,7 @@ def cosines(
 ) -> tuple[dict[str, list[int]], dict[str, Estimate]]:
     """Histograms of cosines, and their means; nothing without features."""
     counts: dict[str, list[int]] = {}
-    means: dict[str, Estimate] = {}
+    estimates: dict[str, Estimate] = {}
     for name in COSINES:
         table = np.zeros((len(records), NUM_COSINE_BINS))
         for i, record in enumerate(records):
@@ -99,16 +99,16 @@ def cosines(
             counts[name] = table.sum(axis=0).astype(np.int64).tolist()
             nums = houses.sums(table.sum(axis=1))
             totals = houses.sums([record.features.totals.get(name, 0.0) for record in records])
-            means[f"cosine_{name}"] = houses.ratio(totals, nums, int(nums.sum()))
+            estimates[f"cosine_{name}"] = houses.ratio(totals, nums, int(nums.sum()))
     nums = houses.sums([record.features.num_texts for record in records])
     if nums.any():
         rights = houses.sums([record.features.num_right for record in records])
-        means["text_right"] = houses.ratio(rights, nums, int(nums.sum()))
-    return counts, means
+        estimates["text_right"] = houses.ratio(rights, nums, int(nums.sum()))
+    return counts, estimates
 
 
 def memory(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> dict[str, Estimate]:
-    """The object map after the first house's tour, and what became of it in the next house."""
+    """Score the object map after the first house's tour, and its stale entries in the next house."""
     first = [_states(record, 0, 1.0) for record in records]
     begun, toured = ([_states(record, 1, share) for record in records] for share in (0.0, 1.0))
     return {
@@ -119,7 +119,7 @@ def memory(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> dict[str,
 
 
 def memory_curve(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> list[tuple[float, dict[str, Estimate]]]:
-    """The same by share of the first house's tour, where all tasks were looked at."""
+    """Score the object map by share of the first house's tour, where all tasks have a state."""
     shares = sorted({state.share for record in records for state in record.memory if state.stage == record.stages[0]})
     found = []
     for share in shares:
@@ -130,7 +130,7 @@ def memory_curve(houses: ClusterBootstrap, records: Sequence[TaskRecord]) -> lis
 
 
 def memory_measures(houses: ClusterBootstrap, states: Sequence[MemoryState | None]) -> dict[str, Estimate]:
-    """Of the memory at one time, one state a task."""
+    """Score the memory at one time, from one state per task."""
     one = houses.sums([float(state is not None) for state in states])
     num_tasks = int(one.sum())
 
@@ -158,7 +158,7 @@ def _share(
 
 
 def _states(record: TaskRecord, house: int, share: float) -> MemoryState | None:
-    """The memory in a house of the tour, after a share of it."""
+    """Return the memory in a house of the tour, after a share of it."""
     if house >= len(record.stages):
         return None
     stage = record.stages[house]

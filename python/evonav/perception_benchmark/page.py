@@ -19,10 +19,10 @@ REPORT_NAME = "report.html"
 
 
 def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
-    """Makes the files from a folder's records.
+    """Write the report's files from a folder's records.
 
     Returns:
-        The page, and what it tells.
+        The page, and the scores that it shows.
 
     Raises:
         StoreError: There are no records, or a file cannot be read or written.
@@ -56,7 +56,7 @@ def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
 
 
 def perception_json(found: Sequence[Scores]) -> dict[str, Any]:
-    """The content of `summary.json`."""
+    """Return the content of `summary.json`."""
     return {
         "schema_version": 1,
         "perceptions": [_values(one) for one in found],

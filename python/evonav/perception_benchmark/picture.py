@@ -16,9 +16,9 @@ RIGHT, MISLABELLED, ALONE = (64, 132, 255), (255, 150, 30), (235, 60, 200)
 """Blue: found with its label; orange: at its place with another label; magenta: missed, or nothing there."""
 _PLAIN = (150, 150, 150)
 _SHARE = 0.42
-"""Of the colour in a mask."""
+"""Share of the colour in a mask."""
 _FONT_PX = 11
-_LEAST_TOLD_PX = 200
+_LEAST_LABELLED_PX = 200
 """Masks of fewer pixels have no room for their label."""
 GAP_PX = 6
 QUALITY = 82
@@ -29,8 +29,8 @@ def side_by_side(rgb: NDArray[np.uint8], truth: TrueObjects, found: Detections, 
 
     Args:
         rgb: `(H, W, 3)`.
-        truth: Of `true_objects`.
-        found: Of the same view.
+        truth: Objects from `true_objects`.
+        found: Detections in the same view.
         matched: Their pairs.
     """
     is_found = matched.found.detection_of[: truth.num_wanted] != NONE
@@ -68,7 +68,7 @@ def _drawn(
     font = ImageFont.load_default(_FONT_PX)
     for i, label in enumerate(labels):
         rows, columns = np.nonzero(masks == i)
-        if rows.size < _LEAST_TOLD_PX:
+        if rows.size < _LEAST_LABELLED_PX:
             continue
         length = draw.textlength(label, font=font)
         x = min(max(1.0, float(np.median(columns)) - length / 2), masks.shape[1] - length - 1)

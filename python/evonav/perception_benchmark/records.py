@@ -1,6 +1,6 @@
-"""What is kept of one perception on one task: a row an object in view, a row a detection, and sums of the rest.
+"""Read and write the records of one perception on one task: a row per object in view, a row per detection, and sums.
 
-A folder of `evonav perception` holds `perception.json`, what was asked for, and `records/NAME/TASK.json.gz`.
+A folder of `evonav perception` holds `perception.json`, the request, and `records/NAME/TASK.json.gz`.
 """
 
 import gzip
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evonav.errors import StoreError
 from evonav.evaluation.records.former_paths import with_current_paths
@@ -22,15 +22,15 @@ HEADER_NAME = "perception.json"
 RECORD_DIR = "records"
 
 DISTANCE_BINS_M = (0.0, 1.0, 2.0, 3.5, 6.0)
-"""Where each begins; the last has no end. 3.5 m is as far as the paper's object memory takes detections."""
+"""Lower edges of the bins; the last has no end. 3.5 m is as far as the paper's object memory takes detections."""
 NUM_COSINE_BINS = 80
-"""Of -1..1."""
+"""Number of bins of -1..1."""
 NUM_CHECKPOINTS = 8
-"""Of a tour, evenly spaced: when the memory is looked at."""
+"""Number of times in a tour, evenly spaced, at which the memory is judged."""
 
 
 class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
 
 
 class TrueRows(_Part):
@@ -62,19 +62,19 @@ class DetectionRows(_Part):
     found: list[int] = []
     """Row of the object of its label, -1 without, -2 for an ignored one."""
     found_iou: list[float] = []
-    """With that object, also an ignored one."""
+    """IoU with that object, also an ignored one."""
     located: list[int] = []
     """Row of the object at its place, whatever its label, -1 without, -2 for an ignored one."""
     located_iou: list[float] = []
 
 
 class DepthSums(_Part):
-    """Of pixels by their true depth, in `DISTANCE_BINS_M`."""
+    """Sums over pixels by their true depth, in `DISTANCE_BINS_M`."""
 
     num: list[int] = [0] * len(DISTANCE_BINS_M)
-    """With a depth in truth."""
+    """Pixels with a true depth."""
     num_lost: list[int] = [0] * len(DISTANCE_BINS_M)
-    """Of those, without one as perceived."""
+    """Pixels with a true depth but without a perceived one."""
     relative: list[float] = [0.0] * len(DISTANCE_BINS_M)
     """Sum of |error| over the true depth."""
     square_m2: list[float] = [0.0] * len(DISTANCE_BINS_M)
@@ -85,24 +85,24 @@ class PoseRows(_Part):
     """Errors of the believed pose, one a view."""
 
     offset_m: list[float] = []
-    """On the ground plane."""
+    """Offsets on the ground plane."""
     turn_rad: list[float] = []
-    """Of the yaw, without its sign."""
+    """Errors of the yaw, without their sign."""
 
 
 class FeatureSums(_Part):
     """Counts of cosines, in `NUM_COSINE_BINS` of -1..1; empty where the perception has no features."""
 
     same_object: list[int] = []
-    """Of two detections of an object, from two views."""
+    """Cosines of two detections of an object, from two views."""
     same_category: list[int] = []
-    """Of two objects of a category."""
+    """Cosines of two objects of a category."""
     other: list[int] = []
-    """Of objects of two categories."""
+    """Cosines of objects of two categories."""
     text_own: list[int] = []
-    """Of a detection and the word for its object's category."""
+    """Cosines of a detection and the word for its object's category."""
     text_other: list[int] = []
-    """Of a detection and the word for another category."""
+    """Cosines of a detection and the word for another category."""
     totals: dict[str, float] = {}
     """Sums of the same cosines, by name of the counts."""
     num_right: int = 0
@@ -116,14 +116,14 @@ class MemoryState(_Part):
 
     stage: int
     num_views: int
-    """In this stage so far; 0: as the stage begins."""
+    """Views in this stage so far; 0: as the stage begins."""
     share: float
-    """Of the stage's tour."""
+    """Share of the stage's tour."""
     num_entries: int
     num_right: int
     """An object of the entry's label stands within 0.3 m of its centre."""
     num_wrong_label: int
-    """Of the entries with an object: its category is not their label."""
+    """Entries with an object whose category is not their label."""
     num_phantoms: int
     """Most of the entry's detections were of no object."""
     num_objects: int
@@ -133,7 +133,7 @@ class MemoryState(_Part):
     num_seen: int
     """Objects that were in reach of the memory: wanted in a view, at most 3.5 m from the camera."""
     num_seen_held: int
-    """Of those, with a right entry."""
+    """Seen objects with a right entry."""
     num_stale: int = 0
     """Entries that were right at the end of the stage before and are not in this house."""
     error_m: float = 0.0
@@ -146,7 +146,7 @@ class TaskRecord(_Part):
 
     task_id: str
     digest: str
-    """Of `task.json`."""
+    """Digest of `task.json`."""
     house: str
     word: str
     """The perception."""
@@ -155,7 +155,7 @@ class TaskRecord(_Part):
     stages: list[int]
     """Toured."""
     num_views: list[int]
-    """Of each of them."""
+    """Number of views in each of them."""
     truths: TrueRows
     detections: DetectionRows
     depth: DepthSums
@@ -167,35 +167,35 @@ class TaskRecord(_Part):
 
 
 class Header(_Part):
-    """What was asked for."""
+    """Request that a folder was made for."""
 
     identity: dict[str, Any]
-    """What makes records go together."""
-    words: list[str]
-    """Perceptions, in the order in which they were first asked for."""
+    """Settings that records of one folder share."""
+    perceptions: list[str] = Field(validation_alias="words", serialization_alias="words")
+    """Perceptions, in the order in which they were first requested."""
     options: dict[str, dict[str, Any]]
-    """By word: import path and keywords."""
+    """Import path and keywords, by perception."""
     models: dict[str, dict[str, Any]] = {}
-    """By word: hashes of weights and versions of libraries, of perceptions that have some."""
+    """Hashes of weights and versions of libraries, by perception that has some."""
     tasks: list[str]
-    """Of the last command."""
+    """Tasks of the last command."""
     digests: dict[str, str]
-    """By task."""
+    """Digests by task."""
 
 
 def slug_of(word: str) -> str:
-    """A folder's name for a perception: different for different words."""
+    """Return a folder's name for a perception; different perceptions have different names."""
     plain = re.sub(r"[^A-Za-z0-9.-]+", "_", word)[:60]
     return plain if plain == word else f"{plain}-{hashlib.sha256(word.encode()).hexdigest()[:6]}"
 
 
 def record_path(folder: Path, word: str, task_id: str) -> Path:
-    """Where the record of a perception on a task is."""
+    """Return the path of the record of a perception on a task."""
     return folder / RECORD_DIR / slug_of(word) / f"{task_id}.json.gz"
 
 
 def write_record(folder: Path, word: str, task_id: str, text: str) -> None:
-    """Writes a record.
+    """Write a record.
 
     Raises:
         StoreError: It cannot be written.
@@ -206,7 +206,7 @@ def write_record(folder: Path, word: str, task_id: str, text: str) -> None:
 
 
 def read_record(path: Path) -> TaskRecord:
-    """Reads a record.
+    """Read a record.
 
     Raises:
         StoreError: It is missing, damaged or of another kind.
@@ -222,7 +222,7 @@ def read_record(path: Path) -> TaskRecord:
 
 
 def read_header(folder: Path) -> Header | None:
-    """What a folder was asked for, `None` for a new one.
+    """Return the header of a folder, `None` for a new one.
 
     Raises:
         StoreError: It cannot be read.
@@ -237,16 +237,16 @@ def read_header(folder: Path) -> Header | None:
 
 
 def write_header(folder: Path, header: Header) -> None:
-    """Writes what was asked for.
+    """Write the header.
 
     Raises:
         StoreError: It cannot be written.
     """
-    write_atomically(folder / HEADER_NAME, json.dumps(header.model_dump(), indent=2) + "\n")
+    write_atomically(folder / HEADER_NAME, json.dumps(header.model_dump(by_alias=True), indent=2) + "\n")
 
 
 def read_records(folder: Path) -> dict[str, list[TaskRecord]]:
-    """Records by perception, of the tasks last asked for that all of them have.
+    """Read records by perception, of the tasks last requested that all of them have.
 
     Raises:
         StoreError: There is nothing, or a record cannot be read.
@@ -255,10 +255,10 @@ def read_records(folder: Path) -> dict[str, list[TaskRecord]]:
     if header is None:
         raise StoreError(f"{folder}: holds no {HEADER_NAME}; `evonav perception` makes one")
     tasks = complete_tasks(folder, header)
-    return {word: [read_record(record_path(folder, word, task)) for task in tasks] for word in header.words}
+    return {word: [read_record(record_path(folder, word, task)) for task in tasks] for word in header.perceptions}
 
 
-def complete_tasks(folder: Path, header: Header, words: Sequence[str] | None = None) -> list[str]:
-    """Tasks last asked for that have a record of every perception."""
-    asked = header.words if words is None else words
-    return [task for task in header.tasks if all(record_path(folder, word, task).exists() for word in asked)]
+def complete_tasks(folder: Path, header: Header, perceptions: Sequence[str] | None = None) -> list[str]:
+    """Return the tasks last requested that have a record of every perception."""
+    requested = header.perceptions if perceptions is None else perceptions
+    return [task for task in header.tasks if all(record_path(folder, word, task).exists() for word in requested)]

@@ -1,4 +1,4 @@
-"""Gathers rows and sums of one perception on one task, view by view."""
+"""Collect rows and sums of one perception on one task, view by view."""
 
 import math
 import re
@@ -33,7 +33,7 @@ from evonav.perception_benchmark.records import (
 from evonav.world.simulator import Frame, SceneObject
 
 MAX_FEATURES = 400
-"""Of a task that are compared, spread evenly over its detections."""
+"""Largest number of a task's features that are compared, spread evenly over its detections."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Matched:
 
 
 def check_percept(frame: Frame, percept: Percept) -> None:
-    """Refuses what a perception may not tell, before it is counted.
+    """Reject a percept with malformed arrays, before it is counted.
 
     Raises:
         InvalidArgumentError: The message names the array and what is wrong with it.
@@ -66,7 +66,7 @@ def check_percept(frame: Frame, percept: Percept) -> None:
 
 @dataclass(slots=True)
 class Rows:
-    """Of one perception on one task."""
+    """Rows of one perception on one task."""
 
     truths: TrueRows = field(default_factory=TrueRows)
     detections: DetectionRows = field(default_factory=DetectionRows)
@@ -80,13 +80,13 @@ class Rows:
     def add(
         self, stage: int, frame: Frame, percept: Percept, truth: TrueObjects, objects: Sequence[SceneObject]
     ) -> Matched:
-        """Takes a view.
+        """Add a view.
 
         Args:
-            stage: Of the house.
-            frame: As it is.
-            percept: As it is perceived.
-            truth: Of `true_objects`.
+            stage: Stage of the house.
+            frame: True frame.
+            percept: Perceived frame.
+            truth: Objects from `true_objects`.
             objects: The simulator's bodies, in instance order.
 
         Raises:
@@ -115,12 +115,12 @@ class Rows:
         return matched
 
     def features(self, text_feature: Callable[[str], NDArray[np.float32] | None]) -> FeatureSums:
-        """How alike the features of the same and of different things are, and those of things and their names."""
+        """Compare features of the same and of different objects, and features of objects and their names."""
         if not self._features:
             return FeatureSums()
-        kept = np.unique(np.linspace(0, len(self._features) - 1, MAX_FEATURES).astype(np.int64)).tolist()
-        matrix = np.stack([self._features[i] for i in kept]).astype(np.float64)
-        of = [self._of[i] for i in kept]
+        chosen = np.unique(np.linspace(0, len(self._features) - 1, MAX_FEATURES).astype(np.int64)).tolist()
+        matrix = np.stack([self._features[i] for i in chosen]).astype(np.float64)
+        of = [self._of[i] for i in chosen]
         views, names, categories = (np.array(column, dtype=object) for column in zip(*of, strict=True))
         cosines = matrix @ matrix.T
         is_pair = np.triu(np.ones(cosines.shape, np.bool_), 1)
@@ -132,16 +132,16 @@ class Rows:
             "same_category": cosines[is_pair & ~is_same & is_alike],
             "other": cosines[is_pair & ~is_alike],
         }
-        words = sorted(set(categories.tolist()))
-        texts = [text_feature(_words_of(word)) for word in words]
+        spelled = sorted(set(categories.tolist()))
+        texts = [text_feature(_words_of(word)) for word in spelled]
         known = [text for text in texts if text is not None]
         right = 0, 0
-        if len(known) == len(words) and all(text.shape == matrix.shape[1:] for text in known):
-            said = matrix @ np.stack(known).astype(np.float64).T
-            own = np.array([words.index(word) for word in categories.tolist()])
-            is_own = own[:, None] == np.arange(len(words))[None, :]
-            compared |= {"text_own": said[is_own], "text_other": said[~is_own]}
-            right = int((said.argmax(axis=1) == own).sum()), len(own)
+        if len(known) == len(spelled) and all(text.shape == matrix.shape[1:] for text in known):
+            similarity = matrix @ np.stack(known).astype(np.float64).T
+            own = np.array([spelled.index(word) for word in categories.tolist()])
+            is_own = own[:, None] == np.arange(len(spelled))[None, :]
+            compared |= {"text_own": similarity[is_own], "text_other": similarity[~is_own]}
+            right = int((similarity.argmax(axis=1) == own).sum()), len(own)
         counts = {name: _counts(values) for name, values in compared.items()}
         totals = {name: round(float(values.sum()), 6) for name, values in compared.items()}
         return FeatureSums.model_validate({**counts, "totals": totals, "num_right": right[0], "num_texts": right[1]})
@@ -181,11 +181,11 @@ class Rows:
         sums.num = _added(sums.num, np.bincount(bins, minlength=num_bins))
         if percept.depth_m is frame.depth_m:
             return
-        told_m = percept.depth_m[is_true].astype(np.float64)
-        is_told = np.isfinite(told_m)
-        sums.num_lost = _added(sums.num_lost, np.bincount(bins[~is_told], minlength=num_bins))
-        bins, true_m = bins[is_told], true_m[is_told]
-        errors_m = told_m[is_told] - true_m
+        perceived_m = percept.depth_m[is_true].astype(np.float64)
+        is_perceived = np.isfinite(perceived_m)
+        sums.num_lost = _added(sums.num_lost, np.bincount(bins[~is_perceived], minlength=num_bins))
+        bins, true_m = bins[is_perceived], true_m[is_perceived]
+        errors_m = perceived_m[is_perceived] - true_m
         weights = np.abs(errors_m) / true_m
         for name, values in (("relative", weights), ("square_m2", np.square(errors_m))):
             totals = np.bincount(bins, values, minlength=num_bins).tolist()
@@ -208,5 +208,5 @@ def _counts(cosines: NDArray[np.float64]) -> list[int]:
 
 
 def _words_of(category: str) -> str:
-    """`DiningTable` as people write it."""
+    """Return `DiningTable` as `dining table`."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", category).lower()

@@ -1,4 +1,4 @@
-"""From records of perceptions to figures, each with its n and a 95% interval by house."""
+"""Compute scores from records of perceptions, each with its n and a 95% interval by house."""
 
 import math
 from collections import Counter
@@ -28,23 +28,23 @@ OUTLINE_LIMITS = (0.5, 0.9)
 OUTLINES = ("under 50%", "50-90%", "over 90%")
 COMPARED = ("ap50", "ap", "precision", "recall", "f1", "located")
 COMPARED_MEMORY = ("memory_precision", "memory_recall")
-"""What perceptions are set against each other by."""
+"""Metrics in which perceptions are compared with each other."""
 
 
 @dataclass(frozen=True, slots=True)
 class Confusion:
-    """Objects of a category that were told by another label."""
+    """Objects of a category that were detected with another label."""
 
     category: str
     label: str
     num: int
     share: Estimate
-    """Of the category's objects."""
+    """Share of the category's objects."""
 
 
 @dataclass(frozen=True, slots=True)
 class Scores:
-    """Of one perception."""
+    """Scores of one perception."""
 
     word: str
     num_tasks: int
@@ -52,7 +52,7 @@ class Scores:
     num_views: int
     overall: Mapping[str, Estimate]
     groups: Mapping[str, Sequence[Group]]
-    """By `category`, `distance`, `size` and `outline`."""
+    """Groups by `category`, `distance`, `size` and `outline`."""
     confusions: Sequence[Confusion]
     """The most frequent first."""
     unexplained: Sequence[tuple[str, int]]
@@ -66,17 +66,17 @@ class Scores:
     """Counts in bins of -1..1; none without features."""
     memory: Mapping[str, Estimate]
     memory_curve: Sequence[tuple[float, Mapping[str, Estimate]]]
-    """By share of the first house's tour."""
+    """Metrics by share of the first house's tour."""
     pictures: Sequence[tuple[str, str]] = field(default=(), repr=False)
     """Task and JPEG in base64."""
 
 
 def scores(records: Mapping[str, Sequence[TaskRecord]], *, seed: int = 0) -> list[Scores]:
-    """Figures of every perception.
+    """Score every perception.
 
     Args:
-        records: By perception, of the same tasks.
-        seed: Of the bootstrap.
+        records: Records by perception, of the same tasks.
+        seed: Seed of the bootstrap.
 
     Raises:
         StoreError: There is no record.
@@ -96,10 +96,10 @@ class Difference:
 
 
 def differences(found: Sequence[Scores]) -> list[Difference]:
-    """Of every two perceptions: those that people compare detectors by.
+    """Return the differences of every two perceptions, in the metrics that detectors are usually compared by.
 
     Args:
-        found: Of the same tasks.
+        found: Scores of the same tasks.
     """
     return [
         Difference(
@@ -163,8 +163,8 @@ class _Scorer:
                 for i, name in enumerate(names)
             ]
         counted = self.partner != IGNORED
-        told = (self.confidence[counted], self.partner[counted] >= 0, self.house[counted])
-        error, calibration = other.calibration(houses, *told)
+        ranked = (self.confidence[counted], self.partner[counted] >= 0, self.house[counted])
+        error, calibration = other.calibration(houses, *ranked)
         depth = other.depth_groups(houses, records)
         cosines, texts = other.cosines(houses, records)
         return Scores(
@@ -225,7 +225,7 @@ class _Scorer:
         ]
 
     def _average_precisions(self) -> tuple[list[float], dict[str, dict[str, Estimate]]]:
-        """The mean curve, and AP by category; "" is their mean, beside AP of places alone."""
+        """Return the mean curve, and AP by category; "" is their mean, beside AP of places alone."""
         houses, draws = self.houses, self.houses.draws[:NUM_AP_RESAMPLES]
         names = sorted(set(self.truth_category.tolist()))
         if not names:
@@ -246,10 +246,10 @@ class _Scorer:
         wanted = houses.sums(np.ones(num), self.truth_house)
         curve, of_places = self._precision_curve(every, self.place, self.place_iou, wanted, AP_LIMITS[0], draws)
         # A resample may lack a category; then the mean is over the others.
-        means = np.nanmean(drawn, axis=0)
+        averages = np.nanmean(drawn, axis=0)
         found[""] = {
-            "ap50": houses.estimate(float(values[:, 0].mean()), means[0], num),
-            "ap": houses.estimate(float(values.mean()), means.mean(axis=0), num),
+            "ap50": houses.estimate(float(values[:, 0].mean()), averages[0], num),
+            "ap": houses.estimate(float(values.mean()), averages.mean(axis=0), num),
             "ap50_located": houses.estimate(float(curve.mean()), of_places, num),
         }
         return np.mean(curves, axis=0).tolist(), found
@@ -263,14 +263,14 @@ class _Scorer:
         limit: float,
         draws: NDArray[np.float64],
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The curve at an IoU limit, and AP in resamples. Pairs at a higher limit are some of those at 0.5."""
+        """Return the curve at an IoU limit, and AP in resamples. Pairs at a higher limit are some of those at 0.5."""
         is_pair = iou >= limit - 1e-6  # rounded in records
         counted = mine & ~((partner == IGNORED) & is_pair)
-        told = (self.confidence[counted], ((partner >= 0) & is_pair)[counted])
-        return interpolated(*told, int(wanted.sum())), resampled(*told, self.house[counted], wanted, draws)
+        ranked = (self.confidence[counted], ((partner >= 0) & is_pair)[counted])
+        return interpolated(*ranked, int(wanted.sum())), resampled(*ranked, self.house[counted], wanted, draws)
 
     def _confusions(self) -> list[Confusion]:
-        """Of objects at whose place something is told by another label."""
+        """Count objects at whose place there is a detection with another label."""
         wrong = (self.place >= 0) & (self.place_category != self.label)
         pairs = Counter(zip(self.place_category[wrong].tolist(), self.label[wrong].tolist(), strict=True))
         found = []

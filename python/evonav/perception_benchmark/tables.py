@@ -14,17 +14,17 @@ INTERVALS = "[..]: 95% interval, bootstrap by house."
 
 
 def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> list[Table]:
-    """All tables, in reading order.
+    """Return all tables, in reading order.
 
     Args:
-        found: A perception each.
-        is_brief: For a terminal: of categories, the most frequent alone.
+        found: Scores, one per perception.
+        is_brief: Brief tables for a terminal: of categories, the most frequent alone.
     """
     tables = [
         _headline(found),
         _differences(found),
         _parts(found),
-        *(_by_group(found, by, words) for by, words in (("distance", "distance"), ("size", "size in the image"))),
+        *(_by_group(found, by, name) for by, name in (("distance", "distance"), ("size", "size in the image"))),
         _by_outline(found),
         _categories(found, MAX_CATEGORIES if is_brief else None),
         _confusions(found, MAX_CONFUSIONS if is_brief else 4 * MAX_CONFUSIONS),
@@ -37,33 +37,33 @@ def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> lis
 
 
 def percent(estimate: Estimate | None, *, has_n: bool = False) -> str:
-    """A share in percent with its interval."""
+    """Return a share in percent with its interval."""
     if estimate is None or estimate.value is None:
         return NONE
-    told = f"{100 * estimate.value:.1f}"
+    text = f"{100 * estimate.value:.1f}"
     if estimate.ci95 is not None:
-        told += " [{:.1f}, {:.1f}]".format(*(100 * end for end in estimate.ci95))
-    return f"{told} ({estimate.n})" if has_n else told
+        text += " [{:.1f}, {:.1f}]".format(*(100 * end for end in estimate.ci95))
+    return f"{text} ({estimate.n})" if has_n else text
 
 
 def points(estimate: Estimate | None) -> str:
-    """A difference of shares in points with its interval."""
+    """Return a difference of shares in points with its interval."""
     if estimate is None or estimate.value is None:
         return NONE
-    told = f"{100 * estimate.value:+.1f}"
+    text = f"{100 * estimate.value:+.1f}"
     if estimate.ci95 is not None:
-        told += " [{:+.1f}, {:+.1f}]".format(*(100 * end for end in estimate.ci95))
-    return told
+        text += " [{:+.1f}, {:+.1f}]".format(*(100 * end for end in estimate.ci95))
+    return text
 
 
 def number(estimate: Estimate | None, decimals: int = 2) -> str:
-    """A figure with its interval."""
+    """Return a number with its interval."""
     if estimate is None or estimate.value is None:
         return NONE
-    told = f"{estimate.value:.{decimals}f}"
+    text = f"{estimate.value:.{decimals}f}"
     if estimate.ci95 is not None:
-        told += f" [{estimate.ci95[0]:.{decimals}f}, {estimate.ci95[1]:.{decimals}f}]"
-    return told
+        text += f" [{estimate.ci95[0]:.{decimals}f}, {estimate.ci95[1]:.{decimals}f}]"
+    return text
 
 
 def _headline(found: Sequence[Scores]) -> Table:
@@ -108,7 +108,7 @@ def _parts(found: Sequence[Scores]) -> Table:
     )
 
 
-def _by_group(found: Sequence[Scores], by: str, words: str) -> Table:
+def _by_group(found: Sequence[Scores], by: str, quantity: str) -> Table:
     names = [group.name for group in found[0].groups[by]]
     rows = tuple(
         (one.word, measure, *(percent(group.measures.get(measure), has_n=True) for group in one.groups[by]))
@@ -116,9 +116,10 @@ def _by_group(found: Sequence[Scores], by: str, words: str) -> Table:
         for measure in ("recall", "precision")
     )
     note = (
-        f"In % (n). {INTERVALS} Recall: by the true object's {words}; precision: by the detection's own, as perceived."
+        f"In % (n). {INTERVALS} Recall: by the true object's {quantity}; "
+        "precision: by the detection's own, as perceived."
     )
-    return Table(f"By {words}", ("perception", "", *names), rows, (note,))
+    return Table(f"By {quantity}", ("perception", "", *names), rows, (note,))
 
 
 def _by_outline(found: Sequence[Scores]) -> Table:
@@ -243,7 +244,7 @@ def _features(found: Sequence[Scores]) -> Table:
 
 
 def perception_csv(found: Sequence[Scores]) -> str:
-    """Every figure as a row, unrounded."""
+    """Return every number as a CSV row, unrounded."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("perception", "by", "group", "measure", "value", "low", "high", "n", "num_houses"))

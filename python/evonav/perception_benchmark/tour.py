@@ -23,8 +23,8 @@ def tour(case: EpisodeSpec, stage: int, simulator: Simulator, *, views_per_room:
     Args:
         case: The task.
         stage: 1-based; the simulator has its house.
-        simulator: At the task's start.
-        views_per_room: At most; rounded up to whole places.
+        simulator: Simulator at the task's start.
+        views_per_room: Largest number of views, rounded up to whole places.
         seed: Together with task and stage it decides what is drawn.
     """
     generator = np.random.Generator(np.random.PCG64(_seed_of(seed, case.task_id, stage)))
@@ -48,7 +48,7 @@ def tour(case: EpisodeSpec, stage: int, simulator: Simulator, *, views_per_room:
 def _spread(
     places: Sequence[tuple[float, float]], count: int, generator: np.random.Generator
 ) -> Iterator[tuple[float, float]]:
-    """Some of the places, each as far from those before as any is."""
+    """Choose some of the places, each as far from those before as any is."""
     points = np.array(places)
     chosen = int(generator.integers(len(points)))
     gaps_m = np.full(len(points), np.inf)
