@@ -9,8 +9,9 @@ from threading import Thread
 import pytest
 from typer.testing import CliRunner
 
-from evonav.cli import app, doctor_checks
-from evonav.cli.doctor_checks import EXTRAS, Where, all_checks
+from evonav.cli import app
+from evonav.cli.doctor import checks as doctor_checks
+from evonav.cli.doctor.checks import EXTRAS, Where, all_checks
 
 ROOT = Path(__file__).parents[2]
 

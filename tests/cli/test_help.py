@@ -9,8 +9,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from evonav.cli import app, completion
+from evonav.cli import app
 from evonav.cli.examples import EXAMPLES
+from evonav.cli.options import completion
 
 GROUP = typer.main.get_command(app)
 

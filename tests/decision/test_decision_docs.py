@@ -7,7 +7,7 @@ from pathlib import Path
 from pkgutil import walk_packages
 
 from evonav import agents
-from evonav.cli.decision_options import DecisionOptions
+from evonav.cli.options.settings import settings_options
 from evonav.decision.noisy import NoiseRates
 from evonav.decision.question import Question
 from evonav.decision.vlm.decision import FAULTS
@@ -35,9 +35,10 @@ def test_every_question_has_a_kind_of_its_own_and_a_row() -> None:
 
 
 def test_options_and_noise_are_told_of() -> None:
-    for field in fields(DecisionOptions):
-        name = "--no-exchange-images" if field.name == "exchange_images" else f"--{field.name.replace('_', '-')}"
-        assert name in TEXT, name
+    for options in (settings_options("decisions"), settings_options("spending")):
+        for field in options.chosen:
+            name = options.option(field).replace("_", "-")
+            assert f"--{'no-exchange-images' if field == 'exchange_images' else name}" in TEXT, name
     for rate in fields(NoiseRates):
         assert f"{rate.name}=" in TEXT, rate.name
 

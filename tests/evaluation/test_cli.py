@@ -35,7 +35,7 @@ def test_evaluates_bundled_tasks_and_resumes(tmp_path):
 
 def test_the_command_retries_as_often_as_the_function():
     # The command's module is imported at every start, and the engine only when something is evaluated.
-    assert importlib.import_module("evonav.cli.evaluate").NUM_RETRIES == engine.NUM_RETRIES
+    assert importlib.import_module("evonav.cli.run.evaluate").NUM_RETRIES == engine.NUM_RETRIES
 
 
 def test_lists():

@@ -262,7 +262,7 @@ def test_the_schema_is_printed():
 def test_a_live_table_shows_every_cell(whole, monkeypatch):
     from rich.console import Console
 
-    from evonav.cli.sweep_display import MAX_ROWS, SweepProgress, _CellState, duration
+    from evonav.cli.run.sweep_display import MAX_ROWS, SweepProgress, _CellState, duration
 
     progress = SweepProgress(whole, {cell: _CellState(14, num_done=14) for cell in CELLS})
     progress.cells["next"] = _CellState(14, num_done=5, num_failed=2, num_new=5, began_s=0.0, ended_s=8.0)

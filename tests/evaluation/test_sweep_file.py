@@ -97,7 +97,7 @@ MISTAKES = {
     "empty agents": ('agents = []\ntasks = "bundled"', "agents = []"),
     "agent twice": ('agents = "fu,fu"\ntasks = "bundled"', "agents: 'fu' is named twice"),
     "unknown key": (SMALL + "sedes = [1]", "sedes: no such key; did you mean seeds?"),
-    "unknown key, nothing near": (SMALL + "zzz = 1", "zzz: no such key; there are name, out, agents"),
+    "unknown key, nothing near": (SMALL + "zzz = 1", "zzz: no such key; there are prices, max_cost, name"),
     "unknown key inside": (SMALL + "[protocol]\nmax_round = 3", "protocol.max_round: no such key; did you mean max_r"),
     "unknown decision key": (
         SMALL + '[decisions.a]\nkind = "vlm"\nmodel = "m"\ntemprature = 0.1',

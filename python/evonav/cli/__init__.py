@@ -6,33 +6,36 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.breakdown import breakdown
-from evonav.cli.check_agent import check_agent
-from evonav.cli.compare import compare
-from evonav.cli.controlled import controlled_app
-from evonav.cli.doctor import doctor
-from evonav.cli.evaluate import demo, evaluate
+from evonav.cli.doctor.doctor import doctor
 from evonav.cli.examples import add_examples
-from evonav.cli.export import export
-from evonav.cli.failures import failures
-from evonav.cli.generate import generate
-from evonav.cli.houses import houses_app
-from evonav.cli.measures import measures
 from evonav.cli.mock_vlm import mock_vlm
-from evonav.cli.paper import paper
-from evonav.cli.perception import perception
-from evonav.cli.report import report, strip
-from evonav.cli.submission import pack, verify
-from evonav.cli.sweep import sweep
-from evonav.cli.tasks import tasks_app
-from evonav.cli.video import rerun, video
-from evonav.cli.view import view
+from evonav.cli.options.settings import SettingsGroup
+from evonav.cli.results.breakdown import breakdown
+from evonav.cli.results.compare import compare
+from evonav.cli.results.export import export
+from evonav.cli.results.measures import measures
+from evonav.cli.results.paper import paper
+from evonav.cli.results.perception import perception
+from evonav.cli.results.report import report, strip
+from evonav.cli.results.submission import pack, verify
+from evonav.cli.results.video import rerun, video
+from evonav.cli.results.view import view
+from evonav.cli.run.check_agent import check_agent
+from evonav.cli.run.controlled import controlled_app
+from evonav.cli.run.demo import demo
+from evonav.cli.run.evaluate import evaluate
+from evonav.cli.run.failures import failures
+from evonav.cli.run.sweep import sweep
+from evonav.cli.tasks.app import tasks_app
+from evonav.cli.tasks.generate import generate
+from evonav.cli.tasks.houses import houses_app
 
 EXIT_ERROR = 1
 DEBUG_VARIABLE = "EVONAV_DEBUG"
 
 app = typer.Typer(
     name="evonav",
+    cls=SettingsGroup,
     help="EvoNav-Bench: lifelong navigation in homes that change.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

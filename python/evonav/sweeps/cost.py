@@ -1,11 +1,9 @@
 """What the cells of a sweep would ask a model and pay for it, before anything is asked."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from evonav.decision.vlm.account import Usage
 from evonav.evaluation.run.cost_estimate import estimate_run
-from evonav.evaluation.run.settings import SpendingSettings
 from evonav.sweeps.file import SweepFile
 from evonav.sweeps.run import CellRun
 
@@ -35,8 +33,7 @@ def cell_estimate(sweep: SweepFile, run: CellRun, num_workers: int) -> CellEstim
     """
     config = run.request.config
     options = dict(config.backend.decision.options)
-    prices = SpendingSettings(None if sweep.prices is None else Path(sweep.prices))
-    price = prices.price(options["model"])
+    price = sweep.price(options["model"])
     found = estimate_run(run.cell.agents, run.request.tasks, config, options, num_workers=num_workers)
     tokens_in = sum(estimate.input_tokens for estimate in found)
     tokens_out = sum(estimate.output_tokens for estimate in found)

@@ -20,6 +20,7 @@ from evonav.evaluation.run.settings import (
     SettingError,
     Settings,
     SimulatorSettings,
+    SpendingSettings,
 )
 from evonav.parallel.pool import EngineName
 from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed
@@ -74,7 +75,7 @@ class Pattern(Settings):
     seed: tuple[Seed, ...] = ()
 
 
-class SweepFile(Settings):
+class SweepFile(SpendingSettings):
     """A sweep: agents x simulators x perceptions x decisions x tasks x seeds."""
 
     model_config = ConfigDict(title="evonav sweep")
@@ -100,10 +101,6 @@ class SweepFile(Settings):
     """Given any, only combinations that fit one of them are run."""
     exclude: tuple[Pattern, ...] = ()
     """Combinations that fit one of them are not run."""
-    prices: str | None = None
-    """JSON of models' prices, as for `evonav evaluate --prices`."""
-    max_cost: float | None = Field(default=None, gt=0.0)
-    """Dollars that the whole sweep may spend; needs prices."""
     workers: int | None = Field(default=None, ge=0)
     """Processes or actors; default: one a core. 0: all in one process."""
     engine: EngineName = "local"
@@ -224,7 +221,7 @@ def _check(sweep: SweepFile, path: Path) -> None:
             try:
                 entry.component() if axis == "simulators" else entry.check()
             except SettingError as error:
-                raise InvalidArgumentError(f"{place}.{error.key} {error.said}") from None
+                raise InvalidArgumentError(f"{place}.{error.key} {error.problem}") from None
             except InvalidArgumentError as error:
                 raise InvalidArgumentError(f"{place}: {error}") from None
             if axis == "decisions" and entry.mode == "record":
@@ -234,6 +231,8 @@ def _check(sweep: SweepFile, path: Path) -> None:
     for name, perception in sweep.perceptions.items():
         try:
             perception.component()
+        except SettingError as error:
+            raise InvalidArgumentError(f"{path}: perceptions.{name}.{error.key} {error.problem}") from None
         except InvalidArgumentError as error:
             raise InvalidArgumentError(f"{path}: perceptions.{name}: {error}") from None
     for name, tasks in sweep.tasks.items():

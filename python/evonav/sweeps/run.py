@@ -25,7 +25,7 @@ from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import NUM_RETRIES, Progress, RunConfig, RunRequest, evaluate_all, run_identity
-from evonav.evaluation.run.settings import Books, SpendingSettings, try_decisions
+from evonav.evaluation.run.settings import DecisionResources, check_decision
 from evonav.parallel.folders import write_atomically, writing
 from evonav.parallel.worker import Resources
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
@@ -134,7 +134,7 @@ def tasks_of(tasks: TaskSet, stack: ExitStack) -> list[TaskFile]:
     return task_files(folder, tasks.limit, tasks.subset)
 
 
-def config_of(sweep: SweepFile, cell: Cell, books: Books | None) -> RunConfig:
+def config_of(sweep: SweepFile, cell: Cell, resources: DecisionResources | None) -> RunConfig:
     """What decides a cell's records; without books, for estimates alone.
 
     Raises:
@@ -144,7 +144,7 @@ def config_of(sweep: SweepFile, cell: Cell, books: Books | None) -> RunConfig:
     backend = Backend(
         simulator=sweep.simulators[cell.simulator].component(),
         perception=sweep.perceptions[cell.perception].component(),
-        decision=decision.component(cell.seed, books),
+        decision=decision.component(cell.seed, resources),
     )
     return RunConfig(
         seed=cell.seed,
@@ -180,13 +180,12 @@ def asking(sweep: SweepFile, out: Path, run: CellRun, num_workers: int) -> CellR
     """
     if sweep.decisions[run.cell.decision].kind == "text":
         return run
-    spending = SpendingSettings(None if sweep.prices is None else Path(sweep.prices), sweep.max_cost)
-    books = Books(
-        run.request.run_dir, out / LEDGER_NAME, spending, account=run.cell.name, num_workers=max(1, num_workers)
+    resources = DecisionResources(
+        run.request.run_dir, out / LEDGER_NAME, sweep, account=run.cell.name, num_workers=max(1, num_workers)
     )
     try:
-        config = config_of(sweep, run.cell, books)
-        try_decisions(config.backend.decision, run.cell.seed)
+        config = config_of(sweep, run.cell, resources)
+        check_decision(config.backend.decision, run.cell.seed)
     except EvonavError as error:
         raise type(error)(f"decisions.{run.cell.decision}: {error}") from error
     return replace(run, request=replace(run.request, config=config))

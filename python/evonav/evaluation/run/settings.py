@@ -1,11 +1,11 @@
-"""A simulator, a decision model and agents' processes as people write them down, and what a run makes of them.
+"""Declare the options of a run's simulator, perception and decision model, once for Python, sweep files and commands.
 
-The command line and sweep files (`evonav.sweeps.run`) say the same things in the same words, and go this one way
-to a `Backend`.
+Sweep files are validated by these models, and the command derives its options from them
+(`evonav.cli.options.settings`). Each model builds a `Component`.
 """
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,7 +17,7 @@ from evonav.decision.vlm.client import Mode
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.perception import Perception
-from evonav.perception.words import read_word
+from evonav.perception.words import PREDICTED, read_word
 from evonav.tasks.records import Record
 from evonav.world.simulator import Simulator
 
@@ -25,154 +25,170 @@ if TYPE_CHECKING:
     from evonav.decision.vlm.account import Price
 
 EXCHANGES_NAME = "exchanges.sqlite"
-"""In the folder of a run."""
+"""File of questions and answers in the folder of a run."""
 MODEL_VARIABLE = "EVONAV_VLM_MODEL"
+"""Environment variable with the default of `DecisionSettings.model`."""
 STAGE_TIMEOUT_S, VLM_STAGE_TIMEOUT_S = 900.0, 4 * 3600.0
-"""The second: 50 rounds of three questions, each answered in a minute and asked again once or twice."""
+"""Time limit of a stage. A model may need a minute for each of three questions in 50 rounds, and be asked again."""
 ANSWER_TIMEOUT_S, VLM_ANSWER_TIMEOUT_S = 600.0, 3600.0
-"""Of an agent, for a round; one whose model is asked several times in it takes its time."""
+"""Time limit of an agent's answer in one round, in which a model may be asked several times."""
 
 _COMPONENTS = "evonav.evaluation.run.components"
-_HOST = ("gpu_device", "x_display", "timeout_s")
-"""Of a simulator's settings: this machine's means, not part of what makes runs the same."""
+_SIMULATOR_HOST_OPTIONS = ("gpu_device", "x_display", "timeout_s")
+"""Settings of AI2-THOR that depend on this machine."""
 
 
 class SettingError(InvalidArgumentError):
-    """A setting that makes no sense beside the others; whoever was told it says where."""
+    """A setting that is invalid beside the others; the command and sweep files add its full name."""
 
-    def __init__(self, key: str, said: str) -> None:
-        """An error.
+    def __init__(self, key: str, problem: str) -> None:
+        """Create the error.
 
         Args:
             key: A field of the settings.
-            said: What is wrong with it, to go after its name.
+            problem: What is wrong with it: the end of a sentence that begins with its name.
         """
-        super().__init__(f"{key} {said}")
+        super().__init__(f"{key} {problem}")
         self.key = key
-        self.said = said
+        self.problem = problem
 
 
 class Settings(Record):
-    """Part of a file that people write: the words below a field tell what it is, in its JSON Schema too."""
+    """Options that people write, in a file or on the command line.
+
+    The string below a field is its description in the JSON Schema of sweep files and in the command's help.
+    """
 
     model_config = ConfigDict(use_attribute_docstrings=True)
 
 
 class SimulatorSettings(Settings):
-    """Which simulator runs the episodes."""
+    """The simulator that runs the episodes."""
 
     kind: Literal["embedded", "ai2thor"] = "embedded"
-    """Evonav's own, or AI2-THOR through its client (docs/ai2thor.md)."""
+    """Simulator: embedded (evonav's own) or ai2thor (AI2-THOR through its client, see docs/ai2thor.md)."""
     allow_unknown_assets: bool = False
-    """embedded: draw assets that the catalogue lacks in the usual size of their category."""
+    """Give assets that are missing from the catalogue the usual size of their category; Objaverse houses need it."""
     executable: str | None = None
-    """ai2thor: path of a build's executable, or `evonav`: our engine. Default: download."""
+    """AI2-THOR: path of a build's executable, or `evonav` for our engine. Default: download a build."""
     commit_id: str | None = None
-    """ai2thor: build to download. Default: the client's."""
+    """AI2-THOR: commit of the build to download. Default: the client's."""
     platform: Literal["cloud", "x11"] | None = None
-    """ai2thor: Vulkan without a display, or an X display."""
+    """AI2-THOR: draw with Vulkan and no display (cloud), or on an X display (x11)."""
     gpu_device: int | None = Field(default=None, ge=0)
-    """ai2thor: GPU to draw on."""
+    """AI2-THOR: index of the GPU that draws."""
     x_display: str | None = None
-    """ai2thor: X display, such as :0. Default: DISPLAY."""
+    """AI2-THOR: X display, such as :0. Default: DISPLAY."""
     timeout_s: float | None = Field(default=None, ge=1.0)
-    """ai2thor: seconds for an answer, three times that to start; then it is restarted."""
+    """AI2-THOR: seconds to wait for an answer before it is restarted; starting may take three times as long.
+    Default: 100."""
 
     def component(self) -> Component[Simulator]:
-        """Return how to build this simulator; what is not given is left to its own defaults.
+        """Return the component of this simulator; options that are not given keep its own defaults.
 
         Raises:
-            SettingError: A setting is of no use with the simulator.
+            SettingError: An option does not apply to the simulator.
         """
         given = self.model_dump(exclude={"kind", "allow_unknown_assets"}, exclude_none=True)
         if self.kind == "ai2thor":
-            # Allowing unknown assets asks nothing of AI2-THOR, which has its own catalogue.
-            means: dict[str, Any] = {key: given.pop(key) for key in _HOST if key in given}
-            return Component(f"{_COMPONENTS}:ai2thor_simulator", given, means)
+            # AI2-THOR has a catalogue of its own, so that allow_unknown_assets changes nothing.
+            host_options = {key: given.pop(key) for key in _SIMULATOR_HOST_OPTIONS if key in given}
+            return Component(f"{_COMPONENTS}:ai2thor_simulator", given, host_options)
         if given:
             raise SettingError(next(iter(given)), "is for simulator ai2thor")
         return Component(f"{_COMPONENTS}:{'lenient' if self.allow_unknown_assets else 'embedded'}_simulator")
 
 
 class PerceptionSettings(Settings):
-    """What agents are given to see with (docs/perception.md)."""
+    """The perception that turns camera images into what agents see (docs/perception.md)."""
 
     make: str = "gt"
-    """gt (the simulator's masks and labels), noisy:PRESET (with errors), predicted:STACK (models), or
-    module:function that makes a `Perception`; each with keys, as in noisy:poor,miss_rate=0.3."""
+    """Perception: gt (the simulator's masks and labels), noisy:PRESET (with simulated errors), predicted:STACK (models)
+    or module:function (your own). Keys follow, as in noisy:poor,miss_rate=0.3 (docs/perception.md)."""
     options: dict[str, Any] = Field(default_factory=dict)
-    """Keywords for it, over those of the word."""
+    """Keyword arguments; they override the keys in `make`."""
+    models: str | None = None
+    """Predicted perception: folder of the models' weights. Default: EVONAV_MODELS, else download them."""
+    device: str | None = None
+    """Predicted perception: device of the models: auto, cpu, cuda or cuda:N. Default: auto."""
 
     def component(self) -> Component[Perception]:
-        """Return how to build this perception.
+        """Return the component of this perception.
 
         Raises:
-            InvalidArgumentError: There is no such perception, or a keyword makes no sense.
+            SettingError: `models` or `device` is given without predicted perception.
+            InvalidArgumentError: There is no such perception, or a keyword is invalid.
         """
-        return read_word(self.make, self.options)
+        host_options = _given(models=self.models and str(Path(self.models).absolute()), device=self.device)
+        found = read_word(self.make, {**self.options, **(host_options if self.make.startswith("predicted") else {})})
+        if host_options and found.path != PREDICTED:
+            raise SettingError(next(iter(host_options)), "is for perception predicted")
+        return found
 
 
 class DecisionSettings(Settings):
-    """Who answers the agents' questions (docs/decision.md)."""
+    """The decision model that answers the agents' questions (docs/decision.md)."""
 
     kind: str = "text"
-    """text (rules), vlm (a model), or module:name (your own)."""
+    """Decision model that answers the agents' questions: text (rules), vlm (a vision-language model on a server) or
+    module:name (your own)."""
     model: str | None = None
-    """vlm: its name, as the server calls it."""
+    """VLM: name of the model on the server. Default: EVONAV_VLM_MODEL."""
     base_url: str | None = None
-    """vlm: of an OpenAI-compatible API, with its /v1. Default: OPENAI_BASE_URL, else OpenAI's."""
+    """VLM: address of an OpenAI-compatible API, with its /v1. Default: OPENAI_BASE_URL, else OpenAI's."""
     mode: Mode | None = None
-    """auto (default) asks what is not kept; replay never asks; record wants a new file; live keeps nothing."""
+    """VLM: auto asks what is not stored yet, replay never asks, record needs a new file, live stores nothing.
+    Default: auto."""
     exchanges: str | None = None
-    """SQLite file of questions and answers. Default: exchanges.sqlite in the run's folder."""
+    """SQLite file that stores questions and answers. Default: exchanges.sqlite in the run's folder."""
     exchange_images: bool = True
-    """Keep the images of exchanges too."""
+    """Store the images of questions too."""
     temperature: float | None = None
-    """vlm: default 0.7."""
+    """VLM: sampling temperature. Default: 0.7."""
     top_p: float | None = None
-    """vlm: default 0.95."""
+    """VLM: probability mass for nucleus sampling. Default: 0.95."""
     max_tokens: int | None = None
-    """vlm: of an answer; default 4096."""
+    """VLM: largest number of tokens in an answer. Default: 4096."""
     reasoning: bool = False
-    """vlm: the model knows max_completion_tokens alone, and no temperature, as OpenAI's that think first."""
+    """VLM: send max_completion_tokens and no temperature, as OpenAI's reasoning models expect."""
     structured: Literal["auto", "on", "off"] = "auto"
-    """vlm: JSON by schema; auto: until the server says that it cannot."""
+    """VLM: request JSON by schema (on), never (off), or until the server rejects it (auto)."""
     images: bool = True
-    """vlm: show the model images."""
+    """VLM: show images to the model."""
     requests_per_minute: float | None = None
-    """vlm: spread over the workers."""
+    """VLM: largest number of requests per minute, shared by all workers. Default: no limit."""
     tokens_per_minute: float | None = None
-    """vlm: spread over the workers."""
+    """VLM: largest number of tokens per minute, shared by all workers. Default: no limit."""
     request_timeout_s: float | None = None
-    """vlm: seconds for a try; default 60."""
+    """VLM: seconds to wait for one answer. Default: 60."""
     max_retries: int | None = None
-    """vlm: of lost connections, 429 and 5xx; default 4."""
+    """VLM: number of retries after a lost connection, status 429 or a server error. Default: 4."""
     noise: dict[str, float] = Field(default_factory=dict)
-    """Mistakes on purpose, as shares: wrong, unparsable, refusal, lost; delay in seconds."""
+    """Rates of simulated mistakes, between 0 and 1: wrong, unparsable, refusal, lost; and delay in seconds."""
 
     @property
     def stage_timeout_s(self) -> float:
-        """How long a stage may take: models take their time."""
+        """Time limit of a stage; longer where a model is asked."""
         return STAGE_TIMEOUT_S if self.kind == "text" else VLM_STAGE_TIMEOUT_S
 
     @property
     def answer_timeout_s(self) -> float:
-        """How long an agent may take for a round."""
+        """Time limit of an agent's answer in a round; longer where a model is asked."""
         return ANSWER_TIMEOUT_S if self.kind == "text" else VLM_ANSWER_TIMEOUT_S
 
     def check(self) -> None:
-        """Finds what makes no sense, without asking or opening anything.
+        """Check the settings without asking or opening anything.
 
         Raises:
-            SettingError: It names the setting.
-            InvalidArgumentError: Rates of mistakes make no sense, or sampling is out of range.
+            SettingError: A setting is invalid or does not apply.
+            InvalidArgumentError: A rate of mistakes or a sampling parameter is out of range.
         """
         from evonav.decision.backends import vlm_config
         from evonav.decision.noisy import NoiseRates
 
         NoiseRates.read(self.noise)
         if self.kind == "text":
-            self._refuse_all_but("model")  # which may come from the environment
+            self._refuse_all_but("model")
         elif self.kind == "vlm":
             identity = self.identity(0)
             vlm_config(identity["model"], identity["request"], self._server(1))
@@ -181,10 +197,10 @@ class DecisionSettings(Settings):
         else:
             self._refuse_all_but("model", "mode", "exchanges", "exchange_images")
         if self.mode == "live" and self.exchanges is not None:
-            raise SettingError("exchanges", "is of no use with mode live, which keeps nothing")
+            raise SettingError("exchanges", "is of no use with mode live, which stores nothing")
 
     def identity(self, seed: int) -> dict[str, Any]:
-        """Options of the model that decide what it answers, part of what makes runs the same.
+        """Return the options that decide the model's answers: part of a run's identity.
 
         Raises:
             SettingError: No model is named.
@@ -206,40 +222,44 @@ class DecisionSettings(Settings):
         request = {**sampling, **given}
         return {"model": model, "structured": self.structured, "images": self.images, "request": request, **noise}
 
-    def component(self, seed: int, books: "Books | None") -> Component[DecisionModel]:
-        """Return how to build the decision model.
+    def component(self, seed: int, resources: "DecisionResources | None") -> Component[DecisionModel]:
+        """Return the component of this decision model.
 
         Args:
-            seed: Of the run.
-            books: Where questions are kept and paid for; without, the model cannot be asked: for estimates.
+            seed: The run's.
+            resources: Where answers are stored and costs are logged; without them the model cannot be asked, which is
+                enough for estimates.
 
         Raises:
-            InvalidArgumentError: A setting makes no sense.
-            StoreError: The exchanges cannot be opened.
+            InvalidArgumentError: A setting is invalid.
+            StoreError: The file of exchanges cannot be opened.
         """
         self.check()
         options = self.identity(seed)
         if self.kind == "text":
             return Component("evonav.decision.backends:text_match", options)
-        maker = "vlm" if self.kind == "vlm" else "own"
-        path = f"evonav.decision.backends:{maker}"
-        if books is None:
+        path = f"evonav.decision.backends:{'vlm' if self.kind == 'vlm' else 'own'}"
+        if resources is None:
             return Component(path, options)
-        means: dict[str, Any] = {**self._keeping(books.run_dir), "ledger": str(books.ledger.absolute())}
-        if books.account:
-            means["account"] = books.account
+        host_options: dict[str, Any] = {
+            **self._response_cache(resources.run_dir),
+            "ledger": str(resources.spending_log.absolute()),
+        }
+        if resources.account:
+            host_options["account"] = resources.account
         if self.kind == "vlm":
-            means |= {"server": self._server(books.num_workers), **books.spending.means(options["model"])}
-        return Component(path, options, means)
+            host_options["server"] = self._server(resources.num_workers)
+            host_options |= resources.spending.host_options(options["model"])
+        return Component(path, options, host_options)
 
     def _refuse_all_but(self, *allowed: str) -> None:
-        """Says of settings that would be overlooked that they are."""
+        """Reject settings that would be ignored."""
         for name in sorted(self.model_fields_set - {"kind", "noise", *allowed}):
             if getattr(self, name) != type(self).model_fields[name].default:
                 raise SettingError(name, f"is of no use where {self.kind} decides")
 
     def _server(self, num_workers: int) -> dict[str, Any]:
-        """How it is reached; each process keeps to its share of what the run may ask."""
+        """Return how the server is reached; each worker has an equal share of the rate limits."""
         share = max(1, num_workers)
         requests, tokens = self.requests_per_minute, self.tokens_per_minute
         return _given(
@@ -250,8 +270,8 @@ class DecisionSettings(Settings):
             tokens_per_minute=None if tokens is None else tokens / share,
         )
 
-    def _keeping(self, run_dir: Path) -> dict[str, Any]:
-        """Where exchanges are kept, and what is had from there."""
+    def _response_cache(self, run_dir: Path) -> dict[str, Any]:
+        """Return where answers are stored, and how the stored ones are used."""
         from evonav.decision.vlm.response_cache import ResponseCache
         from evonav.evaluation.records.store import FILE_NAME
 
@@ -266,68 +286,71 @@ class DecisionSettings(Settings):
         store.close()
         if mode == "record" and not is_new and not (run_dir / FILE_NAME).exists():
             raise StoreError(f"{path}: holds exchanges already: record to a new file, or use mode auto")
-        # Agents of one run ask the same questions: the first answer has to stay, or its replay would be another run.
-        kept = "auto" if mode == "record" else mode
-        return {"cache": str(path.absolute()), "mode": kept, "keeps_images": self.exchange_images}
+        # Agents of one run ask the same questions: the first answer is stored for all, or a replay would differ.
+        return {
+            "cache": str(path.absolute()),
+            "mode": "auto" if mode == "record" else mode,
+            "keeps_images": self.exchange_images,
+        }
 
 
-@dataclass(frozen=True, slots=True)
-class SpendingSettings:
-    """What models cost, and how much may be spent."""
+class SpendingSettings(Settings):
+    """Prices of models, and how much may be spent."""
 
-    prices: Path | None = None
-    """JSON: `{"MODEL": {"input_usd": .., "output_usd": ..}}`, dollars a million tokens."""
-    max_cost_usd: float | None = None
+    prices: str | None = None
+    """JSON file of prices in dollars per million tokens: {"MODEL": {"input_usd": .., "output_usd": ..}}."""
+    max_cost: float | None = Field(default=None, gt=0.0)
+    """Largest cost in dollars; later questions fail. It needs prices. Default: no limit."""
 
     def price(self, model: str) -> "Price | None":
-        """Of the model, from the table given.
+        """Return a model's price; `None` without a file of prices.
 
         Raises:
-            InvalidArgumentError: The table cannot be read, or lacks the model.
+            InvalidArgumentError: The file cannot be read, or lacks the model.
         """
         from evonav.decision.vlm.account import read_prices
 
         if self.prices is None:
             return None
-        table = read_prices(self.prices)
+        table = read_prices(Path(self.prices))
         if model not in table:
             raise InvalidArgumentError(f"{self.prices}: has no prices of {model!r}")
         return table[model]
 
-    def means(self, model: str) -> dict[str, Any]:
-        """Keywords for what makes a model."""
+    def host_options(self, model: str) -> dict[str, Any]:
+        """Return the keyword arguments of a decision model that asks `model`."""
         price = self.price(model)
-        if self.max_cost_usd is not None and price is None:
+        if self.max_cost is not None and price is None:
             raise SettingError("max_cost", "needs the model's prices: name a table with prices")
         spending: dict[str, Any] = {} if price is None else {"price": [price.input_usd, price.output_usd]}
-        return spending if self.max_cost_usd is None else {**spending, "max_cost_usd": self.max_cost_usd}
+        return spending if self.max_cost is None else {**spending, "max_cost_usd": self.max_cost}
 
 
 @dataclass(frozen=True, slots=True)
-class Books:
-    """Where what is asked is kept and paid for."""
+class DecisionResources:
+    """Where a run stores answers of its model and logs their costs."""
 
     run_dir: Path
-    """Exchanges are kept here, unless settings say where."""
-    ledger: Path
-    """File that all processes book in, of one run or of many."""
-    spending: SpendingSettings = field(default_factory=SpendingSettings)
+    """Folder of the run, which holds the answers unless the settings name another file."""
+    spending_log: Path
+    """File in which all workers log costs, of one run or of several."""
+    spending: SpendingSettings
     account: str | None = None
-    """Name in the ledger; default: the model's."""
+    """Name in the spending log; default: the model's."""
     num_workers: int = 1
 
     @classmethod
-    def of_run(cls, run_dir: Path, spending: SpendingSettings, num_workers: int) -> "Books":
-        """A run with a ledger of its own."""
+    def of_run(cls, run_dir: Path, spending: SpendingSettings, num_workers: int) -> "DecisionResources":
+        """Return the resources of a run that has a spending log of its own."""
         return cls(run_dir, run_dir / LEDGER_NAME, spending, num_workers=num_workers)
 
 
-def try_decisions(decision: Component[DecisionModel], seed: int) -> None:
-    """Finds out before a run what would make all its questions fail; asks nothing.
+def check_decision(decision: Component[DecisionModel], seed: int) -> None:
+    """Check before a run that its model can be asked from here, without asking it.
 
     Raises:
-        DecisionError: The model cannot be asked from here: no key, no package.
-        InvalidArgumentError: It cannot be made.
+        DecisionError: A key or package is missing.
+        InvalidArgumentError: The model cannot be made.
     """
     check = getattr(decision.create(seed), "check", None)
     if check is not None:

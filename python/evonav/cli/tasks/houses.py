@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from evonav.cli.display import status
-from evonav.cli.options import HOUSES, Limit
+from evonav.cli.options.shared import HOUSES, Limit
 
 
 class _ListByDefault(typer.core.TyperGroup):

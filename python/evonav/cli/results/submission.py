@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options import Limit, Subset, Tasks, Workers, count_of
+from evonav.cli.options.shared import Limit, Subset, Tasks, Workers, count_of
 
 if TYPE_CHECKING:
     from evonav.submission.verify import Verdict

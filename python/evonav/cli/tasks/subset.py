@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli import completion
+from evonav.cli.options import completion
 
 
 def subset(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import status
-from evonav.cli.options import RunFolder
+from evonav.cli.options.shared import RunFolder
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -22,7 +22,7 @@ def doctor(
     from dataclasses import asdict
 
     from evonav.cli.display import status
-    from evonav.cli.doctor_checks import Where, all_checks
+    from evonav.cli.doctor.checks import Where, all_checks
 
     checks = []
     with status("Looking around") as tell:

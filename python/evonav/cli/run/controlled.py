@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.decision_options import DecisionOptions, decision_component, decision_settings, with_decision_options
 from evonav.cli.display import interruptible, print_table, status
-from evonav.cli.options import (
+from evonav.cli.options.decisions import decision_component
+from evonav.cli.options.settings import SettingsGroup, settings_options, with_settings
+from evonav.cli.options.shared import (
     HOUSES,
     AgentNames,
     AgentTimeout,
@@ -16,21 +17,22 @@ from evonav.cli.options import (
     InProcess,
     Limit,
     OneAgent,
-    PerceptionName,
+    RetryErrored,
     Seed,
     Workers,
     count_of,
     names_of,
-    perception_component,
 )
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.run import Progress
+    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SpendingSettings
 
 EXIT_INCOMPLETE = 3
 
 controlled_app = typer.Typer(
     name="controlled",
+    cls=SettingsGroup,
     help="What a change does, all else being equal: Fixed / Not Fixed, and sweeps of the evolution rate.",
     no_args_is_help=True,
 )
@@ -90,16 +92,17 @@ def generate(
 
 
 @controlled_app.command()
-@with_decision_options
+@with_settings("perception", "decisions", "spending")
 def evaluate(
     directory: Directory,
-    decisions: DecisionOptions,
+    perception: "PerceptionSettings",
+    decisions: "DecisionSettings",
+    spending: "SpendingSettings",
     agents: AgentNames = None,
     agent: OneAgent = None,
     seed: Seed = 0,
-    perception: PerceptionName = "gt",
     workers: Workers = None,
-    retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
+    retry_errored: RetryErrored = False,
     in_process: InProcess = False,
     agent_timeout: AgentTimeout = None,
 ) -> None:
@@ -113,14 +116,15 @@ def evaluate(
 
     record = read_controlled(directory)
     num_workers = count_of(workers)
+    with settings_options("perception").errors():
+        perceived = perception.component()
     backend = Backend(
         simulator=SimulatorSettings(allow_unknown_assets=record.allow_unknown_assets).component(),
-        perception=perception_component(perception),
-        decision=decision_component(decisions, out=directory, seed=seed, num_workers=num_workers),
+        perception=perceived,
+        decision=decision_component(decisions, spending, out=directory, seed=seed, num_workers=num_workers),
     )
-    settings = decision_settings(decisions)
-    hosting = AgentHosting(is_in_process=in_process, timeout_s=agent_timeout or settings.answer_timeout_s)
-    config = RunConfig(seed=seed, backend=backend, stage_timeout_s=settings.stage_timeout_s, hosting=hosting)
+    hosting = AgentHosting(is_in_process=in_process, timeout_s=agent_timeout or decisions.answer_timeout_s)
+    config = RunConfig(seed=seed, backend=backend, stage_timeout_s=decisions.stage_timeout_s, hosting=hosting)
     names = names_of(agents, agent)
 
     def tell(arm: str, news: "Progress") -> None:

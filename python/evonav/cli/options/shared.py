@@ -3,15 +3,11 @@
 import os
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from evonav.cli import completion
-
-if TYPE_CHECKING:  # the command must start fast
-    from evonav.component import Component
-    from evonav.perception import Perception
+from evonav.cli.options import completion
 
 EXIT_INCOMPLETE = 3
 HEURISTICS = "fu,stage-reset,ftu"
@@ -47,24 +43,6 @@ Houses = Annotated[Path | None, typer.Option(help=f"{HOUSES} to generate tasks f
 Tasks = Annotated[
     Path | None,
     typer.Option(help="Folder of tasks; default: the bundled ones.", autocompletion=completion.task_folders),
-]
-PerceptionName = Annotated[
-    str,
-    typer.Option(
-        "--perception",
-        help="What agents see with: gt, noisy:PRESET, noisy:PRESET,KEY=VALUE, predicted:STACK or module:function "
-        "(docs/perception.md).",
-    ),
-]
-Models = Annotated[
-    Path | None,
-    typer.Option(
-        "--models",
-        help="--perception predicted: folder of the models' weights. Default: EVONAV_MODELS, else their own hubs.",
-    ),
-]
-ModelDevice = Annotated[
-    str | None, typer.Option("--device", help="--perception predicted: auto, cpu, cuda or cuda:N. Default: auto.")
 ]
 Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-room) houses or tasks.")]
 Subset = Annotated[
@@ -108,32 +86,7 @@ AnyAsset = Annotated[
 ]
 
 
-class SimulatorName(str, Enum):
-    """Which simulator runs the episodes."""
-
-    EMBEDDED = "embedded"
-    AI2THOR = "ai2thor"
-
-
-class Platform(str, Enum):
-    """How Unity draws."""
-
-    CLOUD = "cloud"
-    X11 = "x11"
-
-
-Which = Annotated[SimulatorName, typer.Option(help="Evonav's own, or AI2-THOR through its client (docs/ai2thor.md).")]
-ThorExecutable = Annotated[
-    str | None, typer.Option(help="AI2-THOR: path of a build's executable, or `evonav`: our engine. Default: download.")
-]
-ThorCommit = Annotated[str | None, typer.Option(help="AI2-THOR: build to download. Default: the client's.")]
-ThorPlatform = Annotated[Platform | None, typer.Option(help="AI2-THOR: Vulkan without a display, or an X display.")]
-ThorGpu = Annotated[int | None, typer.Option(min=0, help="AI2-THOR: GPU to draw on.")]
-ThorDisplay = Annotated[str | None, typer.Option(help="AI2-THOR: X display, such as :0. Default: DISPLAY.")]
-ThorTimeout = Annotated[
-    float,
-    typer.Option(min=1.0, help="AI2-THOR: seconds for an answer, three times that to start; then it is restarted."),
-]
+RetryErrored = Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")]
 Out = Annotated[Path, typer.Option(help="Folder of the run; an unfinished one is resumed.")]
 
 
@@ -148,23 +101,3 @@ def count_of(workers: int | None) -> int:
     if workers is not None:
         return workers
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def perception_component(word: str, models: Path | None = None, device: str | None = None) -> "Component[Perception]":
-    """Return how to build the perception that `--perception` names.
-
-    Args:
-        word: As `--perception` takes it.
-        models: Folder of weights, for models.
-        device: That they compute on.
-
-    Raises:
-        InvalidArgumentError: There is no such perception, or one of its keys makes no sense.
-    """
-    from evonav.evaluation.run.settings import PerceptionSettings
-
-    given = {"models": models and str(models.absolute()), "device": device}
-    options = {key: value for key, value in given.items() if value is not None}
-    if options and not word.startswith("predicted"):
-        raise typer.BadParameter(f"--{next(iter(options))} is for --perception predicted")
-    return PerceptionSettings(make=word, options=options).component()

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options import Limit
+from evonav.cli.options.shared import Limit
 
 if TYPE_CHECKING:
     from evonav.tasks import Task

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import print_table
-from evonav.cli.options import RunFolder
-from evonav.cli.sweep import write_sweep_summary
-from evonav.cli.view import replay_pages
+from evonav.cli.options.shared import RunFolder
+from evonav.cli.results.view import replay_pages
+from evonav.cli.run.sweep import write_sweep_summary
 
 if TYPE_CHECKING:
     from evonav.report.run import Run

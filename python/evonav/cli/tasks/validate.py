@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options import AnyAsset, Limit, Workers, count_of
+from evonav.cli.options.shared import AnyAsset, Limit, Workers, count_of
 
 if TYPE_CHECKING:
     from evonav.generation.validation import FolderReport

@@ -2,23 +2,28 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.decision_options import DecisionOptions, decision_component, with_decision_options
-from evonav.cli.options import PerceptionName, Seed, perception_component
+from evonav.cli.options.decisions import decision_component
+from evonav.cli.options.settings import settings_options, with_settings
+from evonav.cli.options.shared import Seed
+
+if TYPE_CHECKING:  # the command must start fast
+    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SpendingSettings
 
 EXIT_BROKEN = 1
 _STYLES = {"pass": "green", "warn": "yellow", "fail": "bold red", "skip": "dim"}
 
 
-@with_decision_options
+@with_settings("perception", "decisions", "spending")
 def check_agent(
     agent: Annotated[str, typer.Argument(help="A name, `module:Class` or `./file.py:Class`.")],
-    decisions: DecisionOptions,
+    perception: "PerceptionSettings",
+    decisions: "DecisionSettings",
+    spending: "SpendingSettings",
     seed: Seed = 0,
-    perception: PerceptionName = "gt",
     timeout: Annotated[float, typer.Option(min=0.1, help="Seconds for an answer of the agent.")] = 60.0,
 ) -> None:
     """Runs an agent through the contract, on a bundled house that changes; exit code 1 if it breaks it."""
@@ -30,10 +35,12 @@ def check_agent(
     from evonav.evaluation.contract.check import check_agent
     from evonav.evaluation.run.components import Backend
 
+    with settings_options("perception").errors():
+        perceived = perception.component()
     with TemporaryDirectory() as folder, status(f"Running {agent}"):  # a model's exchanges are kept between episodes
         backend = Backend(
-            perception=perception_component(perception),
-            decision=decision_component(decisions, out=Path(folder), seed=seed, num_workers=1),
+            perception=perceived,
+            decision=decision_component(decisions, spending, out=Path(folder), seed=seed, num_workers=1),
         )
         report = check_agent(agent, backend=backend, seed=seed, timeout_s=timeout)
     table = Table(title=f"{agent}: {'keeps the contract' if report.is_ok else 'breaks the contract'}")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.options import RunFolder
+from evonav.cli.options.shared import RunFolder
 
 
 def measures(

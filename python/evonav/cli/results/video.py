@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import status
-from evonav.cli.options import RunFolder
-from evonav.cli.view import task_path
+from evonav.cli.options.shared import RunFolder
+from evonav.cli.results.view import task_path
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import EXIT_INTERRUPTED, show
-from evonav.cli.options import EXIT_INCOMPLETE, EngineOption, count_of
+from evonav.cli.options.shared import EXIT_INCOMPLETE, EngineOption, count_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -89,7 +89,7 @@ def _run(
     again: str,
 ) -> None:
     """Runs what is missing; an interrupt leaves a summary of what there is."""
-    from evonav.cli.sweep_display import SweepProgress, Teller, showing
+    from evonav.cli.run.sweep_display import SweepProgress, Teller, showing
     from evonav.sweeps.run import run_sweep
 
     def interrupt(*_: object) -> None:
@@ -141,7 +141,7 @@ def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
     Returns:
         Whether a stage of the selected cells is.
     """
-    from evonav.cli.decision_options import print_spending
+    from evonav.cli.options.decisions import print_spending
     from evonav.sweeps.tables import sweep_tables
 
     rows = write_sweep_summary(out)

@@ -1,13 +1,13 @@
 """`tasks write`: a model's words in place of the describer's."""
 
 from contextlib import contextmanager
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.decision_options import VlmMode
-from evonav.cli.options import Limit
+from evonav.cli.options.shared import Limit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -15,6 +15,15 @@ if TYPE_CHECKING:
     from evonav.generation.instructions.writer import Writing
 
 EXIT_INCOMPLETE = 3
+
+
+class VlmMode(str, Enum):
+    """Where answers come from."""
+
+    LIVE = "live"
+    RECORD = "record"
+    REPLAY = "replay"
+    AUTO = "auto"
 
 
 Folder = Annotated[Path, typer.Argument(help="Folder of tasks; they are rewritten in place.")]

@@ -1,27 +1,30 @@
 """`evonav perception`: how good perceptions are, against the truth."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli import completion
 from evonav.cli.display import interruptible, show
-from evonav.cli.options import (
+from evonav.cli.options import completion
+from evonav.cli.options.settings import with_settings
+from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
     AnyAsset,
     Limit,
-    ModelDevice,
-    Models,
     Seed,
     Subset,
     Workers,
     count_of,
-    perception_component,
 )
 
+if TYPE_CHECKING:  # the command must start fast
+    from evonav.evaluation.run.settings import PerceptionSettings
 
+
+@with_settings("models")
 def perception(
+    models: "PerceptionSettings",
     tasks: Annotated[
         Path | None,
         typer.Argument(help="Folder of tasks; default: the bundled ones.", autocompletion=completion.task_folders),
@@ -47,8 +50,6 @@ def perception(
         ),
     ] = 2,
     seed: Seed = 0,
-    models: Models = None,
-    device: ModelDevice = None,
     allow_unknown_assets: AnyAsset = False,
     workers: Workers = None,
 ) -> None:
@@ -59,6 +60,7 @@ def perception(
     from rich import progress as bars
     from rich.console import Console
 
+    from evonav.evaluation.run.settings import PerceptionSettings
     from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
     from evonav.perception_benchmark.page import write_perception_report
     from evonav.perception_benchmark.tables import perception_tables
@@ -68,13 +70,12 @@ def perception(
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")
     words = perceptions or ["gt"]
-    if (models or device) and not any(word.startswith("predicted") for word in words):
+    if models.model_fields_set and not any(word.startswith("predicted") for word in words):
         raise typer.BadParameter("--models and --device are for --perception predicted")
     specs = []
     for word in words:
-        is_model = word.startswith("predicted")
-        component = perception_component(word, models if is_model else None, device if is_model else None)
-        specs.append(PerceptionSpec(word, component))
+        settings = models if word.startswith("predicted") else PerceptionSettings()
+        specs.append(PerceptionSpec(word, settings.model_copy(update={"make": word}).component()))
     name = "lenient_simulator" if allow_unknown_assets else "embedded_simulator"
     columns = (
         bars.TextColumn("{task.description}"),

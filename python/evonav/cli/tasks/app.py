@@ -5,13 +5,13 @@ from typing import Annotated
 
 import typer
 
-from evonav.cli.options import Limit
-from evonav.cli.tasks_schema import schema
-from evonav.cli.tasks_show import show
-from evonav.cli.tasks_stats import stats
-from evonav.cli.tasks_subset import subset
-from evonav.cli.tasks_validate import validate
-from evonav.cli.tasks_write import write
+from evonav.cli.options.shared import Limit
+from evonav.cli.tasks.schema import schema
+from evonav.cli.tasks.show import show
+from evonav.cli.tasks.stats import stats
+from evonav.cli.tasks.subset import subset
+from evonav.cli.tasks.validate import validate
+from evonav.cli.tasks.write import write
 
 tasks_app = typer.Typer(help="Task files: what is in them.", no_args_is_help=True)
 

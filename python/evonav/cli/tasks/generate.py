@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import generation_progress, interruptible
-from evonav.cli.options import (
+from evonav.cli.options.shared import (
     HOUSES,
     AnyAsset,
     Engine,

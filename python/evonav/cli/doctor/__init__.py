@@ -1,0 +1,1 @@
+"""The `evonav doctor` command, which checks the installation."""

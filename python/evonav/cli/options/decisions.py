@@ -1,0 +1,123 @@
+"""Build the decision model of a command, and print what its model costs."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from evonav.cli.options.settings import settings_options
+
+if TYPE_CHECKING:  # the command must start fast
+    from collections.abc import Sequence
+
+    from evonav.component import Component
+    from evonav.decision.question import DecisionModel
+    from evonav.evaluation.run.run import RunConfig
+    from evonav.evaluation.run.settings import DecisionSettings, SpendingSettings
+    from evonav.tasks.listing import TaskFile
+
+DryRun = Annotated[
+    bool,
+    typer.Option(
+        "--dry-run",
+        rich_help_panel="Decisions",
+        help="VLM: estimate requests, tokens and cost from a few tasks with the text matcher, and ask nothing.",
+    ),
+]
+
+
+def decision_component(
+    decisions: "DecisionSettings",
+    spending: "SpendingSettings",
+    *,
+    out: Path,
+    seed: int,
+    num_workers: int,
+    dry_run: bool = False,
+) -> "Component[DecisionModel]":
+    """Return the component of the decision model, after a check that it can be asked from here.
+
+    Args:
+        decisions: The command's settings.
+        spending: Prices and limit.
+        out: Folder of the run, which stores answers and costs.
+        seed: The run's.
+        num_workers: Number of processes that ask the model.
+        dry_run: Return a model that cannot be asked, for estimates.
+
+    Raises:
+        InvalidArgumentError: A setting is invalid.
+        DecisionError: The model cannot be asked from here: a key or package is missing.
+        StoreError: The file of exchanges cannot be opened.
+    """
+    from evonav.evaluation.run.settings import DecisionResources, check_decision
+
+    with settings_options("decisions").errors():
+        decisions.check()
+    if decisions.kind != "vlm":
+        flags = {"prices": spending.prices is not None, "max-cost": spending.max_cost is not None, "dry-run": dry_run}
+        for flag in (name for name, is_given in flags.items() if is_given):
+            raise typer.BadParameter(f"--{flag} is for --decision vlm")
+    resources = None if dry_run else DecisionResources.of_run(out, spending, num_workers)
+    with settings_options("decisions").errors():
+        decision = decisions.component(seed, resources)
+    if resources is not None and decisions.kind != "text":
+        check_decision(decision, seed)
+    return decision
+
+
+def print_estimate(
+    spending: "SpendingSettings",
+    agents: "Sequence[str]",
+    tasks: "Sequence[TaskFile]",
+    config: "RunConfig",
+    num_workers: int,
+) -> None:
+    """Print what a run would ask and cost, estimated from a few of its tasks."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from evonav.cli.display import progress
+    from evonav.decision.vlm.account import Usage
+    from evonav.decision.vlm.counting import OUTPUT_TOKENS
+    from evonav.evaluation.run.cost_estimate import estimate_run
+
+    options = dict(config.backend.decision.options)
+    price = spending.price(options["model"])
+    with progress() as show:
+        estimates = estimate_run(agents, tasks, config, options, num_workers=num_workers, on_progress=show)
+    first = estimates[0]
+    title = f"Estimate for {first.num_stages} stages, from {first.num_stages_run} of them with the text matcher"
+    table = Table(title=title)
+    for heading in ("agent", "requests", "by kind", "tokens in", "95%", "tokens out", "dollars"):
+        table.add_column(heading, justify="left" if heading in ("agent", "by kind") else "right")
+    for found in estimates:
+        kinds = ", ".join(f"{kind} {count:.0f}" for kind, count in found.kinds.items())
+        error = "?" if found.relative_error == float("inf") else f"+-{100 * found.relative_error:.0f}%"
+        usage = Usage(int(found.input_tokens), int(found.output_tokens))
+        cost = "?" if price is None else f"{price.of(usage):.2f}"
+        counts = (f"{found.num_requests:.0f}", kinds, f"{found.input_tokens:.0f}", error, f"{found.output_tokens:.0f}")
+        table.add_row(found.agent, *counts, cost)
+    Console().print(table)
+    typer.echo(
+        "Input tokens: 3 characters of text per token, images as gpt-4o counts them; likely too many. "
+        f"Output tokens: {OUTPUT_TOKENS} per answer, assumed. The interval is over tasks. A model that decides "
+        "differently is asked more or less often."
+    )
+
+
+def print_spending(out: Path) -> None:
+    """Print what the models of a run were asked and cost, over all calls of the command."""
+    from evonav.decision.vlm.ledger import LEDGER_NAME, Ledger
+
+    path = out / LEDGER_NAME
+    if not path.is_file():
+        return
+    for spent in Ledger(path).spending():
+        lost = f" ({spent.num_without_answer} without an answer)" if spent.num_without_answer else ""
+        cost = f", ${spent.cost_usd:.4f}" if spent.cost_usd else ""
+        reserved = f", and ${spent.set_aside_usd:.4f} reserved" if spent.set_aside_usd > 1e-9 else ""
+        typer.echo(
+            f"{spent.model}: {spent.num_asked} questions asked{lost}, {spent.num_replayed} answered from exchanges; "
+            f"{spent.input_tokens} tokens in, {spent.output_tokens} out{cost}{reserved}"
+        )

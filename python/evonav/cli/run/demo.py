@@ -1,0 +1,46 @@
+"""`evonav demo`: evaluate the heuristics on the bundled tasks and show the results."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from evonav.cli.options.decisions import DryRun, decision_component, print_estimate
+from evonav.cli.options.settings import with_settings
+from evonav.cli.options.shared import AgentNames, Limit, Seed, Workers, count_of, names_of
+from evonav.cli.results.view import make_pages
+from evonav.cli.run.evaluate import exit_if_incomplete, print_results, run_agents, run_tasks
+
+if TYPE_CHECKING:  # the command must start fast
+    from evonav.evaluation.run.settings import DecisionSettings, SpendingSettings
+
+
+@with_settings("decisions", "spending")
+def demo(
+    decisions: "DecisionSettings",
+    spending: "SpendingSettings",
+    out: Path = Path("out/demo"),
+    agents: AgentNames = None,
+    limit: Limit = None,
+    seed: Seed = 0,
+    workers: Workers = None,
+    dry_run: DryRun = False,
+) -> None:
+    """Evaluate the paper's three heuristics on the bundled tasks, and write a report with replays of one task."""
+    from evonav.evaluation.run.components import Backend
+    from evonav.evaluation.run.run import RunConfig
+    from evonav.report import write_report
+
+    num_workers = count_of(workers)
+    decision = decision_component(decisions, spending, out=out, seed=seed, num_workers=num_workers, dry_run=dry_run)
+    config = RunConfig(seed=seed, backend=Backend(decision=decision), stage_timeout_s=decisions.stage_timeout_s)
+    with run_tasks(out, limit=limit) as task_files:
+        if dry_run:
+            print_estimate(spending, names_of(agents), task_files, config, num_workers)
+            return
+        summaries = run_agents(out, names_of(agents), task_files, config, num_workers)
+    print_results(out, summaries)
+    _, index = make_pages(out)
+    typer.echo(f"report: {write_report(out)}")
+    typer.echo(f"replays: {index}")
+    exit_if_incomplete(summaries)

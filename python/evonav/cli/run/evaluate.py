@@ -1,0 +1,216 @@
+"""`evonav evaluate`: run agents on tasks."""
+
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from evonav.cli.display import generation_progress, interruptible, print_failures, print_table, progress, status
+from evonav.cli.options.decisions import DryRun, decision_component, print_estimate, print_spending
+from evonav.cli.options.settings import settings_options, with_settings
+from evonav.cli.options.shared import (
+    EXIT_INCOMPLETE,
+    AgentMemory,
+    AgentNames,
+    AgentTimeout,
+    Engine,
+    EngineOption,
+    Houses,
+    InProcess,
+    Limit,
+    OneAgent,
+    Out,
+    RayAddress,
+    Retries,
+    RetryErrored,
+    Seed,
+    Subset,
+    Tasks,
+    WorkerGpus,
+    Workers,
+    check_engine,
+    count_of,
+    names_of,
+)
+
+if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
+    from collections.abc import Iterator, Sequence
+
+    from evonav.evaluation.metrics.navigation import AgentSummary
+    from evonav.evaluation.run.run import RunConfig
+    from evonav.evaluation.run.settings import (
+        DecisionSettings,
+        PerceptionSettings,
+        SimulatorSettings,
+        SpendingSettings,
+    )
+    from evonav.parallel.pool import EngineName
+    from evonav.tasks.listing import TaskFile
+
+NUM_RETRIES = 2
+
+
+@with_settings("simulation", "perception", "decisions", "spending")
+def evaluate(
+    out: Out,
+    simulation: "SimulatorSettings",
+    perception: "PerceptionSettings",
+    decisions: "DecisionSettings",
+    spending: "SpendingSettings",
+    agents: AgentNames = None,
+    agent: OneAgent = None,
+    houses: Houses = None,
+    tasks: Tasks = None,
+    limit: Limit = None,
+    subset: Subset = None,
+    seed: Seed = 0,
+    workers: Workers = None,
+    engine: Engine = EngineOption.LOCAL,
+    ray_address: RayAddress = None,
+    worker_gpus: WorkerGpus = 0.0,
+    retries: Retries = NUM_RETRIES,
+    retry_errored: RetryErrored = False,
+    in_process: InProcess = False,
+    agent_timeout: AgentTimeout = None,
+    agent_memory: AgentMemory = None,
+    dry_run: DryRun = False,
+) -> None:
+    """Evaluate agents on tasks; run again to resume.
+
+    Writes records.sqlite and summary.json into OUT.
+    """
+    from evonav.evaluation.hosting.process import AgentHosting
+    from evonav.evaluation.run.components import Backend
+    from evonav.evaluation.run.run import RunConfig
+
+    if houses is not None and tasks is not None:
+        raise typer.BadParameter("give --houses or --tasks, not both")
+    if limit is not None and subset is not None:
+        raise typer.BadParameter("give --limit or --subset, not both")
+    check_engine(engine, ray_address, worker_gpus)
+    num_workers = count_of(workers)
+    with settings_options("simulation").errors():
+        simulator = simulation.component()
+    with settings_options("perception").errors():
+        perceived = perception.component()
+    decision = decision_component(decisions, spending, out=out, seed=seed, num_workers=num_workers, dry_run=dry_run)
+    config = RunConfig(
+        seed=seed,
+        backend=Backend(simulator=simulator, perception=perceived, decision=decision),
+        stage_timeout_s=decisions.stage_timeout_s,
+        hosting=AgentHosting(
+            is_in_process=in_process,
+            timeout_s=agent_timeout or decisions.answer_timeout_s,
+            memory_mb=agent_memory,
+        ),
+    )
+    names = names_of(agents, agent)
+    with run_tasks(out, houses, tasks, limit, subset, seed, simulation.allow_unknown_assets, num_workers) as task_files:
+        if dry_run:
+            print_estimate(spending, names, task_files, config, num_workers)
+            return
+        summaries = run_agents(
+            out,
+            names,
+            task_files,
+            config,
+            num_workers,
+            engine=engine.value,
+            ray_address=ray_address,
+            num_gpus=worker_gpus,
+            num_retries=retries,
+            retry_errored=retry_errored,
+        )
+    print_results(out, summaries)
+    exit_if_incomplete(summaries)
+
+
+@contextmanager
+def run_tasks(
+    out: Path,
+    houses: Path | None = None,
+    tasks: Path | None = None,
+    limit: int | None = None,
+    subset: str | None = None,
+    seed: int = 0,
+    allow_unknown_assets: bool = False,
+    num_workers: int = 0,
+) -> "Iterator[list[TaskFile]]":
+    """Yield the tasks of a run: of a folder, generated from houses into the run's folder, or bundled."""
+    from evonav.generation.dataset import Workforce, generate_dataset, inherited_names
+    from evonav.generation.worker import GenerationOptions
+    from evonav.house.files import HouseTexts
+    from evonav.tasks.bundled import bundled_tasks
+    from evonav.tasks.listing import task_file, task_files
+
+    with ExitStack() as stack:
+        if houses is not None:
+            texts = HouseTexts(houses)
+            dataset, split = inherited_names(texts)
+            options = GenerationOptions(
+                seed=seed, dataset=dataset, split=split, allow_unknown_assets=allow_unknown_assets
+            )
+            with interruptible(out / "tasks"), generation_progress() as show:
+                generated = generate_dataset(
+                    texts,
+                    out / "tasks",
+                    options=options,
+                    limit=limit,
+                    subset=subset,
+                    workforce=Workforce(num_workers=num_workers),
+                    on_progress=show,
+                )
+            yield [task_file(root) for root in generated.roots]
+        else:
+            directory = tasks if tasks is not None else stack.enter_context(bundled_tasks())
+            yield task_files(directory, limit, subset)
+
+
+def run_agents(
+    out: Path,
+    agents: "Sequence[str]",
+    task_files: "list[TaskFile]",
+    config: "RunConfig",
+    num_workers: int,
+    *,
+    engine: "EngineName" = "local",
+    ray_address: str | None = None,
+    num_gpus: float = 0.0,
+    num_retries: int = NUM_RETRIES,
+    retry_errored: bool = False,
+) -> "list[AgentSummary]":
+    """Evaluate agents with a progress bar; an interrupt says how to resume."""
+    from evonav.evaluation.run.run import evaluate
+    from evonav.parallel.worker import Resources
+
+    with interruptible(out):
+        with status("Starting the simulator"):
+            config.backend.check()
+        with progress() as show:
+            return evaluate(
+                agents,
+                task_files,
+                out,
+                config=config,
+                engine=engine,
+                num_workers=num_workers,
+                ray_address=ray_address,
+                resources=Resources(num_gpus=num_gpus),
+                num_retries=num_retries,
+                retry_errored=retry_errored,
+                on_progress=show,
+            )
+
+
+def print_results(out: Path, summaries: "list[AgentSummary]") -> None:
+    """Print success rates, failures and the costs of models."""
+    print_table(summaries)
+    print_failures(out)
+    print_spending(out)
+
+
+def exit_if_incomplete(summaries: "list[AgentSummary]") -> None:
+    """End the command with `EXIT_INCOMPLETE` if a stage errored or was not run."""
+    if any(summary.is_incomplete for summary in summaries):
+        raise typer.Exit(EXIT_INCOMPLETE)
