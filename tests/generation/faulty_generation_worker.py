@@ -1,4 +1,4 @@
-"""A generation worker that fails on purpose: what it does at which house stands in `$EVONAV_TEST_FAULTS`."""
+"""A generation worker that fails on purpose, at the houses and in the ways that `$EVONAV_TEST_FAULTS` gives."""
 
 import json
 import os
@@ -9,7 +9,7 @@ from evonav.generation import worker
 
 
 def make_worker(settings, alive):
-    """As `evonav.generation.worker.make_worker`."""
+    """Return the function of `evonav.generation.worker.make_worker`, with faults."""
     faults = json.loads(os.environ["EVONAV_TEST_FAULTS"])
     work = worker.make_worker(settings, alive)
 

@@ -1,4 +1,4 @@
-"""Whether stage houses are physically possible, judged a second time: from house JSON and shapes, by Shapely.
+"""Check the physics of stage houses independently, with Shapely, from house JSON and shapes.
 
 Nothing of the generator's placement, collision or navigation is used; only the asset catalogue's sizes and shapes
 (`House.footprints`) and the task's files. By hand, over many houses:
@@ -29,20 +29,20 @@ from evonav.tasks import Task, load_tasks
 AGENT_RADIUS_M, AGENT_HEIGHT_M = 0.2, 1.8
 """AI2-THOR's default agent, a capsule."""
 STEP_M = 0.03
-"""What ends below is walked over."""
+"""Obstacles that end below this height are walked over."""
 SLACK_M = 0.01
-"""How deep in something the agent may be: scenes are not exact."""
+"""Largest depth of the agent in an obstacle; scenes are not exact."""
 DEPTH_M = 0.012
-"""Overlap from which two things are in each other: boxes of the catalogue are off by up to 7 mm."""
+"""Smallest overlap of two objects that is a problem; boxes of the catalogue are off by up to 7 mm."""
 REST_M = 0.02
-"""Gap from which a thing hangs over what it stands on."""
+"""Smallest gap at which an object hovers over its support."""
 ROOM_M2 = 0.02
-"""Free floor from which a room can be stood in."""
+"""Smallest free floor area of a room in which the agent can stand."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """Something impossible."""
+    """A physical problem."""
 
     kind: str
     task_id: str
@@ -96,13 +96,13 @@ class Plan:
         self.floor = shapely.union_all([room.buffer(0.01) for room in self.rooms.values()])
 
     def room_of(self, shadow: BaseGeometry) -> str | None:
-        """The room that holds most of it."""
+        """Return the room that contains most of the object."""
         shares = {name: room.intersection(shadow).area for name, room in self.rooms.items()}
         best = max(shares, key=lambda name: shares[name])
         return best if shares[best] > 0.0 else None
 
     def free_floor(self) -> BaseGeometry:
-        """Where the agent's axis can be."""
+        """The possible positions of the agent's axis."""
         near = [(part.outline, _reach_m(part)) for thing in self.things.values() for part in thing.parts]
         near = [(self.walls, AGENT_RADIUS_M - SLACK_M), *(pair for pair in near if pair[1] > 0.0)]
         grown = shapely.buffer([shape for shape, _ in near], [reach_m for _, reach_m in near], quad_segs=4)
@@ -110,7 +110,7 @@ class Plan:
 
 
 def problems_of(task: Task) -> list[Problem]:
-    """What is impossible in the stage houses of a task, and was not in the house before."""
+    """Yield the problems in the stage houses of a task that the house before did not have."""
     found: list[Problem] = []
     by_text = {text: Plan(text) for text in dict.fromkeys(task.houses_json)}
     plans = [by_text[text] for text in task.houses_json]
@@ -162,7 +162,7 @@ def _flat(record: dict) -> Iterator[dict]:
 
 
 def _solid_walls(document: dict) -> BaseGeometry:
-    """Wall lines less what can be walked through: open plan, and doorways that stand open."""
+    """Return the wall lines without open boundaries and open doorways."""
     lines, holes = [], []
     ends = {}
     for wall in document["walls"]:
@@ -186,7 +186,7 @@ def _solid_walls(document: dict) -> BaseGeometry:
 
 
 def _reach_m(part: Part) -> float:
-    """How near the axis of the capsule may come to a part; its rounded ends pass over low and under high things."""
+    """Return the least distance of the capsule's axis from a part; its ends are round, for low and high parts."""
     if part.high_m <= STEP_M or part.low_m >= AGENT_HEIGHT_M:
         return 0.0
     radius_m = AGENT_RADIUS_M - SLACK_M
@@ -195,7 +195,7 @@ def _reach_m(part: Part) -> float:
 
 
 def _reached(free: BaseGeometry, plan: Plan, from_m: tuple[float, float, float]) -> set[str]:
-    """Rooms that can be walked to."""
+    """Return the rooms that the agent can reach."""
     start = shapely.Point(from_m[0], from_m[2])
     pieces = list(getattr(free, "geoms", [free]))
     own = min(pieces, key=lambda piece: piece.distance(start))
@@ -203,7 +203,7 @@ def _reached(free: BaseGeometry, plan: Plan, from_m: tuple[float, float, float])
 
 
 def _outside(before: Plan, plan: Plan, moved: Iterable[str]) -> Iterator[tuple[str, str, str]]:
-    """Moved things that reach out of their room or through a wall, further than before."""
+    """Yield moved objects that extend out of their room or through a wall, further than before."""
     for name in moved:
         shadow = plan.things[name].shadow
         room = plan.room_of(shadow)
@@ -235,7 +235,7 @@ def _depth_out_m(shadow: BaseGeometry, room: BaseGeometry) -> float:
 
 
 def _overlaps(before: Plan, plan: Plan, moved: Iterable[str]) -> Iterator[tuple[str, str, str]]:
-    """Moved things that are in other things, deeper than they were in them before."""
+    """Yield moved objects that overlap others, deeper than before."""
     names = list(plan.things)
     tree = shapely.STRtree([plan.things[name].shadow.envelope for name in names])
     seen = set()
@@ -256,7 +256,7 @@ def _overlaps(before: Plan, plan: Plan, moved: Iterable[str]) -> Iterator[tuple[
 
 
 def _overlap_m(a: Thing, b: Thing) -> float:
-    """How deep two things are in each other: over pairs of parts, the least of the overlaps along plan and height."""
+    """Return the depth of two objects in each other: over pairs of parts, the least overlap along plan and height."""
     deepest_m = 0.0
     for p, q in itertools.product(a.parts, b.parts):
         height_m = min(p.high_m, q.high_m) - max(p.low_m, q.low_m)
@@ -267,7 +267,7 @@ def _overlap_m(a: Thing, b: Thing) -> float:
 
 
 def _width_m(shape: BaseGeometry) -> float:
-    """Least width of a convex shape: over its edges, of how far it reaches from the edge's line."""
+    """Return the least width of a convex shape: over its edges, its extent from the edge's line."""
     if shape.area == 0.0:
         return 0.0
     corners = shapely.get_coordinates(shape.convex_hull)[:-1]
@@ -278,7 +278,7 @@ def _width_m(shape: BaseGeometry) -> float:
 
 
 def _unsupported(before: Plan, plan: Plan, moved: Iterable[str]) -> Iterator[tuple[str, str, str]]:
-    """Moved things that hang in the air or beside what they stand on, and were not so before."""
+    """Yield moved objects that hover or extend beyond their support, and did not before."""
     for name in moved:
         fault = _rest_fault(plan, name)
         if fault is not None and _rest_fault(before, name) is None:
@@ -305,7 +305,7 @@ def _rest_fault(plan: Plan, name: str) -> tuple[str, str] | None:
 
 
 def main() -> None:
-    """Counts problems over the houses of a file."""
+    """Count problems over the houses of a file."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("houses", nargs="+")
     parser.add_argument("--limit", type=int)
@@ -336,7 +336,7 @@ def main() -> None:
 def _tasks(
     paths: list[str], limit: int | None, seed: int, parameters: GenerationParameters, counts: Counter[str]
 ) -> Iterator[Task]:
-    """Tasks of folders of tasks, and made of files of houses."""
+    """Yield the tasks of folders of tasks, and tasks generated from files of houses."""
     for path in paths:
         if Path(path).is_dir():
             yield from load_tasks(path, limit)

@@ -1,4 +1,4 @@
-"""Folders of tasks: the same bytes whoever makes them and however often they are interrupted."""
+"""Folders of tasks have the same bytes for any workers and any number of interruptions."""
 
 import gzip
 import json
@@ -57,7 +57,7 @@ def houses(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def clean(houses, tmp_path_factory):
-    """What an undisturbed run in one process leaves."""
+    """The folder of an uninterrupted run in one process."""
     out = tmp_path_factory.mktemp("clean")
     generate_dataset(houses, out, options=OPTIONS)
     return out

@@ -1,4 +1,4 @@
-"""A second opinion on the physics of stage houses (`shapely_physics.py`): of bundled tasks, and of real houses."""
+"""The physics of stage houses, checked independently by `shapely_physics.py`: bundled tasks and real houses."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""Whether an HTML page nests as it should."""
+"""Check that the elements of an HTML page are nested correctly."""
 
 from html.parser import HTMLParser
 
@@ -24,7 +24,7 @@ class _Nesting(HTMLParser):
 
 
 def check_html(text: str) -> None:
-    """Every element that opens closes, in order."""
+    """Check that every element is closed in order."""
     parser = _Nesting()
     parser.feed(text)
     parser.close()

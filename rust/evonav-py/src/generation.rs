@@ -42,7 +42,7 @@ fn generate_task<'py>(
     Ok((json, houses, images.iter().map(|image| PyBytes::new(py, image)).collect()))
 }
 
-/// Return the paper's parameters as JSON, from which Python takes its defaults.
+/// Return the paper's parameters as JSON; Python takes its defaults from them.
 #[pyfunction]
 fn default_generation_parameters() -> String {
     Parameters::default().to_json()
