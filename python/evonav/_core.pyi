@@ -23,17 +23,17 @@ _Vec3: TypeAlias = tuple[float, float, float]
 
 @final
 class House:
-    """A ProcTHOR house (schema 0.0.1 or 1.0.0), checked; its document is kept losslessly.
+    """A ProcTHOR house (schema 0.0.1 or 1.0.0), checked; the document is stored without loss.
 
     Metres in AI2-THOR's frame: x right, y up, z forward.
     """
 
     def __new__(cls, json: str, *, name: str) -> House:
-        """Reads and checks one house; `HouseError` names house, object, field and value."""
+        """Read and check one house; `HouseError` names house, object, field and value."""
 
     @property
     def name(self) -> str:
-        """What errors call the house."""
+        """Name of the house in errors."""
 
     @property
     def start(self) -> tuple[_Vec3, float, float] | None:
@@ -41,37 +41,37 @@ class House:
 
     @property
     def rooms(self) -> list[Room]:
-        """In file order."""
+        """Rooms, in file order."""
 
     @property
     def walls(self) -> list[Wall]:
-        """In file order: inner walls once a room, outer ones twice."""
+        """Walls, in file order: inner walls once per room, outer ones twice."""
 
     @property
     def doors(self) -> list[Opening]:
-        """In file order."""
+        """Doors, in file order."""
 
     @property
     def windows(self) -> list[Opening]:
-        """In file order."""
+        """Windows, in file order."""
 
     @property
     def objects(self) -> list[HouseObject]:
-        """Depth first: a parent stands before its children."""
+        """Objects, depth first: a parent comes before its children."""
 
     def room_of(self, x_m: float, z_m: float) -> str | None:
-        """Id of the room whose floor holds the point."""
+        """Return the id of the room whose floor contains the point."""
 
     def to_json(self) -> str:
-        """The document, compact: every key and value as it was read, in order."""
+        """Return the document, compact: every key and value as it was read, in order."""
 
     def apply(self, delta_json: str) -> House:
-        """The house after `{"moves": [{"id", "position_m", "rotation_deg", "parent"}]}`."""
+        """Apply a `HouseDelta` (JSON), for example `{"moves": [{"id", "position_m", "rotation_deg", "parent"}]}`."""
 
     def footprints(
         self, *, allow_unknown_assets: bool
     ) -> list[tuple[str, str, list[tuple[list[_Vec2], float, float]]]]:
-        """What each object covers of the floor plan, in order of `objects`.
+        """Return the footprint of each object on the floor plan, in order of `objects`.
 
         Id, category, and for each of its convex parts the outline `(x, z)`, the lowest and the highest point.
         `HouseError` if an asset is unknown, unless allowed: then it has the size and shape of its category.
@@ -124,7 +124,7 @@ class Opening:
 
 @final
 class HouseObject:
-    """An object; its position is its box's centre. `category` is None if nothing tells it."""
+    """An object; its position is its box's centre. `category` is None if it is unknown."""
 
     id: str
     asset_id: str
@@ -139,7 +139,7 @@ class HouseObject:
     def __ne__(self, other: object, /) -> bool: ...
 
 def assets() -> list[tuple[str, str, _Vec3]]:
-    """Id, category and box size in metres of every asset of the catalogue, by id."""
+    """Return id, category and box size in metres of every asset of the catalogue, ordered by id."""
 
 # sensors
 
@@ -161,15 +161,15 @@ def number_instances(
     max_box_fraction: float,
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]: ...
 def draw_normals(seed: int, labels: Sequence[Sequence[str]], *, num_draws: int) -> NDArray[np.float64]:
-    """`(N, num_draws)` standard normals, a row of each named stream."""
+    """Draw standard normal numbers, `(N, num_draws)`: one row from each named stream."""
 
 def mask_outlines(masks: NDArray[np.int32], depth_m: NDArray[np.float32], *, num_masks: int) -> NDArray[np.float64]:
-    """`(num_masks, 3)`: sides of each mask's outline, those that something nearer or the border cuts, mean depth."""
+    """Return `(num_masks, 3)`: sides of each mask's outline, cut sides (something nearer or the border), mean depth."""
 
 def distort_masks(
     masks: NDArray[np.int32], changes: NDArray[np.int32], margins_px: NDArray[np.float64]
 ) -> NDArray[np.int32]:
-    """Masks that grow or shrink by their margins, then are split, cut and renamed.
+    """Grow or shrink masks by their margins, then split, cut and renumber them.
 
     `changes` is `(N, 8)`: number, number of the rest, whether split by column, first row or column of the rest, then
     top, left, bottom and right that the mask is cut to.
@@ -189,7 +189,7 @@ def surface_sites(
     lasting: Sequence[str],
     passing: Sequence[str],
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Cells of the world with a surface in view.
+    """Find the cells of the world with a surface in view.
 
     `(N, 2)` row and column, `(N, 5)` depth, latent, two lasting draws, one passing.
     """
@@ -200,7 +200,7 @@ def paint_blobs(
     blobs: NDArray[np.int64],
     radii_px: NDArray[np.float64],
 ) -> None:
-    """Paints `(N, 3)` row, column, number with `(N, 2)` radii into `masks`, each over its own surface alone."""
+    """Paint `(N, 3)` row, column, number with `(N, 2)` radii into `masks`, each only over its own surface."""
 
 def noisy_depth(
     depth_m: NDArray[np.float32],
@@ -215,32 +215,32 @@ def noisy_depth(
     labels: Sequence[str],
 ) -> NDArray[np.float32]: ...
 def instance_areas(instances: NDArray[np.int32], num_instances: int) -> NDArray[np.int64]:
-    """`(N,)` pixels of each instance of an `(H, W)` image: 0 where nothing is, else 1 + index."""
+    """Count the pixels of each instance, `(N,)`, of an `(H, W)` image: 0 where nothing is, else 1 + index."""
 
 def mask_extents(masks: NDArray[np.int32], *, num_masks: int) -> NDArray[np.int64]:
-    """`(num_masks, 5)`: pixels, left, top, right, bottom of each mask, right and bottom one past the last."""
+    """Return `(num_masks, 5)`: pixels, left, top, right, bottom of each mask, right and bottom one past the last."""
 
 # memory
 
 @final
 class Frontier:
-    """A place to explore from."""
+    """A frontier: a place from which to explore."""
 
     @property
     def id(self) -> int:
-        """Never used twice by one map."""
+        """Id, never used twice by one map."""
 
     @property
     def position_m(self) -> tuple[float, float]:
-        """`(x, z)` where to stand."""
+        """View position, `(x, z)`."""
 
     @property
     def direction_rad(self) -> float:
-        """Where to look, as a yaw."""
+        """Viewing direction, as a yaw."""
 
     @property
     def cells(self) -> NDArray[np.int32]:
-        """`(N, 2)` `[row, col]` of the region, row-major."""
+        """Cells of the region, `(N, 2)` `[row, col]`, row-major."""
 
 @final
 class OccupancyMap:
@@ -284,23 +284,23 @@ class OccupancyMap:
 
 @final
 class ObjectEntry:
-    """An object entry as it was when asked for."""
+    """An object entry at the time of the call that returned it."""
 
     @property
     def id(self) -> int:
-        """Counts up from 1."""
+        """Id, ascending from 1."""
 
     @property
     def label(self) -> str:
-        """The label of most detections."""
+        """Label with the most detections."""
 
     @property
     def label_counts(self) -> list[tuple[str, int]]:
-        """Detections by label, in the order in which the labels came."""
+        """Number of detections by label, in the order of the labels' first detection."""
 
     @property
     def num_detections(self) -> int:
-        """Detections that joined the entry."""
+        """Number of detections that joined the entry."""
 
     @property
     def confidence(self) -> float:
@@ -312,15 +312,15 @@ class ObjectEntry:
 
     @property
     def size_m(self) -> tuple[float, float, float]:
-        """Edges of the box around the points."""
+        """Edge lengths of the box around the points."""
 
     @property
     def num_points(self) -> int:
-        """Points of the cloud."""
+        """Number of points of the cloud."""
 
     @property
     def feature(self) -> NDArray[np.float32] | None:
-        """`(D,)` unit mean of the detections' features."""
+        """Unit mean of the detections' features, `(D,)`."""
 
     @property
     def first_seen_stage(self) -> int:
@@ -473,7 +473,7 @@ class BevMap:
         path_obstacle_radius: int,
         margin: int,
     ) -> tuple[tuple[int, int], float, float | None, float] | None:
-        """`[row, col]`, way from the agent and from the goal, and score."""
+        """Return `[row, col]`, length of the path from the agent and from the goal, and score."""
 
     def plan(
         self,
@@ -486,7 +486,7 @@ class BevMap:
         circle: int,
         small_circle: int,
     ) -> tuple[float | None, float, tuple[float, float] | None]:
-        """Way and straight distance to the nearest goal cell, and the point to head for."""
+        """Return path length and straight distance to the nearest goal cell, and the point to move to."""
 
     def category(self, index: int) -> NDArray[np.float32]: ...
     @property
@@ -512,7 +512,7 @@ def unproject_image(
     yaw_rad: float,
     horizon_rad: float,
 ) -> NDArray[np.float64]:
-    """`(H, W, 3)` world points of an `(H, W)` depth image."""
+    """Return the world points `(H, W, 3)` of an `(H, W)` depth image."""
 
 def unproject_masks(
     depth_m: NDArray[np.float32],
@@ -525,7 +525,7 @@ def unproject_masks(
     yaw_rad: float,
     horizon_rad: float,
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """`(N, 3)` world points behind all masks, mask by mask, and where each mask's points end."""
+    """Return the world points `(N, 3)` behind all masks, mask by mask, and the index after each mask's last point."""
 
 def project_points(
     points_m: NDArray[np.float64],
@@ -536,7 +536,7 @@ def project_points(
     yaw_rad: float,
     horizon_rad: float,
 ) -> NDArray[np.float64]:
-    """`(N, 3)` column, row and planar depth of `(N, 3)` world points; NaN behind the camera."""
+    """Return column, row and planar depth `(N, 3)` of `(N, 3)` world points; NaN behind the camera."""
 
 # nn
 
@@ -548,7 +548,7 @@ class MiniNetwork:
     @property
     def classes(self) -> list[str]: ...
     def logits(self, rgb: NDArray[np.uint8], depth_m: NDArray[np.float32], horizon_rad: float) -> NDArray[np.float32]:
-        """`(75, 75, 1 + classes + 2)`: background, classes, links to the right and downwards."""
+        """Return `(75, 75, 1 + classes + 2)` logits: background, classes, links to the right and downwards."""
 
     def detect(
         self,
@@ -562,7 +562,7 @@ class MiniNetwork:
         depth: float = 8.0,
         place: float = 0.5,
     ) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.float32]]:
-        """`(H, W)` instance of each pixel or -1; class and confidence of each instance."""
+        """Return `(H, W)` instance of each pixel or -1; class and confidence of each instance."""
 
 # simulator
 
@@ -586,21 +586,21 @@ class EmbeddedSimulator:
     def apply(self, delta_json: str) -> EmbeddedSimulator: ...
     def house_json(self) -> str: ...
     def bodies(self) -> list[tuple[str, str, str, tuple[float, float, float], tuple[float, float, float]]]:
-        """Id, category, kind, centre and size of the box, in instance order."""
+        """Return id, category, kind, centre and size of the box of each body, in instance order."""
 
     def random_spawn(self, request_json: str) -> tuple[str, list[str]]:
-        """The `HouseDelta` of a `SpawnRequest` (both JSON), and the ids of what found no place."""
+        """Carry out a `SpawnRequest`; return the `HouseDelta` (both JSON) and the ids of objects without a place."""
 
     def settled(self) -> str:
-        """The `HouseDelta` (JSON) that brings down what hangs in the air."""
+        """Return the `HouseDelta` (JSON) that lets objects that hang in the air fall."""
 
     def start(self) -> tuple[tuple[float, float, float], float, float]:
-        """Position, yaw and horizon."""
+        """Return position, yaw and horizon of the start pose."""
 
     def render(
         self, position_m: tuple[float, float, float], yaw_rad: float, horizon_rad: float, *, rgb: bool, instances: bool
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None, NDArray[np.int32] | None]:
-        """Depth `(H, W)`, colours `(H, W, 3)` and instances `(H, W)`."""
+        """Render depth `(H, W)`, colours `(H, W, 3)` and instances `(H, W)`."""
 
     def render_camera(
         self,
@@ -616,7 +616,7 @@ class EmbeddedSimulator:
         rgb: bool,
         instances: bool,
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None, NDArray[np.int32] | None]:
-        """As `render`; orthographic if `half_height_m` is given."""
+        """Render any view as `render` does; orthographic if `half_height_m` is given."""
 
     def visible_bodies(
         self,
@@ -631,7 +631,7 @@ class EmbeddedSimulator:
         agent_m: tuple[float, float],
         max_distance_m: float,
     ) -> list[int]:
-        """Indices of the bodies that AI2-THOR calls visible, rising."""
+        """Return the indices of the bodies that AI2-THOR calls visible, ascending."""
 
     def is_free(self, point_m: tuple[float, float]) -> bool: ...
     def is_reachable(self, point_m: tuple[float, float]) -> bool: ...
@@ -641,18 +641,18 @@ class EmbeddedSimulator:
         self, from_m: tuple[float, float, float], to_m: tuple[float, float, float], ignored: list[int]
     ) -> bool: ...
     def reachable_positions(self, from_m: tuple[float, float], grid_m: float) -> NDArray[np.float64]:
-        """`(N, 2)`."""
+        """Return the reachable positions, `(N, 2)`."""
 
     def shortest_path(self, start_m: tuple[float, float], target_m: tuple[float, float]) -> NDArray[np.float64]:
-        """`(M, 2)` corners, `(0, 2)` when there is no way."""
+        """Return the corners of the shortest path, `(M, 2)`; `(0, 2)` if there is none."""
 
     def distances_m(self, start_m: tuple[float, float], targets_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        """`(N,)` lengths to `(N, 2)` targets, `inf` where there is no way."""
+        """Return path lengths `(N,)` to `(N, 2)` targets, `inf` if there is no path."""
 
     def occupancy(self, cell_m: float) -> tuple[NDArray[np.uint8], tuple[float, float]]:
-        """Cells `(R, C)` and the corner of the grid."""
+        """Return the cells `(R, C)` and the corner of the grid."""
     def triangles(self) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.uint8]]:
-        """Corners `(N, 3, 3)`, body indices `(N,)` and colours `(N, 3)` of all surfaces."""
+        """Return corners `(N, 3, 3)`, body indices `(N,)` and colours `(N, 3)` of all surfaces."""
 
 @final
 class GeodesicField:
@@ -660,11 +660,11 @@ class GeodesicField:
 
     def __new__(cls, simulator: EmbeddedSimulator, source_m: tuple[float, float]) -> GeodesicField: ...
     def distance_m(self, point_m: tuple[float, float]) -> float:
-        """`inf` where there is no way."""
+        """Return the distance from a point, `inf` if there is no path."""
 
 @final
 class BatchSimulator:
-    """B agents in houses of their own or shared; `evonav_core::simulator::batch` has shapes and units."""
+    """B agents, each in its own or a shared house; `evonav_core::simulator::batch` has shapes and units."""
 
     def __new__(
         cls,
@@ -688,26 +688,26 @@ class BatchSimulator:
         horizon_rad: float,
         labels: NDArray[np.uint8],
     ) -> None:
-        """`labels` `(bodies,)`: what the pixels of each body get, 0 for nothing."""
+        """Put an agent into a house; `labels` `(bodies,)` is the label of each body's pixels, 0 for none."""
 
     def aim(self, slot: int, field: GeodesicField | None) -> None:
-        """What distances of an agent are to; of one just placed, nothing: they are `inf`."""
+        """Set the goal of an agent, to which its distances are; without a goal they are `inf`."""
 
     def step(self, actions: NDArray[np.uint8]) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-        """0 ahead, 1 left, 2 right, 3 stop, `(B,)`: whether each was carried out, and distances after it."""
+        """Act, `(B,)`: 0 ahead, 1 left, 2 right, 3 stop. Return which were carried out and the distances after."""
 
     def plan(self, targets_m: list[tuple[float, float] | None]) -> list[list[tuple[float, float]]]:
-        """Corners of a path for each agent, none where there is no way or no target."""
+        """Return the corners of a path for each agent; none if there is no path or no target."""
 
     def plan_one(self, slot: int, target_m: tuple[float, float]) -> list[tuple[float, float]]:
-        """`plan` of one agent."""
+        """Return the path of one agent, as `plan`."""
 
     def follow(self, slot: int, stops: list[tuple[tuple[float, float], float]]) -> int:
-        """How many of the points, with a yaw each, the agent came to."""
+        """Put an agent at points with yaws in turn; return the number of points at which it fits."""
 
     def distance_m(self, slot: int) -> float: ...
     def poses(self) -> NDArray[np.float64]:
-        """`(B, 5)`: x, y, z, yaw and horizon."""
+        """Poses, `(B, 5)`: x, y, z, yaw and horizon."""
 
     def render(
         self,
@@ -716,10 +716,10 @@ class BatchSimulator:
         rgb: NDArray[np.uint8] | None,
         labels: NDArray[np.uint8] | None,
     ) -> None:
-        """Writes `(B, H, W)` depths, `(B, H, W, 3)` colours and `(B, H, W)` labels."""
+        """Write `(B, H, W)` depths, `(B, H, W, 3)` colours and `(B, H, W)` labels."""
 
 def map_spec(house_json: str, *, name: str, cell_m: float) -> tuple[tuple[int, int], tuple[float, float]]:
-    """Shape `(R, C)` and `(x, z)` of the corner of `EmbeddedSimulator.occupancy`'s grid, without its objects."""
+    """Return shape `(R, C)` and corner `(x, z)` of `EmbeddedSimulator.occupancy`'s grid, without building objects."""
 
 # evolution
 
@@ -739,4 +739,4 @@ def generate_task(
 # validation
 
 def inspect_house(source: House, stage: House, *, touch_m: float, rest_m: float, allow_unknown_assets: bool) -> str:
-    """Findings (JSON): `kind`, `id`, `other_id`, `amount_m`, `is_own` (the source house has it just so)."""
+    """Return findings (JSON): `kind`, `id`, `other_id`, `amount_m`, `is_own` (the source house has the same one)."""
