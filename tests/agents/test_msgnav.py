@@ -1,12 +1,14 @@
 """MSGNav on the toy house."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from scripted_model import Scripted
 from toy_house import CHAIR_AWAY, ToySimulator, stage_case
 
+from evonav.agents.agent import NavigateTo
 from evonav.agents.msgnav.agent import MsgNav, MsgNavConfig
 from evonav.agents.msgnav.questions import GraphQuestion
 from evonav.agents.msgnav.scene_graph import SceneGraph
@@ -62,7 +64,7 @@ def object_of(label, otherwise="Continue Exploration", *, unless_rejected=False)
 @pytest.fixture(scope="module")
 def moved():
     """The chair is found, the agent goes to the bedroom, and the chair is gone when it is asked for again, twice."""
-    agent = MsgNav()
+    agent = Noting()
     away = {"moves": CHAIR_AWAY, "mode": "SALIENT_OBJECT"}
     stages = (
         stage_case(1, "Chair|1"),
@@ -141,9 +143,9 @@ def replace_id(node, entry_id):
 
 
 def test_objects_shown_are_the_selected_ones_and_their_neighbours_and_images_cover_their_edges():
-    agent = MsgNav(decision=script("Continue Exploration", subgraph="1"))
-    run(agent, stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=8))
-    for question in asked(agent._queries.model, "graph"):
+    model = script("Continue Exploration", subgraph="1")
+    run(MsgNav(decision=model), stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=8))
+    for question in asked(model, "graph"):
         first = next(node for node in question.objects if node.entry_id == 1)
         assert {node.entry_id for node in question.objects} == {1, *first.neighbour_ids}
         assert all(1 in (a, b) and numbers for a, b, numbers in question.edges)
@@ -219,25 +221,35 @@ def test_the_text_matcher_sees_to_that_too():
 
 
 class Noting(MsgNav):
-    """Keeps the places to stand of all rounds."""
+    """Notes observations, actions and beliefs of all rounds."""
+
+    def begin_task(self, task):
+        super().begin_task(task)
+        self.rounds = []
 
     def act(self, observation):
         action = super().act(observation)
-        self.noted = [*getattr(self, "noted", []), self._target and self._target.viewpoint]
+        self.rounds.append((observation, action, self.belief()))
         return action
+
+    @property
+    def places_m(self):
+        """Where it went, by round, up to the stop."""
+        return [action.position_m for _, action, _ in self.rounds if isinstance(action, NavigateTo)]
 
 
 def test_the_place_to_stand_is_chosen_once_or_again_while_it_is_off_the_circle():
     """Floor around a far target is not mapped yet: the nearest free cells are far from it."""
     start = replace(START, x_m=2.5, z_m=2.5, yaw_rad=np.pi / 2)
     kept = Noting()
-    run(kept, stage_case(1, "Bed|1"), start=start)
-    assert kept.noted[0].found == "snapped"
-    assert len(set(kept.noted[:-1])) == 1
+    (record,) = run(kept, stage_case(1, "Bed|1"), start=start)
+    assert record.trace[0].counters["viewpoints_snapped"] == 1
+    assert len(kept.places_m) > 1
+    assert len(set(kept.places_m)) == 1
     again = Noting(MsgNavConfig(has_fixed_viewpoint=False))
     run(again, stage_case(1, "Bed|1"), start=start)
-    assert again.noted[0] == kept.noted[0]
-    assert again.noted[-2] != again.noted[0]
+    assert again.places_m[0] == kept.places_m[0]
+    assert again.places_m[-1] != again.places_m[0]
 
 
 def test_a_word_for_nothing_in_the_image_leads_to_a_random_frontier():
@@ -374,14 +386,17 @@ def test_it_looks_with_seven_views_every_round_and_never_clears_its_map(moved):
     agent, records = moved
     assert agent.sensing.later_rounds == agent.sensing.first_round
     assert (agent.sensing.later_rounds.count, agent.sensing.later_rounds.spacing_deg) == (7, 40.0)
-    assert agent._memory.navigator.explorer.num_conflicts == 0
-    assert len(agent._memory.navigator.views.views) == 7 * sum(record.num_rounds for record in records)
+    assert [len(observation.views) for observation, _, _ in agent.rounds] == [7] * sum(len(r.trace) for r in records)
+    beliefs = [belief for _, _, belief in agent.rounds]
+    for before, after in pairwise(beliefs):
+        assert not np.any((before.cells != 0) & (after.cells == 0))
+        assert not np.any(before.explored & ~after.explored)
 
 
 def test_answers_go_through_the_grammar():
-    agent = MsgNav(decision=script("Continue Exploration"))
-    run(agent, stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=2))
-    question = asked(agent._queries.model, "graph")[-1]
+    model = script("Continue Exploration")
+    run(MsgNav(decision=model), stage_case(1, "Mug|1"), protocol=ProtocolConfig(max_rounds=2))
+    question = asked(model, "graph")[-1]
     assert isinstance(question, GraphQuestion)
     first = question.objects[0].entry_id
     for text in (f"Object {first}", "Image 0, garbage can", "Continue Exploration"):

@@ -32,31 +32,18 @@ class Watched(ThreeDMem):
 
     def act(self, observation):
         action = super().act(observation)
-        occupancy = self._navigator.explorer.map
-        snapshots = [(snapshot.view.id, set(snapshot.entry_ids)) for snapshot in self._snapshots.snapshots]
-        seen_in = {
-            view_id: {self._navigator.views.resolve(seen.entry_id) for seen in self._view(view_id).seen if has_id(seen)}
-            for view_id, _ in snapshots
-        }
+        belief = self.belief()
         self.rounds.append(
             {
                 "action": action,
-                "cells": occupancy.cells,
-                "explored": occupancy.explored,
+                "cells": belief.cells,
+                "explored": belief.explored,
                 "num_views": len(observation.views),
-                "entries": {entry.entry_id: entry for entry in self.entries()},
-                "snapshots": snapshots,
-                "seen_in": seen_in,
+                "entries": {entry.entry_id: entry for entry in belief.entries},
+                "questions": [query.question for query in belief.queries],
             }
         )
         return action
-
-    def _view(self, view_id):
-        return self._navigator.views.views[view_id]
-
-
-def has_id(seen):
-    return seen.entry_id is not None
 
 
 def run(agent, *stages, start=START, max_rounds=50):
@@ -258,19 +245,32 @@ def test_memory_lasts_over_stages(table_moved):
     assert records[2].trace[0].details["num_snapshots_before"] == records[1].trace[-1].details["num_snapshots"]
 
 
-def test_each_entry_is_in_one_snapshot_that_shows_it(moved):
-    for entry in moved[0].rounds:
-        owned = [entry_id for _, ids in entry["snapshots"] for entry_id in ids]
-        assert sorted(owned) == sorted(entry["entries"])
-        assert all(ids <= entry["seen_in"][view_id] for view_id, ids in entry["snapshots"])
+@pytest.fixture(scope="module")
+def all_shown():
+    """Frontiers alone are chosen, all classes are kept, and images are asked for; the chair moves after a stage."""
+    model = scripted(lambda question: f"Frontier {len(question.frontiers) - 1}")
+    model.needs_images = True
+    agent = Watched(ThreeDMemConfig(max_classes=100), model)
+    stages = (stage_case(1, "Chair|1"), stage_case(2, "Chair|1", moves=CHAIR_AWAY, mode="SALIENT_OBJECT"))
+    run(agent, *stages, max_rounds=15)
+    asked = [(entry, question) for entry in agent.rounds for question in entry["questions"]]
+    return [(entry, question) for entry, question in asked if isinstance(question, SnapshotQuestion)]
 
 
-def test_a_co_visible_pair_shares_a_snapshot(moved):
-    last = moved[0].rounds[-1]
-    label = {entry_id: entry.label for entry_id, entry in last["entries"].items()}
-    shared = [{label[entry_id] for entry_id in ids} for _, ids in last["snapshots"]]
+def test_each_entry_is_in_one_snapshot_that_shows_it(all_shown):
+    assert len(all_shown) == 30
+    for entry, question in all_shown:
+        shown = [candidate for snapshot in question.snapshots for candidate in snapshot.objects]
+        assert sorted(candidate.entry_id for candidate in shown) == sorted(entry["entries"])
+        assert len({snapshot.view_id for snapshot in question.snapshots}) == len(question.snapshots)
+        assert all(candidate.crop is not None for candidate in shown)  # cut out of the snapshot's own view
+
+
+def test_a_co_visible_pair_shares_a_snapshot(all_shown):
+    last, question = all_shown[-1]
+    shared = [{candidate.label for candidate in snapshot.objects} for snapshot in question.snapshots]
     assert any({"DiningTable", "Mug"} <= labels for labels in shared)
-    assert len(last["snapshots"]) < len(last["entries"])
+    assert len(question.snapshots) < len(last["entries"])
 
 
 def test_an_object_in_unmapped_surroundings_is_gone_to_by_the_planner(monkeypatch):
@@ -291,10 +291,10 @@ def test_a_clean_up_that_drops_the_chosen_entry_does_not_end_the_commitment(monk
 
     def dropping(self, view):
         found = update(self, view)
-        target = agent._navigator.target
-        if target is None or not self.remove(target.entry_id):
+        kind, _, entry_id = agent.diagnostics().choice.partition(" ")
+        if kind != "object" or not self.remove(int(entry_id)):
             return found
-        return replace(found, removed=(*found.removed, target.entry_id))
+        return replace(found, removed=(*found.removed, int(entry_id)))
 
     monkeypatch.setattr(ObjectMap, "update", dropping)
     (record,) = run(agent, stage_case(1, "Mug|1"))

@@ -162,7 +162,8 @@ def test_corrections_rename_until_detections_change_and_delete_until_detected_ag
 def test_groups_are_connected_within_half_a_metre():
     graph = ObjectGraph()
     places = {1: (0.0, 0.0), 2: (0.45, 0.0), 3: (0.9, 0.0), 4: (2.0, 0.0)}
-    graph._nodes = {i: node(i, "chair", x, z) for i, (x, z) in places.items()}
+    for i, (x, z) in places.items():
+        graph.add(node(i, "chair", x, z))
     groups = graph.groups(lambda n: "bedroom" if n.id != 2 else "kitchen")
     assert {room: [[n.id for n in g.nodes] for g in part] for room, part in groups.items()} == {
         "bedroom": [[1], [3], [4]],
@@ -176,7 +177,9 @@ def test_groups_are_connected_within_half_a_metre():
 
 def test_neighbourhood_is_two_hops_along_short_edges():
     graph = ObjectGraph()
-    graph._nodes = {i: node(i, "chair", 1.5 * i) for i in range(1, 6)}
+    for i in (3, 1, 2, 5, 4):
+        graph.add(node(i, "chair", 1.5 * i))
+    assert [n.id for n in graph.nodes] == [1, 2, 3, 4, 5]
     graph.relate([(graph.node(a), graph.node(b)) for a in range(1, 6) for b in range(a + 1, 6)], ["next to"] * 10)
     assert [n.id for n in graph.neighbourhood([1], 2, 2.0)] == [1, 2, 3]
     assert [n.id for n in graph.neighbourhood([1], 1, 99.0)] == [1, 2, 3, 4, 5]

@@ -40,7 +40,7 @@ class Walk:
 
     def step(self, goal, kind):
         """One step; `goal` "explore" asks for targets as an agent does."""
-        self.planner.observe(self.simulator.pose)
+        self.planner.observe(self.simulator.pose, action=self.actions[-1] if self.actions else None)
         self.bev.integrate(look(self.simulator))
         if isinstance(goal, str):
             if self.planner.needs_target(self.simulator.pose):
@@ -121,10 +121,9 @@ def test_it_turns_towards_what_is_more_than_15_degrees_off(bearing_deg, action):
 
 def bump(planner, pose, times):
     """Steps forward that get nowhere."""
-    for _ in range(times):
-        planner.observe(pose)
-        planner._last_action = Action.MOVE_FORWARD
     planner.observe(pose)
+    for _ in range(times):
+        planner.observe(pose, action=Action.MOVE_FORWARD)
 
 
 def test_failed_moves_block_what_is_ahead_and_ever_more_of_it():
@@ -133,10 +132,8 @@ def test_failed_moves_block_what_is_ahead_and_ever_more_of_it():
     pose = Pose(0.025, 0.9, 0.025, 0.0)  # the middle of a cell
     widths = []
     for _ in range(3):
-        planner.observe(pose)
-        planner._last_action = Action.MOVE_FORWARD
-        planner.observe(pose)
-        planner._last_action = Action.TURN_LEFT
+        planner.observe(pose, action=Action.TURN_LEFT)
+        planner.observe(pose, action=Action.MOVE_FORWARD)
         rows, cols = np.nonzero(bev.collisions)
         widths.append((np.ptp(rows) + 1, np.ptp(cols) + 1))
         centres = np.array([bev.centre_of((int(r), int(c))) for r, c in zip(rows, cols, strict=True)])
@@ -157,13 +154,21 @@ def test_a_move_that_gets_on_is_no_collision():
     bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
     planner = UniGoalPlanner(bev, 0)
     for z_m in (0.0, 0.25, 0.5):
-        planner.observe(Pose(0.0, 0.9, z_m, 0.0))
-        planner._last_action = Action.MOVE_FORWARD
+        planner.observe(Pose(0.0, 0.9, z_m, 0.0), action=Action.MOVE_FORWARD)
     assert not bev.collisions.any()
     rows = np.flatnonzero(bev.visited.any(axis=1))
     assert np.array_equal(rows, np.arange(rows[0], rows[0] + 11))
-    planner.observe(Pose(0.0, 0.9, 0.6, 0.0))  # only 0.1 m on: a strip of width 1
+    planner.observe(Pose(0.0, 0.9, 0.6, 0.0), action=Action.MOVE_FORWARD)  # only 0.1 m on: a strip of width 1
     assert bev.collisions.sum() == 2
+
+
+def test_moves_that_were_not_its_own_tell_nothing_of_obstacles():
+    bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
+    planner = UniGoalPlanner(bev, 0)
+    for _ in range(4):
+        planner.observe(START, action=None)
+    assert not bev.collisions.any()
+    assert not planner.is_stuck
 
 
 def test_a_stuck_agent_heads_for_where_it_has_been_until_it_moves():
@@ -178,9 +183,9 @@ def test_a_stuck_agent_heads_for_where_it_has_been_until_it_moves():
     assert step.action is not Action.MOVE_FORWARD  # what is behind it comes first
     again = planner.step(pose, (0.0, 3.0), "exploration")
     assert again.short_term_m == step.short_term_m
-    place_m = planner._stuck.goal_m
-    assert place_m is not None
-    assert 0.8 < -place_m[1] <= 2.0
+    # To the grown goal, which is farther than 0.8 m.
+    assert 0.7 < step.distance_m <= 2.0
+    assert step.short_term_m[1] < 0.0
     planner.observe(Pose(0.0, 0.9, -0.25, math.pi))
     assert not planner.is_stuck
     assert planner.step(Pose(0.0, 0.9, -0.25, math.pi), (0.0, 3.0), "exploration").goal == "exploration"
@@ -225,6 +230,22 @@ def test_shut_in_by_its_own_bumps_it_feels_its_way_out(kind):
     assert walk.num_bumps <= 25
 
 
+class AsNearAsItGets:
+    """A map on which the goal cannot be approached, and all that was visited is `to_visited_m` away."""
+
+    def __init__(self, core):
+        self.core, self.to_visited_m, self.destinations = core, 1.2, []
+
+    def __getattr__(self, name):
+        return getattr(self.core, name)
+
+    def plan(self, here, goal, *, goal_radius, **_):
+        if goal_radius != 1:  # not a place where the agent has been
+            return None, 3.0, None
+        self.destinations.append(goal.tolist())
+        return self.to_visited_m, 1.0, (0.2, 0.0)
+
+
 def test_without_a_way_it_goes_as_near_as_it_gets_and_from_there_to_where_it_has_been():
     bev = BevMap((0.0, 0.0), 0, BevConfig(size_m=12.0))
     planner = UniGoalPlanner(bev, 0)
@@ -240,17 +261,17 @@ def test_without_a_way_it_goes_as_near_as_it_gets_and_from_there_to_where_it_has
     assert (step.goal, step.distance_m, step.short_term_m is None) == ("confirmed", None, False)
     assert planner.counters.unreachable == 1
     # Where it cannot get any nearer, it turns back to where it has been, and comes again from there.
-    to_visited_m = [1.2, 0.2]
-    planner._plan = lambda pose, goal, radius: (to_visited_m[0], 1.0, (0.2, 0.0)) if radius == 1 else (None, 3.0, None)
+    planned = bev.core = AsNearAsItGets(bev.core)
     back = planner.step(pose, goal, "temporary")
     assert (back.goal, back.distance_m) == ("stuck", 1.2)
-    place_m = planner._detour_m
     assert planner.step(pose, goal, "temporary").goal == "stuck"
-    assert planner._detour_m == place_m
-    to_visited_m.pop(0)
+    planned.to_visited_m = 0.2
     planner.step(pose, goal, "temporary")
-    assert planner._detour_m is None
-    del planner._plan
+    there, again, arrived = planned.destinations
+    assert there == again == arrived
+    planner.step(pose, goal, "temporary")
+    assert planned.destinations[-1] != there  # it was reached: the next time it is another
+    bev.core = planned.core
     planner.exploration_target(pose)
     planner.step(pose, (-3.0, 0.0), "exploration")
     assert planner.needs_target(pose)

@@ -86,6 +86,7 @@ class UniGoal:
         self._wander_m: Point2 | None = None
         self._num_steps = 0
         self._num_explored = 0
+        self._last_action: Action | None = None
         self._watch: GoalWatch | None = None
 
     def act(self, observation: Observation) -> AgentAction:
@@ -93,7 +94,7 @@ class UniGoal:
         self._queries.begin_round()
         view, pose = observation.views[-1], observation.pose
         bev, planner, watch = self._ready(pose)
-        planner.observe(pose, is_own_move=not observation.is_guided)
+        planner.observe(pose, action=None if observation.is_guided else self._last_action)
         bev.integrate(view, category_image(view.detections))
         if self._graphs.goal_graph is None:
             self._graphs.understand()
@@ -103,6 +104,7 @@ class UniGoal:
         watch.look(view, self._graphs.category, self._graphs.scene.seen_ids)
         watch.judge(pose)
         step = self._step(bev, planner, watch, pose)
+        self._last_action = step.action
         self._tell(planner, watch, step)
         if step.action is Action.STOP:
             return Stop("arrived")

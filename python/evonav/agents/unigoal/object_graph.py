@@ -160,10 +160,7 @@ class ObjectGraph:
             if known is None or known.caption != caption:
                 self._drop_edges(entry.id)
                 new_ids.append(entry.id)
-            self._nodes[entry.id] = SceneNode(entry.id, caption, entry.centre_m, entry.size_m, entry.num_detections)
-        if not new_ids:
-            return []
-        self._nodes = dict(sorted(self._nodes.items()))
+            self.add(SceneNode(entry.id, caption, entry.centre_m, entry.size_m, entry.num_detections))
         old = [node for node in self._nodes.values() if node.id not in new_ids]
         new = [self._nodes[node_id] for node_id in new_ids]
         return [(node, other) for index, node in enumerate(new) for other in (*old, *new[index + 1 :])]
@@ -227,6 +224,13 @@ class ObjectGraph:
             inside |= border
         return [self._nodes[node_id] for node_id in sorted(inside)]
 
+    def add(self, node: SceneNode) -> None:
+        """Add a node, or replace the node with its id."""
+        is_new = node.id not in self._nodes
+        self._nodes[node.id] = node
+        if is_new:
+            self._nodes = dict(sorted(self._nodes.items()))
+
     def rename(self, node_id: int, word: str) -> None:
         """Change a node's caption, until its detections get another label."""
         node = self._nodes.get(node_id)
@@ -234,7 +238,7 @@ class ObjectGraph:
             return
         _, label = self._renamed.get(node_id, ("", node.caption))
         self._renamed[node_id] = (word, label)
-        self._nodes[node_id] = SceneNode(node.id, word, node.centre_m, node.size_m, node.num_detections)
+        self.add(replace(node, caption=word))
 
     def delete(self, node_id: int) -> None:
         """Remove a node with its edges and its points; it comes back if it is detected again."""

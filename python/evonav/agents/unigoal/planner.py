@@ -137,12 +137,13 @@ class UniGoalPlanner:
         self._exploration = _Exploration()
         self._blacklist = set()
 
-    def observe(self, pose: Pose, *, is_own_move: bool = True) -> None:
-        """Note the pose that the last action has led to; call this once before each `step`.
+    def observe(self, pose: Pose, *, action: Action | None = None) -> None:
+        """Note the present pose; call this once before each `step`.
 
         Args:
             pose: The agent's pose.
-            is_own_move: True if the last `step` led there; any other move reveals no obstacles.
+            action: The agent's own action that has led there. `None`, as at the beginning of a stage or after a guided
+                move, reveals no obstacles.
         """
         here = (pose.x_m, pose.z_m)
         last = self._last or pose
@@ -151,9 +152,10 @@ class UniGoalPlanner:
         is_still = abs(here[0] - there[0]) < self.config.still_m and abs(here[1] - there[1]) < self.config.still_m
         if not is_still:
             self._stuck.is_stuck, self._stuck.goal_m = False, None
-        if is_own_move and self._last is not None and self._last_action is Action.MOVE_FORWARD:
+        if self._last is not None and action is Action.MOVE_FORWARD:
             self._learn_from_move(last, math.dist(here, there), is_still)
         self._last = pose
+        self._last_action = action
         self._exploration.num_steps += 1
 
     def _learn_from_move(self, start: Pose, moved_m: float, is_still: bool) -> None:
@@ -260,7 +262,7 @@ class UniGoalPlanner:
         """Return the next action towards a goal; call `observe` first.
 
         A stuck agent heads for a random place where it has been, until it moves, unless its goal is confirmed. Where
-        the map shows no way to the goal, the agent goes to the reachable place nearest to it, from there to one where
+        the map shows no path to the goal, the agent goes to the reachable place nearest to it, from there to one where
         it has been, and back; an exploration target is dropped. An agent with nothing to head for turns right, one that
         is shut in by what it has bumped into tries in turn to move and to turn.
 
@@ -273,34 +275,30 @@ class UniGoalPlanner:
             if self._stuck.goal_m is None:
                 self._stuck.goal_m = self._visited_place(pose)
             step = self._step_to(pose, self._stuck.goal_m, "stuck")
-            return self._act(step if step.distance_m is not None else self._feel(step))
+            return step if step.distance_m is not None else self._feel(step)
         step = self._step_to(pose, goal, kind)
         if step.goal == "none" or step.action is Action.STOP:
-            return self._act(step)
+            return step
         if step.distance_m is not None:
             self._detour_m = None
-            return self._act(step)
+            return step
         self.counters.unreachable += 1
         self._exploration.target_m = None
         if self.is_stuck:
-            return self._act(self._feel(step))
+            return self._feel(step)
         if self._detour_m is None and step.short_term_m is None:
             self._detour_m = self._visited_place(pose)
         if self._detour_m is None:
-            return self._act(step)
+            return step
         detour = self._step_to(pose, self._detour_m, "stuck")
         if detour.distance_m is None or detour.distance_m < self.config.stop_m:
             self._detour_m = None
-        return self._act(detour)
+        return detour
 
     def _feel(self, step: PlannedStep) -> PlannedStep:
-        """Shut in by what it has bumped into, a stuck agent turns and tries, all around, until it moves."""
+        """Return a move or a turn in alternation, so that an agent shut in by collisions tries all directions."""
         has_tried = self._last_action is Action.MOVE_FORWARD
         return replace(step, action=Action.TURN_RIGHT if has_tried else Action.MOVE_FORWARD)
-
-    def _act(self, step: PlannedStep) -> PlannedStep:
-        self._last_action = step.action
-        return step
 
     def _step_to(
         self, pose: Pose, goal: Cells | Point2 | None, kind: Literal["confirmed", "temporary", "exploration", "stuck"]
