@@ -1,4 +1,4 @@
-"""From rendered frames to what an agent is told that it sees: ground truth, ground truth with errors, models."""
+"""Turn rendered frames into what an agent sees: ground truth, ground truth with errors, or detections of models."""
 
 from evonav.perception.perception import Percept, Perception, StageScene
 

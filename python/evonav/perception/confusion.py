@@ -1,4 +1,4 @@
-"""Which labels are taken for which, and which are seen where nothing is."""
+"""Describe which labels are mistaken for which, and which are seen where nothing is."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -22,12 +22,12 @@ class Confusion:
     frequencies: NDArray[np.float64]
     """`(C,)`, adding up to 1."""
     similar: Mapping[str, tuple[tuple[str, ...], NDArray[np.float64]]]
-    """By category: what it is taken for, and with which shares."""
+    """Labels that a category is mistaken for, with their shares, by category."""
     group_of: Mapping[str, int]
     """Number of the first group that a category is in, of those that are in any."""
 
     def another(self, category: str, is_similar: bool, share: float) -> str:
-        """What a category is taken for.
+        """Draw the label that a category is mistaken for.
 
         Args:
             category: The true one.
@@ -41,7 +41,7 @@ class Confusion:
         return _pick(labels, shares, share) if shares.sum() > 0.0 else category
 
     def frequent(self, share: float) -> str:
-        """A category by frequency; `share`, uniform in 0..1, decides which."""
+        """Draw a category by frequency; `share`, uniform in 0..1, decides which."""
         return _pick(self.categories, self.frequencies, share)
 
 
@@ -52,7 +52,7 @@ def _pick(labels: Sequence[str], weights: NDArray[np.float64], share: float) -> 
 
 @cache
 def read_confusion(path: str = "") -> Confusion:
-    """Reads a file of frequencies, groups and pairs (`confusion.toml` shows the form).
+    """Read a file of frequencies, groups and pairs (`confusion.toml` shows the form).
 
     Args:
         path: Empty: that file.

@@ -1,4 +1,4 @@
-"""What a detector is: views in, masks, boxes, words and confidences out. It is told nothing of the scene."""
+"""Define a detector: views in; masks, boxes, words and confidences out. It knows nothing of the scene."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,19 +12,19 @@ from evonav.errors import InvalidArgumentError
 
 @dataclass(frozen=True, slots=True)
 class DetectorView:
-    """What a detector is shown of a frame."""
+    """View of a frame for a detector."""
 
     rgb: NDArray[np.uint8]
     """`(H, W, 3)`."""
     depth_m: NDArray[np.float32]
     """`(H, W)` planar z, `inf` where nothing is; most detectors do without."""
     horizon_rad: float
-    """How far down the camera looks."""
+    """Angle by which the camera looks down."""
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a detector found in one image of `(H, W)`, in any order; masks may overlap."""
+    """Detections in one image of `(H, W)`, in any order; masks may overlap."""
 
     masks: NDArray[np.bool_]
     """`(N, H, W)`."""
@@ -42,17 +42,17 @@ class Found:
 
     def taken(self, indices: Sequence[int] | NDArray[np.int64]) -> "Found":
         """Only some of it, in the order of `indices`."""
-        kept = np.asarray(indices, np.int64)
+        chosen = np.asarray(indices, np.int64)
         return Found(
-            masks=self.masks[kept],
-            boxes_px=self.boxes_px[kept],
-            labels=tuple(self.labels[index] for index in kept),
-            confidences=self.confidences[kept],
-            features=None if self.features is None else self.features[kept],
+            masks=self.masks[chosen],
+            boxes_px=self.boxes_px[chosen],
+            labels=tuple(self.labels[index] for index in chosen),
+            confidences=self.confidences[chosen],
+            features=None if self.features is None else self.features[chosen],
         )
 
     def check(self, shape: tuple[int, int]) -> None:
-        """Holds it to its description.
+        """Check shapes, dtypes and values.
 
         Args:
             shape: `(H, W)` of the image.
@@ -78,7 +78,7 @@ class Found:
 
 
 def nothing_found(shape: tuple[int, int]) -> Found:
-    """An image without detections.
+    """Return an image without detections.
 
     Args:
         shape: `(H, W)` of the image.
@@ -90,7 +90,7 @@ class Detector(Protocol):
     """Finds objects in views. It may be shared by the episodes of a process, so it keeps nothing between calls."""
 
     def detect(self, views: Sequence[DetectorView]) -> Sequence[Found]:
-        """The views of a round, as one batch.
+        """Detect objects in the views of a round, as one batch.
 
         Returns:
             One `Found` a view.

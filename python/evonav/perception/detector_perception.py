@@ -18,7 +18,7 @@ from evonav.world.simulator import Frame
 
 
 class DetectorPerception:
-    """What a detector sees, as percepts; depth and pose are the frame's own."""
+    """Perception that returns a detector's detections as percepts; depth and pose are the frame's own."""
 
     needs_rgb = True
 
@@ -29,11 +29,11 @@ class DetectorPerception:
         embedder: Embedder | None = None,
         types: Mapping[str, str] = TYPE_OF_WORD,
     ) -> None:
-        """A perception over models that may be shared.
+        """Make a perception over models that may be shared.
 
         Args:
             detector: Finds.
-            filters: What is believed; default: 3D-Mem's values.
+            filters: Filters on detections; default: 3D-Mem's values.
             embedder: Gives what is left features; without, they are the detector's, if it has some.
             types: ProcTHOR's type by the detector's word; a word that is not in it stays as it is.
         """
@@ -43,10 +43,10 @@ class DetectorPerception:
         self._types = types
 
     def begin_stage(self, scene: StageScene) -> None:
-        """Nothing of the scene is used."""
+        """Do nothing: nothing of the scene is used."""
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
-        """The views of a round, as one batch.
+        """Perceive the views of a round, as one batch.
 
         Raises:
             InvalidArgumentError: A frame has no colours, or what the detector returns does not fit.
@@ -55,37 +55,37 @@ class DetectorPerception:
         found = self._detector.detect(views)
         if len(found) != len(views):
             raise InvalidArgumentError(f"a detector returned {len(found)} results for {len(views)} views")
-        kept = []
+        remaining = []
         for one, view in zip(found, views, strict=True):
             one.check((view.rgb.shape[0], view.rgb.shape[1]))
-            kept.append(filtered(one, self._filters))
-        features: Sequence[NDArray[np.float32] | None] = [one.features for one in kept]
+            remaining.append(filtered(one, self._filters))
+        features: Sequence[NDArray[np.float32] | None] = [one.features for one in remaining]
         if self._embedder is not None:
-            features = self._embedder.image_features([view.rgb for view in views], [one.boxes_px for one in kept])
+            features = self._embedder.image_features([view.rgb for view in views], [one.boxes_px for one in remaining])
         return [
             Percept(self._detections(one, feature), frame.depth_m, frame.pose)
-            for one, feature, frame in zip(kept, features, frames, strict=True)
+            for one, feature, frame in zip(remaining, features, frames, strict=True)
         ]
 
     def text_feature(self, text: str) -> NDArray[np.float32] | None:
-        """Of the embedder, if there is one."""
+        """Return the embedder's feature, if there is one."""
         return None if self._embedder is None else self._embedder.text_feature(text)
 
     def _detections(self, found: Found, features: NDArray[np.float32] | None) -> Detections:
-        """One label a pixel; what smaller masks leave fewer pixels of than a mask must have goes."""
+        """Give each pixel one label; drop masks that smaller masks leave too few pixels of."""
         masks = one_label_a_pixel(found.masks)
         num = len(found)
         left_px = np.bincount(masks[masks >= 0], minlength=num)
         min_area_px = self._filters.min_area_px * self._filters.scale_of(masks.shape) ** 2
-        is_kept = left_px >= np.minimum(np.maximum(min_area_px, 1.0), mask_areas_px(found.masks))
-        if not is_kept.all():
-            masks = one_label_a_pixel(found.masks[is_kept])
-        labels = [label for label, kept in zip(found.labels, is_kept.tolist(), strict=True) if kept]
+        is_large_enough = left_px >= np.minimum(np.maximum(min_area_px, 1.0), mask_areas_px(found.masks))
+        if not is_large_enough.all():
+            masks = one_label_a_pixel(found.masks[is_large_enough])
+        labels = [label for label, is_large in zip(found.labels, is_large_enough.tolist(), strict=True) if is_large]
         return Detections(
             masks=masks,
             labels=tuple(self._types.get(label, label) for label in labels),
-            confidences=found.confidences[is_kept],
-            features=None if features is None else features[is_kept],
+            confidences=found.confidences[is_large_enough],
+            features=None if features is None else features[is_large_enough],
         )
 
 

@@ -1,4 +1,4 @@
-"""Which detections are believed, after 3D-Mem and UniGoal: pure functions on masks, boxes and confidences.
+"""Filter detections as 3D-Mem and UniGoal do: pure functions on masks, boxes and confidences.
 
 Lengths and areas in pixels are meant for images of the size that the original looks at and are scaled with the image:
 3D-Mem renders 1280x1280, our protocol 300x300.
@@ -28,14 +28,16 @@ class FilterConfig:
     max_mask_iou: float = 0.9
     """Above it, of two masks the one with less confidence goes."""
     min_centre_distance_px: float = 20.0
-    """Of two boxes with centres nearer than this, the smaller goes."""
+    """Limit for two boxes: of two with centres nearer than this, the smaller is dropped."""
     min_area_px: float = 25.0
     max_box_fraction: float = 0.5
     """Largest part of the image that a box covers."""
     max_share_of_outer: float = 0.7
     min_share_of_inner: float = 0.8
-    """Boxes whose intersection is less than the first of the one and more than the second of the other: the other is
-    a thing on the one, whose mask loses it."""
+    """Smallest share of the inner box that lies in the outer one.
+
+    A box that covers less than `max_share_of_outer` of another is a thing on it: the other mask loses it.
+    """
 
     def __post_init__(self) -> None:
         """Refuses what makes no sense.
@@ -56,25 +58,25 @@ class FilterConfig:
             raise InvalidArgumentError(f"FilterConfig: reference_px is {self.reference_px}, expected positive numbers")
 
     def scale_of(self, shape: tuple[int, int]) -> float:
-        """How long a pixel of the original is in an image of `(H, W)`."""
+        """Return the length of a pixel of the original in an image of `(H, W)`."""
         return math.sqrt(shape[0] * shape[1] / (self.reference_px[0] * self.reference_px[1]))
 
 
 def filtered(found: Found, config: FilterConfig) -> Found:
-    """What is left of an image's detections, the most confident first; masks may still overlap.
+    """Return the remaining detections of an image, the most confident first; masks may still overlap.
 
     Args:
-        found: Of one image.
-        config: Of the stack.
+        found: Detections in one image.
+        config: Filters of the stack.
     """
-    kept = without_small_and_doubtful(found, config)
-    kept = without_doubles(kept, config)
-    kept = without_specks_and_giants(kept, config)
-    return without_contained(kept, config)
+    remaining = without_small_and_doubtful(found, config)
+    remaining = without_doubles(remaining, config)
+    remaining = without_specks_and_giants(remaining, config)
+    return without_contained(remaining, config)
 
 
 def without_small_and_doubtful(found: Found, config: FilterConfig) -> Found:
-    """Drops background, masks that are too small a part of the image and detections of little confidence.
+    """Drop background, masks that are too small a part of the image and detections of little confidence.
 
     Background goes first: a wall's box is no reason to drop the picture on it.
     """
@@ -94,38 +96,38 @@ def without_small_and_doubtful(found: Found, config: FilterConfig) -> Found:
 
 
 def without_doubles(found: Found, config: FilterConfig) -> Found:
-    """Drops what is found twice: nearly the same mask, or boxes around one middle.
+    """Drop what is found twice: nearly the same mask, or boxes around one middle.
 
     Args:
         found: The most confident first.
-        config: Of the stack.
+        config: Filters of the stack.
     """
     ious = mask_ious(found.masks)
     areas_px = box_areas_px(found.boxes_px)
     centres_px = (found.boxes_px[:, :2] + found.boxes_px[:, 2:]) / 2.0
     near_px = config.min_centre_distance_px * config.scale_of(found.masks.shape[1:])
-    kept: list[int] = []
+    remaining: list[int] = []
     for index in range(len(found)):
-        if any(ious[index, other] > config.max_mask_iou for other in kept):
+        if any(ious[index, other] > config.max_mask_iou for other in remaining):
             continue
-        apart_px = np.hypot(*(centres_px[kept] - centres_px[index]).T)
-        rivals = [other for other, px in zip(kept, apart_px.tolist(), strict=True) if px < near_px]
+        apart_px = np.hypot(*(centres_px[remaining] - centres_px[index]).T)
+        rivals = [other for other, px in zip(remaining, apart_px.tolist(), strict=True) if px < near_px]
         if all(areas_px[index] > areas_px[other] for other in rivals):
-            kept = [other for other in kept if other not in rivals] + [index]
-    return found.taken(sorted(kept))
+            remaining = [other for other in remaining if other not in rivals] + [index]
+    return found.taken(sorted(remaining))
 
 
 def without_specks_and_giants(found: Found, config: FilterConfig) -> Found:
-    """Drops masks of a few pixels and boxes over much of the image."""
+    """Drop masks of a few pixels and boxes over much of the image."""
     height_px, width_px = found.masks.shape[1:]
     min_area_px = config.min_area_px * config.scale_of((height_px, width_px)) ** 2
     max_box_px = config.max_box_fraction * height_px * width_px
-    is_kept = (mask_areas_px(found.masks) >= min_area_px) & (box_areas_px(found.boxes_px) <= max_box_px)
-    return found.taken(np.flatnonzero(is_kept))
+    is_plausible = (mask_areas_px(found.masks) >= min_area_px) & (box_areas_px(found.boxes_px) <= max_box_px)
+    return found.taken(np.flatnonzero(is_plausible))
 
 
 def without_contained(found: Found, config: FilterConfig) -> Found:
-    """Takes the pillow's mask off the sofa's; a mask of which nothing is left goes."""
+    """Take the pillow's mask off the sofa's; drop a mask of which nothing is left."""
     boxes = found.boxes_px.astype(np.float64)
     low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
     high = np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
@@ -144,11 +146,11 @@ def without_contained(found: Found, config: FilterConfig) -> Found:
 
 
 def joined(first: Found, second: Found, max_iou: float) -> Found:
-    """What two detectors found in one image; what both found, as the first has it.
+    """Join the detections of two detectors in one image; of a thing that both found, take the first's.
 
     Args:
-        first: Of one.
-        second: Of the other; features are kept if both have some.
+        first: Detections of one detector.
+        second: Detections of the other; features are included if both have some.
         max_iou: Masks that overlap by more are the same thing.
     """
     ious = mask_ious(np.concatenate([first.masks, second.masks]))[len(first) :, : len(first)]
@@ -166,7 +168,7 @@ def joined(first: Found, second: Found, max_iou: float) -> Found:
 
 
 def one_label_a_pixel(masks: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Which mask a pixel belongs to: of several, to the one with the fewest pixels.
+    """Return the mask that each pixel belongs to: of several, the one with the fewest pixels.
 
     What lies on or before something is smaller than that in most images, and a mask of the larger thing often covers
     it; the other way round the small thing would vanish from every map. Among masks of equal size the first one wins.

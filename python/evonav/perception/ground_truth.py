@@ -35,11 +35,11 @@ class GroundTruthPerception:
         return False
 
     def begin_stage(self, scene: StageScene) -> None:
-        """Takes the stage's objects."""
+        """Store the stage's objects."""
         self._objects = scene.objects
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
-        """Each frame as it is."""
+        """Return each frame as it is."""
         return [Percept(self.detect(frame, self._objects), frame.depth_m, frame.pose) for frame in frames]
 
     def text_feature(self, text: str) -> None:
@@ -70,10 +70,10 @@ class GroundTruthPerception:
         )
 
     def number(self, frame: Frame, objects: Sequence[SceneObject]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-        """The same as masks, and the index into `objects` of each: oracle data.
+        """Return numbered masks, and the index into `objects` of each: oracle data.
 
         Raises:
-            InvalidArgumentError: As `detect`.
+            InvalidArgumentError: See `detect`.
         """
         if frame.instances is None:
             raise InvalidArgumentError("argument `frame` has no instances, expected a frame rendered with them")

@@ -19,7 +19,7 @@ from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.filters import FilterConfig
 
 WEIGHTS = Path(__file__).parents[1] / "data" / "mini.weights"
-"""What ships, made by `scripts/train_mini.py` and `scripts/export_mini.py`."""
+"""Shipped weights, made by `scripts/train_mini.py` and `scripts/export_mini.py`."""
 
 
 @cache
@@ -35,14 +35,14 @@ def _network(weights: Path) -> _core.MiniNetwork:
 
 
 class MiniPerception(DetectorPerception):
-    """What `predicted:mini` stands for. Masks do not overlap, so that only specks and doubts are left to filter."""
+    """Perception `predicted:mini`. Its masks do not overlap, so only specks and doubtful ones are filtered."""
 
     def __init__(self, *, min_confidence: float = 0.3, min_cells: int = 2) -> None:
-        """A perception with the shipped weights.
+        """Make a perception with the shipped weights.
 
         Args:
-            min_confidence: Of a detection, 0 to 1.
-            min_cells: As for `MiniDetector`.
+            min_confidence: Least confidence of a detection, 0 to 1.
+            min_cells: Fewest cells of an object, see `MiniDetector`.
 
         Raises:
             InvalidArgumentError: A parameter is outside its domain, or the weights are broken.
@@ -51,10 +51,10 @@ class MiniPerception(DetectorPerception):
         super().__init__(MiniDetector(min_confidence=min_confidence, min_cells=min_cells), filters)
 
     def check(self, agents: Sequence[str]) -> dict[str, Any]:
-        """What decides results beside options: the checksum of the weights.
+        """Return what decides results beside options: the checksum of the weights.
 
         Args:
-            agents: That will look with it; they all see the same.
+            agents: Agents that will use it; they all see the same.
         """
         return {"mini": {WEIGHTS.name: hashlib.sha256(WEIGHTS.read_bytes()).hexdigest()}}
 
@@ -63,7 +63,7 @@ class MiniDetector:
     """Objects of the types in `classes`, from colours and depth together. Shared by all episodes of a process."""
 
     def __init__(self, weights: Path | None = None, *, min_cells: int = 2, min_confidence: float = 0.25) -> None:
-        """A detector.
+        """Make a detector.
 
         Args:
             weights: A file of `scripts/export_mini.py`; default: what ships.
@@ -84,10 +84,10 @@ class MiniDetector:
         """ProcTHOR's types that it tells apart."""
 
     def detect(self, views: Sequence[DetectorView]) -> list[Found]:
-        """Each view by itself: how many come at once changes nothing.
+        """Detect objects in each view by itself: the number of views at once changes nothing.
 
         Args:
-            views: Of a camera of 90 degrees field of view.
+            views: Views of a camera of 90 degrees field of view.
 
         Returns:
             Instances, whose masks do not overlap.

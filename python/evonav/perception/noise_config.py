@@ -1,4 +1,4 @@
-"""How simulated perception errs: every parameter in one place, and the presets (`noise_presets.toml`)."""
+"""Define how simulated perception errs: every parameter in one place, and the presets (`noise_presets.toml`)."""
 
 import math
 from collections.abc import Mapping
@@ -34,13 +34,15 @@ class NoiseConfig:
     area_slope: float = 1.5
     """> 0: exponent of `1 / (1 + (half / area)^slope)`."""
     half_distance_m: float = 0.0
-    """>= 0: mean depth at which half of those are found that would be if near; 0: distance is no matter. Beside size,
-    which distance makes small."""
+    """>= 0: mean depth at which half of the near ones are found; 0: distance has no effect.
+
+    It acts beside size, which distance makes small."""
     distance_slope: float = 4.0
     """> 0: exponent of `1 / (1 + (distance / half)^slope)`."""
     half_visible: float = 0.0
-    """0..1: share of an outline that is the object's own (cut by nothing nearer, nor by the image's border) at which
-    half of those are found that would be if whole; 0: occlusion is no matter."""
+    """0..1: visible share of an outline at which half of the whole ones are found; 0: occlusion has no effect.
+
+    An outline is visible where it is cut by nothing nearer, nor by the image's border."""
     visible_slope: float = 2.0
     """> 0: exponent of `1 / (1 + (half / visible)^slope)`."""
 
@@ -106,10 +108,10 @@ class NoiseConfig:
     persistence: float = 0.0
     """0..1: correlation of an object's errors in two views; 0: each view errs anew."""
     persistence_scope: Scope = "episode"
-    """How long it lasts: `stage` or `episode`."""
+    """Time for which it lasts: `stage` or `episode`."""
 
     def __post_init__(self) -> None:
-        """Checks the parameters.
+        """Check the parameters.
 
         Raises:
             InvalidArgumentError: One is outside its domain.
@@ -119,7 +121,7 @@ class NoiseConfig:
 
     @classmethod
     def read(cls, preset: str = "perfect", /, **options: Any) -> "NoiseConfig":  # noqa: ANN401 - JSON
-        """A preset, with some parameters in the place of its own.
+        """Return a preset, with some of its parameters replaced.
 
         Raises:
             InvalidArgumentError: There is no such preset or parameter, or a value is outside its domain.
@@ -138,7 +140,7 @@ class NoiseConfig:
 
 @cache
 def noise_presets() -> Mapping[str, NoiseConfig]:
-    """The presets by name, the best first."""
+    """Return the presets by name, the best first."""
     presets = read_toml(Path(__file__).with_name("noise_presets.toml"))
     return {name: NoiseConfig(**values) for name, values in presets.items()}
 

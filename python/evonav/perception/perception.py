@@ -1,4 +1,4 @@
-"""What a perception is: frames in, detections out, with the depth and the pose that the agent is to believe."""
+"""Define a perception: frames in; detections out, with the depth and the pose that the agent is to believe."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,28 +15,29 @@ from evonav.world.simulator import Frame, SceneObject
 
 @dataclass(frozen=True, slots=True)
 class StageScene:
-    """What a perception is told as a stage begins. It is on the evaluator's side: the objects are oracle data."""
+    """Input of a perception at the start of a stage. It is on the evaluator's side: the objects are oracle data."""
 
     task_id: str
     goal: StageInput
     agent: str
     """Name of the agent that is given the percepts: published agents have detectors of their own."""
     seed: int
-    """What random errors may depend on, with `task_id` and the stage: the same for all agents of a run, so that they
-    are compared under the same errors."""
+    """Seed of random errors, with `task_id` and the stage. It is the same for all agents of a run.
+
+    Agents are thus compared under the same errors."""
     objects: Sequence[SceneObject]
     """Bodies in instance order."""
 
 
 @dataclass(frozen=True, slots=True)
 class Percept:
-    """A frame as the agent is told of it."""
+    """A frame as the agent perceives it."""
 
     detections: Detections
     depth_m: NDArray[np.float32]
     """`(H, W)` planar z, `inf` where nothing is; the frame's own where the perception does not err about it."""
     pose: Pose
-    """Of the camera, as in `Frame`; the frame's own where the perception does not err about it."""
+    """Pose of the camera, as in `Frame`; the frame's own where the perception does not err about it."""
 
 
 class Perception(Protocol):
@@ -48,11 +49,11 @@ class Perception(Protocol):
         ...
 
     def begin_stage(self, scene: StageScene) -> None:
-        """A stage of the episode begins; stages come in order, each once."""
+        """Begin a stage of the episode; stages come in order, each once."""
         ...
 
     def perceive(self, frames: Sequence[Frame]) -> Sequence[Percept]:
-        """The views of one round, as one batch.
+        """Perceive the views of one round, as one batch.
 
         Args:
             frames: Rendered with instances; the heading view last.

@@ -16,9 +16,9 @@ class PoseDrift:
 
     config: NoiseConfig
     error_m: tuple[float, float] = (0.0, 0.0)
-    """Of x and z."""
+    """Error of x and z."""
     error_rad: float = 0.0
-    """Of yaw."""
+    """Error of yaw."""
     _last: Pose | None = field(default=None, init=False)
 
     @property
@@ -28,7 +28,7 @@ class PoseDrift:
         return not (config.drift_m_per_sqrt_m or config.drift_rad_per_sqrt_m or config.drift_rad_per_sqrt_rad)
 
     def move(self, pose: Pose, normals: NDArray[np.float64]) -> None:
-        """Takes over where the agent is now.
+        """Add the drift of the way to the agent's new pose.
 
         Args:
             pose: The true one.
@@ -40,15 +40,15 @@ class PoseDrift:
         config = self.config
         way_m = math.dist((last.x_m, last.z_m), (pose.x_m, pose.z_m))
         turn_rad = abs(math.remainder(pose.yaw_rad - last.yaw_rad, math.tau))
-        kept = math.exp(-way_m / config.drift_pull_m) if config.drift_pull_m > 0.0 else 1.0
+        decay = math.exp(-way_m / config.drift_pull_m) if config.drift_pull_m > 0.0 else 1.0
         step_m = config.drift_m_per_sqrt_m * math.sqrt(way_m)
         step_rad = math.sqrt(config.drift_rad_per_sqrt_m**2 * way_m + config.drift_rad_per_sqrt_rad**2 * turn_rad)
         x, z, yaw = normals.tolist()
-        self.error_m = (kept * self.error_m[0] + step_m * x, kept * self.error_m[1] + step_m * z)
-        self.error_rad = kept * self.error_rad + step_rad * yaw
+        self.error_m = (decay * self.error_m[0] + step_m * x, decay * self.error_m[1] + step_m * z)
+        self.error_rad = decay * self.error_rad + step_rad * yaw
 
     def believed(self, pose: Pose) -> Pose:
-        """A true pose as it is believed."""
+        """Return a true pose as it is believed."""
         if self.is_off:
             return pose
         x_m, z_m = self.error_m

@@ -40,10 +40,10 @@ class StackPerception:
     _perception: DetectorPerception | None = field(default=None, init=False, repr=False)
 
     def check(self, agents: Sequence[str]) -> dict[str, Any]:
-        """Whether all is there that will be needed, without loading it; files that are missing are fetched.
+        """Check that everything needed is there, without loading it; missing files are fetched.
 
         Args:
-            agents: That will look with it.
+            agents: Agents that will use it.
 
         Returns:
             What decides results beside options: by stack, hashes of weights and versions of libraries.
@@ -60,21 +60,21 @@ class StackPerception:
         return facts
 
     def begin_stage(self, scene: StageScene) -> None:
-        """Loads the models of the agent's stack; of the scene, the agent's name alone is used."""
+        """Load the models of the agent's stack; of the scene, only the agent's name is used."""
         parts = load_stack(self._stack_for(scene.agent), self.config, self.models, self.device)
         self._perception = DetectorPerception(parts.detector, parts.filters, parts.embedder)
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
-        """The views of a round, as one batch."""
+        """Perceive the views of a round, as one batch."""
         return self._begun().perceive(frames)
 
     def text_feature(self, text: str) -> NDArray[np.float32] | None:
-        """Of the stack's CLIP, if it has one."""
+        """Return the feature of the stack's CLIP, if it has one."""
         return self._begun().text_feature(text)
 
     def _begun(self) -> DetectorPerception:
         if self._perception is None:
-            raise InvalidArgumentError("a stack of models is told of a stage (`begin_stage`) before it looks")
+            raise InvalidArgumentError("a stack of models has no stage yet: call `begin_stage` first")
         return self._perception
 
     def _stack_for(self, agent: str) -> StackName:
@@ -87,10 +87,10 @@ def predicted_perception(
     device: str = "auto",
     **options: Any,  # noqa: ANN401 - of `StackConfig`
 ) -> Perception:
-    """What `predicted[:STACK]` stands for.
+    """Make the perception `predicted[:STACK]`.
 
     Args:
-        stack: Of `evonav.perception.words.STACKS`; `auto`: UniGoal its own, all others 3D-Mem's.
+        stack: One of `evonav.perception.words.STACKS`; `auto`: UniGoal's for UniGoal, 3D-Mem's for all others.
         models: Folder of weights; default: `EVONAV_MODELS`, else the libraries' own hubs.
         device: `auto`, `cpu`, `cuda` or `cuda:N`.
         options: See `evonav.perception.stacks.StackConfig`; of `mini`, which needs neither models nor a device,

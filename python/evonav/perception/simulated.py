@@ -25,7 +25,7 @@ from evonav.world.simulator import Frame, SceneObject
 
 F64 = NDArray[np.float64]
 
-_MISS, _CONFUSED, _SIMILAR, _LABEL, _CONFIDENCE, _MARGIN, _SPLIT, _WHERE, _SIDES, _NUM_DRAWS = (
+_MISS, _CONFUSED, _SIMILAR, _LABEL, _CONFIDENCE, _MARGIN, _SPLIT, _WHERE, _EDGES, _NUM_DRAWS = (
     0,
     1,
     2,
@@ -37,11 +37,11 @@ _MISS, _CONFUSED, _SIMILAR, _LABEL, _CONFIDENCE, _MARGIN, _SPLIT, _WHERE, _SIDES
     8,
     12,
 )
-"""Which standard normal of an object decides what; `_SIDES` are four."""
+"""Columns of the standard normals of an object, by what they decide; `_EDGES` are four."""
 _CELL_M, _STRIDE_PX = 0.25, 6
 """Places where nothing may be taken for something: edge, and spacing of the pixels looked at."""
 _REFERENCE_HEIGHT_PX = 300
-"""Of the image that margins in pixels refer to."""
+"""Edge of the image that margins in pixels refer to."""
 _SMALLEST_QUALITY = 1e-3
 _GROUND_TRUTH = GroundTruthPerception()
 
@@ -50,7 +50,7 @@ def noisy_perception(preset: str = "yolo-world-like", **options: Any) -> "NoisyP
     """Ground truth with the errors of a preset.
 
     Args:
-        preset: Of `noise_presets`.
+        preset: Name of a preset of `noise_presets`.
         options: Parameters of `NoiseConfig`, over the preset's.
 
     Raises:
@@ -61,9 +61,9 @@ def noisy_perception(preset: str = "yolo-world-like", **options: Any) -> "NoisyP
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """What is said of the objects of a view, by their number in the ground truth's detections."""
+    """Decisions about the objects of a view, by their number in the ground truth's detections."""
 
-    is_kept: NDArray[np.bool_]
+    is_reported: NDArray[np.bool_]
     labels: list[str]
     true_labels: list[str]
     confidences: F64
@@ -84,7 +84,7 @@ class NoisyPerception:
     """Draws of objects that last for the stage, by id."""
 
     def __post_init__(self) -> None:
-        """Reads the confusion matrix.
+        """Read the confusion matrix.
 
         Raises:
             InvalidArgumentError: It cannot be read.
@@ -98,13 +98,13 @@ class NoisyPerception:
         return False
 
     def begin_stage(self, scene: StageScene) -> None:
-        """Takes the stage's objects; drift goes on."""
+        """Store the stage's objects; drift goes on."""
         self._scene = scene
         self._round = 0
         self._lasting = {}
 
     def perceive(self, frames: Sequence[Frame]) -> list[Percept]:
-        """Each frame with its errors."""
+        """Return each frame with its errors."""
         scene = self._stage()
         self._drift.move(frames[-1].pose, _core.draw_normals(scene.seed, [self._passing("drift")], num_draws=3)[0])
         percepts = [
@@ -115,7 +115,7 @@ class NoisyPerception:
         return percepts
 
     def text_feature(self, text: str) -> NDArray[np.float32] | None:
-        """Of the categories that the text names, where detections have features."""
+        """Return the feature of the categories that the text names, where detections have features."""
         return text_feature(text, self._confusion) if self.config.features else None
 
     def _stage(self) -> StageScene:
@@ -123,13 +123,13 @@ class NoisyPerception:
         return self._scene
 
     def _lasting_labels(self, *labels: str) -> list[str]:
-        """Of a stream that is the same in all views."""
+        """Return the labels of a stream that is the same in all views."""
         scene = self._stage()
         stage = str(scene.goal.stage) if self.config.persistence_scope == "stage" else ""
         return ["lasting", scene.task_id, stage, *labels]
 
     def _passing(self, *labels: str) -> list[str]:
-        """Of a stream that is the round's own."""
+        """Return the labels of a stream of this round alone."""
         scene = self._stage()
         return ["passing", scene.task_id, str(scene.goal.stage), str(self._round), *labels]
 
@@ -145,7 +145,7 @@ class NoisyPerception:
         return math.sqrt(share) * lasting + math.sqrt(1.0 - share) * fresh
 
     def _detect(self, frame: Frame, view: str) -> Detections:
-        """Detections of a view, numbered by their first pixel."""
+        """Return the detections of a view, numbered by their first pixel."""
         objects = self._stage().objects
         truth, instances = _GROUND_TRUTH.number(frame, objects)
         bodies = [objects[index] for index in instances]
@@ -178,7 +178,7 @@ class NoisyPerception:
         )
 
     def _found(self, view: str, bodies: Sequence[SceneObject], outlines: F64, areas: F64) -> _Found:
-        """Which objects are found, as what, and how surely."""
+        """Decide which objects are found, with which label, and with what confidence."""
         config = self.config
         draws = self._draws(view, [body.id for body in bodies])
         shares = _shares(draws)
@@ -199,8 +199,8 @@ class NoisyPerception:
         ]
         medians = np.where(is_confused, config.false_confidence, config.confidence)
         confidences = _confidences(medians, quality, draws[:, _CONFIDENCE], config)
-        is_kept = is_found & (confidences >= config.confidence_threshold)
-        return _Found(is_kept, labels, true_labels, confidences, draws)
+        is_reported = is_found & (confidences >= config.confidence_threshold)
+        return _Found(is_reported, labels, true_labels, confidences, draws)
 
     def _masks(
         self,
@@ -213,10 +213,10 @@ class NoisyPerception:
     ) -> NDArray[np.int32]:
         """Masks with their errors; parts of split ones are added to `sources`, which tells whose each is."""
         config = self.config
-        numbers = np.where(found.is_kept, np.arange(len(bodies)), -1)
+        numbers = np.where(found.is_reported, np.arange(len(bodies)), -1)
         shares = _shares(found.draws)
         _, left, top, right, bottom = extents.T
-        sides = config.box_jitter * found.draws[:, _SIDES : _SIDES + 4]
+        edge_shifts = config.box_jitter * found.draws[:, _EDGES : _EDGES + 4]
         wide, high = right - left, bottom - top
         changes = np.empty((len(bodies), 8), np.int32)
         changes[:, 0] = changes[:, 1] = numbers
@@ -224,13 +224,13 @@ class NoisyPerception:
         changes[:, 2] = is_wide
         at = 0.3 + 0.4 * shares[:, _WHERE]
         changes[:, 3] = np.where(is_wide, left + at * wide, top + at * high).astype(np.int32)
-        for number in np.flatnonzero(found.is_kept & (shares[:, _SPLIT] < config.split_rate)).tolist():
+        for number in np.flatnonzero(found.is_reported & (shares[:, _SPLIT] < config.split_rate)).tolist():
             changes[number, 1] = len(sources)
             sources.append(number)
         margins = config.mask_margin_px + config.mask_margin_spread_px * found.draws[:, _MARGIN]
         margins = np.clip(margins * truth.shape[0] / _REFERENCE_HEIGHT_PX, -32.0, 32.0)
         # Sides that move outwards cut nothing, not even what the mask gains.
-        edges = zip((top, left, bottom, right), (high, wide, high, wide), (1, 1, -1, -1), sides.T, strict=True)
+        edges = zip((top, left, bottom, right), (high, wide, high, wide), (1, 1, -1, -1), edge_shifts.T, strict=True)
         for column, (edge, length, inwards, moved) in enumerate(edges, 4):
             cut = np.clip(moved, 0.0, 0.45) * length
             outside = 0 if inwards > 0 else np.iinfo(np.int32).max
@@ -247,11 +247,11 @@ class NoisyPerception:
         view: str,
         bodies: Sequence[SceneObject],
     ) -> None:
-        """Gives some masks side by side with the same label one number."""
+        """Give one number to some masks that lie side by side with the same label."""
         pairs = [
             (a, b)
             for a, b in _beside(truth)
-            if found.is_kept[a] and found.is_kept[b] and found.labels[a] == found.labels[b]
+            if found.is_reported[a] and found.is_reported[b] and found.labels[a] == found.labels[b]
         ]
         ids = [sorted((bodies[a].id, bodies[b].id)) for a, b in pairs]
         seed, share = self._stage().seed, self.config.persistence
@@ -291,19 +291,21 @@ class NoisyPerception:
         pixels, (depth_m, _, what, size, how) = pixels[is_seen], values[is_seen].T
         medians = np.full(len(pixels), config.false_confidence)
         confidences = _confidences(medians, np.ones(len(pixels)), how, config)
-        kept = confidences >= config.confidence_threshold
+        is_sure = confidences >= config.confidence_threshold
         # Between half and twice the median.
         radii_px = config.false_positive_radius_m * 2.0 ** (2.0 * size - 1.0) * frame.intrinsics.focal_px / depth_m
-        numbers = first + np.arange(int(kept.sum()))
+        numbers = first + np.arange(int(is_sure.sum()))
         _core.paint_blobs(
             masks,
             frame.instances,
-            np.column_stack([pixels[kept], numbers]).astype(np.int64),
-            np.repeat(np.maximum(radii_px[kept], 1.0)[:, None], 2, axis=1),
+            np.column_stack([pixels[is_sure], numbers]).astype(np.int64),
+            np.repeat(np.maximum(radii_px[is_sure], 1.0)[:, None], 2, axis=1),
         )
-        labels = [self._confusion.frequent(share) for share in what[kept].tolist()]
-        names = [(f"{share:.17g}", f"{row},{col}") for share, (row, col) in zip(what[kept], pixels[kept], strict=True)]
-        return list(zip(labels, confidences[kept].tolist(), names, strict=True))
+        labels = [self._confusion.frequent(share) for share in what[is_sure].tolist()]
+        names = [
+            (f"{share:.17g}", f"{row},{col}") for share, (row, col) in zip(what[is_sure], pixels[is_sure], strict=True)
+        ]
+        return list(zip(labels, confidences[is_sure].tolist(), names, strict=True))
 
     def _features(
         self,
@@ -315,8 +317,8 @@ class NoisyPerception:
         labels: Sequence[str],
     ) -> NDArray[np.float32]:
         """`(N, D)` features: of objects, parts of objects and what is not there."""
-        looks = [tuple(dict.fromkeys((found.true_labels[n], found.labels[n]))) for n in sources]
-        looks += [(label,) for label in labels[len(sources) :]]
+        label_sets = [tuple(dict.fromkeys((found.true_labels[n], found.labels[n]))) for n in sources]
+        label_sets += [(label,) for label in labels[len(sources) :]]
         task_id = self._stage().task_id
         things = [["feature", "object", task_id, bodies[n].id] for n in sources]
         things += [["feature", "place", task_id, lasting] for lasting, _ in places]
@@ -325,8 +327,8 @@ class NoisyPerception:
         of_things = _core.draw_normals(0, things, num_draws=DIMENSIONS - 2)
         of_views = _core.draw_normals(self._stage().seed, views, num_draws=DIMENSIONS - 2)
         rows = [
-            image_feature(look, self._confusion, thing, one, self.config.feature_noise)
-            for look, thing, one in zip(looks, of_things, of_views, strict=True)
+            image_feature(label_set, self._confusion, thing, one, self.config.feature_noise)
+            for label_set, thing, one in zip(label_sets, of_things, of_views, strict=True)
         ]
         return np.array(rows, np.float32).reshape(-1, DIMENSIONS)
 
@@ -347,7 +349,7 @@ class NoisyPerception:
 
 
 def _shares(normals: F64) -> F64:
-    """Standard normals as uniform numbers in 0..1."""
+    """Return standard normals as uniform numbers in 0..1."""
     flat = [0.5 * math.erfc(-value / math.sqrt(2.0)) for value in normals.ravel().tolist()]
     return np.array(flat).reshape(normals.shape)
 

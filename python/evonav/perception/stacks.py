@@ -1,4 +1,4 @@
-"""Which models, filters and words make up each stack of predicted perception."""
+"""Put together the models, filters and words of each stack of predicted perception."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -46,13 +46,13 @@ class StackConfig:
     vocabulary: str | None = None
     """`procthor` (default), `scannet200`, or words with semicolons between them; unigoal has its own."""
     min_confidence: float | None = None
-    """Of detections that are kept; 3d-mem 0.4, transformers 0.3, unigoal 0.5 (Mask R-CNN) and 0.3 (Grounding DINO)."""
+    """Least confidence of detections; 3d-mem 0.4, transformers 0.3, unigoal 0.5 (Mask R-CNN), 0.3 (Grounding DINO)."""
     detector: str | None = None
     """Weights of the detector: 3d-mem yolov8x-world.pt, transformers google/owlv2-base-patch16-ensemble."""
     sam: str | None = None
     """Weights of SAM: 3d-mem sam_l.pt, transformers facebook/sam-vit-large, unigoal facebook/sam-vit-huge."""
     min_mask_score: float | None = None
-    """Of SAM's masks that are kept; unigoal 0.95, the others keep all."""
+    """Least score of SAM's masks; unigoal 0.95, the others accept all."""
     swapped_colours: bool = False
     """3d-mem: show detector and SAM red as blue and blue as red, as 3D-Mem's released code does."""
 
@@ -90,24 +90,24 @@ class StackConfig:
         return cls(**options)
 
     @property
-    def words(self) -> tuple[str, ...]:
-        """What an open-vocabulary detector looks for."""
+    def phrases(self) -> tuple[str, ...]:
+        """Words that an open-vocabulary detector looks for."""
         name = self.vocabulary or "procthor"
-        for known_name, words in VOCABULARIES.items():
+        for known_name, phrases in VOCABULARIES.items():
             if name == known_name:
-                return words
-        words = tuple(dict.fromkeys(word.strip().lower() for word in name.split(";") if word.strip()))
-        if not words or (len(words) == 1 and name in (*STACKS, "coco", "scannet")):
+                return phrases
+        phrases = tuple(dict.fromkeys(word.strip().lower() for word in name.split(";") if word.strip()))
+        if not phrases or (len(phrases) == 1 and name in (*STACKS, "coco", "scannet")):
             raise InvalidArgumentError(
                 f"predicted perception: no vocabulary {name!r}; there are {', '.join(VOCABULARIES)}, or words with "
                 "semicolons between them"
             )
-        return words
+        return phrases
 
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What a stack is made of, loaded."""
+    """Loaded parts of a stack."""
 
     detector: Detector
     filters: FilterConfig
@@ -124,7 +124,7 @@ class JointDetector:
     graph_filters: FilterConfig = UNIGOAL_GRAPH
 
     def detect(self, views: Sequence[DetectorView]) -> list[Found]:
-        """What both find; of what both found, the map's word stands, which every table has a graph's word for."""
+        """Join the detections of both; of a thing that both found, take the map's word, which every table knows."""
         firsts = self.network.detect([view.rgb for view in views], _COCO, self.min_confidence)
         seconds = self.grounded.detect(views)
         return [
@@ -140,17 +140,17 @@ class SwappedColours:
     detector: Detector
 
     def detect(self, views: Sequence[DetectorView]) -> Sequence[Found]:
-        """What it finds so."""
+        """Detect objects in the swapped colours."""
         return self.detector.detect([replace(view, rgb=view.rgb[..., ::-1]) for view in views])
 
 
 def stack_of(agent: str) -> StackName:
-    """The stack that `auto` means for an agent."""
+    """Return the stack that `auto` means for an agent."""
     return "unigoal" if agent.startswith("unigoal") else "3d-mem"
 
 
 def weights_of(stack: StackName, config: StackConfig) -> dict[str, Weights]:
-    """What a stack loads, by part.
+    """Return the weights that a stack loads, by part.
 
     Raises:
         PerceptionError: An option names weights that are not known.
@@ -197,13 +197,13 @@ def modules_of(stack: StackName) -> tuple[str, ...]:
 
 
 def facts_of(stack: StackName, config: StackConfig, models: str | None) -> dict[str, Any]:
-    """What decides a stack's results beside its options: hashes of its weights and versions of its libraries.
+    """Return what decides a stack's results beside its options: hashes of weights and versions of libraries.
 
     Raises:
         PerceptionError: A library or a file is missing, or a file is not what it should be.
         InvalidArgumentError: An option makes no sense.
     """
-    config.words  # noqa: B018 - may raise
+    config.phrases  # noqa: B018 - may raise
     folder = models_folder(models)
     weights = list(weights_of(stack, config).values())
     versions = libraries.versions_of(modules_of(stack), "yolo" if stack == "3d-mem" else "torch")
@@ -213,7 +213,7 @@ def facts_of(stack: StackName, config: StackConfig, models: str | None) -> dict[
 
 
 def load_stack(stack: StackName, config: StackConfig, models: str | None, device: str) -> Parts:
-    """A stack's models; what another stack or episode of this process has loaded is not loaded again.
+    """Load a stack's models; a model that this process has loaded before is not loaded again.
 
     Args:
         stack: Its name.
@@ -225,7 +225,7 @@ def load_stack(stack: StackName, config: StackConfig, models: str | None, device
         PerceptionError: A library, a file or the device is missing, or a file cannot be loaded.
         InvalidArgumentError: An option makes no sense.
     """
-    words = config.words
+    phrases = config.phrases
     folder = models_folder(models)
     paths = {part: str(located(one, folder)) for part, one in weights_of(stack, config).items()}
     on = libraries.device_of(device)
@@ -237,7 +237,7 @@ def load_stack(stack: StackName, config: StackConfig, models: str | None, device
         detector: Detector = PromptedDetector(
             ultralytics_models.load_yolo_world(paths["detector"], paths["text"], on),
             ultralytics_models.load_ultralytics_sam(paths["sam"], on),
-            words,
+            phrases,
             min_confidence,
             _either(min_score, -math.inf),
         )
@@ -253,7 +253,7 @@ def load_stack(stack: StackName, config: StackConfig, models: str | None, device
         detector = PromptedDetector(
             transformers_models.load_owlv2(paths["detector"], on),
             masker,
-            words,
+            phrases,
             min_confidence,
             _either(min_score, -math.inf),
         )

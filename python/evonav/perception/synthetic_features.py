@@ -20,9 +20,9 @@ DIMENSIONS = 64
 IMAGES, CATEGORY, OBJECT, VIEW = 0.53, 0.22, 0.10, 0.15
 """Shares of an image feature's squared length; they add up to 1."""
 GROUP = 0.5
-"""Of a category's part, what it has in common with similar ones."""
+"""Share of a category's part that it has in common with similar ones."""
 TEXTS, NOUNS = 0.86, 0.03
-"""The same of a text; the rest is the text's own."""
+"""Shares of a text feature's squared length; the rest is the text's own."""
 GAP = 0.28
 """Cosine of the parts that all images and all texts share."""
 OTHER_NOUN = 0.35
@@ -41,8 +41,8 @@ def image_feature(labels: tuple[str, ...], confusion: Confusion, thing: F64, vie
         view: `(62,)` normals of the view.
         noise: Scale of the view's share.
     """
-    looks = _unit(np.sum([_category(label, confusion.group_of.get(label, -1)) for label in labels], axis=0))
-    parts = [(CATEGORY, looks), (OBJECT, _unit(thing)), (VIEW * noise, _unit(view))]
+    category_part = _unit(np.sum([_category(label, confusion.group_of.get(label, -1)) for label in labels], axis=0))
+    parts = [(CATEGORY, category_part), (OBJECT, _unit(thing)), (VIEW * noise, _unit(view))]
     meaning = sum((np.sqrt(share) * part for share, part in parts), np.zeros(DIMENSIONS - 2))
     return _unit(np.array([np.sqrt(IMAGES), 0.0, *meaning]))
 
@@ -83,7 +83,7 @@ def _category(label: str, group: int) -> F64:
 
 
 def _normals(*labels: str) -> F64:
-    """The same for all runs, as a model's weights are."""
+    """Draw normals that are the same for all runs, as a model's weights are."""
     (drawn,) = _core.draw_normals(0, [["feature", *labels]], num_draws=DIMENSIONS - 2)
     return np.asarray(drawn, np.float64)
 

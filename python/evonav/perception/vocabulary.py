@@ -1,4 +1,4 @@
-"""What detectors are asked for, and what their words mean in ProcTHOR's types."""
+"""List the words that detectors look for, and what they mean in ProcTHOR's types."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -10,11 +10,11 @@ from evonav.tasks.vocabulary import MAP_CATEGORIES
 VocabularyName = Literal["procthor", "scannet200", "coco-unigoal", "dino-unigoal"]
 
 
-def _words(text: str) -> tuple[str, ...]:
+def _split_phrases(text: str) -> tuple[str, ...]:
     return tuple(" ".join(word.split()) for word in text.split(";"))
 
 
-PROCTHOR_TYPES = _words(
+PROCTHOR_TYPES = _split_phrases(
     """
     AlarmClock; AluminumFoil; Apple; ArmChair; BaseballBat; BasketBall; Bed; Blinds; Book; Boots; Bottle; Bowl;
     Box; Bread; ButterKnife; CD; Candle; Cart; CellPhone; Chair; Cloth; ClothesDryer; CoffeeMachine;
@@ -34,7 +34,7 @@ PROCTHOR_TYPES = _words(
 PROCTHOR_NOUNS = tuple(noun_of(kind) for kind in PROCTHOR_TYPES)
 """Their names in words: what an open-vocabulary detector is asked for if nothing else is said."""
 
-SCANNET200 = _words(
+SCANNET200 = _split_phrases(
     """
     wall; chair; floor; table; door; couch; cabinet; shelf; desk; office chair; bed; pillow; sink; picture;
     window; toilet; bookshelf; monitor; curtain; book; armchair; coffee table; box; refrigerator; lamp; kitchen
@@ -64,7 +64,7 @@ SCANNET200 = _words(
 COCO_UNIGOAL = MAP_CATEGORIES
 """UniGoal's 15 of COCO's, in its words."""
 
-DINO_UNIGOAL = _words(
+DINO_UNIGOAL = _split_phrases(
     "table; tv; chair; cabinet; sofa; bed; windows; kitchen; bedroom; living room; mirror; plant; curtain; painting;"
     "picture"
 )
@@ -114,8 +114,8 @@ _TYPE_OF_NOUN = {canonical(kind): kind for kind in PROCTHOR_TYPES}
 
 TYPE_OF_WORD: Mapping[str, str] = {
     word: kind
-    for words in (*VOCABULARIES.values(), PROCTHOR_TYPES)
-    for word in words
+    for phrases in (*VOCABULARIES.values(), PROCTHOR_TYPES)
+    for word in phrases
     if (kind := type_of_word(word)) is not None
 }
 """Type by word, for the words of all lists and the types themselves."""

@@ -35,15 +35,15 @@ class WeightFile:
     """Path in a folder of models: of a release, the file; of Hugging Face, ORGANISATION/REPOSITORY/FILE."""
     licence: str
     size_mb: int = 0
-    """About; 0 for a file of text."""
+    """Approximate size; 0 for a text file."""
     sha256: str = ""
-    """As published, or its beginning where that is all that is; empty: unknown until the first use."""
+    """Published digest, or its published beginning; empty: unknown until the first use."""
     url: str = ""
-    """Of a release's file; empty: on Hugging Face."""
+    """Address of a release's file; empty: on Hugging Face."""
 
     @property
     def source(self) -> str:
-        """Where it is to be had."""
+        """The address to fetch the file from."""
         if self.url:
             return self.url
         repository, _, file = self.name.rpartition("/")
@@ -52,10 +52,10 @@ class WeightFile:
 
 @dataclass(frozen=True, slots=True)
 class Weights:
-    """What one model is loaded from: a file, or the files of a repository."""
+    """Weights of one model: a file, or the files of a repository."""
 
     name: str
-    """As options name it."""
+    """Name in options."""
     files: tuple[WeightFile, ...] = field(repr=False)
 
 
@@ -101,11 +101,11 @@ _CATALOGUE = (
     replace(_repository(_LAION, 605, "MIT", *_TOKENIZER), name=f"{_LAION} for transformers"),
 )
 CATALOGUE: dict[str, Weights] = {weights.name: weights for weights in _CATALOGUE}
-"""By name. Sizes are to the nearest few MB and are never compared."""
+"""Weights by name. Sizes are to the nearest few MB and are never compared."""
 
 
 def models_folder(models: str | None) -> Path | None:
-    """The folder that was named, by option or variable.
+    """Return the folder that an option or a variable names.
 
     Raises:
         PerceptionError: It is no folder.
@@ -132,10 +132,10 @@ def known(name: str) -> Weights:
 
 
 def located(weights: Weights, folder: Path | None) -> Path:
-    """Where weights are; those that are nowhere are fetched if no folder was named.
+    """Locate weights; missing ones are fetched if no folder was named.
 
     Args:
-        weights: Of a model.
+        weights: Weights of a model.
         folder: See `models_folder`.
 
     Returns:
@@ -152,7 +152,7 @@ def fingerprint(weights: Weights, folder: Path | None) -> dict[str, str]:
     """SHA-256 of each file, checked.
 
     Args:
-        weights: Of a model.
+        weights: Weights of a model.
         folder: See `models_folder`.
 
     Raises:
@@ -162,37 +162,37 @@ def fingerprint(weights: Weights, folder: Path | None) -> dict[str, str]:
 
 
 def check_folder(weights: Sequence[Weights], folder: Path) -> None:
-    """Looks for all files at once, so that those that are missing can be got at once.
+    """Check all files at once, so that the missing ones can be fetched at once.
 
     Args:
-        weights: Of the models of a stack.
-        folder: That was named.
+        weights: Weights of the models of a stack.
+        folder: Folder that was named.
 
     Raises:
         PerceptionError: Some are missing; each is named with where it is to be had.
     """
     lacking = [file for one in weights for file, path in places(one, folder) if not path.is_file()]
     if lacking:
-        told = "; ".join(f"{file.name} from {file.source}" for file in lacking)
+        missing = "; ".join(f"{file.name} from {file.source}" for file in lacking)
         size_mb = sum(file.size_mb for file in lacking)
         raise PerceptionError(
             f"{folder} lacks {len(lacking)} of the models' files (about {size_mb} MB): put them there by these names, "
-            f"or leave --models and {MODELS_VARIABLE} out to have them fetched: {told}"
+            f"or leave --models and {MODELS_VARIABLE} out to have them fetched: {missing}"
         )
 
 
 def places(weights: Weights, folder: Path | None) -> list[tuple[WeightFile, Path]]:
-    """Where each file is, or would be; nothing is fetched.
+    """Return the place of each file, whether it exists or not; nothing is fetched.
 
     Args:
-        weights: Of a model.
+        weights: Weights of a model.
         folder: See `models_folder`.
     """
     return [(file, _path_of(file, folder)) for file in weights.files]
 
 
 def _path_of(file: WeightFile, folder: Path | None) -> Path:
-    """Where a file is, or would be."""
+    """Return the place of a file, whether it exists or not."""
     if folder is not None:
         return folder / file.name
     if file.url:
@@ -207,7 +207,7 @@ def _path_of(file: WeightFile, folder: Path | None) -> Path:
 
 
 def own_folder() -> Path:
-    """Where files of releases go, and the lock file of all that is in no folder of the user's."""
+    """Return the folder of releases' files, and of the lock file for all that is not in a folder of the user's."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "evonav" / "models"
 
 
@@ -253,9 +253,9 @@ def _fetched(file: WeightFile, path: Path) -> Path:
     except ImportError as error:
         raise PerceptionError(f"{file.name} cannot be fetched: pip install 'evonav[torch]' ({error})") from None
     except Exception as error:  # of several clients, each with errors of its own
-        said = " ".join(str(error).split())[:300]
+        cause = " ".join(str(error).split())[:300]
         raise PerceptionError(
-            f"{file.name} could not be fetched from {file.source} ({type(error).__name__}: {said}): try again, or put "
+            f"{file.name} could not be fetched from {file.source} ({type(error).__name__}: {cause}): try again, or put "
             "it in a folder and name that with --models"
         ) from error
     return path
@@ -298,7 +298,7 @@ def _read_lock(lock: Path) -> dict[str, dict[str, object]]:
 
 
 def _write_lock(lock: Path, entries: dict[str, dict[str, object]]) -> None:
-    """Of a folder that may not be written to, hashes are computed each time and never compared with earlier ones."""
+    """Write the lock file; in a folder that is not writable, hashes are computed each time and never compared."""
     try:
         lock.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(lock, json.dumps(entries, indent=1, sort_keys=True) + "\n")

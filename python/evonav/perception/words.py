@@ -21,9 +21,9 @@ GROUND_TRUTH = "evonav.perception.ground_truth:GroundTruthPerception"
 NOISY = "evonav.perception.simulated:noisy_perception"
 PREDICTED = "evonav.perception.predicted:predicted_perception"
 STACKS = ("auto", "3d-mem", "unigoal", "transformers", "mini")
-"""Of models; `auto`: UniGoal its own, all others 3D-Mem's."""
+"""Stacks of models; `auto`: UniGoal's for UniGoal, 3D-Mem's for all others."""
 _HOST_OPTIONS = ("models", "device")
-"""Of models: where their weights lie and what they compute on, which depends on this machine."""
+"""Options that depend on this machine: where models' weights lie and what they compute on."""
 NAMES = ("gt", "noisy", "predicted")
 GRAMMAR = "gt, noisy[:PRESET][,KEY=VALUE...], predicted[:STACK][,KEY=VALUE...] or module:function"
 
@@ -62,7 +62,7 @@ def read_word(word: str, options: Mapping[str, Any] | None = None) -> "Component
 
 
 def word_of(make: str, options: Mapping[str, Any]) -> str:
-    """The word for a perception of a run's records: the reverse of `read_word`."""
+    """Return the word for a perception of a run's records: the reverse of `read_word`."""
     left = dict(options)
     head = {GROUND_TRUTH: "gt", NOISY: "noisy", PREDICTED: "predicted"}.get(make, make)
     variant = left.pop("preset", None) if make == NOISY else left.pop("stack", None) if make == PREDICTED else None

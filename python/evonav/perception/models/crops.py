@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 PADDING_PX = 20.0
-"""Around a box, in 3D-Mem's images of 1280x1280; it is scaled with the image."""
+"""Margin around a box, in 3D-Mem's images of 1280x1280; it is scaled with the image."""
 _REFERENCE_PX = 1280.0
 
 
 def padded_crops(image: NDArray[np.uint8], boxes_px: NDArray[np.float32]) -> list[NDArray[np.uint8]]:
-    """What is in boxes and a little around them, never less than a pixel.
+    """Cut out boxes and a little around them, never less than a pixel.
 
     Args:
         image: `(H, W, 3)`.

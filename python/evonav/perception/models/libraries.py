@@ -20,7 +20,7 @@ _PACKAGES = {"open_clip": "open_clip_torch"}
 
 
 def imported(module: str) -> Any:  # noqa: ANN401 - a module
-    """A module of an extra.
+    """Import a module of an extra.
 
     Raises:
         PerceptionError: It is not installed, or does not import.
@@ -37,16 +37,16 @@ def imported(module: str) -> Any:  # noqa: ANN401 - a module
         return import_module(module)
     except (ImportError, OSError, RuntimeError) as error:  # a library of CUDA's or an operator may be what is missing
         extra = EXTRA_OF[module.partition(".")[0]]
-        said = " ".join(str(error).split())[:200]
-        raise PerceptionError(f"predicted perception needs {module}: pip install 'evonav[{extra}]' ({said})") from None
+        cause = " ".join(str(error).split())[:200]
+        raise PerceptionError(f"predicted perception needs {module}: pip install 'evonav[{extra}]' ({cause})") from None
 
 
 def versions_of(modules: tuple[str, ...], extra: str) -> dict[str, str]:
     """Version by package, without importing any.
 
     Args:
-        modules: Of `EXTRA_OF`.
-        extra: That brings them all.
+        modules: Modules of `EXTRA_OF`.
+        extra: Extra that installs them all.
 
     Raises:
         PerceptionError: One is not installed.
@@ -64,7 +64,7 @@ def versions_of(modules: tuple[str, ...], extra: str) -> dict[str, str]:
 
 
 def device_of(word: str) -> str:
-    """The device that a word names: `cpu`, `cuda`, `cuda:1`; `auto` is the GPU, if there is one.
+    """Return the device that a word names: `cpu`, `cuda`, `cuda:1`; `auto` is the GPU, if there is one.
 
     Raises:
         PerceptionError: There is no such device.
@@ -82,7 +82,7 @@ def device_of(word: str) -> str:
 
 
 def make_repeatable() -> None:
-    """The same input, the same output, as far as PyTorch can: no choice of kernels by speed, no rounding to 19 bits."""
+    """Make results reproducible, as far as PyTorch can: no choice of kernels by speed, no rounding to 19 bits."""
     torch = imported("torch")
     torch.backends.cudnn.benchmark = False
     torch.backends.cudnn.deterministic = True

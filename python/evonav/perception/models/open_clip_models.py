@@ -19,13 +19,13 @@ class OpenClip:
     """An `Embedder`."""
 
     def __init__(self, model: Any, preprocess: Any, tokenizer: Any, device: str) -> None:  # noqa: ANN401 - of open_clip
-        """An embedder.
+        """Make an embedder.
 
         Args:
-            model: Of `open_clip`.
-            preprocess: From an image of PIL to the model's input.
-            tokenizer: Of the model.
-            device: To compute on.
+            model: Model of `open_clip`.
+            preprocess: Function from an image of PIL to the model's input.
+            tokenizer: Tokenizer of the model.
+            device: Device to compute on.
         """
         self._model = model
         self._preprocess = preprocess
@@ -36,7 +36,7 @@ class OpenClip:
     def image_features(
         self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]
     ) -> list[NDArray[np.float32]]:
-        """Unit features of padded crops, all images' in batches of 64."""
+        """Return unit features of padded crops, all images' in batches of 64."""
         torch = imported("torch")
         pil = imported("PIL.Image")
         crops = [
@@ -74,12 +74,12 @@ class OpenClip:
 
 @cache
 def load_open_clip(architecture: str, path: str, device: str) -> OpenClip:
-    """The model of a file, once a process.
+    """Return the model of a file, loaded once a process.
 
     Args:
-        architecture: As open_clip names it.
-        path: Of its weights; empty: random ones.
-        device: To compute on.
+        architecture: Architecture, as open_clip names it.
+        path: File of its weights; empty: random ones.
+        device: Device to compute on.
 
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.
@@ -92,9 +92,9 @@ def load_open_clip(architecture: str, path: str, device: str) -> OpenClip:
         )
         tokenizer = open_clip.get_tokenizer(architecture)
     except Exception as error:
-        said = " ".join(str(error).split())[:200]
+        reason = " ".join(str(error).split())[:200]
         raise PerceptionError(
-            f"{path or architecture}: cannot be loaded as {architecture} ({type(error).__name__}: {said}); get the "
+            f"{path or architecture}: cannot be loaded as {architecture} ({type(error).__name__}: {reason}); get the "
             "file again"
         ) from error
     return OpenClip(model.eval(), preprocess, tokenizer, device)

@@ -12,7 +12,7 @@ from evonav.perception.detector import DetectorView, Found, nothing_found
 
 @dataclass(frozen=True, slots=True)
 class Boxes:
-    """What was found in one image, without masks."""
+    """Boxes in one image, without masks."""
 
     boxes_px: NDArray[np.float32]
     """`(N, 4)` left, top, right, bottom."""
@@ -34,8 +34,8 @@ class Masks:
 class BoxFinder(Protocol):
     """Finds what words name."""
 
-    def find(self, images: Sequence[NDArray[np.uint8]], words: tuple[str, ...], min_confidence: float) -> list[Boxes]:
-        """Boxes of each `(H, W, 3)` RGB image; labels are among `words`, or phrases of them."""
+    def find(self, images: Sequence[NDArray[np.uint8]], phrases: tuple[str, ...], min_confidence: float) -> list[Boxes]:
+        """Boxes of each `(H, W, 3)` RGB image; labels are among `phrases`, or phrases of them."""
         ...
 
 
@@ -43,7 +43,7 @@ class MaskMaker(Protocol):
     """Outlines what is in boxes."""
 
     def outline(self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]) -> list[Masks]:
-        """As many masks as boxes `(N, 4)`, in their order, for each `(H, W, 3)` RGB image."""
+        """Return as many masks as boxes `(N, 4)`, in their order, for each `(H, W, 3)` RGB image."""
         ...
 
 
@@ -53,7 +53,7 @@ class PromptedDetector:
 
     finder: BoxFinder
     masker: MaskMaker
-    words: tuple[str, ...]
+    phrases: tuple[str, ...]
     min_confidence: float
     """Boxes below it get no mask."""
     min_mask_score: float = 0.0
@@ -62,7 +62,7 @@ class PromptedDetector:
     def detect(self, views: Sequence[DetectorView]) -> list[Found]:
         """Boxes and masks of all views as one batch; depth is not looked at."""
         images = [view.rgb for view in views]
-        boxes = self.finder.find(images, self.words, self.min_confidence)
+        boxes = self.finder.find(images, self.phrases, self.min_confidence)
         masks = self.masker.outline(images, [one.boxes_px for one in boxes])
         return [
             self._found(some, outlined, (image.shape[0], image.shape[1]))

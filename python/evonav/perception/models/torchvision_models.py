@@ -19,26 +19,26 @@ class MaskRcnn:
     """A network for COCO's categories."""
 
     def __init__(self, model: Any, categories: Sequence[str], device: str) -> None:  # noqa: ANN401 - of torchvision
-        """A network.
+        """Make a detector of a network.
 
         Args:
-            model: Of torchvision.
-            categories: Of its labels, by number.
-            device: To compute on.
+            model: Network of torchvision.
+            categories: Names of its labels, by number.
+            device: Device to compute on.
         """
         self._model = model
         self._categories = tuple(categories)
         self._device = device
 
     def detect(
-        self, images: Sequence[NDArray[np.uint8]], words: Mapping[str, str], min_confidence: float
+        self, images: Sequence[NDArray[np.uint8]], names_of: Mapping[str, str], min_confidence: float
     ) -> list[Found]:
         """Objects of some categories, all images as one batch.
 
         Args:
             images: Each `(H, W, 3)` RGB.
-            words: What each category of interest is called.
-            min_confidence: Of a detection.
+            names_of: Word for each category of interest.
+            min_confidence: Least confidence of a detection.
         """
         torch = imported("torch")
         batch = [
@@ -47,28 +47,28 @@ class MaskRcnn:
         ]
         with torch.inference_mode():
             results = self._model(batch)
-        return [self._found(result, words, min_confidence) for result in results]
+        return [self._found(result, names_of, min_confidence) for result in results]
 
-    def _found(self, result: Mapping[str, Any], words: Mapping[str, str], min_confidence: float) -> Found:
+    def _found(self, result: Mapping[str, Any], names_of: Mapping[str, str], min_confidence: float) -> Found:
         names = [self._categories[int(index)] for index in result["labels"].cpu()]
         scores = result["scores"].float().cpu().numpy()
-        kept = [index for index, name in enumerate(names) if name in words and scores[index] >= min_confidence]
+        chosen = [index for index, name in enumerate(names) if name in names_of and scores[index] >= min_confidence]
         return Found(
-            masks=(result["masks"][kept, 0].cpu().numpy() >= _MIN_MASK),
-            boxes_px=result["boxes"][kept].float().cpu().numpy().astype(np.float32).reshape(-1, 4),
-            labels=tuple(words[names[index]] for index in kept),
-            confidences=np.clip(scores[kept], 0.0, 1.0).astype(np.float32),
+            masks=(result["masks"][chosen, 0].cpu().numpy() >= _MIN_MASK),
+            boxes_px=result["boxes"][chosen].float().cpu().numpy().astype(np.float32).reshape(-1, 4),
+            labels=tuple(names_of[names[index]] for index in chosen),
+            confidences=np.clip(scores[chosen], 0.0, 1.0).astype(np.float32),
         )
 
 
 @cache
 def load_mask_rcnn(path: str, device: str, min_score: float = 0.05) -> MaskRcnn:
-    """The network of a file, once a process.
+    """Return the network of a file, loaded once a process.
 
     Args:
-        path: Of its weights; empty: random ones.
-        device: To compute on.
-        min_score: Below it the network itself drops what it finds.
+        path: File of its weights; empty: random ones.
+        device: Device to compute on.
+        min_score: Limit below which the network itself drops detections.
 
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.
@@ -80,9 +80,9 @@ def load_mask_rcnn(path: str, device: str, min_score: float = 0.05) -> MaskRcnn:
         try:
             model.load_state_dict(torch.load(path, map_location="cpu", weights_only=True))
         except Exception as error:  # of pickle, of zip files, of shapes
-            said = " ".join(str(error).split())[:200]
+            reason = " ".join(str(error).split())[:200]
             raise PerceptionError(
-                f"{path}: cannot be loaded as Mask R-CNN ({type(error).__name__}: {said}); get the file again"
+                f"{path}: cannot be loaded as Mask R-CNN ({type(error).__name__}: {reason}); get the file again"
             ) from error
     categories = detection.MaskRCNN_ResNet50_FPN_Weights.COCO_V1.meta["categories"]
     return MaskRcnn(model.eval().to(device), categories, device)

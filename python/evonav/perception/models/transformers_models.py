@@ -18,19 +18,19 @@ _Model = TypeVar("_Model")
 _BATCH = 64
 _MAX_BOXES = 100
 _NMS_IOU = 0.7
-"""As in YOLO-World: OWLv2 has a box for every patch of the image and drops none."""
+"""Largest number of boxes, as in YOLO-World: OWLv2 has a box for every patch of the image and drops none."""
 
 
 class GroundingDino:
     """Boxes for phrases, all of which go into one text: it is for short lists."""
 
     def __init__(self, model: Any, processor: Any, device: str, min_text: float = 0.25) -> None:  # noqa: ANN401
-        """A detector.
+        """Make a detector.
 
         Args:
             model: `GroundingDinoForObjectDetection`.
             processor: Its own.
-            device: To compute on.
+            device: Device to compute on.
             min_text: Score from which a word of the text belongs to a box.
         """
         self._model = model
@@ -38,10 +38,10 @@ class GroundingDino:
         self._device = device
         self._min_text = min_text
 
-    def find(self, images: Sequence[NDArray[np.uint8]], words: tuple[str, ...], min_confidence: float) -> list[Boxes]:
+    def find(self, images: Sequence[NDArray[np.uint8]], phrases: tuple[str, ...], min_confidence: float) -> list[Boxes]:
         """Boxes of all images, as one batch. A box whose phrase holds none of the words is dropped."""
         torch = imported("torch")
-        text = " ".join(f"{word.lower()}." for word in words)
+        text = " ".join(f"{word.lower()}." for word in phrases)
         inputs = self._processor(images=list(images), text=[text] * len(images), return_tensors="pt").to(self._device)
         with torch.inference_mode():
             outputs = self._model(**inputs)
@@ -53,7 +53,7 @@ class GroundingDino:
             target_sizes=[image.shape[:2] for image in images],
         )
         return [
-            _boxes(result["boxes"], [_word_in(phrase, words) for phrase in result["text_labels"]], result["scores"])
+            _boxes(result["boxes"], [_word_in(phrase, phrases) for phrase in result["text_labels"]], result["scores"])
             for result in results
         ]
 
@@ -62,24 +62,24 @@ class Owlv2:
     """Boxes for any number of words."""
 
     def __init__(self, model: Any, processor: Any, device: str) -> None:  # noqa: ANN401 - of transformers
-        """A detector.
+        """Make a detector.
 
         Args:
             model: `Owlv2ForObjectDetection`.
             processor: Its own.
-            device: To compute on.
+            device: Device to compute on.
         """
         self._model = model
         self._processor = processor
         self._device = device
         self._queries: dict[tuple[str, ...], Any] = {}
 
-    def find(self, images: Sequence[NDArray[np.uint8]], words: tuple[str, ...], min_confidence: float) -> list[Boxes]:
+    def find(self, images: Sequence[NDArray[np.uint8]], phrases: tuple[str, ...], min_confidence: float) -> list[Boxes]:
         """Boxes of all images, as one batch: the best 100 of each, none of them on a better one of its word."""
         torch, ops = imported("torch"), imported("torchvision.ops")
         pixels = self._processor(images=list(images), return_tensors="pt")["pixel_values"].to(self._device)
         with torch.inference_mode():
-            queries = self._queries_of(words).expand(len(images), -1, -1)
+            queries = self._queries_of(phrases).expand(len(images), -1, -1)
             feature_map, _ = self._model.image_embedder(pixels)
             features = feature_map.flatten(1, 2)
             logits, _ = self._model.class_predictor(features, queries)
@@ -87,42 +87,42 @@ class Owlv2:
             results = self._processor.post_process_grounded_object_detection(
                 outputs, threshold=min_confidence, target_sizes=[image.shape[:2] for image in images]
             )
-            kept = [
+            chosen = [
                 ops.batched_nms(result["boxes"].float(), result["scores"].float(), result["labels"], _NMS_IOU)
                 for result in results
             ]
         return [
             _boxes(
                 result["boxes"][rows[:_MAX_BOXES]],
-                [words[int(index)] for index in result["labels"][rows[:_MAX_BOXES]]],
+                [phrases[int(index)] for index in result["labels"][rows[:_MAX_BOXES]]],
                 result["scores"][rows[:_MAX_BOXES]],
                 image.shape[:2],
             )
-            for result, rows, image in zip(results, kept, images, strict=True)
+            for result, rows, image in zip(results, chosen, images, strict=True)
         ]
 
-    def _queries_of(self, words: tuple[str, ...]) -> Any:  # noqa: ANN401 - a tensor
+    def _queries_of(self, phrases: tuple[str, ...]) -> Any:  # noqa: ANN401 - a tensor
         """`(1, N, D)` embedded words; the same words are embedded once."""
-        if words not in self._queries:
-            prompts = [f"a photo of a {word}" for word in words]
+        if phrases not in self._queries:
+            prompts = [f"a photo of a {word}" for word in phrases]
             tokens = self._processor.tokenizer(
                 prompts, padding="max_length", max_length=16, truncation=True, return_tensors="pt"
             ).to(self._device)
             features = self._model.owlv2.get_text_features(tokens["input_ids"], tokens["attention_mask"])
-            self._queries[words] = _pooled(features)[None]
-        return self._queries[words]
+            self._queries[phrases] = _pooled(features)[None]
+        return self._queries[phrases]
 
 
 class Sam:
     """Masks from boxes."""
 
     def __init__(self, model: Any, processor: Any, device: str) -> None:  # noqa: ANN401 - of transformers
-        """A segmenter.
+        """Make a segmenter.
 
         Args:
             model: `SamModel`.
             processor: `SamImageProcessor`.
-            device: To compute on.
+            device: Device to compute on.
         """
         self._model = model
         self._processor = processor
@@ -163,13 +163,13 @@ class Clip:
     """An `Embedder`."""
 
     def __init__(self, model: Any, processor: Any, tokenizer: Any, device: str) -> None:  # noqa: ANN401
-        """An embedder.
+        """Make an embedder.
 
         Args:
             model: `CLIPModel`.
             processor: `CLIPImageProcessor`.
-            tokenizer: Of the model.
-            device: To compute on.
+            tokenizer: Processor of the model.
+            device: Device to compute on.
         """
         self._model = model
         self._processor = processor
@@ -179,7 +179,7 @@ class Clip:
     def image_features(
         self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]
     ) -> list[NDArray[np.float32]]:
-        """Unit features of padded crops, all images' in batches of 64."""
+        """Return unit features of padded crops, all images' in batches of 64."""
         torch = imported("torch")
         crops = [
             np.ascontiguousarray(crop)
@@ -211,7 +211,7 @@ class Clip:
 
 @cache
 def load_grounding_dino(path: str, device: str) -> GroundingDino:
-    """The detector of a folder, once a process.
+    """Return the detector of a folder, loaded once a process.
 
     Raises:
         PerceptionError: The library is not installed, or the folder holds no such model.
@@ -227,7 +227,7 @@ def load_grounding_dino(path: str, device: str) -> GroundingDino:
 
 @cache
 def load_owlv2(path: str, device: str) -> Owlv2:
-    """The detector of a folder, once a process.
+    """Return the detector of a folder, loaded once a process.
 
     Raises:
         PerceptionError: The library is not installed, or the folder holds no such model.
@@ -243,7 +243,7 @@ def load_owlv2(path: str, device: str) -> Owlv2:
 
 @cache
 def load_sam(path: str, device: str) -> Sam:
-    """The segmenter of a folder, once a process.
+    """Return the segmenter of a folder, loaded once a process.
 
     Raises:
         PerceptionError: The library is not installed, or the folder holds no such model.
@@ -259,7 +259,7 @@ def load_sam(path: str, device: str) -> Sam:
 
 @cache
 def load_clip(path: str, device: str) -> Clip:
-    """The embedder of a folder, once a process.
+    """Return the embedder of a folder, loaded once a process.
 
     Raises:
         PerceptionError: The library is not installed, or the folder holds no such model.
@@ -281,9 +281,9 @@ def _loaded(path: str, kind: str, load: Callable[[Any], _Model]) -> _Model:
     try:
         return load(transformers)
     except Exception as error:  # of safetensors, of JSON, of the library
-        said = " ".join(str(error).split())[:200]
+        reason = " ".join(str(error).split())[:200]
         raise PerceptionError(
-            f"{path}: cannot be loaded as {kind} ({type(error).__name__}: {said}); get its files again"
+            f"{path}: cannot be loaded as {kind} ({type(error).__name__}: {reason}); get its files again"
         ) from error
 
 
@@ -291,20 +291,20 @@ def _pooled(features: Any) -> Any:  # noqa: ANN401 - a tensor, which the library
     return getattr(features, "pooler_output", features)
 
 
-def _word_in(phrase: str, words: tuple[str, ...]) -> str | None:
-    """The word that a phrase is or holds, the longest of several."""
-    said = " ".join(phrase.lower().replace(".", " ").split())
-    held = [word for word in words if f" {word.lower()} " in f" {said} "]
-    return said if said in words else max(held, key=len, default=None)
+def _word_in(phrase: str, phrases: tuple[str, ...]) -> str | None:
+    """Return the word that a phrase is or contains, the longest of several."""
+    text = " ".join(phrase.lower().replace(".", " ").split())
+    contained = [word for word in phrases if f" {word.lower()} " in f" {text} "]
+    return text if text in phrases else max(contained, key=len, default=None)
 
 
 def _boxes(boxes: Any, labels: Sequence[str | None], scores: Any, shape: Sequence[int] | None = None) -> Boxes:  # noqa: ANN401 - tensors
-    kept = [index for index, label in enumerate(labels) if label is not None]
-    boxes_px = boxes.float().cpu().numpy().reshape(-1, 4)[kept]
+    chosen = [index for index, label in enumerate(labels) if label is not None]
+    boxes_px = boxes.float().cpu().numpy().reshape(-1, 4)[chosen]
     if shape is not None:
         boxes_px = np.clip(boxes_px, 0.0, np.array([shape[1], shape[0]] * 2, np.float32))
     return Boxes(
         boxes_px=boxes_px.astype(np.float32),
         labels=tuple(label for label in labels if label is not None),
-        confidences=scores.float().cpu().numpy().astype(np.float32)[kept],
+        confidences=scores.float().cpu().numpy().astype(np.float32)[chosen],
     )

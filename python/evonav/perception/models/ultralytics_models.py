@@ -24,29 +24,29 @@ class YoloWorld:
     """
 
     def __init__(self, model: Any, encoder: OpenClip, device: str) -> None:  # noqa: ANN401 - of ultralytics
-        """A detector.
+        """Make a detector.
 
         Args:
             model: `ultralytics.YOLOWorld`.
             encoder: OpenAI's ViT-B/32.
-            device: To compute on.
+            device: Device to compute on.
         """
         self._model = model
         self._encoder = encoder
         self._device = device
-        self._words: tuple[str, ...] | None = None
+        self._phrases: tuple[str, ...] | None = None
         self._features: dict[tuple[str, ...], Any] = {}
         self._lock = threading.Lock()
 
     def find(
         self,
         images: Sequence[NDArray[np.uint8]],
-        words: tuple[str, ...],
+        phrases: tuple[str, ...],
         min_confidence: float,
     ) -> list[Boxes]:
         """Boxes of all images, as one batch."""
         with self._lock:  # words and images go in by two calls
-            self._speak(words)
+            self._speak(phrases)
             results = self._model.predict(
                 [_bgr(image) for image in images],
                 conf=min_confidence,
@@ -54,43 +54,43 @@ class YoloWorld:
                 device=self._device,
                 verbose=False,
             )
-        return [_boxes(result.boxes, words) for result in results]
+        return [_boxes(result.boxes, phrases) for result in results]
 
-    def _speak(self, words: tuple[str, ...]) -> None:
-        """Makes the model look for other words."""
-        if words == self._words:
+    def _speak(self, phrases: tuple[str, ...]) -> None:
+        """Set the words that the model looks for."""
+        if phrases == self._phrases:
             return
-        if words not in self._features:
+        if phrases not in self._features:
             torch = imported("torch")
-            features = np.array(self._encoder.text_features(words))
-            self._features[words] = torch.from_numpy(features)[None].to(self._device)
+            features = np.array(self._encoder.text_features(phrases))
+            self._features[phrases] = torch.from_numpy(features)[None].to(self._device)
         network = self._model.model
-        network.txt_feats = self._features[words]
-        network.model[-1].nc = len(words)
-        network.names = list(words)
+        network.txt_feats = self._features[phrases]
+        network.model[-1].nc = len(phrases)
+        network.names = list(phrases)
         self._model.predictor = None  # it has the old names
-        self._words = words
+        self._phrases = phrases
 
 
 class UltralyticsSam:
     """Masks from boxes."""
 
     def __init__(self, model: Any, device: str) -> None:  # noqa: ANN401 - of ultralytics
-        """A segmenter.
+        """Make a segmenter.
 
         Args:
             model: `ultralytics.SAM`.
-            device: To compute on.
+            device: Device to compute on.
         """
         self._model = model
         self._device = device
 
     def outline(self, images: Sequence[NDArray[np.uint8]], boxes_px: Sequence[NDArray[np.float32]]) -> list[Masks]:
-        """One image after another: the library takes one set of boxes a call."""
+        """Segment one image after another: the library takes one set of boxes a call."""
         return [self._outline(image, boxes) for image, boxes in zip(images, boxes_px, strict=True)]
 
     def _outline(self, image: NDArray[np.uint8], boxes_px: NDArray[np.float32]) -> Masks:
-        """The box itself where the model makes no mask or an empty one: it drops those that it scores 0."""
+        """Take the box itself where the model makes no mask or an empty one: it drops those that it scores 0."""
         masks = box_masks(boxes_px, (image.shape[0], image.shape[1]))
         scores = np.zeros(len(boxes_px), np.float32)
         if len(boxes_px) == 0:
@@ -109,12 +109,12 @@ class UltralyticsSam:
 
 @cache
 def load_yolo_world(path: str, text_path: str, device: str) -> YoloWorld:
-    """The detector of a file, once a process.
+    """Return the detector of a file, loaded once a process.
 
     Args:
         path: `.pt`, or a `.yaml` of the library for random weights.
         text_path: Weights of OpenAI's ViT-B/32; empty: random ones.
-        device: To compute on.
+        device: Device to compute on.
 
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.
@@ -132,11 +132,11 @@ def load_yolo_world(path: str, text_path: str, device: str) -> YoloWorld:
 
 @cache
 def load_ultralytics_sam(path: str, device: str) -> UltralyticsSam:
-    """The segmenter of a file, once a process.
+    """Return the segmenter of a file, loaded once a process.
 
     Args:
         path: Its name says which SAM it is: `sam_l.pt`, `sam_b.pt`, `mobile_sam.pt`.
-        device: To compute on.
+        device: Device to compute on.
 
     Raises:
         PerceptionError: The library is not installed, or the file is no such model.
@@ -152,18 +152,18 @@ def load_ultralytics_sam(path: str, device: str) -> UltralyticsSam:
 
 
 def _unreadable(path: str, kind: str, error: Exception) -> PerceptionError:
-    said = " ".join(str(error).split())[:200]
-    return PerceptionError(f"{path}: cannot be loaded as {kind} ({type(error).__name__}: {said}); get the file again")
+    reason = " ".join(str(error).split())[:200]
+    return PerceptionError(f"{path}: cannot be loaded as {kind} ({type(error).__name__}: {reason}); get the file again")
 
 
 def _bgr(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """As the library takes arrays."""
+    """Return an image as the library takes arrays."""
     return np.ascontiguousarray(image[..., ::-1])
 
 
-def _boxes(found: Any, words: tuple[str, ...]) -> Boxes:  # noqa: ANN401 - of ultralytics
+def _boxes(found: Any, phrases: tuple[str, ...]) -> Boxes:  # noqa: ANN401 - of ultralytics
     return Boxes(
         boxes_px=found.xyxy.cpu().numpy().astype(np.float32).reshape(-1, 4),
-        labels=tuple(words[int(index)] for index in found.cls.cpu().numpy()),
+        labels=tuple(phrases[int(index)] for index in found.cls.cpu().numpy()),
         confidences=found.conf.cpu().numpy().astype(np.float32),
     )
