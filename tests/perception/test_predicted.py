@@ -206,8 +206,8 @@ def test_stacks_are_chosen_by_the_agent_and_options_are_checked() -> None:
     ]
     assert predicted_perception().needs_rgb
     assert weights_of("3d-mem", StackConfig(sam="mobile_sam.pt"))["sam"].name == "mobile_sam.pt"
-    assert StackConfig().words == PROCTHOR_NOUNS
-    assert StackConfig(vocabulary="Sofa; tv ;sofa").words == ("sofa", "tv")
+    assert StackConfig().phrases == PROCTHOR_NOUNS
+    assert StackConfig(vocabulary="Sofa; tv ;sofa").phrases == ("sofa", "tv")
     with pytest.raises(InvalidArgumentError, match="no option 'confidence'; there are vocabulary, min_confidence"):
         predicted_perception(confidence=0.5)
     with pytest.raises(InvalidArgumentError, match="min_confidence is 2"):
@@ -221,7 +221,7 @@ def test_stacks_are_chosen_by_the_agent_and_options_are_checked() -> None:
     with pytest.raises(PerceptionError, match=r"no weights 'yolo\.pt' are known; there are .*yolov8x-world\.pt"):
         weights_of("3d-mem", StackConfig(detector="yolo.pt"))
     with pytest.raises(InvalidArgumentError, match="no vocabulary 'coco'"):
-        _ = StackConfig(vocabulary="coco").words
+        _ = StackConfig(vocabulary="coco").phrases
     with pytest.raises(InvalidArgumentError, match="before it looks"):
         StackPerception("auto", StackConfig(), None, "cpu").perceive([frame()])
 
