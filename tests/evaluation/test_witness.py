@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from evonav.agents.agent import EntryBelief
-from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M, StalenessTracker, TrackedState, held_by, shows_place
+from evonav.evaluation.episode.staleness import (
+    EVIDENCE_RANGE_M,
+    StalenessTracker,
+    TrackedState,
+    matched_objects,
+    shows_place,
+)
 from evonav.evaluation.records.schema import Relocation
 from evonav.world.pose import Pose
 from evonav.world.simulator import Frame, Intrinsics, SceneObject
@@ -42,11 +48,11 @@ def witness(objects=MUGS, so_far=None, relocations=(), target="a"):
 
 def test_an_entry_stands_for_the_nearest_object_of_its_label_within_the_margin():
     bodies = {"Mug": MUGS[1:]}
-    held = held_by([belief("Mug", 0.05, 2.0), belief("Mug", 0.2, 2.0), belief("Mug", 0.0, 2.5)], bodies)
+    held = matched_objects([belief("Mug", 0.05, 2.0), belief("Mug", 0.2, 2.0), belief("Mug", 0.0, 2.5)], bodies)
     assert [one and one.id for one in held] == ["a", "b", None]
     # 0.1 m of its box and 0.3 m of margin.
-    assert held_by([belief("Mug", 0.0, 2.39)], {"Mug": MUGS[1:2]}) == [MUGS[1]]
-    assert held_by([belief("Mug", 0.0, 2.41), belief("Cup", 0.0, 2.0)], bodies) == [None, None]
+    assert matched_objects([belief("Mug", 0.0, 2.39)], {"Mug": MUGS[1:2]}) == [MUGS[1]]
+    assert matched_objects([belief("Mug", 0.0, 2.41), belief("Cup", 0.0, 2.0)], bodies) == [None, None]
 
 
 def test_objects_are_seen_from_enough_pixels_near_enough():

@@ -326,3 +326,11 @@ def test_a_run_notes_its_command_and_versions(tmp_path: Path) -> None:
         sessions = store.meta("sessions")
     assert len(sessions) == 2  # the second call had nothing to do
     assert {"command", "began", "evonav", "git", "python", "platform", "cpus", "workers"} == set(sessions[0])
+
+
+def test_a_run_is_loaded_from_its_metrics_without_parsing_traces(write_run: WriteRun) -> None:
+    run_dir = write_run()
+    outcomes = load_run(run_dir).outcomes
+    with sqlite3.connect(run_dir / "records.sqlite") as db:
+        db.execute("UPDATE stages SET record = json_set(record, '$.trace', 'no trace', '$.entries', 'no entries')")
+    assert load_run(run_dir).outcomes == outcomes

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from evonav.agents.agent import EntryBelief
-from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M, held_by
+from evonav.evaluation.episode.staleness import EVIDENCE_RANGE_M, matched_objects
 from evonav.memory.objects import ObjectMap
 from evonav.perception import Percept
 from evonav.perception_benchmark.matching import NONE, TrueObjects, main_objects
@@ -85,7 +85,7 @@ class JudgedMemory:
         """
         beliefs = self._beliefs()
         right = self._right()
-        remembered = {body.id for body in held_by(right, self._bodies()) if body is not None}
+        remembered = {body.id for body in matched_objects(right, self._bodies()) if body is not None}
         sources = {belief.entry_id: self._source(belief.entry_id) for belief in beliefs}
         there = {body.id: body for body in self._objects}
         named = [name for name in sources.values() if name]
@@ -137,5 +137,5 @@ class JudgedMemory:
     def _right(self) -> list[EntryBelief]:
         """Entries that an object of their label stands by."""
         beliefs = self._beliefs()
-        matched = held_by(beliefs, self._bodies())
+        matched = matched_objects(beliefs, self._bodies())
         return [belief for belief, body in zip(beliefs, matched, strict=True) if body is not None]

@@ -18,7 +18,8 @@ from evonav.decision.query import QueryLogEntry
 from evonav.decision.question import Question
 from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.episode.outcome import StageOutcome
-from evonav.evaluation.records.convert import STALE_MARGIN_M, distance_to_box_m, entry_record, pose_record
+from evonav.evaluation.episode.staleness import entry_record, matched_object
+from evonav.evaluation.records.convert import pose_record
 from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord
 from evonav.replay.types import (
     BLOCKED,
@@ -193,15 +194,10 @@ class Recorder:
 
     def _found(self, label: str, centre_m: tuple[float, float, float]) -> Truth | None:
         for index in reversed(range(len(self._places))):
-            near = [
-                (distance_m, math.dist(body.centre_m, centre_m), body.id)
-                for body in self._places[index].get(label, ())
-                if (distance_m := distance_to_box_m(centre_m, body)) <= STALE_MARGIN_M
-            ]
-            if near:
-                object_id = min(near)[2]
-                now = self._now.get(object_id)
-                return Truth(object_id, index + 1, None if now is None else now.centre_m)
+            body = matched_object(label, centre_m, self._places[index])
+            if body is not None:
+                now = self._now.get(body.id)
+                return Truth(body.id, index + 1, None if now is None else now.centre_m)
         return None
 
 

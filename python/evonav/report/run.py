@@ -1,22 +1,19 @@
 """A run as a report needs it: measures of all agents held at once, stages with their traces a task at a time."""
 
 import hashlib
-import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, agent_pairs, summarise
+from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import FailureRow, RunStore
 from evonav.report.maps.stage_map import success_radius_of
-from evonav.report.tables.causes import FailureCause, cause_of
+from evonav.report.tables.causes import FailureCause
 
 PAPER_ORDER = ("unigoal", "3d-mem", "msgnav", "fu", "stage-reset", "ftu")
 """Agents in the order of the paper's tables."""
@@ -138,17 +135,17 @@ def load_run(run_dir: Path) -> Run:
         agents = agents_in_order(store.meta("agents"), [agent for agent, _, _ in states])
         digests = {}
         episodes: dict[tuple[str, str], Any] = {}
+        rows = {(row.agent, row.task_id, row.stage): row for row in read_stage_metrics(store)}
         for agent in agents:
             digest = hashlib.sha256()
-            failed_before: dict[str, int] = {}
             keys = sorted(key for key in states if key[0] == agent)
-            for key, text in zip(keys, store.record_texts(agent), strict=True):
+            brief = list(store.records(agent, is_brief=True))
+            for key, text, record in zip(keys, store.record_texts(agent), brief, strict=True):
                 digest.update(text.encode())
                 digest.update(b"\n")
-                outcome = _outcome(text, run_dir, failed_before)
-                _check(run_dir, key, states[key], outcome.record, asked_stages)
-                outcomes[agent, outcome.record.task_id, outcome.record.stage] = outcome
-                episodes.setdefault((agent, outcome.record.task_id), hashlib.sha256()).update(text.encode())
+                _check(run_dir, key, states[key], record, asked_stages)
+                outcomes[key] = _outcome(record, rows[key])
+                episodes.setdefault((agent, record.task_id), hashlib.sha256()).update(text.encode())
             digests[agent] = digest.hexdigest()
         num_stages = _num_stages(asked_stages, outcomes)
         config = store.meta("config") or {}
@@ -194,28 +191,13 @@ def _check(
         raise StoreError(f"{run_dir}: stage {stage} of {task_id} by {agent} is no stage of this run")
 
 
-def _outcome(text: str, run_dir: Path, failed_before: dict[str, int]) -> StageOutcome:
-    """A stage in a line; `failed_before` counts the decisions of the tasks so far, whose counters are cumulative."""
-    try:
-        record = StageRecord.model_validate_json(text)
-    except ValidationError as error:
-        raise StoreError(f"{run_dir}: {error}") from error
-    counted = [
-        decision.counters["failed_decisions"] for decision in record.trace if "failed_decisions" in decision.counters
-    ]
-    so_far = 0 if record.memory_lost_at == record.stage else failed_before.get(record.task_id, 0)
-    failed_before[record.task_id] = max([so_far, *counted])
+def _outcome(record: StageRecord, row: StageMetrics) -> StageOutcome:
     return StageOutcome(
-        record=record.model_copy(update={"trace": (), "entries": ()}),
-        num_failed_decisions=failed_before[record.task_id] - so_far,
-        cause=cause_of(record),
-        num_stale_entries=sum(entry.is_stale for entry in record.entries),
-        stale_path_m=sum(
-            math.dist(a, b)
-            for decision in record.trace
-            if decision.chosen_entry is not None and decision.chosen_entry.is_stale
-            for a, b in pairwise(decision.path_m)
-        ),
+        record=record,
+        cause=None if row.cause is None else FailureCause(row.cause),
+        num_stale_entries=row.num_stale_entries or 0,
+        stale_path_m=row.stale_path_m,
+        num_failed_decisions=row.num_failed_decisions or 0,
     )
 
 

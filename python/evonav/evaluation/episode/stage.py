@@ -13,10 +13,10 @@ from evonav.evaluation.episode.outcome import as_errored
 from evonav.evaluation.episode.progress import StageProgress
 from evonav.evaluation.episode.sensors import Sensors, map_frame
 from evonav.evaluation.episode.spec import EpisodeSpec, GuidedWalk
-from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState
+from evonav.evaluation.episode.staleness import StalenessTracker, TrackedState, entry_record
 from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.convert import action_record, entry_record, pose_record, sensing_record
+from evonav.evaluation.records.convert import action_record, pose_record, sensing_record
 from evonav.evaluation.records.costs import Stopwatch
 from evonav.evaluation.records.schema import (
     EndState,

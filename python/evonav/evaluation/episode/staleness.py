@@ -1,8 +1,9 @@
-"""What the evaluator alone sees while an agent acts: what was in view, where memory and world part, and since when.
+"""Track which entries of an agent's memory are stale, and what the agent could have seen. It defines *stale*.
 
-An entry is *right* if an object of its label stands within `STALE_MARGIN_M` of its centre, else *stale*. An object is
-*seen* if `min_visible_px` of it are in a view taken at most `EVIDENCE_RANGE_M` from it, as far as the paper's object
-memory takes detections; what an agent could not have known is not held against it.
+An entry is *stale* unless an object of its label stands within `STALE_MARGIN_M` of its centre; then it is *right*, and
+matched to the nearest such object. An object is *seen* once at least `min_visible_px` of its pixels are in a view that
+was taken at most `EVIDENCE_RANGE_M` from it, the range of the paper's object memory. Only what was seen counts against
+an agent.
 """
 
 import math
@@ -10,28 +11,106 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.agents.agent import EntryBelief
-from evonav.evaluation.records.convert import STALE_MARGIN_M, distance_to_box_m
-from evonav.evaluation.records.schema import MemoryRecord, MovedObjectRecord, Relocation, StaleEntryRecord
+from evonav.evaluation.records.schema import (
+    EntryRecord,
+    MemoryRecord,
+    MovedObjectRecord,
+    Point3,
+    Relocation,
+    StaleEntryRecord,
+)
+from evonav.world.camera import project
 from evonav.world.simulator import Frame, SceneObject
 
+STALE_MARGIN_M = 0.3
+"""Distance from an entry's centre to the box of an object up to which the object can be the entry's."""
 EVIDENCE_RANGE_M = 3.5
-"""On the ground plane, from the camera to the middle of an object or of an entry."""
+"""Largest distance on the ground plane from the camera to an object or an entry that counts as evidence."""
 SURFACE_SLACK_M = 0.05
 
 
+def matched_object(label: str, centre_m: Point3, bodies: Mapping[str, Sequence[SceneObject]]) -> SceneObject | None:
+    """Return the object that an entry stands for; `None` for a stale entry.
+
+    Args:
+        label: The entry's label.
+        centre_m: The entry's centre, `(x, y, z)`.
+        bodies: The objects of the stage's house by category.
+
+    Returns:
+        The object of this label whose box is nearest to the centre, if it is within `STALE_MARGIN_M`. Of several at the
+        same distance, the one with the nearest centre.
+    """
+    nearest, least = None, (STALE_MARGIN_M, math.inf)
+    for body in bodies.get(label, ()):
+        distance_m = distance_to_box_m(centre_m, body)
+        if distance_m <= least[0]:
+            rank = (distance_m, math.dist(centre_m, body.centre_m))
+            if rank < least or nearest is None:
+                nearest, least = body, rank
+    return nearest
+
+
+def matched_objects(
+    beliefs: Sequence[EntryBelief], bodies: Mapping[str, Sequence[SceneObject]]
+) -> list[SceneObject | None]:
+    """Return `matched_object` of each entry."""
+    return [matched_object(belief.label, belief.centre_m, bodies) for belief in beliefs]
+
+
+def entry_record(belief: EntryBelief, bodies: Mapping[str, Sequence[SceneObject]]) -> EntryRecord:
+    """Return an entry for the record, with the evaluator's judgement whether it is stale.
+
+    Args:
+        belief: The entry as the agent believes it.
+        bodies: The objects of the stage's house by category.
+    """
+    return EntryRecord(
+        entry_id=belief.entry_id,
+        label=belief.label,
+        centre_m=belief.centre_m,
+        size_m=belief.size_m,
+        num_detections=belief.num_detections,
+        is_stale=matched_object(belief.label, belief.centre_m, bodies) is None,
+    )
+
+
+def distance_to_box_m(point_m: Point3, body: SceneObject) -> float:
+    """Return the distance from a point to the axis-aligned box of a body; 0 inside."""
+    gaps_m = (max(0.0, abs(p - c) - s / 2) for p, c, s in zip(point_m, body.centre_m, body.size_m, strict=True))
+    return math.hypot(*gaps_m)
+
+
+def shows_place(frame: Frame, belief: EntryBelief) -> bool:
+    """Return whether a view shows the centre of an entry: in the image, near enough, and not hidden.
+
+    Args:
+        frame: A view with depth.
+        belief: An entry; what stands in its own box does not hide it.
+    """
+    pose, intrinsics = frame.pose, frame.intrinsics
+    if math.hypot(belief.centre_m[0] - pose.x_m, belief.centre_m[2] - pose.z_m) > EVIDENCE_RANGE_M:
+        return False
+    ((col, row, depth_m),) = project(np.array([belief.centre_m]), pose, intrinsics).tolist()
+    # NaN, for a place behind the camera, is in no range.
+    if not (0.0 <= col < intrinsics.width_px and 0.0 <= row < intrinsics.height_px):
+        return False
+    reach_m = max(belief.size_m) / 2.0 + SURFACE_SLACK_M
+    return float(frame.depth_m[int(row), int(col)]) >= float(depth_m) - reach_m
+
+
 @dataclass(slots=True)
-class _Stale:
+class _StaleEntry:
     belief: EntryBelief
     evident_round: int | None = None
     cleared_round: int | None = None
 
 
 @dataclass(slots=True)
-class _Moved:
+class _MovedObject:
     body: SceneObject
     index: int
     seen_round: int | None = None
@@ -40,16 +119,16 @@ class _Moved:
 
 @dataclass(slots=True)
 class TrackedState:
-    """What lasts from stage to stage of an episode."""
+    """The state that is carried from stage to stage of an episode."""
 
     seen_ids: set[str] = field(default_factory=set)
     """Objects seen so far."""
     beliefs: Sequence[EntryBelief] = ()
-    """The agent's, at the end of the last stage."""
+    """The agent's entries at the end of the last stage."""
 
 
 class StalenessTracker:
-    """Of one stage."""
+    """Follows one stage: its views, and the agent's entries at the start, between rounds and at the end."""
 
     def __init__(
         self,
@@ -59,20 +138,20 @@ class StalenessTracker:
         so_far: TrackedState,
         min_visible_px: int,
     ) -> None:
-        """A witness who has seen nothing of the stage yet.
+        """Create a tracker that has seen nothing of the stage.
 
         Args:
             objects: The simulator's bodies, in instance order.
-            target_id: Of the stage.
-            relocations: Of the transition before it.
-            so_far: Of the episode; objects that come into view are added.
-            min_visible_px: Pixels from which on an object counts as in view.
+            target_id: The target of the stage.
+            relocations: The objects that the transition before the stage moved.
+            so_far: The state of the episode; objects that are seen are added.
+            min_visible_px: Number of pixels from which an object counts as in view.
         """
         self._objects = objects
         self._so_far = so_far
         self._min_visible_px = min_visible_px
         self.bodies: dict[str, list[SceneObject]] = {}
-        """By category."""
+        """The bodies by category."""
         for body in objects:
             self.bodies.setdefault(body.category, []).append(body)
         index_of = {body.id: index for index, body in enumerate(objects)}
@@ -81,24 +160,24 @@ class StalenessTracker:
         self._ground_m = np.array([(body.centre_m[0], body.centre_m[2]) for body in objects]).reshape(-1, 2)
         self._is_seen = np.array([body.id in so_far.seen_ids for body in objects], dtype=np.bool_)
         self._moved = [
-            _Moved(objects[index], index)
+            _MovedObject(objects[index], index)
             for moved in relocations
             if (index := index_of.get(moved.object_id)) is not None
             and distance_to_box_m(moved.from_m, objects[index]) > STALE_MARGIN_M
         ]
-        self._stale: list[_Stale] = []
-        self._held_before: set[str] = set()
+        self._stale: list[_StaleEntry] = []
+        self._matched_before: set[str] = set()
         self._round = 0
         self.is_target_visible = False
-        """In a view of this round, from however far."""
+        """True if the target is in a view of this round, at any distance."""
 
     @property
     def is_target_seen(self) -> bool:
-        """Now or earlier in the episode, wherever it stood then."""
+        """True if the target was seen, now or earlier in the episode, wherever it stood then."""
         return self._target is not None and bool(self._is_seen[self._target])
 
     def target_box_distance_m(self, point_m: tuple[float, float]) -> float | None:
-        """From a point to the target's box, on the ground plane; 0 over it, `None` without a target in the house."""
+        """Return the ground-plane distance from a point to the target's box; `None` without a target in the house."""
         if self._target is None:
             return None
         body = self._objects[self._target]
@@ -107,26 +186,26 @@ class StalenessTracker:
         return math.hypot(max(0.0, gap_x_m), max(0.0, gap_z_m))
 
     def begin(self, beliefs: Sequence[EntryBelief]) -> MemoryRecord:
-        """Takes what the agent holds as the stage begins."""
-        held = held_by(beliefs, self.bodies)
+        """Judge the agent's entries as the stage begins."""
+        matches = matched_objects(beliefs, self.bodies)
         carried = self._so_far.beliefs
-        carried_held = held if list(carried) == list(beliefs) else held_by(carried, self.bodies)
-        self._held_before = {body.id for body in carried_held if body is not None}
-        self._stale = [_Stale(belief) for belief, body in zip(beliefs, held, strict=True) if body is None]
-        return self._memory(beliefs, held)
+        carried_matches = matches if list(carried) == list(beliefs) else matched_objects(carried, self.bodies)
+        self._matched_before = {body.id for body in carried_matches if body is not None}
+        self._stale = [_StaleEntry(belief) for belief, body in zip(beliefs, matches, strict=True) if body is None]
+        return self._memory(beliefs, matches)
 
     def stale_ids(self, beliefs: Sequence[EntryBelief]) -> list[int]:
-        """Entries that no object stands for."""
-        held = held_by(beliefs, self.bodies)
-        return [belief.entry_id for belief, body in zip(beliefs, held, strict=True) if body is None]
+        """Return the ids of the stale entries."""
+        matches = matched_objects(beliefs, self.bodies)
+        return [belief.entry_id for belief, body in zip(beliefs, matches, strict=True) if body is None]
 
     def begin_round(self, number: int) -> None:
-        """Another round, whose views come next."""
+        """Begin a round (0-based), whose views come next."""
         self._round = number
         self.is_target_visible = False
 
     def look(self, frame: Frame) -> None:
-        """Takes a view as the simulator rendered it, instances and all."""
+        """Take in a view as the simulator rendered it, with instances."""
         if frame.instances is None:
             return
         is_visible = _core.instance_areas(frame.instances, len(self._objects)) >= self._min_visible_px
@@ -143,37 +222,42 @@ class StalenessTracker:
 
     @property
     def wants_entries(self) -> bool:
-        """Whether something has come to light that the agent's entries may not show yet."""
+        """True while an observed change is not yet reflected in the agent's memory."""
         return any(one.evident_round is not None and one.cleared_round is None for one in self._stale) or any(
             one.seen_round is not None and one.found_round is None for one in self._moved
         )
 
     def take_entries(self, beliefs: Sequence[EntryBelief]) -> None:
-        """What the agent holds after a round's views."""
+        """Judge the agent's entries after a round's views."""
         for stale in self._stale:
-            if stale.evident_round is not None and stale.cleared_round is None and not self._is_kept(stale, beliefs):
+            if stale.evident_round is not None and stale.cleared_round is None and not self._remains(stale, beliefs):
                 stale.cleared_round = self._round
         for moved in self._moved:
             if moved.seen_round is not None and moved.found_round is None:
                 alike = [belief for belief in beliefs if belief.label == moved.body.category]
-                if any(body is not None and body.id == moved.body.id for body in held_by(alike, self.bodies)):
+                if any(body is not None and body.id == moved.body.id for body in matched_objects(alike, self.bodies)):
                     moved.found_round = self._round
 
     def end(self, beliefs: Sequence[EntryBelief]) -> tuple[MemoryRecord, int]:
-        """The memory at the end, and how many objects were forgotten that stand where they stood."""
-        held = held_by(beliefs, self.bodies)
+        """Judge the agent's entries at the end.
+
+        Returns:
+            The judgement, and the number of objects that were forgotten although they did not move.
+        """
+        matches = matched_objects(beliefs, self.bodies)
         self.close(beliefs)
-        return self._memory(beliefs, held), len(self._held_before - {body.id for body in held if body is not None})
+        forgotten = self._matched_before - {body.id for body in matches if body is not None}
+        return self._memory(beliefs, matches), len(forgotten)
 
     def close(self, beliefs: Sequence[EntryBelief]) -> None:
-        """Hands on to the next stage what lasts."""
+        """Write the state that the next stage needs to `so_far`."""
         self._so_far.seen_ids.update(
             body.id for body, is_seen in zip(self._objects, self._is_seen.tolist(), strict=True) if is_seen
         )
         self._so_far.beliefs = beliefs
 
     def stale_entries(self) -> tuple[StaleEntryRecord, ...]:
-        """Entries that were stale at the start."""
+        """Return the entries that were stale at the start."""
         return tuple(
             StaleEntryRecord(
                 label=one.belief.label,
@@ -185,28 +269,28 @@ class StalenessTracker:
         )
 
     def moved_objects(self) -> tuple[MovedObjectRecord, ...]:
-        """Objects that left their old places in the transition."""
+        """Return the objects that left their old places in the transition."""
         return tuple(
             MovedObjectRecord(object_id=one.body.id, seen_round=one.seen_round, found_round=one.found_round)
             for one in self._moved
         )
 
-    def _is_kept(self, stale: _Stale, beliefs: Sequence[EntryBelief]) -> bool:
-        """Whether an entry is still where it was, and still wrong; its number may be another."""
+    def _remains(self, stale: _StaleEntry, beliefs: Sequence[EntryBelief]) -> bool:
+        """Return whether an entry is still where it was, and still stale; its id may have changed."""
         old = stale.belief
         near = [
             belief
             for belief in beliefs
             if belief.label == old.label and math.dist(belief.centre_m, old.centre_m) <= STALE_MARGIN_M
         ]
-        return any(body is None for body in held_by(near, self.bodies))
+        return any(body is None for body in matched_objects(near, self.bodies))
 
-    def _memory(self, beliefs: Sequence[EntryBelief], held: Sequence[SceneObject | None]) -> MemoryRecord:
-        ids = {body.id for body in held if body is not None}
+    def _memory(self, beliefs: Sequence[EntryBelief], matches: Sequence[SceneObject | None]) -> MemoryRecord:
+        ids = {body.id for body in matches if body is not None}
         seen = [body.id for body, is_seen in zip(self._objects, self._is_seen.tolist(), strict=True) if is_seen]
         errors_m = [
             math.dist(belief.centre_m, body.centre_m)
-            for belief, body in zip(beliefs, held, strict=True)
+            for belief, body in zip(beliefs, matches, strict=True)
             if body is not None
         ]
         return MemoryRecord(
@@ -217,54 +301,3 @@ class StalenessTracker:
             num_seen_held=sum(object_id in ids for object_id in seen),
             position_error_m=math.fsum(errors_m) / len(errors_m) if errors_m else None,
         )
-
-
-def held_by(beliefs: Sequence[EntryBelief], bodies: Mapping[str, Sequence[SceneObject]]) -> list[SceneObject | None]:
-    """The object that each entry stands for; `None` for a stale one.
-
-    Args:
-        beliefs: Entries.
-        bodies: Of the stage's house, by category.
-
-    Returns:
-        Of the objects of an entry's label, the one whose box is nearest to its centre (of several, the one whose middle
-        is), if that is within `STALE_MARGIN_M`.
-    """
-    held: list[SceneObject | None] = []
-    for belief in beliefs:
-        nearest, least = None, (STALE_MARGIN_M, math.inf)
-        for body in bodies.get(belief.label, ()):
-            distance_m = distance_to_box_m(belief.centre_m, body)
-            if distance_m <= least[0]:
-                rank = (distance_m, math.dist(belief.centre_m, body.centre_m))
-                if rank < least or nearest is None:
-                    nearest, least = body, rank
-        held.append(nearest)
-    return held
-
-
-def shows_place(frame: Frame, belief: EntryBelief) -> bool:
-    """Whether a view shows the middle of an entry's place: in the image, near enough, and nothing in front of it.
-
-    Args:
-        frame: With depth.
-        belief: An entry; what stands in its own box does not hide it.
-    """
-    pose, intrinsics = frame.pose, frame.intrinsics
-    x_m, y_m, z_m = (a - b for a, b in zip(belief.centre_m, pose.position_m, strict=True))
-    if math.hypot(x_m, z_m) > EVIDENCE_RANGE_M:
-        return False
-    sin, cos = math.sin(pose.yaw_rad), math.cos(pose.yaw_rad)
-    ahead_m, right_m = x_m * sin + z_m * cos, x_m * cos - z_m * sin
-    down, level = math.sin(pose.horizon_rad), math.cos(pose.horizon_rad)
-    depth_m = ahead_m * level - y_m * down
-    if depth_m <= 0.0:
-        return False
-    below_m = -ahead_m * down - y_m * level
-    scale = intrinsics.focal_px / depth_m
-    col, row = intrinsics.width_px / 2.0 + right_m * scale, intrinsics.height_px / 2.0 + below_m * scale
-    if not (0.0 <= col < intrinsics.width_px and 0.0 <= row < intrinsics.height_px):
-        return False
-    reach_m = max(belief.size_m) / 2.0 + SURFACE_SLACK_M
-    surface_m: NDArray[np.float32] = frame.depth_m
-    return float(surface_m[int(row), int(col)]) >= depth_m - reach_m

@@ -169,7 +169,7 @@ class EntryRecord(_Record):
     size_m: Point3
     num_detections: int
     is_stale: bool
-    """No object of this label is near the entry in the stage's house."""
+    """The entry is stale, as `evonav.evaluation.episode.staleness` defines it."""
 
 
 class MemoryRecord(_Record):
@@ -177,7 +177,7 @@ class MemoryRecord(_Record):
 
     num_entries: int
     num_right: int
-    """Entries with an object of their label in their place: the others are stale."""
+    """Entries that are right, as `evonav.evaluation.episode.staleness` defines it: the others are stale."""
     num_held: int
     """Objects that right entries stand for, each with the nearest one of its label."""
     num_seen: int
