@@ -143,11 +143,14 @@ class Journal:
             num_bytes += len(line)
             try:
                 if number == 1:
-                    check_same_run(json.loads(line), self._run, folder)
+                    stored = json.loads(line)
+                    if not isinstance(stored, dict):
+                        raise ValueError("not a JSON object")
+                    check_same_run(stored, self._run, folder)
                 else:
                     outcome = Outcome.model_validate_json(line)
                     self.outcomes[outcome.index] = outcome
-            except (ValueError, AttributeError, ValidationError) as error:
+            except (ValueError, ValidationError) as error:
                 subject = "the run" if number == 1 else "a house"
                 advice = "use another folder" if number == 1 else "remove the line to process the house again"
                 problem = str(error).splitlines()[0]

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from evonav.errors import StoreError
+from evonav.json_diff import json_differences
 
 try:
     import fcntl
@@ -72,10 +73,9 @@ def check_same_run(stored: Mapping[str, Any], requested: Mapping[str, Any], fold
     Raises:
         StoreError: An entry differs; the message names each, nested ones with dots.
     """
-    there, here = _flat(stored), _flat(requested)
-    differing = sorted(key for key in there.keys() | here.keys() if there.get(key) != here.get(key))
+    differing = sorted(json_differences(stored, requested), key=lambda one: one.path)
     if differing:
-        lines = "; ".join(f"{key}: there {there.get(key)!r}, asked {here.get(key)!r}" for key in differing)
+        lines = "; ".join(f"{one.path}: there {one.left!r}, asked {one.right!r}" for one in differing)
         raise StoreError(f"{folder} holds a run of another configuration ({lines}); use another folder")
 
 
@@ -168,13 +168,3 @@ def sha256_of_file(path: Path) -> str:
         while chunk := file.read(1 << 20):
             digest.update(chunk)
     return digest.hexdigest()
-
-
-def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            flat |= _flat(value, f"{prefix}{key}.")
-        else:
-            flat[prefix + key] = value
-    return flat

@@ -21,7 +21,7 @@ from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.json_diff import record_differences
+from evonav.evaluation.records.record_diff import record_differences
 from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend, make_agent

@@ -25,7 +25,7 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig
-from evonav.evaluation.records.json_diff import record_differences
+from evonav.evaluation.records.record_diff import record_differences
 from evonav.evaluation.records.schema import ActionRecord, EntryRecord, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.perception import Percept, StageScene

@@ -19,6 +19,7 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
+from evonav.json_diff import json_differences
 from evonav.parallel.pool import Job, answers, open_pool
 from evonav.submission.pack import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
 from evonav.tasks.listing import TaskFile
@@ -218,7 +219,8 @@ def _claims(header: Submission, records: Mapping[str, Sequence[StageRecord]]) ->
     claimed, computed = header.summary, packed_summary({a: list(r) for a, r in records.items()}, num_stages)
     if claimed.get("schema_version") == 1:
         claimed, computed = _without_intervals(claimed), _without_intervals(computed)
-    yield from _unequal(claimed, computed, "")
+    for one in json_differences(claimed, computed, is_equal=_is_close):
+        yield f"{one.path} is {one.left}, the records give {one.right}"
 
 
 def _without_intervals(summary: Any) -> Any:  # noqa: ANN401 - JSON
@@ -234,18 +236,10 @@ def _without_intervals(summary: Any) -> Any:  # noqa: ANN401 - JSON
     }
 
 
-def _unequal(claimed: Any, computed: Any, where: str) -> Iterator[str]:  # noqa: ANN401 - JSON
-    if isinstance(claimed, dict) and isinstance(computed, dict):
-        for key in claimed.keys() | computed.keys():
-            yield from _unequal(claimed.get(key), computed.get(key), f"{where}.{key}" if where else key)
-    elif isinstance(claimed, list) and isinstance(computed, list) and len(claimed) == len(computed):
-        for index, (a, b) in enumerate(zip(claimed, computed, strict=True)):
-            yield from _unequal(a, b, f"{where}[{index}]")
-    elif isinstance(claimed, float) and isinstance(computed, float):
-        if not math.isclose(claimed, computed, abs_tol=TOLERANCE):
-            yield f"{where} is {claimed}, the records give {computed}"
-    elif claimed != computed or type(claimed) is not type(computed):
-        yield f"{where} is {claimed}, the records give {computed}"
+def _is_close(claimed: Any, computed: Any) -> bool:  # noqa: ANN401 - JSON
+    if isinstance(claimed, float) and isinstance(computed, float):
+        return math.isclose(claimed, computed, abs_tol=TOLERANCE)
+    return bool(claimed == computed) and type(claimed) is type(computed)
 
 
 def _rescore(

@@ -26,6 +26,7 @@ from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import NUM_RETRIES, Progress, RunConfig, RunRequest, evaluate_all, run_identity
 from evonav.evaluation.run.settings import DecisionResources, check_decision
+from evonav.json_diff import json_differences
 from evonav.parallel.folders import write_atomically, writing
 from evonav.parallel.worker import Resources
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
@@ -321,17 +322,8 @@ def _differences(there: Mapping[str, Any], asked: Mapping[str, Any]) -> Iterator
         gone = [agent for agent in cell["agents"] if agent not in asked[name]["agents"]]
         if gone:
             yield f"cell {name} is without agent {', '.join(gone)}: put it back"
-        old, new = _flat(cell["run"]), _flat(asked[name]["run"])
-        for key in sorted(old.keys() | new.keys()):
-            if old.get(key) != new.get(key):
-                yield f"cell {name}: {key}: there {old.get(key)!r}, asked {new.get(key)!r}"
-
-
-def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in values.items():
-        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {prefix + key: value}
-    return flat
+        for one in sorted(json_differences(cell["run"], asked[name]["run"]), key=lambda one: one.path):
+            yield f"cell {name}: {one.path}: there {one.left!r}, asked {one.right!r}"
 
 
 def _is_recorded(run: CellRun) -> bool:

@@ -8,6 +8,7 @@ from typing import Any
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records.store import FILE_NAME, RunStore
+from evonav.json_diff import json_differences
 from evonav.report.run import agents_in_order
 
 
@@ -116,19 +117,9 @@ def _named(compared_agents: Sequence[ComparedAgent]) -> list[ComparedAgent]:
 
 def config_differences(a: ComparedAgent, b: ComparedAgent) -> dict[str, tuple[str, str]]:
     """Return the settings in which two runs differ, by dotted name."""
-    flat_a, flat_b = _flat(a.config), _flat(b.config)
-    return {
-        key: (flat_a.get(key, "-"), flat_b.get(key, "-"))
-        for key in sorted(flat_a.keys() | flat_b.keys())
-        if flat_a.get(key) != flat_b.get(key)
-    }
 
+    def text(value: Any) -> str:  # noqa: ANN401 - JSON
+        return "-" if value is None else str(value)
 
-def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-    flat: dict[str, str] = {}
-    for key, value in values.items():
-        if isinstance(value, Mapping):
-            flat.update(_flat(value, f"{prefix}{key}."))
-        else:
-            flat[f"{prefix}{key}"] = str(value)
-    return flat
+    found = sorted(json_differences(a.config, b.config), key=lambda one: one.path)
+    return {one.path: (text(one.left), text(one.right)) for one in found}
