@@ -222,7 +222,7 @@ def test_stacks_are_chosen_by_the_agent_and_options_are_checked() -> None:
         weights_of("3d-mem", StackConfig(detector="yolo.pt"))
     with pytest.raises(InvalidArgumentError, match="no vocabulary 'coco'"):
         _ = StackConfig(vocabulary="coco").phrases
-    with pytest.raises(InvalidArgumentError, match="before it looks"):
+    with pytest.raises(InvalidArgumentError, match="call `begin_stage` first"):
         StackPerception("auto", StackConfig(), None, "cpu").perceive([frame()])
 
 
