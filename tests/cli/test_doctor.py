@@ -36,10 +36,10 @@ def test_a_machine_on_which_evonav_works(tmp_path):
         "renderer",
     ]
     assert all(check.state == "ok" for check in checks.values() if check.is_essential)
-    assert re.search(r"[1-9]\d* views/s of 300x300", checks["renderer"].said)
-    assert checks["bundled tasks"].said.startswith("24,")
-    assert str(tmp_path) in checks["run folder"].said
-    assert "locks work" in checks["run folder"].said
+    assert re.search(r"[1-9]\d* views/s of 300x300", checks["renderer"].finding)
+    assert checks["bundled tasks"].finding.startswith("24,")
+    assert str(tmp_path) in checks["run folder"].finding
+    assert "locks work" in checks["run folder"].finding
     assert list(tmp_path.iterdir()) == []
     assert all(check.remedy for check in checks.values() if check.state == "failed")
 
@@ -82,14 +82,14 @@ def test_a_missing_extra_says_how_to_get_it(monkeypatch, tmp_path):
     monkeypatch.setitem(EXTRAS, "viz", (("no-such-package",), "figures"))
     check = found(tmp_path)["extra viz"]
     assert (check.state, check.remedy) == ("missing", "pip install 'evonav[viz]'")
-    assert "no-such-package" in check.said
+    assert "no-such-package" in check.finding
 
 
 def test_files_of_models_are_looked_for_where_they_are_to_be(monkeypatch, tmp_path):
     monkeypatch.setenv("EVONAV_MODELS", str(tmp_path))
     check = found(tmp_path)["models 3d-mem"]
     assert check.state == "missing"
-    assert f"4 of 4 files are not in {tmp_path} (about 2607 MB): yolov8x-world.pt" in check.said
+    assert f"4 of 4 files are not in {tmp_path} (about 2607 MB): yolov8x-world.pt" in check.finding
     for name in ("timm/vit_base_patch32_clip_224.openai", "laion/CLIP-ViT-B-32-laion2B-s34B-b79K"):
         (tmp_path / name).mkdir(parents=True)
         (tmp_path / name / "open_clip_model.safetensors").touch()
@@ -108,7 +108,7 @@ def test_a_folder_that_cannot_be_written_or_locked(monkeypatch, tmp_path):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(doctor_checks.tempfile, "TemporaryDirectory", refuse)
-    assert "Permission denied" in found(tmp_path)["run folder"].said
+    assert "Permission denied" in found(tmp_path)["run folder"].finding
 
 
 @pytest.mark.parametrize(("status", "state", "words"), [(200, "ok", "answers"), (401, "failed", "OPENAI_API_KEY")])
@@ -139,7 +139,7 @@ def test_an_endpoint_is_asked_only_where_it_may_be(monkeypatch, tmp_path, status
         server.server_close()
     assert asked == [("/v1/models", "Bearer sk-canary")]
     assert check.state == state
-    assert words in check.said + check.remedy
-    assert "canary" not in check.said + check.remedy
+    assert words in check.finding + check.remedy
+    assert "canary" not in check.finding + check.remedy
     lost = found(tmp_path, base_url=url)["model endpoint"]
     assert lost.state == "failed"

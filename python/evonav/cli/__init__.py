@@ -1,4 +1,4 @@
-"""The `evonav` command. Exit codes: 0 done, 1 an error that is told, 2 wrong usage, 3 incomplete, 130 interrupted."""
+"""The `evonav` command. Exit codes: 0 done, 1 an error, 2 wrong usage, 3 incomplete, 130 interrupted."""
 
 import os
 import sys
@@ -96,7 +96,7 @@ def list_agents() -> None:
 
 @app.command()
 def version() -> None:
-    """Prints the version."""
+    """Print the version."""
     from evonav import __version__
 
     typer.echo(__version__)
@@ -106,7 +106,7 @@ add_examples(app)
 
 
 def main() -> None:
-    """Runs the command; errors of evonav, and of files, are one line, not a traceback."""
+    """Run the command; an error of evonav or of a file is printed as one line, without a traceback."""
     from evonav.errors import EvonavError
 
     try:

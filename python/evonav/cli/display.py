@@ -1,4 +1,4 @@
-"""What commands show: tables, a moving line, a bar."""
+"""Show tables, status lines and progress bars."""
 
 import signal
 import time
@@ -10,7 +10,7 @@ import typer
 
 EXIT_INTERRUPTED = 130
 LINE_EVERY_S = 60.0
-"""Lines of progress where there is no terminal."""
+"""Seconds between two lines of progress where there is no terminal."""
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 
 MAX_WIDTH = 200
-"""Of tables where there is no terminal, in characters."""
+"""Largest width of a table where there is no terminal, in characters."""
 
 
 def show(table: "Table") -> None:
-    """Prints a table of which nothing is cut off, however narrow the terminal; without one, as wide as it likes."""
+    """Print a table without cutting anything off, however narrow the terminal is."""
     from rich.console import Console
     from rich.measure import Measurement
 
@@ -38,7 +38,7 @@ def show(table: "Table") -> None:
 
 
 def print_table(summaries: "list[AgentSummary]") -> None:
-    """Agents with their rates, and what is missing of a run."""
+    """Print the rates of agents, and how many stages are missing."""
     from rich.table import Table
 
     table = Table(title="SR and SPL in % with 95% intervals; SR by whether the target was moved")
@@ -64,7 +64,7 @@ def print_table(summaries: "list[AgentSummary]") -> None:
 
 
 def print_failures(run: Path) -> None:
-    """How often attempts at stages have failed, if any has, and where to read why."""
+    """Print how many attempts at stages failed, if any did, and the command that lists them."""
     from collections import Counter
 
     from evonav.evaluation.records.store import RunStore
@@ -89,7 +89,7 @@ def _percent_interval(interval: tuple[float, float] | None) -> str:
 
 @contextmanager
 def status(text: str) -> "Iterator[Callable[[str], None]]":
-    """A line that moves while something takes its time."""
+    """Show a moving line; the yielded function adds a text to it."""
     from rich.console import Console
 
     console = Console(stderr=True)
@@ -99,7 +99,7 @@ def status(text: str) -> "Iterator[Callable[[str], None]]":
 
 @contextmanager
 def progress() -> "Iterator[Callable[[Progress], None]]":
-    """A bar over stages."""
+    """Show a progress bar over stages; the yielded function updates it."""
     from rich import progress as bars
     from rich.console import Console
 
@@ -113,30 +113,30 @@ def progress() -> "Iterator[Callable[[Progress], None]]":
     with bars.Progress(*columns, console=Console(stderr=True)) as bar:
         stages = bar.add_task("stages")
 
-        def show(news: "Progress") -> None:
-            latest = news.latest
+        def show(state: "Progress") -> None:
+            latest = state.latest
             described = "stages" if latest is None else f"{latest.agent} {latest.task_id}/{latest.stage}"
-            bar.update(stages, completed=news.num_done, total=news.num_stages, description=described)
+            bar.update(stages, completed=state.num_done, total=state.num_stages, description=described)
 
         yield show
 
 
 @contextmanager
 def generation_progress() -> "Iterator[Callable[[GenerationProgress], None]]":
-    """A bar over houses on a terminal, else a line a minute."""
+    """Show a progress bar over houses on a terminal, else print a line each minute."""
     from rich import progress as bars
     from rich.console import Console
 
     console = Console(stderr=True)
     if not console.is_terminal:
-        told_s = time.monotonic()
+        printed_s = time.monotonic()
 
-        def tell(news: "GenerationProgress") -> None:
-            nonlocal told_s
-            if time.monotonic() - told_s >= LINE_EVERY_S:
-                told_s = time.monotonic()
-                left_s = news.seconds * (1.0 - news.share) / news.share if news.share else float("inf")
-                typer.echo(f"{100 * news.share:.0f}%: {_counts(news)}, about {left_s / 60:.0f} min left", err=True)
+        def tell(state: "GenerationProgress") -> None:
+            nonlocal printed_s
+            if time.monotonic() - printed_s >= LINE_EVERY_S:
+                printed_s = time.monotonic()
+                left_s = state.seconds * (1.0 - state.share) / state.share if state.share else float("inf")
+                typer.echo(f"{100 * state.share:.0f}%: {_counts(state)}, about {left_s / 60:.0f} min left", err=True)
 
         yield tell
         return
@@ -149,17 +149,17 @@ def generation_progress() -> "Iterator[Callable[[GenerationProgress], None]]":
     )
     with bars.Progress(*columns, console=console) as bar:
         houses = bar.add_task("starting", total=1.0)
-        yield lambda news: bar.update(houses, completed=news.share, description=_counts(news))
+        yield lambda state: bar.update(houses, completed=state.share, description=_counts(state))
 
 
-def _counts(news: "GenerationProgress") -> str:
-    failed = f", {news.num_failed} failed" if news.num_failed else ""
-    return f"{news.num_tasks} tasks ({news.tasks_per_s:.1f}/s), {news.num_rejected} houses rejected{failed}"
+def _counts(state: "GenerationProgress") -> str:
+    failed = f", {state.num_failed} failed" if state.num_failed else ""
+    return f"{state.num_tasks} tasks ({state.tasks_per_s:.1f}/s), {state.num_rejected} houses rejected{failed}"
 
 
 @contextmanager
 def interruptible(out: Path) -> "Iterator[None]":
-    """Says of an interrupt what it leaves; what a scheduler sends is to be as good as Ctrl-C."""
+    """Say how to resume when the command is interrupted by Ctrl-C or by a scheduler's SIGTERM."""
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
@@ -168,5 +168,5 @@ def interruptible(out: Path) -> "Iterator[None]":
     try:
         yield
     except KeyboardInterrupt:
-        typer.echo(f"interrupted; what is finished is in {out}, the same command goes on from there", err=True)
+        typer.echo(f"interrupted; finished stages are in {out}; run the same command again to resume", err=True)
         raise typer.Exit(EXIT_INTERRUPTED) from None

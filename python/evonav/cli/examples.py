@@ -1,4 +1,4 @@
-"""What to type: the examples below every command's `--help`, in one place, so that tests can read all of them."""
+"""Keep the examples that are shown below the `--help` of every command."""
 
 from typing import TYPE_CHECKING
 
@@ -70,11 +70,11 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "controlled report": ("evonav controlled report out/fixed",),
     "controlled picture": ("evonav controlled picture out/fixed --agent fu --out pair.svg",),
 }
-"""By the words of the command."""
+"""Examples by command."""
 
 
 def add_examples(app: "typer.Typer", before: str = "") -> None:
-    """Puts examples below the help of every command of an app."""
+    """Show examples below the help of every command of an app."""
     for command in app.registered_commands:
         name = command.name or getattr(command.callback, "__name__", "").replace("_", "-")
         examples = EXAMPLES.get(f"{before}{name}")

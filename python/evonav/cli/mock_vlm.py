@@ -1,4 +1,4 @@
-"""`evonav mock-vlm`: a model's stand-in, to try everything that leads to a model and back."""
+"""`evonav mock-vlm`: serve a simulated model, to try the whole way to a model and back."""
 
 from typing import Annotated
 
@@ -6,15 +6,15 @@ import typer
 
 
 def mock_vlm(
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0: any that is free.")] = 8000,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes any free one.")] = 8000,
     faults: Annotated[
-        str, typer.Option(help="Shares of requests that go wrong, such as refusal=0.1,rate_limit=0.05; see below.")
+        str, typer.Option(help="Rates of failing requests, such as refusal=0.1,rate_limit=0.05; see below.")
     ] = "",
-    schemas: Annotated[bool, typer.Option(help="Hold answers to JSON Schemas, as some servers do.")] = True,
-    seed: Annotated[int, typer.Option(min=0, help="Decides which requests go wrong.")] = 0,
-    latency: Annotated[float, typer.Option(min=0.0, help="Seconds that an answer takes.")] = 0.0,
+    schemas: Annotated[bool, typer.Option(help="Accept JSON Schemas and follow them, as some servers do.")] = True,
+    seed: Annotated[int, typer.Option(min=0, help="Seed that decides which requests fail.")] = 0,
+    latency: Annotated[float, typer.Option(min=0.0, help="Seconds before each answer.")] = 0.0,
 ) -> None:
-    """Serves an OpenAI-compatible API on this machine; answers by simple rules on the prompt's words.
+    """Serve an OpenAI-compatible API on this machine that answers by simple rules.
 
     Faults: rate_limit (429 with Retry-After), server_error (500), hang, disconnect, malformed (broken JSON around the
     answer), broken_json (in it), truncated, refusal, filtered, empty, off_topic.

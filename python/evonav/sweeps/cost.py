@@ -1,4 +1,4 @@
-"""What the cells of a sweep would ask a model and pay for it, before anything is asked."""
+"""Estimate what the cells of a sweep would ask a model and what it would cost."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from evonav.sweeps.run import CellRun
 
 @dataclass(frozen=True, slots=True)
 class CellEstimate:
-    """Of all agents of a cell, see `evonav.evaluation.run.cost_estimate`."""
+    """The estimated cost of all agents of a cell, see `evonav.evaluation.run.cost_estimate`."""
 
     num_requests: float
     input_tokens: float
@@ -20,11 +20,11 @@ class CellEstimate:
 
 
 def cell_estimate(sweep: SweepFile, run: CellRun, num_workers: int) -> CellEstimate:
-    """Runs a few tasks of a cell with the text matcher and counts what its model would be asked.
+    """Run a few tasks of a cell with the text matcher and count what its model would be asked.
 
     Args:
         sweep: The file.
-        run: Of a cell whose decisions are a model's.
+        run: A cell with a model as decision model.
         num_workers: Processes.
 
     Raises:

@@ -1,7 +1,7 @@
-"""Sweep files: TOML that names what is to be run (docs/sweeps.md).
+"""Read sweep files: TOML that lists the runs to make (docs/sweeps.md).
 
-Short forms (`tasks = ["bundled:2"]`) are spelled out first, so that there is one record and one way to read it.
-Whatever is wrong is one sentence with the file, the key and the value.
+Short forms (`tasks = ["bundled:2"]`) are expanded first, so that one model validates all files. An error is one
+sentence with file, key and value.
 """
 
 import difflib
@@ -28,9 +28,9 @@ from evonav.tasks.subsets import SubsetError, parse_subset
 from evonav.toml import read_toml
 
 BUNDLED = "bundled"
-"""Stands for the folder of the tasks that come with evonav."""
+"""Name for the folder of the tasks that come with evonav."""
 SEPARATOR = "__"
-"""Between the parts of a cell's name, and in none of them."""
+"""Separator between the parts of a cell's name; no part contains it."""
 
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9](_?[A-Za-z0-9.-])*$", max_length=MAX_NAME_CHARACTERS)]
 Seed = Annotated[int, Field(ge=0)]
@@ -48,7 +48,7 @@ class TaskSet(Settings):
 
 
 class ProtocolSettings(Settings):
-    """What every agent is held to; what is left out is the paper's (docs/parity.md)."""
+    """The protocol of every run; values left out are the paper's (docs/parity.md)."""
 
     max_rounds: int | None = Field(default=None, ge=1)
     max_actions: int | None = Field(default=None, ge=1)
@@ -60,7 +60,7 @@ class ProtocolSettings(Settings):
     min_visible_px: int | None = Field(default=None, ge=0)
 
     def config(self) -> ProtocolConfig:
-        """The paper's, with what was given in its place."""
+        """Return the paper's protocol with the given values in place of its own."""
         return ProtocolConfig(**self.model_dump(exclude_none=True))
 
 
@@ -81,9 +81,9 @@ class SweepFile(SpendingSettings):
     model_config = ConfigDict(title="evonav sweep")
 
     name: str = ""
-    """Told in the summary."""
+    """Name of the sweep in its summary."""
     out: str | None = None
-    """Folder for runs and summary; `--out` goes before it."""
+    """Folder for runs and summary; `--out` overrides it."""
     agents: tuple[str, ...] = Field(min_length=1)
     """Names as `evonav agents` lists them, `./file.py:Class` or `module:Class`."""
     tasks: dict[Name, TaskSet] = Field(min_length=1)
@@ -95,41 +95,41 @@ class SweepFile(SpendingSettings):
     decisions: dict[Name, DecisionSettings] = Field(default={"text": DecisionSettings()}, min_length=1)
     """Short: a list of text, text:wrong=0.1 (with mistakes), vlm:MODEL, module:name."""
     seeds: tuple[Seed, ...] = Field(default=(0,), min_length=1)
-    """Each decides everything random of its runs."""
+    """Seeds of every random choice, one run each."""
     protocol: ProtocolSettings = ProtocolSettings()
     include: tuple[Pattern, ...] = ()
-    """Given any, only combinations that fit one of them are run."""
+    """Run only combinations that match one of these patterns. Default: all."""
     exclude: tuple[Pattern, ...] = ()
-    """Combinations that fit one of them are not run."""
+    """Do not run combinations that match one of these patterns."""
     workers: int | None = Field(default=None, ge=0)
-    """Processes or actors; default: one a core. 0: all in one process."""
+    """Number of worker processes or actors; 0 runs in this process. Default: one per core."""
     engine: EngineName = "local"
     """Processes of this machine, or Ray."""
     ray_address: str | None = None
-    """Of a cluster that shares this file system; default: one on this machine."""
+    """Ray: address of a cluster that shares this file system. Default: start Ray on this machine."""
     worker_gpus: float = Field(default=0.0, ge=0.0)
-    """Ray: GPUs set aside for each worker, such as 0.5; for perception that needs one."""
+    """Ray: GPUs reserved for each worker, such as 0.5, for perception that needs one."""
     num_retries: int | None = Field(default=None, ge=0)
-    """Of a stage that lost its worker, its simulator or its agent's process."""
+    """Number of retries of a stage that lost its worker, simulator or agent process. Default: 2."""
     stage_timeout_s: float | None = Field(default=None, gt=0.0)
-    """Default: 900, four hours where a model decides."""
+    """Seconds before a stage is errored. Default: 900, with a model 14400."""
     agent_timeout_s: float | None = Field(default=None, ge=0.1)
-    """For an agent's answer; default: 600, an hour where a model decides."""
+    """Seconds to wait for an agent's answer before its stage is errored. Default: 600, with a model 3600."""
     agent_memory_mb: int | None = Field(default=None, ge=256)
-    """Address space of an agent's process."""
+    """Largest address space of an agent's process, in MB. Default: no limit."""
     in_process: bool = False
-    """Agents in the workers' own processes: faster for many short stages, but only exceptions are held."""
+    """Run agents in the workers' processes: faster for short stages, but a crash of an agent ends its worker."""
 
 
 def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
-    """Reads a sweep file.
+    """Read a sweep file.
 
     Args:
         path: A file of TOML.
-        changes: `KEY=VALUE` over what the file says; keys with dots reach into tables, values are JSON or plain words.
+        changes: `KEY=VALUE` that override the file; a key with dots names an entry of a table, a value is JSON or text.
 
     Raises:
-        InvalidArgumentError: With file, key and value.
+        InvalidArgumentError: A value is invalid; the message names file, key and value.
     """
     raw = read_toml(path)
     for change in changes:
@@ -147,7 +147,7 @@ def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
     try:
         sweep = SweepFile.model_validate_json(text)
     except ValidationError as error:
-        raise InvalidArgumentError(_told(path, error)) from None
+        raise InvalidArgumentError(_sentence(path, error)) from None
     _check(sweep, path)
     return sweep
 
@@ -155,14 +155,14 @@ def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
 def sweep_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of sweep files, short forms included, for editors."""
     schema = SweepFile.model_json_schema()
-    words: dict[str, Any] = {"type": "string"}
-    short: dict[str, Any] = {"anyOf": [words, {"type": "array", "items": words}]}
+    text_schema: dict[str, Any] = {"type": "string"}
+    short: dict[str, Any] = {"anyOf": [text_schema, {"type": "array", "items": text_schema}]}
     for axis in SHORT_FORMS:
         field = schema["properties"][axis]
         long = {key: field.pop(key) for key in tuple(field) if key not in ("title", "description", "default")}
         for pattern, entry in long.get("patternProperties", {}).items():
-            long |= {"patternProperties": {pattern: {"anyOf": [entry, words]}}, "additionalProperties": False}
-        field["anyOf"] = [long, *([words, {"type": "integer"}] if axis == "seeds" else short["anyOf"])]
+            long |= {"patternProperties": {pattern: {"anyOf": [entry, text_schema]}}, "additionalProperties": False}
+        field["anyOf"] = [long, *([text_schema, {"type": "integer"}] if axis == "seeds" else short["anyOf"])]
         field.pop("default", None)
     for name, field in schema["$defs"]["Pattern"]["properties"].items():
         one = {"type": "integer" if name == "seed" else "string"}
@@ -170,8 +170,8 @@ def sweep_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
-def _told(path: Path, error: ValidationError) -> str:
-    """The first thing wrong, in a sentence."""
+def _sentence(path: Path, error: ValidationError) -> str:
+    """Return the first problem as a sentence."""
     found = error.errors(include_url=False, include_context=True)
     # A key that nobody knows explains what is missing.
     first = next((one for one in found if one["type"] == "extra_forbidden"), found[0])
@@ -185,15 +185,15 @@ def _told(path: Path, error: ValidationError) -> str:
     if first["type"] == "missing":
         return f"{path}: {place} is missing{more}"
     if first["type"] == "string_pattern_mismatch" and "[key]" in first["loc"]:
-        said = "a name is letters, digits, '.', '-' and single '_', and begins with one of the first two"
-        return f"{path}: {place}: {said}{more}"
+        rule = "a name is letters, digits, '.', '-' and single '_', and begins with one of the first two"
+        return f"{path}: {place}: {rule}{more}"
     shown = repr(first.get("input"))
     shown = shown if len(shown) <= 80 else shown[:77] + "..."
     return f"{path}: {place} = {shown}: {first['msg']}{more}"
 
 
 def _keys_at(place: Sequence[int | str]) -> list[str]:
-    """Keys that a table of the file may have."""
+    """Return the keys that a table of the file may have."""
     model: type[Settings] = SweepFile
     tables: Mapping[str, type[Settings]] = {
         "tasks": TaskSet,
@@ -210,7 +210,7 @@ def _keys_at(place: Sequence[int | str]) -> list[str]:
 
 
 def _check(sweep: SweepFile, path: Path) -> None:
-    """What no single field can tell."""
+    """Check what concerns more than one field."""
     settings: Sequence[tuple[Literal["simulators", "decisions"], Mapping[str, Any]]] = (
         ("simulators", sweep.simulators),
         ("decisions", sweep.decisions),

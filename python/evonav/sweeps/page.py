@@ -11,12 +11,12 @@ from evonav.report.tables.table import Table
 
 
 def write_sweep_page(out_dir: Path, name: str, tables: Sequence[Table], reports: Sequence[tuple[str, Path]]) -> Path:
-    """Writes `report.html`.
+    """Write `report.html`.
 
     Args:
-        out_dir: Where to.
-        name: Of the sweep.
-        tables: Of `sweep.sweep_tables`.
+        out_dir: Folder to write.
+        name: Name of the sweep.
+        tables: Tables of `evonav.sweeps.tables.sweep_tables`.
         reports: Name and report of each cell.
 
     Returns:

@@ -8,7 +8,7 @@ from evonav.statistics import Interval
 
 AXES = ("simulator", "perception", "decision", "tasks", "seed")
 STATES = ("success", "failure", "errored", "not_run")
-"""In which a stage of a sweep ends, in the order of tables."""
+"""End states of a stage, in the order of tables."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
-"""A sweep: agents x simulators x perceptions x decisions x tasks x seeds, as one ordinary run a cell in one folder.
+"""Run a sweep: every combination of its settings is a cell, and every cell an ordinary run in one folder.
 
-    OUT/sweep.json      what the folder is for: settings, cells, and what makes their runs the same
+    OUT/sweep.json      settings, cells, and the identity of their runs
     OUT/runs/CELL/      a run like any other: `evonav report`, `view`, `compare` work on it
     OUT/spending.sqlite what models cost, over all cells
     OUT/summary.*       every cell and agent, see `evonav.sweeps.summary`
@@ -36,7 +36,7 @@ from evonav.tasks.listing import TaskFile, task_files
 SWEEP_NAME, RUNS_NAME = "sweep.json", "runs"
 SCHEMA_VERSION = 1
 _HOW = {"out", "workers", "engine", "ray_address", "worker_gpus", "num_retries", "stage_timeout_s", "agent_timeout_s"}
-"""Of a file: how it is run, no part of what."""
+"""Entries of a sweep file that do not decide records."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,19 +54,19 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class CellRun:
-    """A cell and the run that it is."""
+    """A cell with its run."""
 
     cell: Cell
     request: RunRequest
 
     @property
     def num_stages(self) -> int:
-        """Over all agents."""
+        """Number of stages of all agents."""
         return len(self.cell.agents) * sum(task.num_stages for task in self.request.tasks)
 
 
 def cells_of(sweep: SweepFile) -> list[Cell]:
-    """The cells of a sweep, in the order of the file.
+    """Return the cells of a sweep, in the order of the file.
 
     Raises:
         InvalidArgumentError: A pattern fits nothing, or nothing is left.
@@ -93,16 +93,16 @@ def cells_of(sweep: SweepFile) -> list[Cell]:
             cells.append(Cell(cell.name, simulator, perception, decision, tasks, seed, tuple(agents)))
     for (which, i), is_used in used.items():
         if not is_used:
-            said = getattr(sweep, which)[i].model_dump(exclude_defaults=True)
-            told = ", ".join(f"{axis} {' or '.join(map(str, values))}" for axis, values in said.items())
-            raise InvalidArgumentError(f"{which}.{i} fits no combination: there is none of {told}")
+            pattern = getattr(sweep, which)[i].model_dump(exclude_defaults=True)
+            values_text = ", ".join(f"{axis} {' or '.join(map(str, values))}" for axis, values in pattern.items())
+            raise InvalidArgumentError(f"{which}.{i} fits no combination: there is none of {values_text}")
     if not cells:
         raise InvalidArgumentError("the sweep has no cell: `exclude` leaves nothing")
     return cells
 
 
 def chosen(cells: Sequence[Cell], patterns: Sequence[str]) -> list[Cell]:
-    """The cells whose name fits one of the patterns; all without any.
+    """Return the cells whose name matches one of the patterns; without patterns, all.
 
     Raises:
         InvalidArgumentError: A pattern fits none.
@@ -116,7 +116,7 @@ def chosen(cells: Sequence[Cell], patterns: Sequence[str]) -> list[Cell]:
 
 @contextmanager
 def task_sets(sweep: SweepFile) -> Iterator[dict[str, list[TaskFile]]]:
-    """The tasks of every set, while in use.
+    """Lend the tasks of every set.
 
     Raises:
         TaskError: A folder holds none, too few, or malformed ones.
@@ -126,7 +126,7 @@ def task_sets(sweep: SweepFile) -> Iterator[dict[str, list[TaskFile]]]:
 
 
 def tasks_of(tasks: TaskSet, stack: ExitStack) -> list[TaskFile]:
-    """The tasks of a set; `stack` holds bundled ones.
+    """Return the tasks of a set; `stack` keeps the bundled ones available.
 
     Raises:
         TaskError: There are none, too few, or malformed ones.
@@ -136,7 +136,7 @@ def tasks_of(tasks: TaskSet, stack: ExitStack) -> list[TaskFile]:
 
 
 def config_of(sweep: SweepFile, cell: Cell, resources: DecisionResources | None) -> RunConfig:
-    """What decides a cell's records; without books, for estimates alone.
+    """Return the configuration of a cell; without resources its model cannot be asked, which is enough for estimates.
 
     Raises:
         EvonavError: A model's settings make no sense, or its exchanges cannot be opened.
@@ -161,7 +161,7 @@ def config_of(sweep: SweepFile, cell: Cell, resources: DecisionResources | None)
 
 
 def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[TaskFile]], out: Path) -> list[CellRun]:
-    """The runs of cells, before their models can be asked."""
+    """Return the runs of cells, whose models cannot be asked yet."""
     return [
         CellRun(
             cell,
@@ -173,8 +173,8 @@ def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[
     ]
 
 
-def asking(sweep: SweepFile, out: Path, run: CellRun, num_workers: int) -> CellRun:
-    """A run whose agents can ask their model; that is tried, nothing is asked.
+def with_resources(sweep: SweepFile, out: Path, run: CellRun, num_workers: int) -> CellRun:
+    """Return a run whose agents can ask their model, after a check that it can be reached.
 
     Raises:
         EvonavError: The model cannot be asked from here.
@@ -193,14 +193,14 @@ def asking(sweep: SweepFile, out: Path, run: CellRun, num_workers: int) -> CellR
 
 
 def claim(out: Path, sweep: SweepFile, runs: Sequence[CellRun]) -> None:
-    """Makes the folder this sweep's, or checks that it is.
+    """Make the folder this sweep's, or check that it is.
 
     Cells and agents may be added; of what has begun, none may be changed or left out.
 
     Args:
-        out: Of the sweep.
+        out: Folder of the sweep.
         sweep: The file.
-        runs: Of all its cells.
+        runs: The runs of all its cells.
 
     Raises:
         StoreError: The folder holds another sweep, or cannot be written; it says what differs.
@@ -222,7 +222,7 @@ def claim(out: Path, sweep: SweepFile, runs: Sequence[CellRun]) -> None:
 
 
 def read_claim(out: Path) -> dict[str, Any]:
-    """The content of `sweep.json`.
+    """Read `sweep.json`.
 
     Raises:
         StoreError: There is none, or it is no such file.
@@ -252,12 +252,12 @@ def run_sweep(
     retry_errored: bool = False,
     on_progress: Callable[[Cell, Progress], None] = lambda _, __: None,
 ) -> None:
-    """Runs what is missing of a sweep, with one set of workers; what was finished stays.
+    """Run the missing stages of a sweep, with one set of workers.
 
     Args:
         sweep: The file.
         out: Folder of the sweep.
-        runs: Of all cells.
+        runs: The runs of all cells.
         num_workers: Processes or actors; 0 runs everything in this process.
         only: Patterns of cells' names; others are left as they are.
         retry_errored: Run errored stages again, and those that were not run because of them.
@@ -272,7 +272,7 @@ def run_sweep(
     with writing(out):
         claim(out, sweep, runs)
         todo = [run for run in todo if retry_errored or not _is_recorded(run)]
-        todo = [asking(sweep, out, run, num_workers) for run in todo]
+        todo = [with_resources(sweep, out, run, num_workers) for run in todo]
         for name in dict.fromkeys(run.cell.simulator for run in todo):
             _check_simulator(next(run for run in todo if run.cell.simulator == name))
         evaluate_all(
@@ -283,7 +283,7 @@ def run_sweep(
             resources=Resources(num_gpus=sweep.worker_gpus),
             num_retries=NUM_RETRIES if sweep.num_retries is None else sweep.num_retries,
             retry_errored=retry_errored,
-            on_progress=lambda index, news: on_progress(todo[index].cell, news),
+            on_progress=lambda index, progress: on_progress(todo[index].cell, progress),
         )
 
 
@@ -303,7 +303,7 @@ def _is_one(name: str, globs: Sequence[str]) -> bool:
 
 
 def _content(run: CellRun) -> dict[str, Any]:
-    """Of a cell, for `sweep.json`."""
+    """Return a cell's entry in `sweep.json`."""
     axes = {key: value for key, value in asdict(run.cell).items() if key not in ("name", "agents")}
     return {
         "agents": list(run.cell.agents),
@@ -314,7 +314,7 @@ def _content(run: CellRun) -> dict[str, Any]:
 
 
 def _differences(there: Mapping[str, Any], asked: Mapping[str, Any]) -> Iterator[str]:
-    """What was promised and is not asked for any more."""
+    """Yield how the stored cells differ from those of the file."""
     for name, cell in there.items():
         if name not in asked:
             yield f"cell {name} is not in the file: put it back, `--only` runs a part"
@@ -327,11 +327,11 @@ def _differences(there: Mapping[str, Any], asked: Mapping[str, Any]) -> Iterator
 
 
 def _is_recorded(run: CellRun) -> bool:
-    """Whether every stage of a cell has a record, in a run that is the cell's."""
+    """Return true if every stage of a cell is recorded, in a run of the same identity."""
     try:
         with RunStore(run.request.run_dir) as store:
             if store.meta("config") != _content(run)["run"]:
-                return False  # the engine says what differs
+                return False  # `evaluate_all` says what differs
             states = store.states()
     except StoreError:
         return False
@@ -344,7 +344,7 @@ def _is_recorded(run: CellRun) -> bool:
 
 
 def _check_simulator(run: CellRun) -> None:
-    """Starts the simulator once, before anything is written for a cell."""
+    """Start the simulator once, before anything is written for a cell."""
     try:
         run.request.config.backend.check()
     except EvonavError as error:

@@ -1,4 +1,4 @@
-"""What a sweep file and `--set` say, as plain values: short forms (`tasks = ["bundled:2"]`) are spelled out here."""
+"""Expand the short forms of sweep files (`tasks = ["bundled:2"]`) and apply the changes of `--set`."""
 
 import json
 import re
@@ -13,11 +13,11 @@ MAX_NAME_CHARACTERS = 64
 
 
 def apply(raw: dict[str, Any], change: str, path: Path) -> None:
-    """Sets a value as `--set KEY=VALUE` says it.
+    """Set a value, as `--set KEY=VALUE` does.
 
     Args:
         raw: Changed.
-        change: A key with dots reaches into tables; a value is JSON, or plain words.
+        change: A key with dots reaches into tables; a value is JSON, or text.
         path: Named in errors.
 
     Raises:
@@ -42,15 +42,15 @@ def apply(raw: dict[str, Any], change: str, path: Path) -> None:
     table[keys[-1]] = value
 
 
-def _words(value: Any) -> Any:  # noqa: ANN401 - as read
-    """One string, with commas or not, as a list."""
+def _listed_text(value: Any) -> Any:  # noqa: ANN401 - as read
+    """Split a string at its commas; other values are returned as they are."""
     if isinstance(value, str):
         return [word.strip() for word in value.split(",") if word.strip()]
     return value
 
 
 def _agents(value: Any, place: str) -> Any:  # noqa: ANN401 - as read
-    agents = _words(value)
+    agents = _listed_text(value)
     if isinstance(agents, list):
         twice = next((agent for i, agent in enumerate(agents) if agent in agents[:i]), None)
         if twice is not None:
@@ -63,7 +63,7 @@ def _seeds(value: Any, place: str) -> Any:  # noqa: ANN401 - as read
         return [value]
     if isinstance(value, str):
         try:
-            value = [int(word) for word in _words(value)]
+            value = [int(word) for word in _listed_text(value)]
         except ValueError:
             raise InvalidArgumentError(f"{place} = {value!r}: expected whole numbers, such as [0, 1, 2]") from None
     if isinstance(value, list) and len({str(seed) for seed in value}) < len(value):
@@ -112,20 +112,20 @@ def _simulator(word: str, place: str) -> tuple[str, dict[str, Any]]:
 
 
 def _axis(read: Any) -> Any:  # noqa: ANN401 - a function of (word, place)
-    """Spells out a list of short forms, each under a name made from it; tables stay as they are."""
+    """Expand a list of short forms, each under a name made from it; tables stay as they are."""
 
     def spell(value: Any, place: str) -> Any:  # noqa: ANN401 - as read
         has_commas = read in (_decision, _perception)  # within a word
-        words = _words(value) if not has_commas else [value] if isinstance(value, str) else value
-        if isinstance(words, dict):
+        entries = _listed_text(value) if not has_commas else [value] if isinstance(value, str) else value
+        if isinstance(entries, dict):
             return {
                 name: read(entry, f"{place}.{name}")[1] if isinstance(entry, str) else entry
-                for name, entry in words.items()
+                for name, entry in entries.items()
             }
-        if not isinstance(words, list):
-            return words
+        if not isinstance(entries, list):
+            return entries
         table: dict[str, Any] = {}
-        for word in words:
+        for word in entries:
             if not isinstance(word, str):
                 raise InvalidArgumentError(f"{place}: {word!r}: expected a word; give tables names of their own")
             name, entry = read(word, place)
@@ -152,7 +152,7 @@ SHORT_FORMS: Mapping[str, Callable[[Any, str], Any]] = {
 
 
 def listed(pattern: Any) -> Any:  # noqa: ANN401 - as read
-    """A pattern with a list of one for each value that stands alone."""
+    """Return a pattern in which single values are lists of one."""
     if not isinstance(pattern, dict):
         return pattern
     return {key: value if isinstance(value, list) else [value] for key, value in pattern.items()}

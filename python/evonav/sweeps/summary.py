@@ -1,4 +1,4 @@
-"""What came of a sweep: a row a cell and agent, and one over the seeds of cells that differ in nothing else.
+"""Summarise a sweep: a row per cell and agent, and one over the seeds of cells that differ only in the seed.
 
 Rates and intervals are the runs' own; over seeds, stages of one house under several seeds are resampled together.
 """
@@ -19,7 +19,7 @@ from evonav.sweeps.run import RUNS_NAME, read_claim
 
 
 def sweep_rows(out: Path) -> list[SweepRow]:
-    """The rows of a sweep as it stands, cell by cell, then those over seeds.
+    """Return the rows of a sweep, finished or not: cell by cell, then those over seeds.
 
     Raises:
         StoreError: There is no sweep, or it cannot be read.
@@ -38,7 +38,7 @@ def sweep_rows(out: Path) -> list[SweepRow]:
 
 
 def sweep_json(out: Path, rows: list[SweepRow]) -> dict[str, Any]:
-    """The content of the sweep's `summary.json`."""
+    """Return the content of the sweep's `summary.json`."""
     return {
         "schema_version": 1,
         "name": read_claim(out)["settings"]["name"],
@@ -72,7 +72,7 @@ def _cell_rows(run_dir: Path, name: str, cell: Mapping[str, Any]) -> list[SweepR
 
 
 def _run_summary(run_dir: Path) -> dict[str, dict[str, Any]]:
-    """A run's summary by agent, computed anew where its records are newer; nothing for a run not begun."""
+    """Return a run's summary by agent, computed again if its records are newer; empty for a run without records."""
     records, written = run_dir / FILE_NAME, run_dir / SUMMARY_NAME
     if not records.exists():
         return {}
@@ -87,7 +87,7 @@ def _run_summary(run_dir: Path) -> dict[str, dict[str, Any]]:
 
 
 def _over_seeds(out: Path, cells: Mapping[str, Mapping[str, Any]], rows: list[SweepRow]) -> list[SweepRow]:
-    """One row an agent that runs under more than one seed."""
+    """Return a row for each agent that runs with more than one seed."""
     axes = {key: value for key, value in next(iter(cells.values()))["axes"].items() if key != "seed"}
     found = []
     for agent in dict.fromkeys(agent for cell in cells.values() for agent in cell["agents"]):

@@ -13,12 +13,12 @@ from evonav.sweeps.row import AXES, STATES, SweepRow
 
 
 def write_sweep_files(out: Path, rows: Sequence[SweepRow], content: Mapping[str, Any]) -> None:
-    """Writes `summary.json`, `summary.csv` and `summary.md` of a sweep.
+    """Write `summary.json`, `summary.csv` and `summary.md` of a sweep.
 
     Args:
         out: The sweep's folder.
         rows: Its rows.
-        content: Of `summary.json`.
+        content: Content of `summary.json`.
 
     Raises:
         StoreError: They cannot be written.
@@ -32,7 +32,7 @@ def write_sweep_files(out: Path, rows: Sequence[SweepRow], content: Mapping[str,
 
 
 def sweep_tables(rows: Sequence[SweepRow]) -> list[Table]:
-    """A table of cells, and where there are several seeds one over them; axes with one value are left out."""
+    """Return a table of cells, and one over seeds if there are several; axes with one value are left out."""
     axes = [axis for axis in AXES if len({getattr(row, axis) for row in rows if row.cell}) > 1]
     cells = [row for row in rows if row.cell]
     seeds = [row for row in rows if not row.cell]
@@ -43,7 +43,7 @@ def sweep_tables(rows: Sequence[SweepRow]) -> list[Table]:
 
 
 def sweep_csv(rows: Sequence[SweepRow]) -> str:
-    """A line a row, rates as shares."""
+    """Return CSV with a line per row; rates are fractions."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     ends = [f"{measure}_{end}" for measure in ("sr", "spl") for end in ("mean", "low95", "high95")]
@@ -68,7 +68,7 @@ def sweep_csv(rows: Sequence[SweepRow]) -> str:
 
 def _table(title: str, rows: Sequence[SweepRow], axes: Sequence[str]) -> Table:
     columns = ("Agent", *axes, "SR % [95% CI]", "SPL % [95% CI]", "n", "stages")
-    told = tuple(
+    lines = tuple(
         (
             row.agent,
             *(str(getattr(row, axis)) for axis in axes),
@@ -82,7 +82,7 @@ def _table(title: str, rows: Sequence[SweepRow], axes: Sequence[str]) -> Table:
     notes = [INTERVALS]
     if any(row.is_incomplete for row in rows):
         notes.append("Incomplete: some stages errored or were not run; their rates are not final.")
-    return Table(title, columns, told, tuple(notes))
+    return Table(title, columns, lines, tuple(notes))
 
 
 def _missing(row: SweepRow) -> str:

@@ -1,4 +1,4 @@
-"""What works on this machine, a check a capability: quick, and none of them changes anything."""
+"""Check what works on this machine, quickly and without changing anything."""
 
 import os
 import platform
@@ -55,29 +55,29 @@ _ARM_FEATURES = ("asimd", "neon", "sve")
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What came of a look at one capability."""
+    """The result of one check."""
 
     name: str
     state: State
-    """missing: something optional; failed: it is there and does not work, or nothing works without it."""
-    said: str
+    """missing: an optional part is not installed; failed: a part does not work, or an essential one is missing."""
+    finding: str
     remedy: str = ""
-    """What to do about it."""
+    """The action that repairs it."""
     is_essential: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Where:
-    """What the checks are about, beside the machine."""
+    """The folder and endpoint to check, beside the machine."""
 
     out: Path
-    """Folder that runs would go to; need not exist."""
+    """Folder for runs; it need not exist."""
     uses_network: bool = True
     base_url: str | None = None
 
 
 def all_checks(where: Where) -> Iterator[Check]:
-    """Every check, in reading order; one that goes wrong itself is a failed check, not an error."""
+    """Run every check; a check that raises counts as failed."""
     essential: tuple[tuple[str, Callable[[], Check]], ...] = (
         ("evonav", _core),
         ("python", _python),
@@ -101,22 +101,26 @@ def all_checks(where: Where) -> Iterator[Check]:
 def _guarded(name: str, check: Callable[[], Check], *, is_essential: bool = False) -> Check:
     try:
         return check()
-    except Exception as error:  # whatever is broken here is what is to be told
-        said = " ".join(f"{type(error).__name__}: {error}".split())
-        return Check(name, "failed", said, "pip install --force-reinstall evonav" if is_essential else "", is_essential)
+    except Exception as error:  # a broken part may raise anything
+        finding = " ".join(f"{type(error).__name__}: {error}".split())
+        return Check(
+            name, "failed", finding, "pip install --force-reinstall evonav" if is_essential else "", is_essential
+        )
 
 
 def _core() -> Check:
     import evonav
     from evonav import _core as core
 
-    said = f"{evonav.__version__}, Rust core {core.__version__}, in {Path(evonav.__file__).parent}"
-    return Check("evonav", "ok", said, is_essential=True)
+    finding = f"{evonav.__version__}, Rust core {core.__version__}, in {Path(evonav.__file__).parent}"
+    return Check("evonav", "ok", finding, is_essential=True)
 
 
 def _python() -> Check:
-    said = f"{platform.python_version()} ({sys.executable}), numpy {version('numpy')}, {platform.platform(terse=True)}"
-    return Check("python", "ok", said, is_essential=True)
+    finding = (
+        f"{platform.python_version()} ({sys.executable}), numpy {version('numpy')}, {platform.platform(terse=True)}"
+    )
+    return Check("python", "ok", finding, is_essential=True)
 
 
 def _bundled() -> Check:
@@ -131,7 +135,7 @@ def _bundled() -> Check:
 
 
 def _renderer() -> Check:
-    """Turns and looks for a second."""
+    """Render views of a bundled house for one second."""
     from dataclasses import replace
 
     from evonav.house import bundled_houses
@@ -147,10 +151,10 @@ def _renderer() -> Check:
         num += 1
     simulator.close()
     if most == 0:
-        return Check("renderer", "failed", "sees nothing in a bundled house", "tell us: it is a bug", is_essential=True)
+        return Check("renderer", "failed", "sees nothing in a bundled house", "report this as a bug", is_essential=True)
     size = f"{simulator.config.width_px}x{simulator.config.height_px}"
-    said = f"{num / took_s:.0f} views/s of {size} (colour, depth, instances) on one core"
-    return Check("renderer", "ok", said, is_essential=True)
+    finding = f"{num / took_s:.0f} views/s of {size} (colour, depth, instances) on one core"
+    return Check("renderer", "ok", finding, is_essential=True)
 
 
 def _processor() -> Check:
@@ -159,12 +163,12 @@ def _processor() -> Check:
     text = info.read_text(encoding="utf-8", errors="replace") if info.is_file() else ""
     flags = set(" ".join(re.findall(r"^(?:flags|Features)\s*:(.*)$", text, re.MULTILINE)[:1]).split())
     known = [name for name in (*_X86_FEATURES, *_ARM_FEATURES) if name in flags]
-    told = f", {' '.join(known)}" if known else ""
-    return Check("processor", "ok", f"{platform.machine()}, {cores} cores for workers{told}")
+    listed = f", {' '.join(known)}" if known else ""
+    return Check("processor", "ok", f"{platform.machine()}, {cores} cores for workers{listed}")
 
 
 def _folder(out: Path) -> Check:
-    """Space and locks where runs would go."""
+    """Check free space and file locks in the folder for runs."""
     place = next(folder for folder in (out.absolute(), *out.absolute().parents) if folder.is_dir())
     free_gb = shutil.disk_usage(place).free / 1e9
     try:
@@ -173,16 +177,16 @@ def _folder(out: Path) -> Check:
     except OSError as error:
         remedy = "name a folder that you may write to with --out"
         return Check("run folder", "failed", f"{place}: {error.strerror or error}", remedy)
-    said = f"{place}: {free_gb:.0f} GB free, {'locks work' if has_locks else 'no file locks'}"
+    finding = f"{place}: {free_gb:.0f} GB free, {'locks work' if has_locks else 'no file locks'}"
     if not has_locks:
-        return Check("run folder", "failed", said, "put runs on a local disk: two commands could write to one run")
+        return Check("run folder", "failed", finding, "put runs on a local disk: two commands could write to one run")
     if free_gb < MIN_FREE_GB:
-        return Check("run folder", "failed", said, "a run takes about 0.1 MB a stage, with a model 1 MB: make room")
-    return Check("run folder", "ok", said)
+        return Check("run folder", "failed", finding, "a run takes about 0.1 MB a stage, with a model 1 MB: make room")
+    return Check("run folder", "ok", finding)
 
 
 def _has_locks(path: Path) -> bool:
-    """Whether a second opening of a locked file is kept out."""
+    """Return true if a locked file cannot be locked a second time."""
     try:
         import fcntl
     except ImportError:  # Windows
@@ -218,7 +222,7 @@ def _extra(extra: str) -> Check:
 
 
 def _gpu() -> Check:
-    """By NVIDIA's own tool; PyTorch is named by its version and not loaded, which takes seconds."""
+    """Ask nvidia-smi; PyTorch's version is read without loading it, which would take seconds."""
     try:
         torch = f", torch {version('torch')}"
     except PackageNotFoundError:
@@ -234,7 +238,7 @@ def _gpu() -> Check:
 
 
 def _models(stack: StackName) -> Check:
-    """Files by name and place: hashes, which take seconds, are compared before a run."""
+    """Look for the files of a stack by name; hashes take seconds and are compared before a run."""
     folder = models_folder(None)
     files = {
         file.name: (file, path)
@@ -245,9 +249,9 @@ def _models(stack: StackName) -> Check:
     where = str(folder) if folder is not None else "the libraries' own folders"
     if lacking:
         size_mb = sum(file.size_mb for file in lacking)
-        said = f"{len(lacking)} of {len(files)} files are not in {where} (about {size_mb} MB): {lacking[0].name}"
-        remedy = "fetched at first use" if folder is None else "docs/perception.md says where they are to be had"
-        return Check(f"models {stack}", "missing", f"{said}, ..." if len(lacking) > 1 else said, remedy)
+        finding = f"{len(lacking)} of {len(files)} files are not in {where} (about {size_mb} MB): {lacking[0].name}"
+        remedy = "fetched at first use" if folder is None else "docs/perception.md says where to download them"
+        return Check(f"models {stack}", "missing", f"{finding}, ..." if len(lacking) > 1 else finding, remedy)
     return Check(f"models {stack}", "ok", f"{len(files)} files in {where}")
 
 
@@ -274,12 +278,12 @@ def _procthor() -> Check:
     manifest = read_manifest(folder)
     if manifest is None:
         return Check("ProcTHOR-10k", "missing", f"not in {folder}", "evonav houses fetch procthor-10k")
-    told = ", ".join(f"{name} {split.num_houses}" for name, split in manifest.splits.items())
-    return Check("ProcTHOR-10k", "ok", f"{told} houses in {folder}")
+    listed = ", ".join(f"{name} {split.num_houses}" for name, split in manifest.splits.items())
+    return Check("ProcTHOR-10k", "ok", f"{listed} houses in {folder}")
 
 
 def _endpoint(where: Where) -> Check:
-    """Lists the models of an endpoint, only where one is configured."""
+    """Ask the configured endpoint for its models, if there is one."""
     from evonav.decision.vlm.client import KEY_VARIABLE, URL_VARIABLE
 
     key, url = os.environ.get(KEY_VARIABLE), where.base_url or os.environ.get(URL_VARIABLE)

@@ -1,4 +1,4 @@
-"""`evonav doctor`: what works here, and what to install."""
+"""`evonav doctor`: check the installation."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,14 +10,14 @@ _STYLES = {"ok": "green", "missing": "yellow", "failed": "bold red"}
 
 
 def doctor(
-    out: Annotated[Path, typer.Option(help="Folder that runs are to go to.")] = Path("out"),
+    out: Annotated[Path, typer.Option(help="Folder for runs.")] = Path("out"),
     network: Annotated[bool, typer.Option(help="Ask the model's endpoint, if one is configured.")] = True,
-    base_url: Annotated[str | None, typer.Option(help="Of an endpoint; default: OPENAI_BASE_URL, else OpenAI's.")] = (
-        None
-    ),
+    base_url: Annotated[
+        str | None, typer.Option(help="Address of the endpoint. Default: OPENAI_BASE_URL, else OpenAI's.")
+    ] = (None),
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON, for programs and bug reports.")] = False,
 ) -> None:
-    """Says what works on this machine and how to get the rest; exit code 1 if something essential does not."""
+    """Check what works on this machine and how to install the rest; exit code 1 if an essential part does not work."""
     import json
     from dataclasses import asdict
 
@@ -25,7 +25,7 @@ def doctor(
     from evonav.cli.doctor.checks import Where, all_checks
 
     checks = []
-    with status("Looking around") as tell:
+    with status("Checking") as tell:
         for check in all_checks(Where(out, network, base_url)):
             checks.append(check)
             tell(check.name)
@@ -40,7 +40,7 @@ def doctor(
         width = max(len(check.name) for check in checks)
         for check in checks:
             line = Text.assemble(
-                (f"{check.state:8}", _STYLES[check.state]), f"{check.name:{width}}  ", (check.said, "")
+                (f"{check.state:8}", _STYLES[check.state]), f"{check.name:{width}}  ", (check.finding, "")
             )
             if check.remedy:
                 line.append(f" -> {check.remedy}", style="bold")

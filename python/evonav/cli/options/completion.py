@@ -1,4 +1,4 @@
-"""What a shell offers at the tab key. Nothing is imported before it is asked for: commands are to start fast."""
+"""Complete words in the shell; heavy imports happen only when the shell asks for words."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""Options that commands share."""
+"""Declare options that several commands share."""
 
 import os
 from enum import Enum
@@ -16,7 +16,7 @@ AgentNames = Annotated[
     list[str] | None,
     typer.Option(
         "--agents",
-        help=f"Names, comma-separated; see `evonav agents`. Default: {HEURISTICS}.",
+        help=f"Agents, separated by commas (see `evonav agents`). Default: {HEURISTICS}.",
         autocompletion=completion.agents,
     ),
 ]
@@ -24,56 +24,74 @@ OneAgent = Annotated[
     list[str] | None,
     typer.Option(
         "--agent",
-        help="A name, `module:Class` or `./file.py:Class`; repeat it for more.",
+        help="One agent: a name, `module:Class` or `./file.py:Class`. Repeat the option for more agents.",
         autocompletion=completion.agents,
     ),
 ]
 RunFolder = Annotated[Path, typer.Argument(help="Folder of a run.", autocompletion=completion.runs)]
 InProcess = Annotated[
     bool,
-    typer.Option("--in-process", help="Agents in the evaluator's process, for debuggers: only exceptions are held."),
+    typer.Option(
+        "--in-process",
+        help="Run agents in the evaluator's process, for debuggers; a crash of an agent then ends the worker.",
+    ),
 ]
 AgentTimeout = Annotated[
     float | None,
-    typer.Option(min=0.1, help="Seconds for an agent's answer, then its stage is errored. Default: 600, vlm 3600."),
+    typer.Option(
+        min=0.1,
+        help="Seconds to wait for an agent's answer before its stage is errored. Default: 600, with a VLM 3600.",
+    ),
 ]
-AgentMemory = Annotated[int | None, typer.Option(min=256, help="MB of address space for an agent's process.")]
+AgentMemory = Annotated[
+    int | None, typer.Option(min=256, help="Largest address space of an agent's process, in MB. Default: no limit.")
+]
 HOUSES = "ProcTHOR JSON, JSONL, JSONL.gz, or procthor-10k:SPLIT"
-Houses = Annotated[Path | None, typer.Option(help=f"{HOUSES} to generate tasks from.")]
+Houses = Annotated[Path | None, typer.Option(help=f"Houses to generate tasks from: {HOUSES}.")]
 Tasks = Annotated[
     Path | None,
-    typer.Option(help="Folder of tasks; default: the bundled ones.", autocompletion=completion.task_folders),
+    typer.Option(help="Folder of tasks. Default: the bundled tasks.", autocompletion=completion.task_folders),
 ]
-Limit = Annotated[int | None, typer.Option(min=1, help="Take the first N (multi-room) houses or tasks.")]
+Limit = Annotated[
+    int | None, typer.Option(min=1, help="Take only the first N multi-room houses or tasks. Default: all.")
+]
 Subset = Annotated[
     str | None,
-    typer.Option(help="Named subset, SPLIT-N, such as test-90 (docs/tasks.md).", autocompletion=completion.subsets),
+    typer.Option(
+        help="Take a named subset, SPLIT-N, such as test-90 (docs/tasks.md). Default: all.",
+        autocompletion=completion.subsets,
+    ),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Decides everything random.")]
-Workers = Annotated[int | None, typer.Option(min=0, help="Processes; default: one a core. 0: in this process.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of every random choice.")]
+Workers = Annotated[
+    int | None, typer.Option(min=0, help="Number of worker processes; 0 runs in this process. Default: one per core.")
+]
 Retries = Annotated[
     int,
-    typer.Option(min=0, help="How often a stage is tried again that lost its worker, simulator or agent's process."),
+    typer.Option(min=0, help="Number of retries of a stage that lost its worker, simulator or agent process."),
 ]
 
 
 class EngineOption(str, Enum):
-    """What the workers are."""
+    """The kind of workers."""
 
     LOCAL = "local"
     RAY = "ray"
 
 
-Engine = Annotated[EngineOption, typer.Option(help="Processes here, or Ray.")]
-RayAddress = Annotated[str | None, typer.Option(help="Of a Ray cluster that shares this file system.")]
+Engine = Annotated[EngineOption, typer.Option(help="Run workers as local processes or as Ray actors.")]
+RayAddress = Annotated[
+    str | None,
+    typer.Option(help="Ray: address of a cluster that shares this file system. Default: start Ray on this machine."),
+]
 WorkerGpus = Annotated[
     float,
-    typer.Option(min=0.0, help="Ray: GPUs set aside for each worker, such as 0.5; for perception that needs one."),
+    typer.Option(min=0.0, help="Ray: GPUs reserved for each worker, such as 0.5, for perception that needs one."),
 ]
 
 
 def check_engine(engine: EngineOption, ray_address: str | None, worker_gpus: float = 0.0) -> None:
-    """Refuses options of Ray without it."""
+    """Reject options of Ray that are given without `--engine ray`."""
     if engine is not EngineOption.RAY:
         for name, is_given in (("--ray-address", ray_address is not None), ("--worker-gpus", worker_gpus > 0.0)):
             if is_given:
@@ -82,22 +100,27 @@ def check_engine(engine: EngineOption, ray_address: str | None, worker_gpus: flo
 
 AnyAsset = Annotated[
     bool,
-    typer.Option("--allow-unknown-assets", help="Objaverse houses: unknown assets get their category's usual size."),
+    typer.Option(
+        "--allow-unknown-assets",
+        help="Give assets missing from the catalogue the usual size of their category; Objaverse houses need it.",
+    ),
 ]
 
 
-RetryErrored = Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")]
-Out = Annotated[Path, typer.Option(help="Folder of the run; an unfinished one is resumed.")]
+RetryErrored = Annotated[
+    bool, typer.Option("--retry-errored", help="Run errored stages again, and those not run because of them.")
+]
+Out = Annotated[Path, typer.Option(help="Folder of the run; an unfinished run is resumed.")]
 
 
 def names_of(agents: list[str] | None, agent: list[str] | None = None) -> list[str]:
-    """What `--agents` and `--agent` name, in that order; the heuristics where neither was given."""
+    """Return the agents of `--agents`, then those of `--agent`; the paper's heuristics if neither is given."""
     lists = agents if agents is not None else [] if agent else [HEURISTICS]
     return [*(name for text in lists for part in text.split(",") if (name := part.strip())), *(agent or ())]
 
 
 def count_of(workers: int | None) -> int:
-    """Processes to start: as told, or one a core."""
+    """Return the number of worker processes: the given one, or one per core."""
     if workers is not None:
         return workers
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

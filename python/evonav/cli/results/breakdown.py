@@ -1,4 +1,4 @@
-"""`evonav breakdown`: rates by kind of stage."""
+"""`evonav breakdown`: show rates by kind of stage."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,7 +8,8 @@ import typer
 
 def breakdown(
     runs: Annotated[
-        list[str], typer.Argument(help="Runs or sweeps (all agents), RUN:AGENT, or a run and then names of its agents.")
+        list[str],
+        typer.Argument(help="Runs or sweeps (all agents), RUN:AGENT, or a run followed by names of its agents."),
     ],
     by: Annotated[
         list[str] | None,
@@ -17,13 +18,13 @@ def breakdown(
             "row; repeat it for more. Default: all of these."
         ),
     ] = None,
-    measure: Annotated[str, typer.Option(help="Any numeric field of a stage's row.")] = "success",
-    md: Annotated[Path | None, typer.Option(help="Markdown file to write.")] = None,
-    latex: Annotated[Path | None, typer.Option(help="LaTeX file to write (booktabs, graphicx).")] = None,
-    csv: Annotated[Path | None, typer.Option(help="CSV file to write, unrounded.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Plots to write: .svg, .png or .pdf file (extra `viz`).")] = None,
+    measure: Annotated[str, typer.Option(help="Numeric field of a stage's row (docs/measures.md).")] = "success",
+    md: Annotated[Path | None, typer.Option(help="Write a Markdown file.")] = None,
+    latex: Annotated[Path | None, typer.Option(help="Write a LaTeX file (booktabs, graphicx).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write a CSV file with unrounded numbers.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Write plots to a .svg, .png or .pdf file (extra `viz`).")] = None,
 ) -> None:
-    """Shows rates by kind of stage, each with n and a 95% interval by house."""
+    """Show rates by kind of stage, each with n and a 95% interval over houses."""
     from rich.console import Console
 
     from evonav.parallel.folders import write_atomically
@@ -33,8 +34,8 @@ def breakdown(
 
     if plot is not None:
         check_plot(plot)
-    sides = read_compared_agents(runs)
-    found = [made.breakdown(sides, name, measure) for name in by or made.STANDARD]
+    compared = read_compared_agents(runs)
+    found = [made.breakdown(compared, name, measure) for name in by or made.STANDARD]
     found = [one for one in found if one.groups]
     tables = [made.breakdown_table(one) for one in found]
     console = Console()

@@ -1,4 +1,4 @@
-"""`evonav compare`: agents against each other on the same stages."""
+"""`evonav compare`: compare agents on the same stages."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,26 +13,31 @@ if TYPE_CHECKING:
 
 def compare(
     sides: Annotated[
-        list[str], typer.Argument(help="Runs or sweeps (all agents), RUN:AGENT, or a run and then names of its agents.")
+        list[str],
+        typer.Argument(help="Runs or sweeps (all agents), RUN:AGENT, or a run followed by names of its agents."),
     ],
     measure: Annotated[
-        list[str] | None, typer.Option(help="Another numeric field of a stage's row; repeat it for more.")
+        list[str] | None,
+        typer.Option(help="Compare another numeric field of a stage's row. Repeat the option for more."),
     ] = None,
-    baseline: Annotated[str | None, typer.Option(help="Compare all with this one, not every pair.")] = None,
+    baseline: Annotated[str | None, typer.Option(help="Compare all agents with this one. Default: every pair.")] = None,
     allow_differences: Annotated[
-        bool, typer.Option("--allow-differences", help="Runs of other tasks or protocol: what they have in common.")
+        bool,
+        typer.Option(
+            "--allow-differences", help="Compare runs of different tasks or protocols on the stages that they share."
+        ),
     ] = False,
-    md: Annotated[Path | None, typer.Option(help="Markdown file to write.")] = None,
-    latex: Annotated[Path | None, typer.Option(help="LaTeX file to write (booktabs, graphicx).")] = None,
-    csv: Annotated[Path | None, typer.Option(help="CSV file to write, unrounded.")] = None,
-    json: Annotated[Path | None, typer.Option(help="JSON file to write, with the stages that flipped.")] = None,
-    html: Annotated[Path | None, typer.Option(help="HTML page to write, with links to replays.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Plot to write: .svg, .png or .pdf file (extra `viz`).")] = None,
+    md: Annotated[Path | None, typer.Option(help="Write a Markdown file.")] = None,
+    latex: Annotated[Path | None, typer.Option(help="Write a LaTeX file (booktabs, graphicx).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write a CSV file with unrounded numbers.")] = None,
+    json: Annotated[Path | None, typer.Option(help="Write a JSON file, with the stages whose outcome differs.")] = None,
+    html: Annotated[Path | None, typer.Option(help="Write an HTML page with links to replays.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Write a plot to a .svg, .png or .pdf file (extra `viz`).")] = None,
 ) -> None:
-    """Compares agents stage by stage: differences with 95% interval and p, by stratum and mode, and what flipped."""
+    """Compare agents on the same stages: differences with 95% intervals and p-values, and the stages that differ."""
     from rich.console import Console
 
-    from evonav.report.compare import wording as words
+    from evonav.report.compare import wording
     from evonav.report.compare.compare import compare as compare_sides
     from evonav.report.compare.selection import read_compared_agents
 
@@ -40,11 +45,11 @@ def compare(
         read_compared_agents(sides), measures=measure or [], baseline=baseline, allow_differences=allow_differences
     )
     console = Console()
-    for table in words.terminal_tables(found):
+    for table in wording.terminal_tables(found):
         console.print(table.rich())
-    for line in words.statements(found) if len(found) == 1 else words.warnings(found):
+    for line in wording.statements(found) if len(found) == 1 else wording.warnings(found):
         console.print(line, markup=False, highlight=False)
-    console.print(words.METHOD, style="dim", highlight=False)
+    console.print(wording.METHOD, style="dim", highlight=False)
     for path in _write(found, md=md, latex=latex, csv=csv, json=json, html=html, plot=plot):
         typer.echo(f"written: {path}")
 
@@ -63,16 +68,16 @@ def _write(
     from collections.abc import Callable
 
     from evonav.parallel.folders import write_atomically
-    from evonav.report.compare import wording as words
+    from evonav.report.compare import wording
     from evonav.report.compare.compare import comparison_json
     from evonav.report.compare.page import comparison_page, comparison_plot
     from evonav.report.plots.render import write_plots
 
     written = []
     texts: list[tuple[Path | None, Callable[[], str]]] = [
-        (md, lambda: words.comparison_markdown(found)),
-        (latex, lambda: words.comparison_latex(found)),
-        (csv, lambda: words.comparison_csv(found)),
+        (md, lambda: wording.comparison_markdown(found)),
+        (latex, lambda: wording.comparison_latex(found)),
+        (csv, lambda: wording.comparison_csv(found)),
         (json, lambda: json_text.dumps(comparison_json(found), indent=1) + "\n"),
         (html, lambda: comparison_page(found, None if html is None else html.parent)),
     ]

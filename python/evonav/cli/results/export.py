@@ -1,4 +1,4 @@
-"""`evonav export`: a run's stages and rounds for other programs."""
+"""`evonav export`: write a run's stages or rounds for other programs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,19 +10,23 @@ from evonav.cli.options.shared import RunFolder
 
 def export(
     run: RunFolder,
-    csv: Annotated[Path | None, typer.Option(help="CSV file to write.")] = None,
-    jsonl: Annotated[Path | None, typer.Option(help="File of JSON lines to write.")] = None,
-    parquet: Annotated[Path | None, typer.Option(help="Parquet file to write (extra `data`).")] = None,
-    rounds: Annotated[bool, typer.Option("--rounds", help="One row a decision round, not a stage.")] = False,
-    agent: Annotated[list[str] | None, typer.Option(help="Only this agent; repeat it for more.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write a CSV file.")] = None,
+    jsonl: Annotated[Path | None, typer.Option(help="Write a file of JSON lines.")] = None,
+    parquet: Annotated[Path | None, typer.Option(help="Write a Parquet file (extra `data`).")] = None,
+    rounds: Annotated[
+        bool, typer.Option("--rounds", help="Write one row per decision round instead of one per stage.")
+    ] = False,
+    agent: Annotated[
+        list[str] | None, typer.Option(help="Write only this agent. Repeat the option for more agents.")
+    ] = None,
 ) -> None:
-    """Writes one row a stage, or a decision round, with every measure (docs/measures.md)."""
+    """Write one row per stage or decision round, with every metric (docs/measures.md)."""
     from evonav.report import export as made
 
-    asked = {".csv": csv, ".jsonl": jsonl, ".parquet": parquet}
-    if not any(asked.values()):
+    files = {".csv": csv, ".jsonl": jsonl, ".parquet": parquet}
+    if not any(files.values()):
         raise typer.BadParameter("name a file: --csv, --jsonl or --parquet")
-    for suffix, path in asked.items():
+    for suffix, path in files.items():
         if path is None:
             continue
         if path.suffix != suffix:

@@ -1,4 +1,4 @@
-"""`evonav measures`: what explains a run's rates."""
+"""`evonav measures`: show the metrics that explain a run's rates."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,10 +10,12 @@ from evonav.cli.options.shared import RunFolder
 
 def measures(
     run: RunFolder,
-    agents: Annotated[str | None, typer.Option(help="Only these, comma-separated, in this order.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Markdown file to write, too.")] = None,
+    agents: Annotated[
+        str | None, typer.Option(help="Show only these agents, separated by commas, in this order. Default: all.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Write the tables to a Markdown file too.")] = None,
 ) -> None:
-    """Shows success by several definitions, stale entries believed, memory, and what a stage costs."""
+    """Show metrics that explain a run's rates: success by several definitions, stale entries, memory and costs."""
     from rich.console import Console
 
     from evonav.parallel.folders import write_atomically

@@ -1,4 +1,4 @@
-"""`evonav paper`: a run beside the paper's tables."""
+"""`evonav paper`: show a run beside the paper's tables."""
 
 from enum import Enum
 from pathlib import Path
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Half(str, Enum):
-    """Of the paper's tables."""
+    """A half of the paper's tables."""
 
     GT = "gt"
     PREDICTION = "prediction"
@@ -22,14 +22,16 @@ class Half(str, Enum):
 
 def paper(
     run: RunFolder,
-    perception: Annotated[Half, typer.Option(help="Which half of the paper's tables.")] = Half.GT,
-    out: Annotated[Path | None, typer.Option(help="Markdown file to write, too.")] = None,
-    latex: Annotated[Path | None, typer.Option(help="LaTeX file: Tables 1 and 2 in the paper's layout.")] = None,
+    perception: Annotated[Half, typer.Option(help="Half of the paper's tables to compare with.")] = Half.GT,
+    out: Annotated[Path | None, typer.Option(help="Write the tables to a Markdown file too.")] = None,
+    latex: Annotated[
+        Path | None, typer.Option(help="Write Tables 1 and 2 in the paper's layout to a LaTeX file.")
+    ] = None,
     prediction: Annotated[
-        Path | None, typer.Option(help="Run with predicted perception, for the lower half of the LaTeX tables.")
+        Path | None, typer.Option(help="Run with predicted perception, which fills the lower half of the LaTeX tables.")
     ] = None,
 ) -> None:
-    """Shows the paper's Tables 1 and 2 beside a run's, the order of agents, and what its differences could tell."""
+    """Show the paper's Tables 1 and 2 beside a run's, the order of agents, and which differences it could detect."""
     from rich.console import Console
 
     from evonav.errors import StoreError

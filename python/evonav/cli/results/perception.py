@@ -1,4 +1,4 @@
-"""`evonav perception`: how good perceptions are, against the truth."""
+"""`evonav perception`: measure perceptions against the truth."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -27,35 +27,37 @@ def perception(
     models: "PerceptionSettings",
     tasks: Annotated[
         Path | None,
-        typer.Argument(help="Folder of tasks; default: the bundled ones.", autocompletion=completion.task_folders),
+        typer.Argument(help="Folder of tasks. Default: the bundled tasks.", autocompletion=completion.task_folders),
     ] = None,
     perceptions: Annotated[
         list[str] | None,
         typer.Option(
-            "--perception", metavar="WORD", help="As for evaluate (docs/perception.md); repeat it. Default: gt."
+            "--perception",
+            metavar="WORD",
+            help="Perception, as for evaluate (docs/perception.md). Repeat the option for more. Default: gt.",
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of records and report; what it has is not done again.")] = Path(
-        "out/perception"
-    ),
+    out: Annotated[
+        Path, typer.Option(help="Folder of records and report; finished tasks are not measured again.")
+    ] = Path("out/perception"),
     limit: Limit = None,
     subset: Subset = None,
     views_per_room: Annotated[
-        int, typer.Option(min=1, help="Views of a room, at most: places of 6, as far apart as they can be.")
+        int, typer.Option(min=1, help="Largest number of views of a room, in places of 6 views that are far apart.")
     ] = 12,
     houses: Annotated[
         int,
         typer.Option(
-            min=1, help="Different houses of a task to tour: stage 1's, then those it becomes. 1: no staleness."
+            min=1, help="Number of a task's houses to tour, in the order of its stages; with 1 no memory becomes stale."
         ),
     ] = 2,
     seed: Seed = 0,
     allow_unknown_assets: AnyAsset = False,
     workers: Workers = None,
 ) -> None:
-    """Measures perceptions against the truth: what they find, and the memory that comes of it.
+    """Measure perceptions against the truth: their detections, and the memory built from them.
 
-    Every perception sees the same views. Leaves OUT/report.html, summary.json, .csv and .md.
+    Every perception sees the same views. Run again to resume. Writes OUT/report.html, summary.json, .csv and .md.
     """
     from rich import progress as bars
     from rich.console import Console
@@ -69,11 +71,11 @@ def perception(
 
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")
-    words = perceptions or ["gt"]
-    if models.model_fields_set and not any(word.startswith("predicted") for word in words):
+    names = perceptions or ["gt"]
+    if models.model_fields_set and not any(word.startswith("predicted") for word in names):
         raise typer.BadParameter("--models and --device are for --perception predicted")
     specs = []
-    for word in words:
+    for word in names:
         settings = models if word.startswith("predicted") else PerceptionSettings()
         specs.append(PerceptionSpec(word, settings.model_copy(update={"make": word}).component()))
     name = "lenient_simulator" if allow_unknown_assets else "embedded_simulator"
@@ -106,5 +108,8 @@ def perception(
                 show(table.rich())
             typer.echo(f"page: {page}; tables: {out / 'summary.md'}, .csv, .json")
     if measured.failures:
-        typer.echo(f"incomplete: {len(measured.tasks)} tasks have every perception; the same command goes on", err=True)
+        typer.echo(
+            f"incomplete: {len(measured.tasks)} tasks have every perception; run the same command again to resume",
+            err=True,
+        )
         raise typer.Exit(EXIT_INCOMPLETE)

@@ -1,4 +1,4 @@
-"""What comes of a run: `report`, `strip`."""
+"""`evonav report` and `evonav strip`: write a run's report, or draw one of its tasks."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,21 +18,21 @@ NUM_REPLAYS = 2
 
 def report(
     run: RunFolder,
-    out: Annotated[Path | None, typer.Option(help="Where to write; default: RUN.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write. Default: RUN.")] = None,
     replays: Annotated[
         str | None,
         typer.Option(
             metavar="all|N|none",
-            help=f"Episodes to show round by round, the most telling first; default: {NUM_REPLAYS}, none of a sweep.",
+            help=f"Number of episodes to replay, all or none. Default: {NUM_REPLAYS} highlights, none for sweeps.",
         ),
     ] = None,
     tasks: Annotated[
-        Path | None, typer.Option(help="Folder of the run's tasks; default: where the run had them.")
+        Path | None, typer.Option(help="Folder of the run's tasks. Default: where the run found them.")
     ] = None,
-    exchanges: Annotated[Path | None, typer.Option(help="File of a model's answers; default: the one in RUN.")] = None,
-    maps: Annotated[bool, typer.Option("--maps", help="Write every stage's map as a file too, maps/*.svg.")] = False,
+    exchanges: Annotated[Path | None, typer.Option(help="File of a model's answers. Default: the one in RUN.")] = None,
+    maps: Annotated[bool, typer.Option("--maps", help="Also write the map of every stage to maps/*.svg.")] = False,
 ) -> None:
-    """Writes a run's or a sweep's report: HTML with tables, maps, and episodes round by round (docs/report.md)."""
+    """Write an HTML report of a run or sweep, with tables, maps and replays (docs/report.md)."""
     from evonav.sweeps.run import SWEEP_NAME
 
     if (run / SWEEP_NAME).is_file():
@@ -58,7 +58,7 @@ def _report(
 def _report_sweep(
     sweep: Path, out: Path | None, num_replays: int | None, tasks: Path | None, exchanges: Path | None, has_maps: bool
 ) -> Path:
-    """A report a cell that has records, and a page that leads to them."""
+    """Write a report for each cell that has records, and a page with links to them."""
     from evonav.evaluation.records.store import FILE_NAME
     from evonav.sweeps.page import write_sweep_page
     from evonav.sweeps.run import RUNS_NAME
@@ -75,12 +75,14 @@ def _report_sweep(
 
 def strip(
     run: RunFolder,
-    out: Annotated[Path, typer.Option(help="Picture to write: .svg, or .png or .pdf (extra `viz`).")],
-    task: Annotated[str | None, typer.Argument(help="Id of a task of the run; default: the most telling one.")] = None,
-    agents: Annotated[str, typer.Option(help="Agents of the run, comma-separated: a row each.")] = "ftu",
-    stages: Annotated[str, typer.Option(help="Stages, comma-separated; default: all.")] = "",
+    out: Annotated[
+        Path, typer.Option(help="Picture to write: .svg, .png or .pdf (the last two need the extra `viz`).")
+    ],
+    task: Annotated[str | None, typer.Argument(help="Id of a task of the run. Default: the best highlight.")] = None,
+    agents: Annotated[str, typer.Option(help="Agents of the run, separated by commas; each has a row.")] = "ftu",
+    stages: Annotated[str, typer.Option(help="Stages, separated by commas. Default: all.")] = "",
 ) -> None:
-    """Draws one task of a run as a picture: stages side by side, agents below each other."""
+    """Draw one task of a run as a picture, with a column per stage and a row per agent."""
     from evonav.report import write_strip
 
     try:
@@ -91,7 +93,7 @@ def strip(
 
 
 def _count(replays: str) -> int | None:
-    """How many; `None` for all."""
+    """Return the number of episodes to replay; `None` for all."""
     if replays in ("all", "none"):
         return None if replays == "all" else 0
     if not replays.isdecimal():
@@ -100,7 +102,7 @@ def _count(replays: str) -> int | None:
 
 
 def _replay(run: "Run", num: int | None, tasks: Path | None, exchanges: Path | None) -> None:
-    """Makes the pages of the most telling episodes that have none of these records yet."""
+    """Replay the highlights that have no page of the current records."""
     from evonav.errors import EvonavError
     from evonav.report.maps.stage_map import VIEW_DIR
     from evonav.report.pages.highlights import highlights_first
@@ -117,5 +119,5 @@ def _replay(run: "Run", num: int | None, tasks: Path | None, exchanges: Path | N
         return
     try:
         replay_pages(run, missing, tasks=tasks, exchanges=exchanges)
-    except EvonavError as error:  # records alone are a report too
-        typer.echo(f"no episodes round by round: {error}", err=True)
+    except EvonavError as error:  # a report needs only the records
+        typer.echo(f"no replays: {error}", err=True)

@@ -1,4 +1,4 @@
-"""`evonav pack` and `evonav verify`: a run as one file to hand in, and whether such a file is what it claims."""
+"""`evonav pack` and `evonav verify`: pack a run into a file for submission, and verify such a file."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,15 +15,17 @@ EXIT_REJECTED = 1
 
 def pack(
     run: Annotated[Path, typer.Argument(help="Folder of a complete run.")],
-    out: Annotated[Path | None, typer.Option(help="File to write; default: RUN.evonav.zip beside the folder.")] = None,
-    agents: Annotated[str | None, typer.Option(help="Agents of the run, comma-separated; default: all.")] = None,
-    title: Annotated[str, typer.Option(help="Of the entry.")] = "",
-    authors: Annotated[str, typer.Option(help="Whose it is.")] = "",
-    contact: Annotated[str, typer.Option(help="Where to ask.")] = "",
-    url: Annotated[str, typer.Option(help="Paper or code.")] = "",
-    description: Annotated[str, typer.Option(help="Model, prompts, training data: what a reader should know.")] = "",
+    out: Annotated[Path | None, typer.Option(help="File to write. Default: RUN.evonav.zip beside the folder.")] = None,
+    agents: Annotated[str | None, typer.Option(help="Agents of the run, separated by commas. Default: all.")] = None,
+    title: Annotated[str, typer.Option(help="Title of the entry.")] = "",
+    authors: Annotated[str, typer.Option(help="Authors of the entry.")] = "",
+    contact: Annotated[str, typer.Option(help="Address for questions.")] = "",
+    url: Annotated[str, typer.Option(help="Address of the paper or code.")] = "",
+    description: Annotated[
+        str, typer.Option(help="Model, prompts, training data and what else readers should know.")
+    ] = "",
 ) -> None:
-    """Packs a run's records, configuration and task checksums into one file for a leaderboard."""
+    """Pack a run's records, configuration and task checksums into one file for a leaderboard."""
     from evonav.submission.pack import SUFFIX, About, pack
 
     run = run.absolute()
@@ -43,12 +45,16 @@ def verify(
     limit: Limit = None,
     subset: Subset = None,
     scores_only: Annotated[
-        bool, typer.Option("--scores-only", help="Do not carry the actions out again: seconds, but less is shown.")
+        bool,
+        typer.Option(
+            "--scores-only",
+            help="Recompute the scores without carrying out the actions: takes seconds, but proves less.",
+        ),
     ] = False,
     workers: Workers = None,
-    as_json: Annotated[bool, typer.Option("--json", help="The verdict as JSON.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the verdict as JSON.")] = False,
 ) -> None:
-    """Scores a packed run again, by carrying its actions out; exit code 1 if anything was altered or is missing."""
+    """Score a packed run again by carrying out its actions; exit code 1 if anything was altered or is missing."""
     import json
 
     from rich.console import Console

@@ -1,4 +1,4 @@
-"""`evonav video` and `evonav rerun`: an episode as a film, or as a recording for rerun's viewer."""
+"""`evonav video` and `evonav rerun`: write an episode as a video, or as a recording for the rerun viewer."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     from evonav.replay.replay import RunReplay
     from evonav.replay.types import ReplayedStage
 
-Task = Annotated[str | None, typer.Argument(help="Id of a task of the run; default: the most telling one.")]
-Agent = Annotated[str | None, typer.Option(help="Agent of the run; default: of the most telling episode.")]
-Stages = Annotated[str, typer.Option("--stage", help="Stages, comma-separated; default: all.")]
-Tasks = Annotated[Path | None, typer.Option(help="Folder of the run's tasks; default: where the run had them.")]
-Exchanges = Annotated[Path | None, typer.Option(help="File of a model's answers; default: the one in RUN.")]
+Task = Annotated[str | None, typer.Argument(help="Id of a task of the run. Default: the best highlight.")]
+Agent = Annotated[str | None, typer.Option(help="Agent of the run. Default: that of the best highlight.")]
+Stages = Annotated[str, typer.Option("--stage", help="Stages, separated by commas. Default: all.")]
+Tasks = Annotated[Path | None, typer.Option(help="Folder of the run's tasks. Default: where the run found them.")]
+Exchanges = Annotated[Path | None, typer.Option(help="File of a model's answers. Default: the one in RUN.")]
 Out = Annotated[Path, typer.Option(help="File to write.")]
 
 ACTIONS_FPS, ROUNDS_FPS = 12.0, 2.0
 VIEW_PX = 396
-"""Longer edge of the heading views."""
+"""Longer edge of the heading views, in pixels."""
 MANY_ROUNDS = 100
-"""Rounds of a stage's budget from which on rounds are single actions."""
+"""Budget of rounds above which each round is a single action."""
 
 
 def video(
@@ -35,12 +35,14 @@ def video(
     task: Task = None,
     agent: Agent = None,
     stage: Stages = "",
-    fps: Annotated[float | None, typer.Option(help="Rounds a second; default: 2, or 12 of single actions.")] = None,
-    width: Annotated[int, typer.Option(help="Of the video, pixels.")] = 1280,
+    fps: Annotated[
+        float | None, typer.Option(help="Rounds per second. Default: 2, or 12 where each round is a single action.")
+    ] = None,
+    width: Annotated[int, typer.Option(help="Width of the video, in pixels.")] = 1280,
     tasks: Tasks = None,
     exchanges: Exchanges = None,
 ) -> None:
-    """Films an episode: views, the agent's map and memory, and the truth side by side (docs/video.md)."""
+    """Write a video of an episode: views, the agent's map and memory, and the truth (docs/video.md)."""
     from evonav.replay.video import check_video, write_video
     from evonav.replay.video_frames import episode_frame, stage_frames
 
@@ -71,7 +73,7 @@ def rerun(
     tasks: Tasks = None,
     exchanges: Exchanges = None,
 ) -> None:
-    """Writes an episode as a recording for rerun's viewer: one scene with views, map, memory and truth (.rrd)."""
+    """Write an episode as a recording for the rerun viewer, with views, map, memory and truth (.rrd)."""
     from evonav.replay.rerun_export import check_recording, write_recording
 
     check_recording(out)
@@ -94,7 +96,7 @@ def _replayed(
     *,
     keeps_depth: bool = False,
 ) -> "tuple[RunReplay, str, tuple[list[ReplayedStage], list[ReplayedStage]], float]":
-    """An episode, run again: its replay, agent, stages up to the last one asked for and those asked for, radius."""
+    """Replay an episode; return the replay, its agent, its stages (all, and the chosen ones) and the success radius."""
     from evonav.errors import InvalidArgumentError
     from evonav.replay.replay import RunReplay
     from evonav.report.pages.highlights import highlights_first
@@ -107,7 +109,7 @@ def _replayed(
     found = load_run(run)
     episodes = highlights_first(found)
     fitting = (one for one in episodes if one[0] == (agent or one[0]) and one[1] == (task or one[1]))
-    name, task_id = next(fitting, (agent or "", task or ""))  # what there is no record of is told by the replay
+    name, task_id = next(fitting, (agent or "", task or ""))  # the replay raises if there is no record
     replay = RunReplay(run, task_path(run, tasks), exchanges, heading_px=heading_px, keeps_depth=keeps_depth)
     with status("Replaying") as tell:
         last = None if wanted is None else max(wanted)
@@ -116,10 +118,10 @@ def _replayed(
     if not shown:
         raise InvalidArgumentError(f"{run}: no stage {stage} of task {task_id!r} by agent {name!r}")
     for one in shown:
-        told = one.why_not or "; ".join(one.differences)
-        if told:
-            what = "is shown as recorded" if one.why_not else "went otherwise than recorded, the new run is shown"
-            typer.echo(f"stage {one.record.stage} {what}: {told}", err=True)
+        reason = one.why_not or "; ".join(one.differences)
+        if reason:
+            what = "is shown as recorded" if one.why_not else "differs from the record; the replay is shown"
+            typer.echo(f"stage {one.record.stage} {what}: {reason}", err=True)
     return replay, name, (stages, shown), found.success_radius_m
 
 

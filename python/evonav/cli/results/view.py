@@ -1,4 +1,4 @@
-"""`evonav view`: an episode round by round, in a browser."""
+"""`evonav view`: show episodes in a browser, round by round."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 def view(
     run: RunFolder,
-    task: Annotated[str | None, typer.Option(help="Id of a task of the run; default: the most telling one.")] = None,
-    agent: Annotated[str, typer.Option(help="Agents of the run, comma-separated; default: all.")] = "",
-    stage: Annotated[int | None, typer.Option(min=1, help="Show this stage alone.")] = None,
+    task: Annotated[str | None, typer.Option(help="Id of a task of the run. Default: the best highlight.")] = None,
+    agent: Annotated[str, typer.Option(help="Agents of the run, separated by commas. Default: all.")] = "",
+    stage: Annotated[int | None, typer.Option(min=1, help="Show only this stage.")] = None,
     tasks: Annotated[
-        Path | None, typer.Option(help="Folder of the run's tasks; default: where the run had them.")
+        Path | None, typer.Option(help="Folder of the run's tasks. Default: where the run found them.")
     ] = None,
-    exchanges: Annotated[Path | None, typer.Option(help="File of a model's answers; default: the one in RUN.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Where to write; default: RUN/view.")] = None,
+    exchanges: Annotated[Path | None, typer.Option(help="File of a model's answers. Default: the one in RUN.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write. Default: RUN/view.")] = None,
     open_: Annotated[bool, typer.Option("--open", help="Open the page in a browser.")] = False,
 ) -> None:
-    """Shows episodes round by round: views, map, memory, questions and answers, as pages of HTML (docs/viewer.md)."""
+    """Show episodes round by round as HTML pages: views, map, memory, questions and answers (docs/viewer.md)."""
     agents = [name.strip() for name in agent.split(",") if name.strip()]
     pages, index = make_pages(run, task, agents, stage=stage, tasks=tasks, exchanges=exchanges, out=out)
     for page in pages:
@@ -49,23 +49,23 @@ def make_pages(
     exchanges: Path | None = None,
     out: Path | None = None,
 ) -> "tuple[list[WrittenPage], Path]":
-    """Replays episodes and writes their pages and the index.
+    """Replay episodes and write their pages and the index.
 
     Args:
         run: A run.
-        task: Default the most telling one.
-        agents: Default all of the run's.
-        stage: The one to show.
+        task: Id of a task; default: the best highlight.
+        agents: Names; default: all of the run's.
+        stage: The only stage to show.
         tasks: Folder of the run's tasks.
         exchanges: File of a model's answers.
-        out: Where to write.
+        out: Folder to write.
     """
     from evonav.report.pages.highlights import best_highlight
     from evonav.report.run import load_run
 
     found = load_run(run)
     agents = agents or found.agents
-    # Telling is a task in which memory misleads some, the first named, and not the last one.
+    # The best highlight is a task in which memory misleads the first agents, and not the last one.
     ranked = sorted(agents, key=lambda name: name not in ("fu", "stage-reset"))
     task_id = task if task is not None else best_highlight(found, ranked)[0]
     episodes = [(name, task_id) for name in agents]
@@ -81,7 +81,7 @@ def replay_pages(
     exchanges: Path | None = None,
     out: Path | None = None,
 ) -> "tuple[list[WrittenPage], Path]":
-    """Replays these episodes (agent, task) of a run, and writes their pages and the index; the rest as `make_pages`."""
+    """Replay these episodes (agent, task) of a run, and write their pages and the index; see `make_pages`."""
     from evonav.replay.pages import write_episode, write_index
     from evonav.replay.replay import RunReplay
     from evonav.report.maps.stage_map import VIEW_DIR
@@ -108,7 +108,7 @@ def _teller(tell: "Callable[[str], None]", agent: str, task_id: str) -> "Callabl
 
 
 def task_path(run: Path, tasks: Path | None) -> "Callable[[str], Path]":
-    """Where the run's tasks are: as told, in the run's folder, where it had them, or bundled.
+    """Return a function that finds a task: in `tasks`, the run's folder, where the run found it, or among the bundled.
 
     Raises:
         TaskError: There are none.

@@ -1,4 +1,4 @@
-"""`evonav check-agent`: does an agent keep the contract?"""
+"""`evonav check-agent`: check that an agent keeps the contract."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,14 +19,14 @@ _STYLES = {"pass": "green", "warn": "yellow", "fail": "bold red", "skip": "dim"}
 
 @with_settings("perception", "decisions", "spending")
 def check_agent(
-    agent: Annotated[str, typer.Argument(help="A name, `module:Class` or `./file.py:Class`.")],
+    agent: Annotated[str, typer.Argument(help="Agent: a name, `module:Class` or `./file.py:Class`.")],
     perception: "PerceptionSettings",
     decisions: "DecisionSettings",
     spending: "SpendingSettings",
     seed: Seed = 0,
-    timeout: Annotated[float, typer.Option(min=0.1, help="Seconds for an answer of the agent.")] = 60.0,
+    timeout: Annotated[float, typer.Option(min=0.1, help="Seconds to wait for an answer of the agent.")] = 60.0,
 ) -> None:
-    """Runs an agent through the contract, on a bundled house that changes; exit code 1 if it breaks it."""
+    """Check that an agent keeps the contract, in a bundled house that changes; exit code 1 if it does not."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text

@@ -1,4 +1,4 @@
-"""Controlled analyses: `controlled generate`, `controlled evaluate`, `controlled report` (docs/controlled.md)."""
+"""`evonav controlled`: generate, evaluate and report controlled analyses (docs/controlled.md)."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -33,31 +33,34 @@ EXIT_INCOMPLETE = 3
 controlled_app = typer.Typer(
     name="controlled",
     cls=SettingsGroup,
-    help="What a change does, all else being equal: Fixed / Not Fixed, and sweeps of the evolution rate.",
+    help="Measure the effect of a change with all else equal: Fixed / Not Fixed pairs, or several evolution rates.",
     no_args_is_help=True,
 )
 
-Directory = Annotated[Path, typer.Argument(help="Folder of the analysis, which `controlled generate` made.")]
+Directory = Annotated[Path, typer.Argument(help="Folder of the analysis, which `controlled generate` writes.")]
 
 
 @controlled_app.command()
 def generate(
-    source: Annotated[Path, typer.Argument(help=f"{HOUSES}; or a folder of tasks, whose houses are taken.")],
-    out: Annotated[Path, typer.Option(help="Folder of the analysis; an unfinished one is gone on with.")],
+    source: Annotated[Path, typer.Argument(help=f"Houses ({HOUSES}), or a folder of tasks whose houses are used.")],
+    out: Annotated[Path, typer.Option(help="Folder of the analysis; an unfinished analysis is resumed.")],
     rates: Annotated[
         str | None,
-        typer.Option(help="Probabilities of evolution to compare, such as 0,0.5,1. Default: Fixed / Not Fixed pairs."),
+        typer.Option(
+            help="Probabilities of evolution to compare, such as 0,0.5,1. Default: generate Fixed / Not Fixed pairs."
+        ),
     ] = None,
     limit: Limit = None,
-    per_house: Annotated[int, typer.Option(min=1, help="Tasks a house, of the seeds from SEED on.")] = 1,
+    per_house: Annotated[int, typer.Option(min=1, help="Number of tasks per house, with seeds from SEED on.")] = 1,
     seed: Seed = 0,
     config: Annotated[
-        Path | None, typer.Option(help="TOML with any of the generator's parameters (docs/extensions.md).")
+        Path | None,
+        typer.Option(help="TOML file with parameters of the generator (docs/extensions.md). Default: the paper's."),
     ] = None,
     workers: Workers = None,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
-    """Makes the same tasks in several arms that differ in one thing alone; run again to resume."""
+    """Generate the same tasks in several arms that differ in one thing only; run again to resume."""
     from evonav.controlled.dataset import generate_controlled
     from evonav.controlled.generate import ControlledOptions
     from evonav.generation.config import read_parameters
@@ -75,7 +78,7 @@ def generate(
         except ValueError:
             raise typer.BadParameter(f"--rates {rates}: numbers, comma-separated") from None
         options = replace(options, kind="rates", rates=probabilities)
-    with interruptible(out), status("Making tasks") as show:
+    with interruptible(out), status("Generating tasks") as show:
         made = generate_controlled(
             source,
             out,
@@ -86,7 +89,7 @@ def generate(
         )
     record = made.record
     arms = ", ".join(arm.name for arm in record.arms)
-    typer.echo(f"{len(record.task_ids)} tasks in each arm ({arms}) in {out}; {made.num_new} made now")
+    typer.echo(f"{len(record.task_ids)} tasks in each arm ({arms}) in {out}; {made.num_new} new")
     for rejection in record.rejections:
         typer.echo(f"  without: {rejection.house}: {rejection.reason}")
 
@@ -106,7 +109,7 @@ def evaluate(
     in_process: InProcess = False,
     agent_timeout: AgentTimeout = None,
 ) -> None:
-    """Runs agents in every arm, into DIRECTORY/runs/ARM; run again to resume, or to add agents."""
+    """Evaluate agents in every arm, into DIRECTORY/runs/ARM; run again to resume, or to add agents."""
     from evonav.controlled.evaluate import evaluate_controlled
     from evonav.controlled.layout import read_controlled
     from evonav.evaluation.hosting.process import AgentHosting
@@ -127,9 +130,13 @@ def evaluate(
     config = RunConfig(seed=seed, backend=backend, stage_timeout_s=decisions.stage_timeout_s, hosting=hosting)
     names = names_of(agents, agent)
 
-    def tell(arm: str, news: "Progress") -> None:
-        latest = "" if news.latest is None else f" {news.latest.agent} {news.latest.task_id}/{news.latest.stage}"
-        show(f"{arm} {news.num_done} of {news.num_stages}{latest}")
+    def tell(arm: str, progress: "Progress") -> None:
+        latest = (
+            ""
+            if progress.latest is None
+            else f" {progress.latest.agent} {progress.latest.task_id}/{progress.latest.stage}"
+        )
+        show(f"{arm} {progress.num_done} of {progress.num_stages}{latest}")
 
     with interruptible(directory), status("Running") as show:
         summaries = evaluate_controlled(
@@ -150,9 +157,9 @@ def evaluate(
 @controlled_app.command()
 def report(
     directory: Directory,
-    out: Annotated[Path | None, typer.Option(help="Where to write; default: DIRECTORY/report.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write. Default: DIRECTORY/report.")] = None,
 ) -> None:
-    """Prints the tables, and writes them, the plots and a page of all pairs."""
+    """Print the tables, and write them with plots and a page of all pairs."""
     from rich.console import Console
 
     from evonav.controlled.analysis import load_analysis
@@ -167,11 +174,13 @@ def report(
 @controlled_app.command()
 def picture(
     directory: Directory,
-    out: Annotated[Path, typer.Option(help="Picture to write: .svg, or .png or .pdf (extra `viz`).")],
-    task: Annotated[str | None, typer.Argument(help="Id of a task; default: the most telling pair.")] = None,
-    agent: Annotated[str, typer.Option(help="Whose rollouts.")] = "fu",
+    out: Annotated[
+        Path, typer.Option(help="Picture to write: .svg, .png or .pdf (the last two need the extra `viz`).")
+    ],
+    task: Annotated[str | None, typer.Argument(help="Id of a task. Default: the best highlight.")] = None,
+    agent: Annotated[str, typer.Option(help="Agent to draw.")] = "fu",
 ) -> None:
-    """Draws one agent in one pair: Fixed on the left, Not Fixed on the right."""
+    """Draw one agent in one pair, Fixed on the left and Not Fixed on the right."""
     from evonav.controlled.analysis import load_analysis
     from evonav.controlled.paired_maps import highlighted_pairs, write_pair
     from evonav.errors import InvalidArgumentError

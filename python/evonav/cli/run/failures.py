@@ -1,4 +1,4 @@
-"""What went wrong in a run: `failures`."""
+"""`evonav failures`: list failed attempts at stages."""
 
 from typing import Annotated
 
@@ -9,10 +9,10 @@ from evonav.cli.options.shared import RunFolder
 
 def failures(
     run: RunFolder,
-    agent: Annotated[str | None, typer.Option(help="Only of this agent.")] = None,
-    brief: Annotated[bool, typer.Option("--brief", help="Without tracebacks.")] = False,
+    agent: Annotated[str | None, typer.Option(help="List only this agent.")] = None,
+    brief: Annotated[bool, typer.Option("--brief", help="Leave out tracebacks.")] = False,
 ) -> None:
-    """Lists the attempts at stages that failed, those tried again included, with their tracebacks."""
+    """List failed attempts at stages, with tracebacks, including those that were retried."""
     from evonav.evaluation.records.store import RunStore
 
     with RunStore(run) as store:

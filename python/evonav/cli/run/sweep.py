@@ -1,4 +1,4 @@
-"""`evonav sweep`: many runs from one file."""
+"""`evonav sweep`: run many evaluations from one file."""
 
 import shlex
 import signal
@@ -20,32 +20,55 @@ if TYPE_CHECKING:
 
 
 def sweep(
-    file: Annotated[Path | None, typer.Argument(help="A TOML file (docs/sweeps.md).", show_default=False)] = None,
+    file: Annotated[
+        Path | None, typer.Argument(help="Sweep file in TOML (docs/sweeps.md).", show_default=False)
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder of the sweep; default: the file's `out`, else out/NAME of the file.")
+        Path | None, typer.Option(help="Folder of the sweep. Default: the file's `out`, else out/NAME.")
     ] = None,
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Over the file: seeds=[0,1], protocol.max_rounds=20; repeat."),
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUE",
+            help="Change a value of the file, such as seeds=[0,1] or protocol.max_rounds=20. Repeat for more.",
+        ),
     ] = None,
     only: Annotated[
-        list[str] | None, typer.Option(metavar="GLOB", help="Run cells of these names alone; repeat it for more.")
+        list[str] | None,
+        typer.Option(metavar="GLOB", help="Run only cells whose name matches. Repeat the option for more."),
     ] = None,
-    workers: Annotated[int | None, typer.Option(min=0, help="Processes; default: the file's, else one a core.")] = None,
-    engine: Annotated[EngineOption | None, typer.Option(help="Processes here, or Ray. Default: the file's.")] = None,
-    ray_address: Annotated[str | None, typer.Option(help="Of a Ray cluster that shares this file system.")] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=0, help="Number of worker processes; 0 runs in this process. Default: the file's, else one per core."
+        ),
+    ] = None,
+    engine: Annotated[
+        EngineOption | None, typer.Option(help="Run workers as local processes or as Ray actors. Default: the file's.")
+    ] = None,
+    ray_address: Annotated[
+        str | None,
+        typer.Option(
+            help="Ray: address of a cluster that shares this file system. Default: start Ray on this machine."
+        ),
+    ] = None,
     worker_gpus: Annotated[
-        float | None, typer.Option(min=0.0, help="Ray: GPUs set aside for each worker. Default: the file's.")
+        float | None, typer.Option(min=0.0, help="Ray: GPUs reserved for each worker. Default: the file's.")
     ] = None,
-    retry_errored: Annotated[bool, typer.Option("--retry-errored", help="Run errored stages again.")] = False,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="List cells, stages and what models would cost; run nothing.")
+    retry_errored: Annotated[
+        bool, typer.Option("--retry-errored", help="Run errored stages again, and those not run because of them.")
     ] = False,
-    schema: Annotated[bool, typer.Option("--schema", help="Print the file's JSON Schema, for editors.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="List cells, stages and the estimated cost of models; run nothing.")
+    ] = False,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON Schema of sweep files, for editors.")
+    ] = False,
 ) -> None:
-    """Runs agents x perceptions x decisions x tasks x seeds from one file; run again to resume.
+    """Evaluate every combination of agents, perceptions, decisions, tasks and seeds in a file; run again to resume.
 
-    Leaves a run for every cell in OUT/runs, and OUT/summary.json, .csv and .md.
+    Writes a run for every cell into OUT/runs, and OUT/summary.json, .csv and .md.
     """
     if schema:
         _print_schema()
@@ -62,25 +85,25 @@ def sweep(
         "worker_gpus": worker_gpus,
     }
     changes = [*(set_ or ()), *(f"{key}={value}" for key, value in flags.items() if value is not None)]
-    asked = read_sweep(file, changes)
-    folder = out or Path(asked.out or f"out/{file.stem}")
-    cells = cells_of(asked)
+    settings = read_sweep(file, changes)
+    folder = out or Path(settings.out or f"out/{file.stem}")
+    cells = cells_of(settings)
     selected = chosen(cells, only or ())
-    num_workers = count_of(asked.workers)
-    with task_sets(asked) as tasks:
+    num_workers = count_of(settings.workers)
+    with task_sets(settings) as tasks:
         if dry_run:
-            _print_plan(asked, selected, tasks, folder, num_workers)
+            _print_plan(settings, selected, tasks, folder, num_workers)
             return
-        runs = cell_runs(asked, cells, tasks, folder)
+        runs = cell_runs(settings, cells, tasks, folder)
         again = _command(file, out, set_ or (), only or (), flags)
-        _run(asked, folder, runs, selected, num_workers, retry_errored, again)
+        _run(settings, folder, runs, selected, num_workers, retry_errored, again)
     is_incomplete = _print_summary(folder, {cell.name for cell in selected}, again)
     if is_incomplete:
         raise typer.Exit(EXIT_INCOMPLETE)
 
 
 def _run(
-    asked: "SweepFile",
+    settings: "SweepFile",
     out: Path,
     runs: "Sequence[CellRun]",
     selected: "Sequence[Cell]",
@@ -88,8 +111,8 @@ def _run(
     retry_errored: bool,
     again: str,
 ) -> None:
-    """Runs what is missing; an interrupt leaves a summary of what there is."""
-    from evonav.cli.run.sweep_display import SweepProgress, Teller, showing
+    """Run the stages without a record; an interrupt still writes the summary."""
+    from evonav.cli.run.sweep_display import ProgressLines, SweepProgress, showing
     from evonav.sweeps.run import run_sweep
 
     def interrupt(*_: object) -> None:
@@ -98,28 +121,28 @@ def _run(
     signal.signal(signal.SIGTERM, interrupt)
     names = {cell.name for cell in selected}
     progress = SweepProgress.of(out, [run for run in runs if run.cell.name in names])
-    teller = Teller(progress)
+    lines = ProgressLines(progress)
     try:
         with showing(progress):
             run_sweep(
-                asked,
+                settings,
                 out,
                 runs,
                 num_workers=num_workers,
                 only=sorted(names),
                 retry_errored=retry_errored,
-                on_progress=teller.take,
+                on_progress=lines.take,
             )
     except KeyboardInterrupt:
-        typer.echo(f"interrupted: {progress.line()}; what is finished is in {out}", err=True)
-        typer.echo(f"to go on: {again}", err=True)
+        typer.echo(f"interrupted: {progress.line()}; finished stages are in {out}", err=True)
+        typer.echo(f"to resume: {again}", err=True)
         if (out / "sweep.json").exists():
             write_sweep_summary(out)
         raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
 def write_sweep_summary(out: Path) -> "list[SweepRow]":
-    """Writes the summary files of a sweep as it stands.
+    """Write the summary files of a sweep, finished or not.
 
     Returns:
         Its rows.
@@ -136,10 +159,10 @@ def write_sweep_summary(out: Path) -> "list[SweepRow]":
 
 
 def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
-    """Tables, files, and what to do about what is missing.
+    """Print tables and files, and how to run errored stages again.
 
     Returns:
-        Whether a stage of the selected cells is.
+        True if a stage of the selected cells is missing.
     """
     from evonav.cli.options.decisions import print_spending
     from evonav.sweeps.tables import sweep_tables
@@ -158,9 +181,9 @@ def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
 
 
 def _print_plan(
-    asked: "SweepFile", cells: "Sequence[Cell]", tasks: "Mapping[str, list[TaskFile]]", out: Path, num_workers: int
+    settings: "SweepFile", cells: "Sequence[Cell]", tasks: "Mapping[str, list[TaskFile]]", out: Path, num_workers: int
 ) -> None:
-    """What would be run, and what it would cost."""
+    """Print the cells to run and their estimated cost."""
     from rich.table import Table
 
     from evonav.cli.display import status
@@ -169,8 +192,8 @@ def _print_plan(
     from evonav.sweeps.run import cell_runs
 
     for agent in dict.fromkeys(agent for cell in cells for agent in cell.agents):
-        check_agent_name(agent, is_in_process=asked.in_process)
-    has_models = any(asked.decisions[cell.decision].kind == "vlm" for cell in cells)
+        check_agent_name(agent, is_in_process=settings.in_process)
+    has_models = any(settings.decisions[cell.decision].kind == "vlm" for cell in cells)
     table = Table(title=f"{len(cells)} cells into {out}", title_justify="left")
     table.add_column("cell", overflow="fold", min_width=20)
     table.add_column("agents", overflow="fold")
@@ -178,12 +201,12 @@ def _print_plan(
         table.add_column(heading, justify="right", no_wrap=True)
     total, total_usd = 0, 0.0
     with status("Estimating") as tell:
-        for run in cell_runs(asked, cells, tasks, out):
+        for run in cell_runs(settings, cells, tasks, out):
             cell = run.cell
             cost = [""] * 3 if has_models else []
-            if asked.decisions[cell.decision].kind == "vlm":
+            if settings.decisions[cell.decision].kind == "vlm":
                 tell(cell.name)
-                found = cell_estimate(asked, run, num_workers)
+                found = cell_estimate(settings, run, num_workers)
                 total_usd += found.dollars or 0.0
                 dollars = "?" if found.dollars is None else f"{found.dollars:.2f}"
                 cost = [f"{found.num_requests:.0f}", f"{found.input_tokens:.0f}", dollars]
@@ -191,10 +214,10 @@ def _print_plan(
             table.add_row(cell.name, ", ".join(cell.agents), str(len(run.request.tasks)), str(run.num_stages), *cost)
     show(table)
     typer.echo(f"{total} stages" + (f", about ${total_usd:.2f}" if total_usd else ""))
-    if has_models and asked.prices is None:
+    if has_models and settings.prices is None:
         typer.echo("dollars: name a table of prices, `prices = ...` (docs/decision.md)")
-    if asked.max_cost is not None and total_usd > asked.max_cost:
-        typer.echo(f"more than max_cost = {asked.max_cost:g}: stages beyond it would end as errored")
+    if settings.max_cost is not None and total_usd > settings.max_cost:
+        typer.echo(f"more than max_cost = {settings.max_cost:g}: stages beyond it would end as errored")
 
 
 def _print_schema() -> None:
@@ -208,11 +231,11 @@ def _print_schema() -> None:
 def _command(
     file: Path, out: Path | None, changes: "Sequence[str]", only: "Sequence[str]", flags: "Mapping[str, object]"
 ) -> str:
-    """The command that goes on."""
-    words = ["evonav", "sweep", str(file)]
-    words += [] if out is None else ["--out", str(out)]
-    words += [word for change in changes for word in ("--set", change)]
-    words += [word for pattern in only for word in ("--only", pattern)]
+    """Return the command that resumes the sweep."""
+    arguments = ["evonav", "sweep", str(file)]
+    arguments += [] if out is None else ["--out", str(out)]
+    arguments += [word for change in changes for word in ("--set", change)]
+    arguments += [word for pattern in only for word in ("--only", pattern)]
     for key, value in flags.items():
-        words += [] if value is None else [f"--{key.replace('_', '-')}", str(value)]
-    return shlex.join(words)
+        arguments += [] if value is None else [f"--{key.replace('_', '-')}", str(value)]
+    return shlex.join(arguments)

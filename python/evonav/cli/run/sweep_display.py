@@ -1,4 +1,4 @@
-"""How far a sweep is: a table that moves on a terminal, else lines."""
+"""Show the progress of a sweep: a live table on a terminal, else lines."""
 
 import time
 from collections import Counter
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 COST_EVERY_S = 2.0
 MAX_ROWS = 16
-"""Cells shown at a time; of finished ones and those to come, the rest is counted."""
+"""Largest number of cells in the table; the others are counted."""
 
 
 @dataclass
@@ -42,7 +42,7 @@ class _CellState:
 
 @dataclass
 class SweepProgress:
-    """What is known of every cell, in the order of the file."""
+    """The progress of every cell, in the order of the file."""
 
     out: Path
     cells: "dict[str, _CellState]"
@@ -52,7 +52,7 @@ class SweepProgress:
 
     @classmethod
     def of(cls, out: Path, runs: "Sequence[CellRun]") -> "SweepProgress":
-        """Of the cells that are to be run, as the folder has them."""
+        """Return the progress of these runs, as recorded in their folders."""
         progress = cls(out, {run.cell.name: _CellState(run.num_stages) for run in runs})
         for run in runs:
             state = progress.cells[run.cell.name]
@@ -61,45 +61,45 @@ class SweepProgress:
             state.num_failed = counts["errored"] + counts["not_run"]
         return progress
 
-    def take(self, cell: "Cell", news: "Progress") -> bool:
-        """Takes news of a cell.
+    def take(self, cell: "Cell", progress: "Progress") -> bool:
+        """Update a cell.
 
         Returns:
-            Whether it is finished by them.
+            True if the cell is now finished.
         """
         state = self.cells[cell.name]
         was_done = state.is_done
         now_s = time.monotonic()
-        state.num_done = news.num_done
-        if news.latest is not None:
+        state.num_done = progress.num_done
+        if progress.latest is not None:
             state.began_s = state.began_s if state.began_s is not None else now_s
             state.num_new += 1
-            state.num_failed += not news.latest.is_scored
+            state.num_failed += not progress.latest.is_scored
             state.ended_s = now_s
         return state.is_done and not was_done
 
     @property
     def num_done(self) -> int:
-        """Stages with a record."""
+        """Number of stages with a record."""
         return sum(state.num_done for state in self.cells.values())
 
     @property
     def num_stages(self) -> int:
-        """Of all cells."""
+        """Number of stages of all cells."""
         return sum(state.num_stages for state in self.cells.values())
 
     def stages_per_s(self) -> float:
-        """Over this call."""
+        """Return the rate since the command began."""
         num_new = sum(state.num_new for state in self.cells.values())
         return num_new / max(1e-9, time.monotonic() - self.began_s)
 
     def seconds_left(self) -> float:
-        """By the rate so far; `inf` before there is one."""
+        """Return the time left at the rate so far; `inf` while the rate is unknown."""
         rate = self.stages_per_s()
         return (self.num_stages - self.num_done) / rate if rate > 0 else float("inf")
 
     def costs(self) -> "Mapping[str, float]":
-        """Dollars by cell; read now and then."""
+        """Return dollars by cell, read at most every `COST_EVERY_S`."""
         from evonav.decision.vlm.ledger import LEDGER_NAME, Ledger
 
         now_s = time.monotonic()
@@ -112,7 +112,7 @@ class SweepProgress:
         return self._costs
 
     def line(self) -> str:
-        """All of it in a line."""
+        """Return a line about the whole sweep."""
         num_cells = sum(state.is_done for state in self.cells.values())
         num_failed = sum(state.num_failed for state in self.cells.values())
         failed = f", {num_failed} failed" if num_failed else ""
@@ -124,14 +124,14 @@ class SweepProgress:
         )
 
     def cell_line(self, name: str) -> str:
-        """A finished cell in a line."""
+        """Return a line about one cell."""
         state = self.cells[name]
         failed = f", {state.num_failed} failed" if state.num_failed else ""
         cost = self.costs().get(name, 0.0)
         return f"{name}: {state.num_done} of {state.num_stages} stages{failed}" + (f", ${cost:.2f}" if cost else "")
 
     def table(self) -> "RenderableType":
-        """Cells under way and some around them, and a line of everything."""
+        """Return a table of running and nearby cells, and a line about the whole sweep."""
         from rich.console import Group
         from rich.table import Table
         from rich.text import Text
@@ -162,7 +162,7 @@ class SweepProgress:
         return Group(table, Text(self.line(), style="bold"))
 
     def _shown(self) -> tuple[list[str], int, int]:
-        """Cells to show, and how many finished and future ones are left out."""
+        """Return the cells to show, and the numbers of finished and waiting cells left out."""
         names = list(self.cells)
         if len(names) <= MAX_ROWS:
             return names, 0, 0
@@ -182,7 +182,7 @@ class SweepProgress:
 
 @contextmanager
 def showing(progress: SweepProgress) -> "Iterator[None]":
-    """Shows the table on a terminal while in use; `tell` does where there is none."""
+    """Show the live table on a terminal; without one, `ProgressLines` prints lines."""
     from rich.console import Console
     from rich.live import Live
 
@@ -194,31 +194,31 @@ def showing(progress: SweepProgress) -> "Iterator[None]":
         yield
 
 
-class Teller:
-    """Lines where there is no terminal: every finished cell, and all of it once a minute."""
+class ProgressLines:
+    """Prints lines where there is no terminal: each finished cell, and the whole sweep once a minute."""
 
     def __init__(self, progress: SweepProgress) -> None:
-        """Quiet on a terminal."""
+        """Print nothing on a terminal."""
         from rich.console import Console
 
         self._progress = progress
         self._is_quiet = Console(stderr=True).is_terminal
-        self._told_s = time.monotonic()
+        self._printed_s = time.monotonic()
 
-    def take(self, cell: "Cell", news: "Progress") -> None:
-        """Takes news of a cell, and tells them if it is time."""
-        is_finished = self._progress.take(cell, news)
+    def take(self, cell: "Cell", progress: "Progress") -> None:
+        """Update a cell, and print a line if one is due."""
+        is_finished = self._progress.take(cell, progress)
         if self._is_quiet:
             return
         if is_finished:
             typer.echo(self._progress.cell_line(cell.name), err=True)
-        if time.monotonic() - self._told_s >= LINE_EVERY_S:
-            self._told_s = time.monotonic()
+        if time.monotonic() - self._printed_s >= LINE_EVERY_S:
+            self._printed_s = time.monotonic()
             typer.echo(self._progress.line(), err=True)
 
 
 def duration(seconds: float) -> str:
-    """`40 s`, `12 min`, `3.5 h`."""
+    """Return a duration as `40 s`, `12 min` or `3.5 h`."""
     if seconds == float("inf"):
         return "?"
     if seconds < 90:
@@ -227,7 +227,7 @@ def duration(seconds: float) -> str:
 
 
 def _recorded(run_dir: Path, agents: "Sequence[str]") -> "Counter[str]":
-    """Stages with a record, by end state."""
+    """Return the number of recorded stages by end state."""
     from evonav.evaluation.records.store import FILE_NAME, RunStore
 
     if not (run_dir / FILE_NAME).exists():

@@ -1,4 +1,4 @@
-"""Task files: `tasks ...`."""
+"""`evonav tasks`: list, draw, describe and check task files."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,14 +13,14 @@ from evonav.cli.tasks.subset import subset
 from evonav.cli.tasks.validate import validate
 from evonav.cli.tasks.write import write
 
-tasks_app = typer.Typer(help="Task files: what is in them.", no_args_is_help=True)
+tasks_app = typer.Typer(help="List, draw, describe, check and rewrite task files.", no_args_is_help=True)
 
-Folder = Annotated[Path, typer.Argument(help="Folder of tasks, one folder each.")]
+Folder = Annotated[Path, typer.Argument(help="Folder that holds one folder per task.")]
 
 
 @tasks_app.command(name="list")
 def list_tasks(folder: Folder, limit: Limit = None) -> None:
-    """Lists tasks: id, rooms, stages, and the stages before which the house changes."""
+    """List tasks with their rooms, stages, and the stages before which the house changes."""
     from evonav.tasks import load_tasks
 
     for task in load_tasks(folder, limit):

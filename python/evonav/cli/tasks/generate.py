@@ -1,4 +1,4 @@
-"""Making tasks: `generate`."""
+"""`evonav generate`: generate tasks from houses."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -25,32 +25,34 @@ if TYPE_CHECKING:
 
 
 def generate(
-    houses: Annotated[Path, typer.Option(help=f"{HOUSES}.")],
-    out: Annotated[Path, typer.Option(help="Folder for the tasks; an unfinished one is gone on with.")],
+    houses: Annotated[Path, typer.Option(help=f"Houses: {HOUSES}.")],
+    out: Annotated[Path, typer.Option(help="Folder of the tasks; an unfinished one is resumed.")],
     limit: Limit = None,
     subset: Subset = None,
     seed: Seed = 0,
     config: Annotated[
-        Path | None, typer.Option(help="TOML with any of the generator's parameters (docs/extensions.md).")
+        Path | None,
+        typer.Option(help="TOML file with parameters of the generator (docs/extensions.md). Default: the paper's."),
     ] = None,
     evolve_probability: Annotated[
-        float | None, typer.Option(help="Chance that a transition changes the house; the paper's: 0.5.")
+        float | None, typer.Option(help="Probability that a transition changes the house. Default: the paper's 0.5.")
     ] = None,
     num_stages: Annotated[
-        str | None, typer.Option(help="Numbers of stages to draw from, comma-separated; the paper's: 3,4,5.")
+        str | None,
+        typer.Option(help="Numbers of stages to draw from, separated by commas. Default: the paper's 3,4,5."),
     ] = None,
     workers: Workers = None,
     engine: Engine = EngineOption.LOCAL,
     ray_address: RayAddress = None,
-    house_timeout: Annotated[float, typer.Option(min=1.0, help="Seconds after which a house is given up.")] = 120.0,
+    house_timeout: Annotated[float, typer.Option(min=1.0, help="Seconds before a house is abandoned.")] = 120.0,
     retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Do houses again at which the generator failed.")
+        bool, typer.Option("--retry-failed", help="Try houses again on which the generator failed.")
     ] = False,
-    split: Annotated[str | None, typer.Option(help="Recorded; default: of the dataset of the houses.")] = None,
-    dataset_name: Annotated[str | None, typer.Option(help="Recorded; default: of the dataset of the houses.")] = None,
+    split: Annotated[str | None, typer.Option(help="Split to record. Default: that of the houses.")] = None,
+    dataset_name: Annotated[str | None, typer.Option(help="Dataset to record. Default: that of the houses.")] = None,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
-    """Generates tasks from multi-room houses; run again to resume."""
+    """Generate tasks from multi-room houses; run again to resume."""
     from evonav.generation.config import read_parameters
     from evonav.generation.dataset import Workforce, generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
@@ -83,6 +85,6 @@ def generate(
 
 def _tell(made: "GenerationSummary", out: Path) -> None:
     rate = f" in {made.seconds:.0f} s ({made.num_new / made.seconds:.1f} tasks/s)" if made.num_new else ""
-    typer.echo(f"{len(made.roots)} tasks in {out}, from {made.num_houses} houses; {made.num_new} made now{rate}")
+    typer.echo(f"{len(made.roots)} tasks in {out}, from {made.num_houses} houses; {made.num_new} new{rate}")
     for reason, count in made.reasons.most_common():
         typer.echo(f"  {count} houses without a task: {reason}")

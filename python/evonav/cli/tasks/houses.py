@@ -1,4 +1,4 @@
-"""House files: `houses list`, `houses fetch`."""
+"""`evonav houses`: list and download houses."""
 
 from itertools import islice
 from pathlib import Path
@@ -19,15 +19,15 @@ class _ListByDefault(typer.core.TyperGroup):
         return super().parse_args(ctx, args)
 
 
-houses_app = typer.Typer(cls=_ListByDefault, help="Lists houses (the default), or fetches published ones.")
+houses_app = typer.Typer(cls=_ListByDefault, help="List houses (the default), or download published ones.")
 
 
 @houses_app.command(name="list")
 def list_houses(
-    path: Annotated[Path | None, typer.Argument(help=f"{HOUSES}; default: bundled.")] = None,
+    path: Annotated[Path | None, typer.Argument(help=f"Houses: {HOUSES}. Default: the bundled ones.")] = None,
     limit: Limit = None,
 ) -> None:
-    """Lists houses with their rooms and objects."""
+    """List houses with their rooms and objects."""
     from evonav.house import bundled_houses, load_houses
 
     for house in islice(bundled_houses() if path is None else load_houses(path), limit):
@@ -36,14 +36,18 @@ def list_houses(
 
 @houses_app.command(name="fetch")
 def fetch_houses(
-    dataset: Annotated[str, typer.Argument(help="procthor-10k")],
-    revision: Annotated[str | None, typer.Option(help="Commit, tag or branch; default: that for AI2-THOR 5.")] = None,
-    split: Annotated[list[str] | None, typer.Option(help="train, val or test, repeatable; default: all.")] = None,
+    dataset: Annotated[str, typer.Argument(help="Dataset: procthor-10k.")],
+    revision: Annotated[
+        str | None, typer.Option(help="Commit, tag or branch. Default: the one for AI2-THOR 5.")
+    ] = None,
+    split: Annotated[
+        list[str] | None, typer.Option(help="Split: train, val or test. Repeat the option for more. Default: all.")
+    ] = None,
     cache: Annotated[
-        Path | None, typer.Option(help="Folder to keep it in; default: $EVONAV_CACHE or ~/.cache/evonav.")
+        Path | None, typer.Option(help="Folder of the download. Default: EVONAV_CACHE, else ~/.cache/evonav.")
     ] = None,
 ) -> None:
-    """Downloads a published dataset of houses once; verifies its checksums from then on."""
+    """Download a published dataset of houses; if it is already there, verify its checksums."""
     from evonav.house.procthor10k import NAME, REVISION, SPLITS
     from evonav.house.procthor10k_fetch import fetch_procthor10k
 

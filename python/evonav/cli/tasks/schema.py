@@ -1,4 +1,4 @@
-"""`evonav tasks schema`."""
+"""`evonav tasks schema`: print the JSON Schemas of task files."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,11 +8,13 @@ import typer
 
 def schema(
     name: Annotated[
-        str | None, typer.Argument(help="dataset, oracle_stage, public_stage or task; default: all.")
+        str | None, typer.Argument(help="File to describe: dataset, oracle_stage, public_stage or task. Default: all.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for all of them, NAME.schema.json.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write NAME.schema.json files to. Default: print them.")
+    ] = None,
 ) -> None:
-    """Prints or writes the JSON Schema (draft 2020-12) of task files."""
+    """Print or write the JSON Schemas (draft 2020-12) of task files."""
     from evonav.tasks.schema import MODELS, schema_text, write_schemas
 
     if out is not None:

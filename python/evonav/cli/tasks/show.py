@@ -1,4 +1,4 @@
-"""`tasks show`: pictures of what tasks ask and of what changes in them."""
+"""`evonav tasks show`: draw tasks with their hidden changes."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,15 +12,18 @@ if TYPE_CHECKING:
 
 
 def show(
-    folder: Annotated[Path, typer.Argument(help="Folder of a task, or of a data set.")],
-    task: Annotated[str | None, typer.Option(help="Of a data set: this task only.")] = None,
-    stage: Annotated[int | None, typer.Option(help="This stage only.")] = None,
+    folder: Annotated[Path, typer.Argument(help="Folder of a task, or of a dataset.")],
+    task: Annotated[str | None, typer.Option(help="Draw only this task of a dataset.")] = None,
+    stage: Annotated[int | None, typer.Option(help="Draw only this stage.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Page (.html), picture (.svg, .png or .pdf; of a --stage), or folder.")
+        Path | None,
+        typer.Option(
+            help="File or folder to write: a page (.html), a picture of one --stage (.svg, .png or .pdf), or a folder."
+        ),
     ] = None,
     limit: Limit = None,
 ) -> None:
-    """Draws tasks with their hidden changes: a page a task, or a gallery of a data set. It tells the answers."""
+    """Draw tasks with their hidden changes and answers: a page for a task, or a gallery for a dataset."""
     from evonav.report.maps.files import SUFFIXES
     from evonav.report.tasks.pages import write_gallery, write_stage_picture, write_task_page
     from evonav.tasks import load_tasks
@@ -43,7 +46,7 @@ def show(
 
 
 def _one_task(folder: Path, task_id: str | None, stage: int | None) -> "Task | None":
-    """The task that the options mean; `None` for all of a data set.
+    """Return the chosen task; `None` for all of a dataset.
 
     Raises:
         InvalidArgumentError: There is no such task or stage.

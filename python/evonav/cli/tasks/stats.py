@@ -1,4 +1,4 @@
-"""`evonav tasks stats`: what a set of tasks is like, beside the paper's."""
+"""`evonav tasks stats`: compare statistics of tasks with the paper's."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,23 +13,24 @@ if TYPE_CHECKING:
     from evonav.tasks.statistics import Estimate, Metric, TaskStatistics, Test
 
 NUM_NAMES = 6
-"""Of a distribution in one line."""
+"""Largest number of values of a distribution in one line."""
 
 
 def stats(
-    folders: Annotated[list[Path], typer.Argument(help="Folders of tasks: in each, one folder a task.")],
+    folders: Annotated[list[Path], typer.Argument(help="Folders that hold one folder per task.")],
     out: Annotated[
-        Path | None, typer.Option(help="Folder for statistics.json, statistics.html and statistics.svg.")
+        Path | None, typer.Option(help="Folder to write statistics.json, statistics.html and statistics.svg to.")
     ] = None,
     reweight: Annotated[
-        str | None, typer.Option(help="Also weigh tasks so that houses have the rooms of a set: procthor-10k.")
+        str | None,
+        typer.Option(help="Also weight tasks so that their houses have the room counts of a dataset: procthor-10k."),
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(help="File for the paper's figure: .svg, .png or .pdf (extra `viz`).")
+        Path | None, typer.Option(help="Write the paper's figure to a .svg, .png or .pdf file (extra `viz`).")
     ] = None,
     workers: Workers = None,
 ) -> None:
-    """Prints and plots statistics of tasks beside the paper's."""
+    """Print and plot statistics of tasks beside the paper's."""
     from evonav.cli.display import status
     from evonav.generation.statistics.compute import statistics_of_folders
     from evonav.report.plots.render import check_plot
@@ -52,7 +53,7 @@ def stats(
 
 
 def print_statistics(found: "TaskStatistics") -> None:
-    """Tables and lines, 80 columns wide."""
+    """Print statistics in tables and lines of 80 columns."""
     from rich.console import Console
 
     console = Console(highlight=False)

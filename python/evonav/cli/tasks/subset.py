@@ -1,4 +1,4 @@
-"""`evonav tasks subset`."""
+"""`evonav tasks subset`: list the tasks of a named subset."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,10 +10,12 @@ from evonav.cli.options import completion
 
 def subset(
     folder: Annotated[Path, typer.Argument(help="Folder of tasks with a dataset.json.")],
-    name: Annotated[str, typer.Argument(help="SPLIT-N, such as test-90.", autocompletion=completion.subsets)],
-    out: Annotated[Path | None, typer.Option(help="File for the task ids, one a line; default: print them.")] = None,
+    name: Annotated[str, typer.Argument(help="Subset: SPLIT-N, such as test-90.", autocompletion=completion.subsets)],
+    out: Annotated[
+        Path | None, typer.Option(help="File to write the task ids to, one per line. Default: print them.")
+    ] = None,
 ) -> None:
-    """Lists the tasks of a named subset (docs/tasks.md): the same for everyone who has the same houses."""
+    """List the tasks of a named subset, which is the same for everyone with the same houses (docs/tasks.md)."""
     from evonav.errors import TaskError
     from evonav.tasks.subsets import subset_roots
 

@@ -1,4 +1,4 @@
-"""`evonav tasks validate`."""
+"""`evonav tasks validate`: check task files."""
 
 from collections import Counter
 from pathlib import Path
@@ -12,17 +12,17 @@ if TYPE_CHECKING:
     from evonav.generation.validation import FolderReport
 
 NUM_EXAMPLES = 3
-"""Of each kind of problem, in the table."""
+"""Largest number of examples of each kind of problem in the table."""
 
 
 def validate(
-    folder: Annotated[Path, typer.Argument(help="Folder of tasks, one folder each.")],
+    folder: Annotated[Path, typer.Argument(help="Folder that holds one folder per task.")],
     limit: Limit = None,
     workers: Workers = None,
-    json_file: Annotated[Path | None, typer.Option("--json", help="File for all problems, JSON.")] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Write all problems to a JSON file.")] = None,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
-    """Checks tasks: files, records, physics, reference views, ways, and that nothing of the oracle is public."""
+    """Check tasks: files, records, physics, reference views, trajectories, and that no oracle data is public."""
     from rich import progress as bars
     from rich.console import Console
 
@@ -46,7 +46,7 @@ def validate(
 
 
 def print_report(report: "FolderReport") -> None:
-    """A table of problems by kind, and what source houses have of themselves."""
+    """Print problems by kind, and how many of them the source houses already have."""
     from rich.console import Console
     from rich.table import Table
 
@@ -72,7 +72,7 @@ def print_report(report: "FolderReport") -> None:
 
 
 def write_json(report: "FolderReport", path: Path) -> None:
-    """All problems, and what source houses have of themselves.
+    """Write all problems, and how many of them the source houses already have.
 
     Raises:
         TaskError: It cannot be written.

@@ -1,4 +1,4 @@
-"""`tasks write`: a model's words in place of the describer's."""
+"""`evonav tasks write`: let a model rewrite the instructions of tasks."""
 
 from contextlib import contextmanager
 from enum import Enum
@@ -18,7 +18,7 @@ EXIT_INCOMPLETE = 3
 
 
 class VlmMode(str, Enum):
-    """Where answers come from."""
+    """The source of answers."""
 
     LIVE = "live"
     RECORD = "record"
@@ -26,21 +26,32 @@ class VlmMode(str, Enum):
     AUTO = "auto"
 
 
-Folder = Annotated[Path, typer.Argument(help="Folder of tasks; they are rewritten in place.")]
-VlmModel = Annotated[str, typer.Option(help="The model's name, as the server calls it.")]
+Folder = Annotated[Path, typer.Argument(help="Folder of tasks, which are rewritten in place.")]
+VlmModel = Annotated[str, typer.Option(help="Name of the model on the server.")]
 VlmBaseUrl = Annotated[
-    str | None, typer.Option(help="Of an OpenAI-compatible API, with its /v1. Default: OPENAI_BASE_URL, else OpenAI's.")
+    str | None,
+    typer.Option(help="Address of an OpenAI-compatible API, with its /v1. Default: OPENAI_BASE_URL, else OpenAI's."),
 ]
-VlmExchanges = Annotated[Path | None, typer.Option(help="SQLite file of questions and answers, to be had again.")]
+VlmExchanges = Annotated[
+    Path | None, typer.Option(help="SQLite file that stores questions and answers. Default: none.")
+]
 VlmModeOption = Annotated[
     VlmMode | None,
-    typer.Option(help="live keeps nothing, record asks and keeps, replay never asks, auto asks what is not kept."),
+    typer.Option(
+        help="auto asks what is not stored yet, replay never asks, record asks and stores, live stores nothing."
+    ),
 ]
-VlmWorkers = Annotated[int, typer.Option(min=1, help="Questions at a time.")]
+VlmWorkers = Annotated[int, typer.Option(min=1, help="Number of questions asked at the same time.")]
 Prices = Annotated[
-    Path | None, typer.Option(help='JSON: {"MODEL": {"input_usd": .., "output_usd": ..}}, dollars a million tokens.')
+    Path | None,
+    typer.Option(
+        help='JSON file of prices in dollars per million tokens: {"MODEL": {"input_usd": .., "output_usd": ..}}.'
+    ),
 ]
-MaxCost = Annotated[float | None, typer.Option(help="Dollars after which no more is asked; needs --prices.")]
+MaxCost = Annotated[
+    float | None,
+    typer.Option(help="Largest cost in dollars; then no more is asked. It needs --prices. Default: no limit."),
+]
 
 
 def write(
@@ -52,12 +63,12 @@ def write(
     vlm_workers: VlmWorkers = 4,
     prices: Prices = None,
     max_cost: MaxCost = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what it would cost, and ask nothing.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Estimate the cost, and ask nothing.")] = False,
     limit: Limit = None,
 ) -> None:
-    """Has a model write appearance and unified instructions, with the paper's prompts.
+    """Let a model write appearance and unified instructions, with the paper's prompts; run again to resume.
 
-    The key is read from OPENAI_API_KEY. An interrupted pass goes on where it was when it is started again.
+    The key is read from OPENAI_API_KEY.
     """
     from evonav.decision.vlm.account import Account, read_prices
     from evonav.decision.vlm.client import VlmClient, VlmConfig
@@ -87,20 +98,20 @@ def write(
     counts = f"{account.num_asked} questions asked, {account.num_replayed} answered from exchanges"
     typer.echo(f"{counts}; {account.usage.input_tokens} tokens in, {account.usage.output_tokens} out{cost}")
     if writing.stopped is not None:
-        typer.echo(f"stopped: {writing.stopped}; start again to go on", err=True)
+        typer.echo(f"stopped: {writing.stopped}; run again to resume", err=True)
         raise typer.Exit(EXIT_INCOMPLETE)
 
 
 @contextmanager
 def _bar() -> "Iterator[Callable[[Writing], None]]":
-    """A bar over tasks."""
+    """Show a progress bar over tasks; the yielded function updates it."""
     from rich import progress as bars
     from rich.console import Console
 
     columns = (bars.TextColumn("tasks"), bars.BarColumn(), bars.MofNCompleteColumn(), bars.TimeRemainingColumn())
     with bars.Progress(*columns, console=Console(stderr=True)) as bar:
         tasks = bar.add_task("tasks")
-        yield lambda news: bar.update(tasks, completed=news.num_done, total=news.num_tasks)
+        yield lambda state: bar.update(tasks, completed=state.num_done, total=state.num_tasks)
 
 
 def _tell(writing: "Writing") -> None:

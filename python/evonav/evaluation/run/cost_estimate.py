@@ -1,7 +1,7 @@
-"""What a run would cost, before it is run: a few of its tasks with the text matcher, and every prompt counted.
+"""Estimate the cost of a run: run a few of its tasks with the text matcher and count the tokens of every prompt.
 
-Tokens are the client's estimates, rather too many than too few. A model decides otherwise than the text matcher, walks
-on for longer or stops sooner, and is asked again after answers that cannot be read: the interval holds none of that.
+Tokens are estimated by the client, which overestimates. The interval does not include that a model decides differently
+from the text matcher, takes more or fewer rounds, and is asked again after malformed answers.
 """
 
 import math
@@ -20,17 +20,17 @@ from evonav.tasks.listing import TaskFile
 
 @dataclass(frozen=True, slots=True)
 class RunEstimate:
-    """Of one agent."""
+    """The estimated cost of one agent."""
 
     agent: str
     num_stages: int
-    """Of the run."""
+    """Number of stages of the run."""
     num_stages_run: int
-    """That the estimate is from."""
+    """Number of stages that were run for the estimate."""
     num_requests: float
     input_tokens: float
     output_tokens: float
-    """By an assumed length of answers."""
+    """Number of output tokens, from an assumed length of answers."""
     relative_error: float
     """Half width of a 95% interval of `input_tokens` over tasks, as a share of it; 0 if all were run, `inf` if one."""
     kinds: dict[str, float]
@@ -47,14 +47,14 @@ def estimate_run(
     num_workers: int = 0,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> list[RunEstimate]:
-    """Runs a few tasks, spread over all, and extrapolates by the number of stages.
+    """Run a few tasks, spread over all, and extrapolate by the number of stages.
 
     Args:
         agents: Names.
-        tasks: Of the run.
-        config: Of the run, but for its decision model.
-        options: Of `evonav.decision.backends.counting`, but for `ledger`.
-        num_tasks: That are run.
+        tasks: The run's tasks.
+        config: The run's configuration; its decision model is replaced.
+        options: Options of `evonav.decision.backends.counting`, without `ledger`.
+        num_tasks: Number of tasks to run.
         num_workers: Processes.
         on_progress: Called after every stage.
 

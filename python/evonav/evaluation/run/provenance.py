@@ -1,4 +1,4 @@
-"""Who ran a run, when and on what: notes beside its records, no part of what it is."""
+"""Note the commands, machines and versions that worked on a run, beside its records."""
 
 import os
 import platform
@@ -15,23 +15,23 @@ from evonav.evaluation.records.store import RunStore
 
 KEY = "sessions"
 MAX_SESSIONS = 50
-"""Kept of a run that is resumed again and again: the first one and the latest."""
+"""Largest number of noted sessions: the first one and the latest."""
 
 
 def note_session(store: RunStore, num_workers: int) -> None:
-    """Notes the call that is about to evaluate: its command, machine and versions.
+    """Note the command that is about to evaluate, its machine and versions.
 
     Args:
-        store: Of the run.
-        num_workers: Processes that evaluate.
+        store: The run's store.
+        num_workers: Number of processes that evaluate.
     """
     before = store.meta(KEY) or []
-    kept = [*before[:1], *before[1:][-(MAX_SESSIONS - 2) :]]
-    store.set_meta(KEY, [*kept, {**session_facts(), "workers": num_workers}])
+    sessions = [*before[:1], *before[1:][-(MAX_SESSIONS - 2) :]]
+    store.set_meta(KEY, [*sessions, {**session_facts(), "workers": num_workers}])
 
 
 def session_facts() -> dict[str, Any]:
-    """The command of this process, its machine and versions; no user's or machine's name."""
+    """Return the command of this process, its machine and versions, without names of users or machines."""
     return {
         "command": _command(),
         "began": datetime.now(timezone.utc).isoformat(timespec="seconds"),
@@ -44,7 +44,7 @@ def session_facts() -> dict[str, Any]:
 
 
 def _command() -> str:
-    """As typed, for the command of ours; the script's name for others."""
+    """Return the command as typed if it is evonav's, else an empty string."""
     name = Path(sys.argv[0]).name if sys.argv else ""
     is_ours = name in ("evonav", "__main__.py")
     return shlex.join(["evonav", *sys.argv[1:]]) if is_ours else ""
@@ -52,11 +52,11 @@ def _command() -> str:
 
 @cache
 def _revision(directory: Path) -> str:
-    """Of the checkout that the package lies in; empty where it is installed, or git is not there."""
+    """Return the git revision of the package's checkout; empty if it is installed or git is missing."""
     try:
         command = ["git", "-C", str(directory), "describe", "--always", "--dirty", "--abbrev=12"]
-        tracked = ["git", "-C", str(directory), "ls-files", "--error-unmatch", "sessions.py"]
-        if subprocess.run(tracked, capture_output=True, timeout=5).returncode != 0:  # noqa: S603
+        in_git = ["git", "-C", str(directory), "ls-files", "--error-unmatch", Path(__file__).name]
+        if subprocess.run(in_git, capture_output=True, timeout=5).returncode != 0:  # noqa: S603
             return ""  # some other project's checkout, with this package in an environment inside
         return subprocess.run(command, capture_output=True, text=True, timeout=5).stdout.strip()  # noqa: S603
     except (OSError, subprocess.SubprocessError):

@@ -1,4 +1,4 @@
-"""A run: agents x tasks into one folder, resumable, with any number of workers."""
+"""Evaluate agents on tasks into one folder, with any number of workers; run again to resume."""
 
 import hashlib
 import json
@@ -17,8 +17,8 @@ from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_agent_name
 from evonav.evaluation.run.provenance import note_session
-from evonav.evaluation.run.scheduler import Progress, Run, run_all
-from evonav.evaluation.run.worker import WORK, EpisodeJob, Setup
+from evonav.evaluation.run.scheduler import Progress, RunJobs, run_all
+from evonav.evaluation.run.worker import WORK, EpisodeJob, WorkerConfig
 from evonav.parallel.folders import check_same_run, write_atomically, writing
 from evonav.parallel.pool import EngineName, open_pool
 from evonav.parallel.worker import Resources
@@ -40,28 +40,30 @@ __all__ = [
 
 SUMMARY_NAME = "summary.json"
 MODELS_KEY = "perception_models"
-"""Of a run's header and summary: hashes of weights and versions of libraries, by stack."""
+"""Key in a run's header and summary for hashes of weights and versions of libraries, by stack."""
 NUM_RETRIES = 2
-"""Of a stage that lost its worker, its simulator or its agent's process."""
+"""Number of retries of a stage that lost its worker, its simulator or its agent's process."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunConfig:
-    """What decides the records of a run, beside agents and tasks."""
+    """The configuration that decides a run's records, beside agents and tasks."""
 
     seed: int = 0
     protocol: ProtocolConfig = field(default_factory=ProtocolConfig)
     backend: Backend = field(default_factory=Backend)
     stage_timeout_s: float = 900.0
-    """After which a stage is errored (of an agent in a process of its own, a round); like all that follows, not part of
-    what makes runs the same."""
+    """Seconds after which a stage is errored; for an agent in a process of its own, a round.
+
+    This field and `hosting` are not part of a run's identity.
+    """
     hosting: AgentHosting = field(default_factory=AgentHosting)
-    """Where agents run; with `num_workers=0`, always in this process."""
+    """The process in which agents run; with `num_workers=0`, it is always this one."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunRequest:
-    """Agents x tasks into one folder: a run, or a cell of a sweep."""
+    """The agents, tasks and folder of a run, or of a cell of a sweep."""
 
     agents: tuple[str, ...]
     tasks: tuple[TaskFile, ...]
@@ -83,28 +85,28 @@ def evaluate(
     retry_errored: bool = False,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> list[AgentSummary]:
-    """Evaluates agents on tasks; called again on the same folder, does what is left.
+    """Evaluate agents on tasks; call it again on the same folder to resume.
 
     Args:
         agents: Names, see `evonav agents`.
         tasks: See `task_files`.
         run_dir: Holds `records.sqlite` and `summary.json`.
         config: Must be the run's own when the folder already holds one.
-        engine: As for `evaluate_all`, like all that follows.
+        engine: Processes of this machine, or Ray actors.
         num_workers: 0 runs everything in this process.
-        ray_address: Of a cluster.
-        resources: Of the cluster, for each worker; default: a CPU.
-        num_retries: A stage.
+        ray_address: Address of a Ray cluster; default: one on this machine.
+        resources: Resources that Ray reserves for each worker; default: one CPU.
+        num_retries: Number of retries of a stage, see `evaluate_all`.
         retry_errored: Run errored stages again, and those that were not run because of them.
         on_progress: Called after every recorded stage.
 
     Returns:
-        One summary an agent asked for.
+        One summary an agent wanted for.
 
     Raises:
-        InvalidArgumentError: An agent is unknown, or asked for twice.
+        InvalidArgumentError: An agent is unknown, or wanted for twice.
         StoreError: The folder holds a run of another configuration or cannot be written.
-        EngineError: Workers cannot be had.
+        EngineError: Workers do not start.
     """
     request = RunRequest(tuple(agents), tuple(tasks), run_dir, config or RunConfig())
     (summaries,) = evaluate_all(
@@ -115,7 +117,7 @@ def evaluate(
         resources=resources,
         num_retries=num_retries,
         retry_errored=retry_errored,
-        on_progress=lambda _, news: on_progress(news),
+        on_progress=lambda _, progress: on_progress(progress),
     )
     return summaries
 
@@ -131,40 +133,40 @@ def evaluate_all(
     retry_errored: bool = False,
     on_progress: Callable[[int, Progress], None] = lambda _, __: None,
 ) -> list[list[AgentSummary]]:
-    """Does what is left of several runs, with one set of workers for all.
+    """Run what is left of several runs, with one set of workers for all.
 
     Args:
         requests: Runs, each in a folder of its own.
         engine: Processes of this machine, or Ray actors.
         num_workers: Processes or actors; 0 runs everything in this process.
-        ray_address: Of a cluster; default: one on this machine.
-        resources: Of the cluster, for each worker; default: a CPU.
-        num_retries: How often a stage is tried again that lost its worker, its simulator or its agent's process, or at
-            which evonav itself failed. Each time is kept, see `RunStore.failures`.
+        ray_address: Address of a Ray cluster; default: one on this machine.
+        resources: Resources that Ray reserves for each worker; default: one CPU.
+        num_retries: Number of retries of a stage that lost its worker, its simulator or its agent's process, or in
+            which evonav itself failed. Every failure is recorded, see `RunStore.failures`.
         retry_errored: Run errored stages again, and those that were not run because of them.
         on_progress: Called with the index of a request as it begins and after each of its recorded stages.
 
     Returns:
-        By request, one summary an agent asked for.
+        By request, one summary an agent wanted for.
 
     Raises:
-        InvalidArgumentError: An agent is unknown or asked for twice, or two requests have one folder.
+        InvalidArgumentError: An agent is unknown or wanted for twice, or two requests have one folder.
         StoreError: A folder holds a run of another configuration or cannot be written.
         PerceptionError: Models of a perception are missing.
-        EngineError: Workers cannot be had.
+        EngineError: Workers do not start.
     """
     folders = [request.run_dir.absolute() for request in requests]
     if len(set(folders)) != len(folders):
-        raise InvalidArgumentError("two runs are asked for in one folder")
+        raise InvalidArgumentError("two runs are wanted for in one folder")
     _check_requests(requests, num_workers)
     for request in requests:
         if not (request.run_dir / FILE_NAME).exists():  # what cannot begin leaves nothing behind
             request.config.backend.check_perception(request.agents)
     with ExitStack() as stack:
-        runs: list[Run] = []
+        runs: list[RunJobs] = []
         for index, request in enumerate(requests):
             stack.enter_context(writing(request.run_dir))
-            runs.append(stack.enter_context(closing(_begun(request, num_workers, num_retries, retry_errored))))
+            runs.append(stack.enter_context(closing(_begin(request, num_workers, num_retries, retry_errored))))
             on_progress(index, runs[-1].progress(None))
         summaries: dict[int, list[AgentSummary]] = {}
 
@@ -191,12 +193,12 @@ def evaluate_all(
         return [summaries[index] for index in range(len(requests))]
 
 
-def _begun(request: RunRequest, num_workers: int, num_retries: int, retry_errored: bool) -> Run:
-    """A run whose folder is claimed, with what is left to do."""
+def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errored: bool) -> RunJobs:
+    """Claim a run's folder and return the jobs that are left."""
     config = request.config
     hosting = _hosting(request, num_workers)
-    setup = Setup(config.backend, config.protocol, hosting, num_retries)
-    # An agent in a process of its own has a limit of its own, for every answer; what is left is for all the rest.
+    worker_config = WorkerConfig(config.backend, config.protocol, hosting, num_retries)
+    # An agent in a process of its own has another limit for each answer; the rest of a round has stage_timeout_s.
     limit_s = config.stage_timeout_s + (0.0 if hosting.is_in_process else hosting.timeout_s)
     with RunStore(request.run_dir, create=True) as store:
         _claim(store, request)
@@ -224,11 +226,11 @@ def _begun(request: RunRequest, num_workers: int, num_retries: int, retry_errore
         with RunStore(request.run_dir) as store:
             _claim_models(store, request)
             note_session(store, num_workers)
-    return Run(request.run_dir, setup, limit_s, request.agents, request.tasks, jobs, states)
+    return RunJobs(request.run_dir, worker_config, limit_s, request.agents, request.tasks, jobs, states)
 
 
 def _forget_errored(store: RunStore, request: RunRequest) -> None:
-    """Drops episodes' stages from the first errored one on."""
+    """Delete the stages of episodes from the first errored one on."""
     first: dict[tuple[str, str], int] = {}
     for (agent, task_id, stage), state in store.states().items():
         if state is EndState.ERRORED:
@@ -249,7 +251,7 @@ def _hosting(request: RunRequest, num_workers: int) -> AgentHosting:
 
 
 def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[AgentSummary]:
-    """Computes every agent's measures from the records, and writes `summary.json`.
+    """Compute every agent's metrics from the records, and write `summary.json`.
 
     Args:
         run_dir: A run.
@@ -275,13 +277,13 @@ def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[Agen
 
 
 def agent_seed(seed: int, agent: str, task_id: str) -> int:
-    """The seed of an agent's random choices: a function of names, not of order or workers."""
+    """Return the seed of an agent's random choices, which depends on names and not on order or workers."""
     digest = hashlib.sha256(f"{seed}\0{agent}\0{task_id}".encode()).digest()
     return int.from_bytes(digest[:6], "big")
 
 
 def perception_seed(seed: int, task_id: str) -> int:
-    """The seed of a perception's errors: the same for all agents, which then meet the same ones."""
+    """Return the seed of a perception's errors, which is the same for all agents."""
     return agent_seed(seed, "", task_id)
 
 
@@ -312,7 +314,7 @@ def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
 
 
 def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]:
-    """What makes runs the same: a folder holds one run, of any number of agents."""
+    """Return the identity of a run: a folder holds one run, of any number of agents."""
     return {
         "evonav": __version__,
         "seed": config.seed,
@@ -324,24 +326,24 @@ def run_identity(tasks: Sequence[TaskFile], config: RunConfig) -> dict[str, Any]
 
 
 def _claim_models(store: RunStore, request: RunRequest) -> None:
-    """Notes the models of the perception before anyone looks through them, or checks that they are the run's."""
+    """Store the models of the perception before they are used, or check that they are the stored ones."""
     found = request.config.backend.check_perception(request.agents)
-    there = store.meta(MODELS_KEY) or {}
-    both = found.keys() & there.keys()
-    check_same_run({key: there[key] for key in both}, {key: found[key] for key in both}, request.run_dir)
-    if found.keys() - there.keys():
-        store.set_meta(MODELS_KEY, {**there, **found})
+    stored = store.meta(MODELS_KEY) or {}
+    both = found.keys() & stored.keys()
+    check_same_run({key: stored[key] for key in both}, {key: found[key] for key in both}, request.run_dir)
+    if found.keys() - stored.keys():
+        store.set_meta(MODELS_KEY, {**stored, **found})
 
 
 def _claim(store: RunStore, request: RunRequest) -> None:
-    """Makes the folder this run's, or checks that it is."""
-    asked = run_identity(request.tasks, request.config)
-    there = store.meta("config")
-    if there is not None:
-        check_same_run(there, asked, request.run_dir)
+    """Make the folder this run's, or check that it is."""
+    wanted = run_identity(request.tasks, request.config)
+    stored = store.meta("config")
+    if stored is not None:
+        check_same_run(stored, wanted, request.run_dir)
     store.set_header(
         {
-            "config": asked,
+            "config": wanted,
             "num_stages": {task.task_id: task.num_stages for task in request.tasks},
             "agents": sorted({*(store.meta("agents") or []), *request.agents}),
             "tasks_dir": str(request.tasks[0].path.absolute().parent),  # for `evonav view`

@@ -1,4 +1,4 @@
-"""The bookkeeping of runs that are under way: news of workers into records."""
+"""Schedule episode jobs and commit the workers' results."""
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
@@ -11,14 +11,14 @@ from evonav.evaluation.episode.spec import EpisodeSpec, unreadable_task_spec
 from evonav.evaluation.records.encoded import EncodedStage, encode_stage
 from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
 from evonav.evaluation.records.store import RunStore
-from evonav.evaluation.run.worker import RETRIED, EpisodeJob, Setup, decode_event, floor_plan_if_possible
+from evonav.evaluation.run.worker import RETRIED, EpisodeJob, WorkerConfig, decode_event, floor_plan_if_possible
 from evonav.parallel.pool import Answer, Job, Pool
 from evonav.tasks.listing import TaskFile
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is."""
+    """The progress of a run."""
 
     num_done: int
     """Recorded stages, those of earlier calls included."""
@@ -27,33 +27,33 @@ class Progress:
     """The stage that was recorded last; `None` at the beginning."""
 
 
-class Run:
-    """One run's: what is recorded, and what is left."""
+class RunJobs:
+    """The jobs of one run, its recorded stages and its store."""
 
     def __init__(
         self,
         run_dir: Path,
-        setup: Setup,
+        config: WorkerConfig,
         limit_s: float,
         agents: Sequence[str],
         tasks: Sequence[TaskFile],
         jobs: Sequence[EpisodeJob],
         states: dict[tuple[str, str, int], EndState],
     ) -> None:
-        """Opens nothing yet.
+        """Store the arguments; the store opens at its first use.
 
         Args:
-            run_dir: Holds a store.
-            setup: Of the episodes.
-            limit_s: Without a word of an episode.
-            agents: Asked for.
-            tasks: Of the run.
+            run_dir: Folder of the run, which holds a store.
+            config: Configuration of the episodes.
+            limit_s: Longest silence of an episode, in seconds.
+            agents: Names of the requested agents.
+            tasks: The run's tasks.
             jobs: Episodes with a stage that has no record.
-            states: Of all that is recorded.
+            states: End state of every recorded stage, by agent, task and stage.
         """
         self.jobs = jobs
-        self.setup = setup
-        self.setup_text = setup.text
+        self.config = config
+        self.config_text = config.text
         self.limit_s = limit_s
         self.num_left = len(jobs)
         self._run_dir = run_dir
@@ -70,26 +70,26 @@ class Run:
 
     @property
     def store(self) -> RunStore:
-        """Open from the first use on."""
+        """The run's store, opened at its first use."""
         if self._store is None:
             self._store = RunStore(self._run_dir)
         return self._store
 
     def close(self) -> None:
-        """Closes the store; safe to call twice."""
+        """Close the store; safe to call twice."""
         if self._store is not None:
             self._store.close()
         self._store = None
 
     def progress(self, latest: EncodedStage | None) -> Progress:
-        """How far it is."""
+        """Return the progress, with the stage that was recorded last."""
         return Progress(self._num_done, len(self._keys), latest)
 
     def add(self, stage: EncodedStage) -> bool:
         """Commit a stage, unless the same record is stored: a resumed episode runs its recorded stages again.
 
-        An agent that is not deterministic may do otherwise than recorded. Mixing two rollouts in one episode would join
-        what never happened, so the newer rollout then replaces the older from that stage on.
+        An agent that is not deterministic may differ from its record. An episode must not mix two rollouts, so the
+        newer rollout then replaces the older from that stage on.
         """
         if stage.floor_plan is not None:
             self.store.add_floor_plan(stage.task_id, stage.stage, stage.floor_plan)
@@ -114,7 +114,7 @@ class Run:
         task = self._tasks[job.task_id]
         plans: dict[int, FloorPlan | None] = {}
         try:
-            case: EpisodeSpec = self.setup.backend.tasks.create(task.path)
+            case: EpisodeSpec = self.config.backend.tasks.create(task.path)
             if job.sends_floor_plans:
                 plans = {stage: floor_plan_if_possible(case, stage) for stage in range(1, task.num_stages + 1)}
         except Exception as error:  # whatever a broken file does to whatever reads it
@@ -138,24 +138,24 @@ class _Episode:
     """A job and how it goes."""
 
     index: int
-    """Of its run."""
+    """Index of its run."""
     job: EpisodeJob
     stage: int = 1
-    """That this attempt is at."""
+    """Stage that this attempt runs."""
     num_tried: Counter[int] = field(default_factory=Counter)
-    """Attempts that failed, by the stage that they were at."""
+    """Number of failed attempts by stage."""
 
 
 def run_all(
-    runs: Sequence[Run], pool: Pool, num_retries: int, on_done: Callable[[int], None]
+    runs: Sequence[RunJobs], pool: Pool, num_retries: int, on_done: Callable[[int], None]
 ) -> Iterator[tuple[int, EncodedStage]]:
-    """Has all jobs of runs done and records what comes of them.
+    """Run all jobs of several runs and commit their results.
 
     Args:
-        runs: Where to.
-        pool: Who does it.
-        num_retries: Of a stage whose worker was lost.
-        on_done: Called with the index of a run of which nothing is left.
+        runs: The runs.
+        pool: Workers that run the jobs.
+        num_retries: Number of retries of a stage whose worker was lost.
+        on_done: Called with the index of a run when its last job has ended.
 
     Yields:
         Index of the run, and a stage that was committed.
@@ -168,19 +168,19 @@ def run_all(
             episode, number = waiting.popleft(), next(numbers)
             under_way[number] = episode
             run = runs[episode.index]
-            pool.submit(Job(number, episode.job.text(run.setup_text), run.limit_s))
+            pool.submit(Job(number, episode.job.text(run.config_text), run.limit_s))
         answer = pool.next_answer()
         episode = under_way[answer.key]
         run = runs[episode.index]
         if answer.is_end:
             del under_way[answer.key]
-        news = _news_of(answer, run)
-        if isinstance(news, EncodedStage):
-            episode.stage = news.stage + 1
-            if run.add(news):
-                yield episode.index, news
-        elif news is not None:
-            failure = replace(news, stage=news.stage or episode.stage)
+        event = _event_of(answer, run)
+        if isinstance(event, EncodedStage):
+            episode.stage = event.stage + 1
+            if run.add(event):
+                yield episode.index, event
+        elif event is not None:
+            failure = replace(event, stage=event.stage or episode.stage)
             if not answer.is_end:  # the worker tries again itself
                 _note_retry(run, episode, failure)
             elif failure.kind in RETRIED and episode.num_tried[failure.stage] < num_retries:
@@ -199,16 +199,16 @@ def run_all(
                 on_done(episode.index)
 
 
-def _note_retry(run: Run, episode: _Episode, failure: StageFailure) -> None:
+def _note_retry(run: RunJobs, episode: _Episode, failure: StageFailure) -> None:
     run.store.add_retry(episode.job.agent, episode.job.task_id, failure)
     episode.stage = 1
 
 
-def _news_of(answer: Answer, run: Run) -> EncodedStage | StageFailure | None:
+def _event_of(answer: Answer, run: RunJobs) -> EncodedStage | StageFailure | None:
     if answer.failure == "crash":
         return StageFailure(0, ErrorKind.CRASH, answer.detail)
     if answer.failure == "timeout":
-        what = "stage" if run.setup.hosting.is_in_process else "round"
+        what = "stage" if run.config.hosting.is_in_process else "round"
         return StageFailure(0, ErrorKind.TIMEOUT, f"no {what} ended within {run.limit_s:g} s")
     if answer.failure == "error":
         message = answer.detail.strip().rpartition("\n")[2]

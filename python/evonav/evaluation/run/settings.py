@@ -46,7 +46,7 @@ class SettingError(InvalidArgumentError):
 
         Args:
             key: A field of the settings.
-            problem: What is wrong with it: the end of a sentence that begins with its name.
+            problem: The problem, as the end of a sentence that begins with the field's name.
         """
         super().__init__(f"{key} {problem}")
         self.key = key
@@ -103,8 +103,10 @@ class PerceptionSettings(Settings):
     """The perception that turns camera images into what agents see (docs/perception.md)."""
 
     make: str = "gt"
-    """Perception: gt (the simulator's masks and labels), noisy:PRESET (with simulated errors), predicted:STACK (models)
-    or module:function (your own). Keys follow, as in noisy:poor,miss_rate=0.3 (docs/perception.md)."""
+    """Perception of the agents (docs/perception.md).
+
+    gt (the simulator's masks and labels), noisy:PRESET (with simulated errors), predicted:STACK (models) or
+    module:function (your own), with keys as in noisy:poor,miss_rate=0.3."""
     options: dict[str, Any] = Field(default_factory=dict)
     """Keyword arguments; they override the keys in `make`."""
     models: str | None = None
@@ -130,8 +132,9 @@ class DecisionSettings(Settings):
     """The decision model that answers the agents' questions (docs/decision.md)."""
 
     kind: str = "text"
-    """Decision model that answers the agents' questions: text (rules), vlm (a vision-language model on a server) or
-    module:name (your own)."""
+    """Decision model that answers the agents' questions.
+
+    text (rules), vlm (a vision-language model on a server) or module:name (your own)."""
     model: str | None = None
     """VLM: name of the model on the server. Default: EVONAV_VLM_MODEL."""
     base_url: str | None = None
@@ -227,7 +230,7 @@ class DecisionSettings(Settings):
 
         Args:
             seed: The run's.
-            resources: Where answers are stored and costs are logged; without them the model cannot be asked, which is
+            resources: The files for answers and costs; without them the model cannot be asked, which is
                 enough for estimates.
 
         Raises:
@@ -328,7 +331,7 @@ class SpendingSettings(Settings):
 
 @dataclass(frozen=True, slots=True)
 class DecisionResources:
-    """Where a run stores answers of its model and logs their costs."""
+    """The files in which a run stores answers of its model and logs their costs."""
 
     run_dir: Path
     """Folder of the run, which holds the answers unless the settings name another file."""

@@ -1,12 +1,12 @@
-"""What a worker of `evonav.parallel.pool` does in an evaluation: an episode a job, told stage by stage.
+"""Run episodes in a worker of `evonav.parallel.pool`: one episode per job, with an event for each stage.
 
-Agents run in processes of their own (`agent_process.py`), unless they are oracle baselines or it is switched off. A
-worker that dies or hangs costs its episode, not the run.
+Agents run in processes of their own (`evonav.evaluation.hosting`), unless they are oracle baselines or this is switched
+off. A worker that dies or hangs costs its episode, not the run.
 
-What is lost to the machine is tried again: the episode runs from its beginning, with a fresh agent and the same seed.
-That brings a deterministic agent to the state in which it began the stage, which no snapshot would do for every agent;
-of another kind of agent, the newer rollout replaces the older. Here it is done for a lost simulator, a lost process of
-an agent and a failure of the harness; for a lost worker, by those who run the pool (`engine.py`).
+A stage that was lost to the machine is retried: its episode runs from the beginning, with a fresh agent and the same
+seed. This brings a deterministic agent to the state in which it began the stage, which no snapshot would do for every
+agent; for another agent, the newer rollout replaces the older. The worker retries after a lost simulator, a lost agent
+process or a failure of the harness; `evonav.evaluation.run.scheduler` retries after a lost worker.
 """
 
 import json
@@ -37,29 +37,29 @@ from evonav.world.simulator import Simulator
 
 WORK = "evonav.evaluation.run.worker:EpisodeWork"
 RETRIED = (ErrorKind.HARNESS, ErrorKind.SIMULATOR_LOST, *LOSSES)
-"""Failures that another attempt may not have; an exception of an agent's or of a simulator's is the same again."""
+"""Failures that a retry may avoid; an exception of an agent or simulator would be the same again."""
 MAX_CONTEXTS = 2
-"""Kept by a worker; the one that was used longest ago makes room."""
+"""Largest number of contexts of a worker; the least recently used one is closed."""
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
-    """What episodes need beside the task and the agent."""
+class WorkerConfig:
+    """The configuration that episodes need beside the task and the agent."""
 
     backend: Backend
     protocol: ProtocolConfig
     hosting: AgentHosting
     num_retries: int = 0
-    """Of a stage."""
+    """Number of retries of a stage."""
 
     @property
     def text(self) -> str:
-        """As JSON, to be read by `from_values`."""
+        """The configuration as JSON, which `from_values` reads."""
         return json.dumps(asdict(self), sort_keys=True)
 
     @classmethod
-    def from_values(cls, values: dict[str, Any]) -> "Setup":
-        """What `text` tells."""
+    def from_values(cls, values: dict[str, Any]) -> "WorkerConfig":
+        """Return the configuration whose JSON is `values`."""
         return cls(
             Backend.from_json(values["backend"]),
             ProtocolConfig(**values["protocol"]),
@@ -75,7 +75,7 @@ class EpisodeJob:
     agent: str
     task_id: str
     path: str
-    """Of the task."""
+    """Folder of the task."""
     seed: int
     """The agent's."""
     perception_seed: int
@@ -83,39 +83,36 @@ class EpisodeJob:
     sends_floor_plans: bool = False
     """Send the floor plans of the task's stages: one episode of a task does, for all agents."""
 
-    def text(self, setup_text: str) -> str:
-        """As a worker takes it."""
-        return f"{json.dumps(asdict(self))}\n{setup_text}"
+    def text(self, config_text: str) -> str:
+        """Return the text of the job for a worker."""
+        return f"{json.dumps(asdict(self))}\n{config_text}"
 
 
 class WorkerContext:
-    """Where episodes run one after another, with one simulator for all: one with a process takes long to start.
+    """Runs episodes one after another with one simulator and one set of agent processes, which are slow to start."""
 
-    So it is with the processes of agents.
-    """
-
-    def __init__(self, setup: Setup, alive: Callable[[], None]) -> None:
-        """Makes nothing yet."""
-        hosting = setup.hosting
-        self.setup = setup
-        # An agent in this process has one limit of time for a whole stage.
+    def __init__(self, config: WorkerConfig, alive: Callable[[], None]) -> None:
+        """Store the configuration; the simulator starts with the first episode."""
+        hosting = config.hosting
+        self.config = config
+        # An agent in this process has one time limit for a whole stage.
         self.on_round = (lambda: None) if hosting.is_in_process else alive
         self._simulator: Simulator | None = None
         self._processes = None if hosting.is_in_process else AgentProcesses(hosting)
 
     def agent(self, job: EpisodeJob) -> Agent | HostedAgent:
-        """A fresh agent. Oracle baselines are given oracle data: they stay here."""
+        """Make a fresh agent. Oracle baselines are given oracle data and stay in this process."""
         if self._processes is not None and job.agent not in ORACLE_BASELINES:
-            return RemoteAgent(self._processes, job.agent, self.setup.backend.decision, job.seed)
+            return RemoteAgent(self._processes, job.agent, self.config.backend.decision, job.seed)
         try:
-            return make_agent(job.agent, self.setup.backend.decision.create(job.seed))
+            return make_agent(job.agent, self.config.backend.decision.create(job.seed))
         except Exception as error:
-            return _Unmade(error)
+            return _FailedAgent(error)
 
     @contextmanager
     def simulator(self) -> Iterator[Simulator]:
-        """The simulator; it is not used again after an episode that did not end by itself."""
-        simulator, self._simulator = self._simulator or self.setup.backend.simulator.create(), None
+        """Lend the simulator; it is closed after an episode that raised."""
+        simulator, self._simulator = self._simulator or self.config.backend.simulator.create(), None
         try:
             yield simulator
         except BaseException:
@@ -124,7 +121,7 @@ class WorkerContext:
         self._simulator = simulator
 
     def close(self) -> None:
-        """Closes the simulator and ends the agents' processes; safe to call twice."""
+        """Close the simulator and end the agents' processes; safe to call twice."""
         if self._simulator is not None:
             self._simulator.close()
         self._simulator = None
@@ -132,8 +129,8 @@ class WorkerContext:
             self._processes.close()
 
 
-class _Unmade:
-    """Stands for an agent whose making has failed: its stages are errored with that, each."""
+class _FailedAgent:
+    """An agent that could not be made: every stage of it is errored with the same error."""
 
     def __init__(self, error: Exception) -> None:
         self._error = error
@@ -157,7 +154,7 @@ class _Unmade:
 
 
 class _Heartbeat:
-    """Says of every round that the episode goes on."""
+    """Reports after every round that the episode continues."""
 
     def __init__(self, on_round: Callable[[], None]) -> None:
         self._on_round = on_round
@@ -173,13 +170,13 @@ class _Heartbeat:
 
 
 def run_job(job: EpisodeJob, context: WorkerContext) -> Generator[EncodedStage | StageFailure]:
-    """Runs an episode in this process.
+    """Run an episode in this process.
 
     Yields:
         Finished stages. After a failure that costs only the attempt: the failure, and then the stages from stage 1 on
         again.
     """
-    case = context.setup.backend.tasks.create(Path(job.path))
+    case = context.config.backend.tasks.create(Path(job.path))
     num_tried: Counter[int] = Counter()
     is_whole = False
     while not is_whole:
@@ -190,7 +187,7 @@ def run_job(job: EpisodeJob, context: WorkerContext) -> Generator[EncodedStage |
                 if failure is not None and failure.kind in RETRIED:
                     # What an agent does to itself is tried again so often an episode, not a stage: it costs time.
                     stage = 0 if failure.kind.is_agents else failure.stage
-                    if num_tried[stage] < context.setup.num_retries:
+                    if num_tried[stage] < context.config.num_retries:
                         num_tried[stage] += 1
                         is_whole = False
                         yield failure
@@ -199,8 +196,8 @@ def run_job(job: EpisodeJob, context: WorkerContext) -> Generator[EncodedStage |
 
 
 def _attempt(case: EpisodeSpec, job: EpisodeJob, context: WorkerContext) -> Generator[StageOutcome]:
-    setup = context.setup
-    perception = setup.backend.perception.create()
+    config = context.config
+    perception = config.backend.perception.create()
     with context.simulator() as simulator:
         agent = context.agent(job)
         observer = _Heartbeat(context.on_round)
@@ -210,7 +207,7 @@ def _attempt(case: EpisodeSpec, job: EpisodeJob, context: WorkerContext) -> Gene
             agent,
             simulator,
             perception,
-            setup.protocol,
+            config.protocol,
             job.seed,
             observer,
             perception_seed=job.perception_seed,
@@ -218,36 +215,36 @@ def _attempt(case: EpisodeSpec, job: EpisodeJob, context: WorkerContext) -> Gene
 
 
 class EpisodeWork:
-    """A worker's, as `evonav.parallel.pool` calls it. Cells of a sweep share it: each setup has a context."""
+    """The work of `evonav.parallel.pool`. Cells of a sweep share a worker: each configuration has a context."""
 
     def __init__(self, _settings: str, alive: Callable[[], None]) -> None:
         self._alive = alive
         self._contexts: dict[str, WorkerContext] = {}
 
     def __call__(self, text: str) -> Generator[str, None, str]:
-        """Runs the episode of `EpisodeJob.text`; what it yields and returns is for `decode_event`."""
-        head, _, setup_text = text.partition("\n")
+        """Run the episode of `EpisodeJob.text`; yield and return events for `decode_event`."""
+        head, _, config_text = text.partition("\n")
         try:
-            context = self._context(setup_text)
-            with closing(run_job(EpisodeJob(**json.loads(head)), context)) as said:
-                for news in said:
-                    yield news.to_text() if isinstance(news, EncodedStage) else _failure_text(news)
+            context = self._context(config_text)
+            with closing(run_job(EpisodeJob(**json.loads(head)), context)) as events:
+                for event in events:
+                    yield event.to_text() if isinstance(event, EncodedStage) else _failure_text(event)
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
             return _failure_text(StageFailure(0, ErrorKind.HARNESS, message, error_text.traceback_of(error)))
         return "{}"
 
-    def _context(self, setup_text: str) -> WorkerContext:
-        found = self._contexts.pop(setup_text, None)
+    def _context(self, config_text: str) -> WorkerContext:
+        found = self._contexts.pop(config_text, None)
         while found is None and len(self._contexts) >= MAX_CONTEXTS:
             self._contexts.pop(next(iter(self._contexts))).close()
-        self._contexts[setup_text] = place = found or WorkerContext(
-            Setup.from_values(json.loads(setup_text)), self._alive
+        self._contexts[config_text] = context = found or WorkerContext(
+            WorkerConfig.from_values(json.loads(config_text)), self._alive
         )
-        return place
+        return context
 
     def close(self) -> None:
-        """Closes all workplaces."""
+        """Close all contexts."""
         while self._contexts:
             self._contexts.popitem()[1].close()
 
