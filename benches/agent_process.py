@@ -15,7 +15,8 @@ import numpy as np
 
 from evonav.agents.agent import AgentAction, Sensing, Stop
 from evonav.component import Component
-from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
+from evonav.evaluation.hosting.agent import RemoteAgent
+from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.run import RunConfig, evaluate
 from evonav.parallel.local import one_thread_each

@@ -19,11 +19,11 @@ from evonav.agents.registry import BUILT_IN
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.errors import AgentFailedError
+from evonav.evaluation.hosting.agent import RemoteAgent
 from evonav.evaluation.hosting.process import (
     LOG_NAME,
     AgentHosting,
     AgentProcesses,
-    RemoteAgent,
     check_importable,
 )
 from evonav.evaluation.protocol import ProtocolConfig

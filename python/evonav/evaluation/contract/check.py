@@ -17,8 +17,8 @@ from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent
-from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
+from evonav.evaluation.hosting.agent import HostedAgent, LocalAgent, RemoteAgent
+from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import ErrorKind, StageRecord
 from evonav.evaluation.run.components import Backend

@@ -5,6 +5,12 @@ from collections.abc import Mapping, Sequence
 
 from evonav.agents import wire
 from evonav.agents.agent import Agent, AgentAction, EntryBelief, ExplainingAgent, RoundDiagnostics, Sensing
+from evonav.component import Component
+from evonav.decision.question import DecisionModel
+from evonav.errors import InvalidArgumentError
+from evonav.evaluation.episode.errors import AgentFailedError
+from evonav.evaluation.hosting.process import AgentProcess, AgentProcesses, failure_of
+from evonav.evaluation.records.schema import ErrorKind
 from evonav.sensors.observation import Observation
 from evonav.tasks.public import StageInput, TaskInfo
 
@@ -83,3 +89,114 @@ class LocalAgent(HostedAgent):
         if self._explaining is None:
             return None
         return wire.ENTRIES.read(wire.ENTRIES.write(list(self._explaining.entries())))
+
+
+class RemoteAgent(HostedAgent):
+    """An agent in a process of its own.
+
+    If that process is lost, the next request starts a fresh agent in a fresh process, which knows no task yet.
+    """
+
+    def __init__(self, processes: AgentProcesses, name: str, decision: Component[DecisionModel], seed: int) -> None:
+        """Start nothing yet.
+
+        Args:
+            processes: Processes of agents; the agent's own is started or reused when it is needed.
+            name: Name of the agent.
+            decision: Decision model, made in the agent's process.
+            seed: Seed of the model.
+        """
+        self._processes = processes
+        self._name = name
+        self._decision = decision
+        self._seed = seed
+        self._process: AgentProcess | None = None
+        self._sensing: Sensing | None = None
+        self._last_parts: Mapping[str, bytes] = {}
+        """Parts of the answer to the last `act`."""
+        self._label = name
+        self._cpu_s = 0.0
+
+    @property
+    def cpu_s(self) -> float:
+        """CPU time that its processes have used."""
+        return self._cpu_s
+
+    @property
+    def sensing(self) -> Sensing:
+        """The sensors that the agent needs."""
+        if self._sensing is None:
+            self._make()
+        assert self._sensing is not None
+        return self._sensing
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """Start in a new house."""
+        self._label = f"{self._name} {task.task_id}"
+        self._describe(self._label)
+        self._sense(self._ask("begin_task", task))
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """Start the search for a new goal."""
+        self._describe(f"{self._label} stage {stage.stage}")
+        self._sense(self._ask("begin_stage", stage))
+
+    def act(self, observation: Observation) -> AgentAction:
+        """Decide what to do in one decision round."""
+        self._last_parts = self._ask("act", observation)
+        return wire.read_action(_part(self._last_parts, "action"))
+
+    def diagnostics(self) -> RoundDiagnostics:
+        """Return what the agent said of the last round, right after it."""
+        if (failure := self._last_parts.get("diagnostics_failure")) is not None:
+            raise failure_of(failure)
+        text = self._last_parts.get("diagnostics")
+        return RoundDiagnostics() if text is None else wire.DIAGNOSTICS.read(text)
+
+    def entries(self) -> Sequence[EntryBelief] | None:
+        """Return the object memory; None if the agent is no `ExplainingAgent`."""
+        text = self._ask("entries").get("entries")
+        return None if text is None else wire.ENTRIES.read(text)
+
+    def costs(self) -> Mapping[str, float]:
+        """Return what its decision model has cost since it was made; empty if its process is gone."""
+        if self._process is None:
+            return {}
+        try:
+            costs = wire.COSTS.read(_part(self._ask("costs"), "costs"))
+        except InvalidArgumentError:  # they decide nothing
+            return {}
+        return {str(name): amount for name, amount in costs.items()}
+
+    def _make(self) -> None:
+        self._process = self._processes.process(self._name)
+        self._describe(self._label)
+        self._sense(self._ask("make", self._decision.path, self._seed, self._decision.keywords))
+
+    def _sense(self, parts: Mapping[str, bytes]) -> None:
+        self._sensing = wire.SENSING.read(_part(parts, "sensing"))
+
+    def _describe(self, label: str) -> None:
+        if self._process is not None:
+            self._process.describe(label)
+
+    def _ask(self, operation: str, *arguments: object) -> dict[str, bytes]:
+        if self._process is None:
+            self._make()
+        process = self._process
+        assert process is not None
+        before_s = process.cpu_s
+        try:
+            return process.ask(operation, *arguments)
+        except AgentFailedError as error:
+            if error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT) or operation == "make":
+                self._process = self._sensing = None
+            raise
+        finally:
+            self._cpu_s += process.cpu_s - before_s
+
+
+def _part(parts: Mapping[str, bytes], name: str) -> bytes:
+    if name not in parts:
+        raise InvalidArgumentError(f'malformed response: missing "{name}"')
+    return parts[name]

@@ -17,25 +17,18 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from evonav.agents import wire
-from evonav.agents.agent import AgentAction, EntryBelief, RoundDiagnostics, Sensing
 from evonav.agents.error_text import clean
 from evonav.agents.serving import LENGTH
-from evonav.component import Component
-from evonav.decision.question import DecisionModel
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.errors import AgentFailedError
-from evonav.evaluation.hosting.agent import HostedAgent
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
 from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
-from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
 
 LOG_NAME = "agents.log"
 """In a run's folder: all that agents have printed."""
@@ -162,7 +155,7 @@ class AgentProcess:
         self._is_asking = False
         self.cpu_s = cpu_s
         if (failure := parts.get("failure")) is not None:
-            raise _failure(failure)
+            raise failure_of(failure)
         return parts
 
     def _send(self, operation: str, arguments: tuple[object, ...], deadline_s: float) -> None:
@@ -265,111 +258,6 @@ class AgentProcesses:
             self._processes.popitem()[1].close()
 
 
-class RemoteAgent(HostedAgent):
-    """An agent in another process.
-
-    After the loss of its process it is a fresh agent in a fresh one, that knows no task yet.
-    """
-
-    def __init__(self, processes: AgentProcesses, name: str, decision: Component[DecisionModel], seed: int) -> None:
-        """Starts nothing yet.
-
-        Args:
-            processes: Where its own is kept between episodes.
-            name: Of the agent.
-            decision: Of the model that it asks, made in its process.
-            seed: Of the model.
-        """
-        self._processes = processes
-        self._name = name
-        self._decision = decision
-        self._seed = seed
-        self._process: AgentProcess | None = None
-        self._sensing: Sensing | None = None
-        self._last_parts: Mapping[str, bytes] = {}
-        """Of the answer to the last `act`."""
-        self._label = name
-        self._cpu_s = 0.0
-
-    @property
-    def cpu_s(self) -> float:
-        """CPU time that its processes have used."""
-        return self._cpu_s
-
-    @property
-    def sensing(self) -> Sensing:
-        """What it asks of its sensors."""
-        if self._sensing is None:
-            self._make()
-        assert self._sensing is not None
-        return self._sensing
-
-    def begin_task(self, task: TaskInfo) -> None:
-        """A new house."""
-        self._label = f"{self._name} {task.task_id}"
-        self._describe(self._label)
-        self._sense(self._ask("begin_task", task))
-
-    def begin_stage(self, stage: StageInput) -> None:
-        """A new goal."""
-        self._describe(f"{self._label} stage {stage.stage}")
-        self._sense(self._ask("begin_stage", stage))
-
-    def act(self, observation: Observation) -> AgentAction:
-        """A decision round."""
-        self._last_parts = self._ask("act", observation)
-        return wire.read_action(_part(self._last_parts, "action"))
-
-    def diagnostics(self) -> RoundDiagnostics:
-        """What it said of the last round, right after it."""
-        if (failure := self._last_parts.get("diagnostics_failure")) is not None:
-            raise _failure(failure)
-        text = self._last_parts.get("diagnostics")
-        return RoundDiagnostics() if text is None else wire.DIAGNOSTICS.read(text)
-
-    def entries(self) -> Sequence[EntryBelief] | None:
-        """Its object memory; None if it is no `ExplainingAgent`."""
-        text = self._ask("entries").get("entries")
-        return None if text is None else wire.ENTRIES.read(text)
-
-    def costs(self) -> Mapping[str, float]:
-        """What its decision model has cost since it was made; empty if its process is gone."""
-        if self._process is None:
-            return {}
-        try:
-            costs = wire.COSTS.read(_part(self._ask("costs"), "costs"))
-        except InvalidArgumentError:  # they decide nothing
-            return {}
-        return {str(name): amount for name, amount in costs.items()}
-
-    def _make(self) -> None:
-        self._process = self._processes.process(self._name)
-        self._describe(self._label)
-        self._sense(self._ask("make", self._decision.path, self._seed, self._decision.keywords))
-
-    def _sense(self, parts: Mapping[str, bytes]) -> None:
-        self._sensing = wire.SENSING.read(_part(parts, "sensing"))
-
-    def _describe(self, label: str) -> None:
-        if self._process is not None:
-            self._process.describe(label)
-
-    def _ask(self, operation: str, *arguments: object) -> dict[str, bytes]:
-        if self._process is None:
-            self._make()
-        process = self._process
-        assert process is not None
-        before_s = process.cpu_s
-        try:
-            return process.ask(operation, *arguments)
-        except AgentFailedError as error:
-            if error.kind in (ErrorKind.CRASH, ErrorKind.TIMEOUT) or operation == "make":
-                self._process = self._sensing = None
-            raise
-        finally:
-            self._cpu_s += process.cpu_s - before_s
-
-
 def check_importable(name: str) -> None:
     """Imports an agent in a process that ends then: this one runs no code of strangers.
 
@@ -383,13 +271,7 @@ def check_importable(name: str) -> None:
         raise InvalidArgumentError(message) from None
 
 
-def _part(parts: Mapping[str, bytes], name: str) -> bytes:
-    if name not in parts:
-        raise InvalidArgumentError(f'malformed response: missing "{name}"')
-    return parts[name]
-
-
-def _failure(text: bytes) -> AgentFailedError:
-    """The failure that a process says its agent had."""
+def failure_of(text: bytes) -> AgentFailedError:
+    """Return the failure of an agent that its process reports, from a `wire.FAILURE`."""
     failure = wire.FAILURE.read(text)
     return AgentFailedError(ErrorKind(failure.kind), failure.message, failure.traceback)

@@ -25,8 +25,8 @@ from evonav.evaluation.episode.observer import LOSSES
 from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES
 from evonav.evaluation.episode.outcome import StageOutcome
 from evonav.evaluation.episode.spec import EpisodeSpec
-from evonav.evaluation.hosting.agent import HostedAgent
-from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses, RemoteAgent
+from evonav.evaluation.hosting.agent import HostedAgent, RemoteAgent
+from evonav.evaluation.hosting.process import AgentHosting, AgentProcesses
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.encoded import EncodedStage, encode_stage
 from evonav.evaluation.records.schema import ErrorKind, FloorPlan, RoundRecord, StageFailure
