@@ -99,7 +99,7 @@ def test_a_sweep_that_was_interrupted_goes_on_to_the_same_records(whole, file, t
     assert child.returncode == 130, told
     before = num_recorded(out)
     assert 9 <= before < 56
-    assert f"to go on: evonav sweep {file} --out {out} --workers 2" in told
+    assert f"to resume: evonav sweep {file} --out {out} --workers 2" in told
     assert "Traceback" not in told
     # The summary of what there is says what there is not.
     summary = json.loads((out / "summary.json").read_text())

@@ -376,7 +376,7 @@ def test_an_interrupt_says_how_to_go_on(many_houses, tmp_path, signal_):
     process.send_signal(signal_)
     _, stderr = process.communicate(timeout=20)
     assert process.returncode == 130
-    assert "the same command goes on" in stderr
+    assert "run the same command again to resume" in stderr
     assert "Traceback" not in stderr
     assert num_lines(out) >= 3
 
