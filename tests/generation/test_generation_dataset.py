@@ -409,7 +409,7 @@ def test_a_folder_that_cannot_be_written_is_one_clear_error(houses, tmp_path):
 def test_the_command_tells_what_it_did(houses, tmp_path):
     done = subprocess.run(command(houses, tmp_path / "out", "--workers", 0), capture_output=True, text=True, check=True)
     assert "8 tasks in" in done.stdout
-    assert "from 10 houses; 8 made now in" in done.stdout
+    assert "from 10 houses; 8 new in" in done.stdout
     assert "1 houses without a task: too_few_rooms" in done.stdout
     done = subprocess.run(command(houses, tmp_path / "out", "--seed", 1), capture_output=True, text=True)
     assert done.returncode == 1
