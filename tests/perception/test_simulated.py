@@ -14,8 +14,8 @@ from evonav import _core
 from evonav.evaluation.run.components import load_case
 from evonav.perception import Percept, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.perception.noise_config import NoiseConfig, noise_presets
-from evonav.perception.pose_drift import PoseDrift
+from evonav.perception.noise.config import NoiseConfig, noise_presets
+from evonav.perception.noise.pose_drift import PoseDrift
 from evonav.perception.simulated import NoisyPerception, noisy_perception
 from evonav.sensors.observation import Detections
 from evonav.tasks.bundled import bundled_tasks

@@ -9,8 +9,8 @@ import pytest
 from evonav import _core
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.run.components import load_case
-from evonav.perception.confusion import read_confusion
-from evonav.perception.noise_config import NoiseConfig, noise_presets
+from evonav.perception.noise.config import NoiseConfig, noise_presets
+from evonav.perception.noise.confusion import read_confusion
 from evonav.perception.simulated import noisy_perception
 from evonav.perception.synthetic_features import DIMENSIONS, image_feature, nouns_of, text_feature
 from evonav.tasks.bundled import bundled_tasks

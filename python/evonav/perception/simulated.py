@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
-from evonav.perception.confusion import Confusion, read_confusion
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.perception.noise_config import NoiseConfig
+from evonav.perception.noise.config import NoiseConfig
+from evonav.perception.noise.confusion import Confusion, read_confusion
+from evonav.perception.noise.pose_drift import PoseDrift
 from evonav.perception.perception import Percept, StageScene
-from evonav.perception.pose_drift import PoseDrift
 from evonav.perception.synthetic_features import DIMENSIONS, image_feature, text_feature
 from evonav.sensors.observation import Detections
 from evonav.world.simulator import Frame, SceneObject

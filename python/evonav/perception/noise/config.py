@@ -1,4 +1,4 @@
-"""Define how simulated perception errs: every parameter in one place, and the presets (`noise_presets.toml`)."""
+"""Define how simulated perception errs: every parameter in one place, and the presets (`presets.toml`)."""
 
 import math
 from collections.abc import Mapping
@@ -141,7 +141,7 @@ class NoiseConfig:
 @cache
 def noise_presets() -> Mapping[str, NoiseConfig]:
     """Return the presets by name, the best first."""
-    presets = read_toml(Path(__file__).with_name("noise_presets.toml"))
+    presets = read_toml(Path(__file__).with_name("presets.toml"))
     return {name: NoiseConfig(**values) for name, values in presets.items()}
 
 

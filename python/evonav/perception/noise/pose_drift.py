@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.perception.noise_config import NoiseConfig
+from evonav.perception.noise.config import NoiseConfig
 from evonav.world.pose import Pose
 
 

@@ -1,0 +1,1 @@
+"""Describe simulated errors of perception: presets, confused labels, drifting poses."""
