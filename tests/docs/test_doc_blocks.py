@@ -120,9 +120,8 @@ def parse(arguments: list[str]) -> None:
     command: Any = typer.main.get_command(app)
     context, rest = typer.Context(command), arguments
     while hasattr(command, "commands"):
-        name, rest = rest[0], rest[1:]
-        assert name in command.commands, f"no command {name}"
-        command = command.commands[name]
+        assert rest[0] in command.commands, f"no command {rest[0]}"
+        _, command, rest = command.resolve_command(context, rest)  # which adds the options of its settings
         if not rest:
             return  # the help of a command
     command.make_context(command.name, list(rest), parent=context)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from evonav import _core
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
-from evonav.world.ai2thor_images import InstanceDecoder, depth_of, rgb_of
+from evonav.world.ai2thor_events import InstanceDecoder, depth_of, rgb_of, with_boxes
 from evonav.world.ai2thor_startup import Ai2ThorOptions, ProcessLog, lost, start_controller
 from evonav.world.embedded import EmbeddedSimulator, nearest_of
 from evonav.world.pose import Pose
@@ -115,7 +115,7 @@ class Ai2ThorSimulator:
                 raise self._failed("CreateHouse", error) from error
         if not event.metadata["lastActionSuccess"]:
             raise SimulationError(f"AI2-THOR does not load the house: {event.metadata['errorMessage']}")
-        self._objects = tuple(_with_boxes(self._reading.objects, event.metadata["objects"]))
+        self._objects = tuple(with_boxes(self._reading.objects, event.metadata["objects"]))
         self._decoder = InstanceDecoder(self._objects)
         self._is_loaded = True
         # Only the agent moves from now on: events need not list every object, which is most of their cost.
@@ -380,25 +380,3 @@ class Ai2ThorSimulator:
     def _vector(self, position_m: _Position) -> dict[str, float]:
         """Return a position for the wire, where the agent's height is always AI2-THOR's own."""
         return {"x": position_m[0], "y": _AGENT_Y_M, "z": position_m[2]}
-
-
-def _with_boxes(bodies: Sequence[SceneObject], records: Sequence[dict[str, Any]]) -> Iterator[SceneObject]:
-    """Yield the bodies of a house, objects with the boxes that AI2-THOR reports.
-
-    Raises:
-        SimulationError: AI2-THOR does not list an object of the house.
-    """
-    boxes = {record["objectId"]: record["axisAlignedBoundingBox"] for record in records}
-    missing = [body.id for body in bodies if body.kind == "object" and boxes.get(body.id) is None]
-    if missing:
-        raise SimulationError(f"AI2-THOR's scene lacks {len(missing)} objects of the house: {', '.join(missing[:5])}")
-    for body in bodies:
-        if body.kind == "object":
-            centre, size = boxes[body.id]["center"], boxes[body.id]["size"]
-            yield replace(
-                body,
-                centre_m=(float(centre["x"]), float(centre["y"]), float(centre["z"])),
-                size_m=(float(size["x"]), float(size["y"]), float(size["z"])),
-            )
-        else:
-            yield body

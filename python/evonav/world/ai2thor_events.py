@@ -1,6 +1,7 @@
-"""Convert AI2-THOR's images to evonav's."""
+"""Convert AI2-THOR's events, images and boxes, to evonav's."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -110,3 +111,25 @@ class InstanceDecoder:
             is_nearer = squared_m2 < best_m2
             best[is_nearer], best_m2[is_nearer] = instance, squared_m2[is_nearer]
         return best
+
+
+def with_boxes(bodies: Sequence[SceneObject], records: Sequence[dict[str, Any]]) -> Iterator[SceneObject]:
+    """Yield the bodies of a house, objects with the boxes that AI2-THOR reports.
+
+    Raises:
+        SimulationError: AI2-THOR does not list an object of the house.
+    """
+    boxes = {record["objectId"]: record["axisAlignedBoundingBox"] for record in records}
+    missing = [body.id for body in bodies if body.kind == "object" and boxes.get(body.id) is None]
+    if missing:
+        raise SimulationError(f"AI2-THOR's scene lacks {len(missing)} objects of the house: {', '.join(missing[:5])}")
+    for body in bodies:
+        if body.kind == "object":
+            centre, size = boxes[body.id]["center"], boxes[body.id]["size"]
+            yield replace(
+                body,
+                centre_m=(float(centre["x"]), float(centre["y"]), float(centre["z"])),
+                size_m=(float(size["x"]), float(size["y"]), float(size["z"])),
+            )
+        else:
+            yield body
