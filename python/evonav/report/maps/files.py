@@ -83,7 +83,7 @@ def png_of(svg: str, *, zoom: float = 1.0, background: str | None = "#ffffff", h
 
 
 def check_png() -> None:
-    """Check that drawings can be made PNGs.
+    """Check that drawings can be converted to PNG.
 
     Raises:
         StoreError: resvg is not installed.
