@@ -1,4 +1,4 @@
-"""How an agent's answer is carried out: planner waypoints and teleports, as in the paper (Sec. C.3)."""
+"""Carry out an agent's answer with planner waypoints and teleports, as in the paper (Sec. C.3)."""
 
 import math
 from collections.abc import Sequence
@@ -17,10 +17,10 @@ Point2 = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """What came of an action."""
+    """The result of an action."""
 
     path_m: tuple[Point2, ...]
-    """Points passed, the start first."""
+    """Points of the path, the start first."""
     is_success: bool
     has_arrived: bool = False
 
@@ -31,17 +31,17 @@ class Motion:
 
 
 def polyline_length_m(path_m: Sequence[Point2]) -> float:
-    """Length of a polyline on the ground plane."""
+    """Return the length of a polyline on the ground plane."""
     return math.fsum(math.dist(a, b) for a, b in pairwise(path_m))
 
 
 def length_outside_m(path_m: Sequence[Point2], centre_m: Point2, radius_m: float) -> float:
-    """Length of a polyline up to where it first comes within a radius; all of it, if it never does."""
-    walked_m = 0.0
+    """Return the length of a polyline until it first comes within a radius; its whole length if it never does."""
+    length_before_m = 0.0
     for (x0, z0), (x1, z1) in pairwise([*path_m, *path_m[-1:]]):
         dx, dz, ox, oz = x1 - x0, z1 - z0, x0 - centre_m[0], z0 - centre_m[1]
         if math.hypot(ox, oz) <= radius_m:
-            return walked_m
+            return length_before_m
         length_m = math.hypot(dx, dz)
         # |o + t d| = r for the least t in 0..1.
         a, half_b = dx * dx + dz * dz, ox * dx + oz * dz
@@ -49,17 +49,17 @@ def length_outside_m(path_m: Sequence[Point2], centre_m: Point2, radius_m: float
         if a > 0.0 and discriminant >= 0.0:
             share = (-half_b - math.sqrt(discriminant)) / a
             if 0.0 <= share <= 1.0:
-                return walked_m + share * length_m
-        walked_m += length_m
-    return walked_m
+                return length_before_m + share * length_m
+        length_before_m += length_m
+    return length_before_m
 
 
 def waypoints(corners_m: Sequence[Point2], spacing_m: float, max_travel_m: float) -> tuple[list[Point2], bool]:
-    """Points along a path, every corner and at most `spacing_m` apart.
+    """Return points along a path, every corner and at most `spacing_m` apart.
 
     Args:
         corners_m: The path; the agent stands at its first point.
-        spacing_m: Longest hop.
+        spacing_m: Longest distance between two points.
         max_travel_m: Path length after which to end.
 
     Returns:
@@ -89,7 +89,7 @@ def waypoints(corners_m: Sequence[Point2], spacing_m: float, max_travel_m: float
 
 
 def legs(corners_m: Sequence[Point2], travel_m: float) -> list[tuple[Point2, ...]]:
-    """A path in pieces of `travel_m`, the last one shorter; each begins where the one before ends.
+    """Cut a path into pieces of `travel_m`, the last one shorter; each begins where the one before ends.
 
     Args:
         corners_m: The path.
@@ -124,12 +124,12 @@ class Planner:
     """
 
     def __init__(self, simulator: Simulator) -> None:
-        """Of the house and pose that the simulator is in."""
+        """Create a planner for the present house of the simulator."""
         self._simulator = simulator
         self._reachable_m: NDArray[np.float64] | None = None
 
     def path_m(self, target_m: Point2) -> list[Point2]:
-        """Corners from the agent to a target; empty if there is no way to anywhere near it."""
+        """Return corners from the agent to a target; empty if there is no path to any place near it."""
         pose = self._simulator.pose
         corners = self._simulator.shortest_path(pose.position_m, (target_m[0], pose.y_m, target_m[1]))
         if len(corners) == 0:
@@ -137,7 +137,7 @@ class Planner:
         return [(float(x), float(z)) for x, _, z in corners]
 
     def _path_near(self, target_m: Point2) -> NDArray[np.float64]:
-        """`(M, 3)` corners to the nearest place that can be reached; `(0, 3)` when there is none."""
+        """Return `(M, 3)` corners to the nearest place that can be reached; `(0, 3)` when there is none."""
         pose = self._simulator.pose
         if self._reachable_m is None:
             self._reachable_m = self._simulator.reachable_positions()[:, [0, 2]]
@@ -156,14 +156,14 @@ class Planner:
 
 
 def _by_distance(places_m: NDArray[np.float64], target_m: Point2) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places, the nearest to a point first, and how far they are from it."""
+    """Sort places by their distance to a point, and return the distances."""
     gaps_m = np.hypot(*(places_m - np.array(target_m)).T)
     order = gaps_m.argsort(kind="stable")
     return places_m[order], gaps_m[order]
 
 
 def _free_cells_m(grid: OccupancyGrid) -> NDArray[np.float64]:
-    """`(N, 2)` middles of the cells that the agent's body reaches from the house's start."""
+    """Return the `(N, 2)` middles of the cells that the agent's body reaches from the house's start."""
     rows, cols = np.nonzero(grid.cells == 0)
     corner_m = np.array(grid.corner_m, dtype=np.float64)
     return np.column_stack((cols, rows)) * float(grid.cell_m) + grid.cell_m / 2 + corner_m
@@ -172,7 +172,7 @@ def _free_cells_m(grid: OccupancyGrid) -> NDArray[np.float64]:
 def navigate(
     simulator: Simulator, planner: Planner, action: NavigateTo, *, spacing_m: float, max_travel_m: float
 ) -> Motion:
-    """Follows the planner towards a point; the heading is that of travel, on arrival towards `face_m`."""
+    """Follow the planner towards a point; the heading is that of travel, on arrival towards `face_m`."""
     start = simulator.pose
     here = (start.x_m, start.z_m)
     corners = planner.path_m(action.position_m)
@@ -192,10 +192,10 @@ def navigate(
 
 
 def walk(simulator: Simulator, leg_m: Sequence[Point2], yaw_rad: float | None = None) -> Motion:
-    """Takes the agent along a piece of a path that is known to be free.
+    """Move the agent along a piece of a path that is known to be free.
 
     Args:
-        simulator: It is moved.
+        simulator: The simulator whose agent is moved.
         leg_m: Points, the agent's own first.
         yaw_rad: Heading at the end; default: that of travel.
     """
@@ -206,7 +206,7 @@ def walk(simulator: Simulator, leg_m: Sequence[Point2], yaw_rad: float | None = 
 
 
 def face(simulator: Simulator, point_m: Point2) -> None:
-    """Turns on the spot towards a point; stays as it is when already on it."""
+    """Turn on the spot towards a point; do nothing at the point itself."""
     pose = simulator.pose
     dx_m, dz_m = point_m[0] - pose.x_m, point_m[1] - pose.z_m
     if math.hypot(dx_m, dz_m) > 1e-6:
@@ -214,7 +214,7 @@ def face(simulator: Simulator, point_m: Point2) -> None:
 
 
 def move(simulator: Simulator, action: Move) -> Motion:
-    """One discrete action."""
+    """Carry out one discrete action."""
     start = simulator.pose
     is_success = action.action is Action.STOP or simulator.step(action.action)
     end: Pose = simulator.pose

@@ -1,7 +1,7 @@
-"""Oracle baselines: they know more than an agent may, and so bound what agents can reach.
+"""Define the oracle baselines, which know more than an agent may, and so bound the scores that agents can reach.
 
-Only the classes of `ORACLE_BASELINES` are given anything. A plug-in gets nothing by having methods of the same names,
-or by inheriting from `OracleBaseline`.
+Only the classes of `ORACLE_BASELINES` receive oracle data. A plug-in receives none, even if it has methods of the same
+names or inherits from `OracleBaseline`.
 """
 
 import math
@@ -25,11 +25,11 @@ STOP_DISTANCE_M = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Sighting:
-    """What perfect recognition tells about a round's views."""
+    """The result of perfect recognition on a round's views."""
 
     is_target_visible: bool
     is_target_seen: bool
-    """In this or an earlier round of the episode, from near enough to be remembered; it may have been elsewhere."""
+    """True if the target was seen in this or an earlier round of the episode, at any place, and near enough to remember."""
 
 
 class OracleBaseline:
@@ -44,25 +44,25 @@ class OracleBaseline:
         self._is_target_seen = False
 
     def reveal_target(self, position_m: Point3) -> None:
-        """Where the target is, at the start of a stage."""
+        """Receive the target's position at the start of a stage."""
         self._target_m = (position_m[0], position_m[2])
 
     def reveal_sighting(self, sighting: Sighting) -> None:
-        """Whether the target is in view, before each `act`."""
+        """Receive the sighting of the target before each `act`."""
         self._is_target_visible = sighting.is_target_visible
         self._is_target_seen = sighting.is_target_seen
 
     def reveal_stale(self, entry_ids: Sequence[int]) -> None:
-        """Which of its entries are stale, at the start of a stage."""
+        """Receive the ids of its stale entries at the start of a stage."""
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Nothing to forget."""
+        """Do nothing: there is no memory."""
 
     def begin_stage(self, stage: StageInput) -> None:
-        """Nothing to read."""
+        """Do nothing: the goal is not read."""
 
     def act(self, observation: Observation) -> AgentAction:
-        """One decision round."""
+        """Answer one decision round."""
         raise NotImplementedError
 
     def _go_to_target(self, observation: Observation) -> AgentAction:
@@ -78,7 +78,7 @@ class ShortestPath(OracleBaseline):
     description = "the planner's path to the target, SR = SPL = 1 by construction"
 
     def act(self, observation: Observation) -> AgentAction:
-        """Follows the path until the target is near."""
+        """Follow the path until the target is near."""
         return self._go_to_target(observation)
 
 
@@ -94,16 +94,16 @@ class PerfectRecognition(OracleBaseline):
         self._has_seen_target = False
 
     def begin_task(self, task: TaskInfo) -> None:
-        """Forgets the map."""
+        """Forget the map."""
         self._explorer.begin_task(task)
 
     def begin_stage(self, stage: StageInput) -> None:
-        """A new target, not yet seen; the map stays."""
+        """Begin with a new target, not yet seen; the map stays."""
         self._explorer.begin_stage(stage)
         self._has_seen_target = False
 
     def act(self, observation: Observation) -> AgentAction:
-        """Explores until the target has been in view, then goes there."""
+        """Explore until the target has been in view, then go there."""
         action = self._explorer.act(observation)
         if self._is_target_visible and not self._has_seen_target:
             self._has_seen_target = True
@@ -117,11 +117,11 @@ class PerfectRecognition(OracleBaseline):
         return Stop() if is_near else NavigateTo(self._target_m)
 
     def diagnostics(self) -> RoundDiagnostics:
-        """The explorer's."""
+        """Return the explorer's diagnostics."""
         return self._explorer.diagnostics()
 
     def entries(self) -> tuple[EntryBelief, ...]:
-        """It remembers no objects."""
+        """Return no entries: it remembers no objects."""
         return ()
 
 
@@ -131,14 +131,14 @@ class OracleMemory(PerfectRecognition):
     description = "the same, and goes at once to what it has seen in an earlier stage, wherever that stands now"
 
     def reveal_sighting(self, sighting: Sighting) -> None:
-        """What was seen counts as in view."""
+        """Receive the sighting; a target that was seen counts as in view."""
         super().reveal_sighting(
             Sighting(sighting.is_target_visible or sighting.is_target_seen, sighting.is_target_seen)
         )
 
 
 class OracleFlags(FrontierUpdate, OracleBaseline):
-    """Frontier-Update that is told, as a stage begins, which of its entries the change has made stale."""
+    """Frontier-Update that knows, as a stage begins, which of its entries the change has made stale."""
 
     description = "Frontier-Update whose stale entries are taken out as a stage begins"
 
@@ -147,7 +147,7 @@ class OracleFlags(FrontierUpdate, OracleBaseline):
         FrontierUpdate.__init__(self, decision=decision)
 
     def reveal_stale(self, entry_ids: Sequence[int]) -> None:
-        """Forgets them."""
+        """Forget these entries."""
         for entry_id in entry_ids:
             self._navigator.objects.remove(entry_id)
 
@@ -155,7 +155,7 @@ class OracleFlags(FrontierUpdate, OracleBaseline):
 ORACLE_BASELINES: dict[str, type[OracleBaseline]] = dict(
     zip(ORACLE_BASELINE_NAMES, (ShortestPath, PerfectRecognition, OracleMemory, OracleFlags), strict=True)
 )
-"""By name, for `evonav evaluate --agents`."""
+"""The oracle baselines by name, for `evonav evaluate --agents`."""
 
 
 def as_oracle_baseline(agent: object) -> OracleBaseline | None:
@@ -167,7 +167,7 @@ def new_oracle_baseline(name: str, decision: DecisionModel | None = None) -> Ora
     """Make an oracle baseline.
 
     Args:
-        name: Of `ORACLE_BASELINES`.
+        name: A name in `ORACLE_BASELINES`.
         decision: Handed to one that takes one; default: its own.
 
     Raises:

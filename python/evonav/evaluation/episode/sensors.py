@@ -1,4 +1,4 @@
-"""From the simulator to what an agent receives: views on its schedule, without ids and without the oracle."""
+"""Turn simulator frames into an agent's observations: views on its schedule, without ids and oracle data."""
 
 import math
 from dataclasses import replace
@@ -14,7 +14,7 @@ from evonav.world.simulator import Frame, OccupancyGrid, Simulator
 
 
 def view_yaws_rad(schedule: ViewSchedule, heading_rad: float) -> list[float]:
-    """Camera yaws of a round: left to right without the heading, then the heading."""
+    """Return the camera yaws of a round: left to right without the heading, then the heading."""
     first = -(schedule.count - 1) / 2.0
     offsets = [(first + i) * schedule.spacing_deg for i in range(schedule.count)]
     heading = min(offsets, key=abs)
@@ -23,7 +23,7 @@ def view_yaws_rad(schedule: ViewSchedule, heading_rad: float) -> list[float]:
 
 
 def map_frame(grid: OccupancyGrid) -> MapFrame:
-    """Shape and place of the occupancy grid."""
+    """Return shape and place of the occupancy grid."""
     rows, cols = grid.cells.shape
     return MapFrame(rows=rows, cols=cols, cell_m=grid.cell_m, corner_m=grid.corner_m)
 
@@ -37,27 +37,27 @@ class Sensors:
         perception: Perception,
         sensing: Sensing,
         scene: StageScene,
-        witness: StalenessTracker | None = None,
+        staleness: StalenessTracker | None = None,
         stopwatch: Stopwatch | None = None,
     ) -> None:
-        """Sensors at the simulator's pose, wherever it is.
+        """Create sensors at the simulator's pose.
 
         Args:
-            simulator: With the stage's house.
-            perception: Of the run.
-            sensing: As granted.
-            scene: For the perception.
-            witness: Is shown every frame.
-            stopwatch: Books what rendering and perceiving take.
+            simulator: A simulator with the stage's house.
+            perception: The run's perception.
+            sensing: The sensing that the agent was granted.
+            scene: The stage as the perception may know it.
+            staleness: Receives every frame.
+            stopwatch: Measures rendering and perception.
         """
         self._simulator = simulator
         self._perception = perception
         self._sensing = sensing
         self._grid = simulator.occupancy()
-        self._staleness = witness
+        self._staleness = staleness
         self._stopwatch = stopwatch or Stopwatch()
         self.pose = simulator.pose
-        """Where the last observation was made, whatever the agent was told."""
+        """The true pose of the last observation."""
         with self._stopwatch.timing("perception"):
             perception.begin_stage(scene)
             self._goal_feature = perception.text_feature(scene.goal.unified_instruction)
@@ -71,7 +71,7 @@ class Sensors:
         has_arrived: bool = False,
         is_guided: bool = False,
     ) -> Observation:
-        """Looks around from the agent's pose."""
+        """Observe from the agent's pose."""
         self.pose = pose = self._simulator.pose
         schedule = self._sensing.first_round if is_first else self._sensing.later_rounds
         yaws_rad = view_yaws_rad(schedule, pose.yaw_rad)
@@ -110,7 +110,7 @@ class Sensors:
 
 
 def _believed(body: Pose, camera: Pose, perceived: Pose) -> Pose:
-    """The agent's own pose with the error of its heading camera's."""
+    """Return the agent's pose with the error of its heading camera's pose."""
     if perceived == camera:
         return body
     return replace(

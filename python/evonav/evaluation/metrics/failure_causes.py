@@ -1,4 +1,4 @@
-"""Why a stage failed: one cause a stage, the first that fits, judged from its record alone.
+"""Find the cause of a failed stage: the first cause that fits, judged from its record alone.
 
 Definitions, in the order in which they are tried, are in docs/measures.md.
 """
@@ -13,7 +13,7 @@ NEAR_TARGET_M = 1.0
 
 
 class FailureCause(str, Enum):
-    """What to fix. The first nine are failures, the others stages without a score."""
+    """The cause of a failed stage. The first nine are failures, the others stages without a score."""
 
     STALE_ENTRY = "stale_entry"
     """It stopped at an entry with no object of its label there."""
@@ -58,10 +58,10 @@ _OF_ERRORS = {
 
 
 def cause_of(record: StageRecord) -> FailureCause | None:
-    """The cause of a stage that did not succeed; `None` for a success, and for a walk of the evaluator's.
+    """Return the cause of a stage that did not succeed; `None` for a success and for a guided stage.
 
     Args:
-        record: Whole: trace and entries are looked at.
+        record: The whole record, with trace and entries.
     """
     if record.state in (EndState.SUCCESS, EndState.GUIDED):
         return None

@@ -1,4 +1,4 @@
-"""The paper's measures (Sec. C.2), per stage and over stages, with intervals.
+"""Compute the paper's metrics (Sec. C.2) over stages, with intervals.
 
 Stages of a house are not independent, so intervals and verdicts are by house (`evonav.statistics`).
 """
@@ -17,7 +17,7 @@ from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.statistics import ClusterBootstrap, Interval, PairedEffect, paired_effects, wilson, with_holm
 
 SUMMARY_VERSION = 2
-"""Of `summary.json`. Version 1 resampled tasks instead of houses, and had no p and no verdict."""
+"""The version of `summary.json`. Version 1 resampled tasks instead of houses, and had no p and no verdict."""
 
 
 class _Stage(Protocol):
@@ -46,7 +46,7 @@ class Rates:
     sr_ci95: Interval | None = None
     """Bootstrap by house (`ClusterBootstrap`); `None` of one house, or where all of them agree."""
     spl_ci95: Interval | None = None
-    """Likewise."""
+    """Bootstrap by house, as `sr_ci95`."""
     sr_wilson95: Interval | None = None
     """Wilson's score interval, as if stages were independent: for comparison with tables that give `n` alone."""
 
@@ -88,7 +88,7 @@ class AgentPair:
     """Stages where only `a` succeeded."""
     num_only_b: int
     sr: PairedEffect
-    """Of `b` less `a`, as all effects here. Its verdict allows for the number of pairs, by Holm."""
+    """The effect of `b` less `a`, as all effects here. Its verdict allows for the number of pairs, by Holm."""
     spl: PairedEffect
 
     @property
@@ -98,7 +98,7 @@ class AgentPair:
 
 
 def rates(records: Sequence[StageRecord]) -> Rates:
-    """SR and SPL over the scored stages among `records`."""
+    """Return SR and SPL over the scored stages among `records`."""
     scored = [record for record in records if record.is_scored]
     if not scored:
         return Rates(n=0, sr=None, spl=None)
@@ -115,7 +115,7 @@ def rates(records: Sequence[StageRecord]) -> Rates:
 
 
 def summarise(agent: str, records: Sequence[StageRecord], num_stages: int) -> AgentSummary:
-    """One table row. Stages of the run without a record count as not run.
+    """Summarise an agent as a table row. Stages of the run without a record count as not run.
 
     Raises:
         StoreError: There are more records than stages, or two of one stage: the states would not add up to the run.

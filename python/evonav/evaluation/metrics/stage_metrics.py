@@ -1,7 +1,7 @@
-"""One flat row a stage: everything that tables, exports and comparisons are made of (docs/measures.md defines it).
+"""Compute one flat row per stage, the source of all tables, exports and comparisons (defined in docs/measures.md).
 
-`read_stage_metrics` reads what the store holds beside each record, so no trace is parsed. For older runs it
-derives the same from the records. What old records lack is `None`.
+`read_stage_metrics` reads the metrics that the store holds beside each record, so no trace is parsed. For older runs
+it derives them from the records. Values that old records lack are `None`.
 """
 
 import json
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from evonav.evaluation.records.store import RunStore
 
 METRICS_VERSION = 3
-"""Raised whenever a measure changes: measures kept under another version are derived again from their records."""
+"""Raised whenever a metric changes: metrics stored under another version are derived again from their records."""
 STRICT_RADIUS_M = 1.0
-"""Of `is_strict_success`."""
+"""Largest distance to the target's box for `is_strict_success`."""
 COUNTERS = {
     "decisions": "num_decisions",
     "failed_decisions": "num_failed_decisions",
@@ -35,7 +35,7 @@ COUNTERS = {
 
 @dataclass(frozen=True, kw_only=True)
 class RecordMetrics:
-    """What one record tells by itself. Without a score (errored, not run), scores and distances are `None`."""
+    """The metrics of one record. Without a score (errored, not run), scores and distances are `None`."""
 
     agent: str
     is_baseline: bool
@@ -45,16 +45,16 @@ class RecordMetrics:
     stage: int
     """1-based: `stage - 1` earlier stages share its memory."""
     num_stages: int
-    """Of its task."""
+    """Stages of the task."""
     state: str
     """`success`, `failure`, `errored` or `not_run`."""
     cause: str | None
-    """Why it is no success: a value of `FailureCause`."""
+    """The reason why it is no success: a value of `FailureCause`."""
     error_kind: str | None
     category: str
-    """Of the target."""
+    """The target's category."""
     mode: str
-    """Of the transition before the stage: `TransitionRecord.kind`; `first` in stage 1."""
+    """The kind of the transition before the stage (`TransitionRecord.kind`); `first` in stage 1."""
     stratum: str
     """`stage_1`, `relocated` or `not_relocated` (the paper's)."""
     is_relocated_now: bool
@@ -103,9 +103,9 @@ class RecordMetrics:
     num_stale_at_start: int | None
     """Entries that are stale as the stage begins."""
     num_stale_evident: int | None
-    """Of them, those whose empty place came into view."""
+    """The stale entries whose empty place came into view."""
     num_stale_cleared: int | None
-    """Of those, the ones that the agent dropped or corrected before the stage ended."""
+    """The evident stale entries that the agent dropped or corrected before the stage ended."""
     rounds_to_clear: float | None
     """Mean over the cleared ones, from the first view of the empty place."""
     metres_to_clear: float | None
@@ -113,7 +113,7 @@ class RecordMetrics:
     """Objects that the transition moved out of their old places."""
     num_moved_seen: int | None
     num_moved_found: int | None
-    """Of those seen at their new place, the ones that an entry came to stand for."""
+    """Objects that were seen at their new place and that an entry came to stand for."""
     rounds_to_find: float | None
     """Mean over the found ones, from the first view of the object at its new place."""
     metres_to_find: float | None
@@ -121,9 +121,9 @@ class RecordMetrics:
     """Objects known at the start and not at the end though they stand where they stood."""
 
     num_entries: int | None
-    """In memory at the end."""
+    """Entries in memory at the end."""
     num_stale_entries: int | None
-    """Of them, stale."""
+    """Stale entries in memory at the end."""
     precision: float | None
     """Entries at the end with an object of their label in their place, by all; `None` without entries."""
     recall: float | None
@@ -134,16 +134,16 @@ class RecordMetrics:
     position_error_m: float | None
     num_entries_at_start: int | None
     precision_at_start: float | None
-    """The same when the agent had been told the goal: stages from 2 on tell what the change has cost."""
+    """The precision at the start, after the agent received the goal: from stage 2 on it shows the cost of the change."""
     recall_at_start: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class StageMetrics(StageCosts, RecordMetrics):
-    """A stage in a row: what its record tells, what those before it add, and what it cost."""
+    """A stage as one row: the metrics of its record, changes since the stage before, and costs."""
 
     precision_before: float | None
-    """At the end of the stage before, in that stage's house: less `precision_at_start`, what the change made stale."""
+    """Precision at the end of the stage before, in that stage's house; the change costs its difference to `precision_at_start`."""
     num_decisions: int | None
     """Questions that the agent's model answered in this stage, or rounds in which it decided; its own counter."""
     num_failed_decisions: int | None
@@ -153,65 +153,65 @@ class StageMetrics(StageCosts, RecordMetrics):
 
     @property
     def is_scored(self) -> bool:
-        """Whether the stage counts in rates."""
+        """True if the stage counts in rates."""
         return self.success is not None
 
     def is_success_at(self, radius_m: float) -> bool | None:
-        """Success had the radius been another; `None` where the stage has no score."""
+        """Return whether the stage were a success with another radius; `None` where the stage has no score."""
         return None if self.terminal_distance_m is None or not self.is_scored else self.terminal_distance_m < radius_m
 
 
 @dataclass(frozen=True, slots=True)
-class _Kept:
-    """What the store keeps of a record beside it."""
+class _StoredMetrics:
+    """The metrics of a record as the store holds them."""
 
-    measures: RecordMetrics
+    metrics: RecordMetrics
     counters: dict[str, int]
-    """Cumulative, at the end of the stage."""
+    """The agent's cumulative counters at the end of the stage."""
     is_fresh: bool
     """The agent began anew in this stage, and its counters with it."""
 
 
 def encode_metrics(record: StageRecord) -> str:
-    """What `read_stage_metrics` needs of a record, as JSON; derived from it alone.
+    """Encode the metrics and counters of a record as JSON, for `read_stage_metrics`.
 
     Args:
-        record: Whole, with its trace.
+        record: The whole record, with its trace.
     """
     last = record.trace[-1].counters if record.trace else {}
-    kept = {
+    values = {
         "measures": asdict(metrics_of(record)),
         "counters": {name: last[name] for name in COUNTERS if name in last}
         # Agents count failures from the first one on.
         | ({"failed_decisions": last.get("failed_decisions", 0)} if "decisions" in last else {}),
         "is_fresh": record.stage == 1 or record.memory_lost_at == record.stage,
     }
-    return json.dumps(kept, separators=(",", ":"), allow_nan=False)
+    return json.dumps(values, separators=(",", ":"), allow_nan=False)
 
 
 def read_stage_metrics(store: "RunStore", agents: Sequence[str] | None = None) -> list[StageMetrics]:
-    """A row for every recorded stage, by agent, task and stage.
+    """Return a row for every recorded stage, by agent, task and stage.
 
     Args:
-        store: Of a run, finished or not.
-        agents: Only these.
+        store: The store of a run, finished or not.
+        agents: The agents to read; default: all.
 
     Raises:
         StoreError: The run cannot be read.
     """
-    kept = _kept(store, agents)
+    stored = _stored_metrics(store, agents)
     costs, timings, retries = store.costs(), store.timings(), store.retries()
     rows: list[StageMetrics] = []
-    for _, episode in groupby(kept, key=lambda one: (one.measures.agent, one.measures.task_id)):
-        before: _Kept | None = None
+    for _, episode in groupby(stored, key=lambda one: (one.metrics.agent, one.metrics.task_id)):
+        before: _StoredMetrics | None = None
         counted: dict[str, int] = {}
         for one in episode:
-            key = (one.measures.agent, one.measures.task_id, one.measures.stage)
+            key = (one.metrics.agent, one.metrics.task_id, one.metrics.stage)
             counted = {} if one.is_fresh else counted
-            follows = before is not None and before.measures.stage == one.measures.stage - 1
+            follows = before is not None and before.metrics.stage == one.metrics.stage - 1
             wall_s, cpu_s = timings.get(key, (None, None))
             values: dict[str, Any] = {
-                **_values(one.measures),
+                **_values(one.metrics),
                 "wall_s": wall_s,
                 "cpu_s": cpu_s,
                 **costs.get(key, {}),
@@ -220,7 +220,7 @@ def read_stage_metrics(store: "RunStore", agents: Sequence[str] | None = None) -
                     field: one.counters[name] - counted.get(name, 0) if name in one.counters else None
                     for name, field in COUNTERS.items()
                 },
-                "precision_before": before.measures.precision if before is not None and follows else None,
+                "precision_before": before.metrics.precision if before is not None and follows else None,
             }
             rows.append(StageMetrics(**values))
             before, counted = one, {**counted, **one.counters}
@@ -228,21 +228,21 @@ def read_stage_metrics(store: "RunStore", agents: Sequence[str] | None = None) -
 
 
 def metrics_of(record: StageRecord) -> RecordMetrics:
-    """What one record tells.
+    """Return the metrics of one record.
 
     Args:
-        record: Whole, with its trace.
+        record: The whole record, with its trace.
     """
     is_success = record.state is EndState.SUCCESS if record.is_scored else None
     cause = cause_of(record)
-    walked_m = _walked_m(record.trace)
+    travelled_m = _travelled_m(record.trace)
     visits = [list(group) for (_, is_stale), group in groupby(record.trace, key=_chosen) if is_stale]
     start, end = record.memory_at_start, record.memory_at_end
-    is_told = end is not None
+    has_memory = end is not None
     cleared = [(e.evident_round, e.cleared_round) for e in record.stale_entries]
     found = [(m.seen_round, m.found_round) for m in record.moved_objects]
     # Records of the first runs have no `memory_at_end`, but entries: stale or not is in them.
-    has_entries = is_told or bool(record.entries)
+    has_entries = has_memory or bool(record.entries)
     num_stale = sum(entry.is_stale for entry in record.entries)
     return RecordMetrics(
         agent=record.agent,
@@ -285,16 +285,16 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
         num_stale_visits=len(visits),
         num_stale_rounds=sum(map(len, visits)),
         stale_path_m=math.fsum(_length_m(taken) for visit in visits for taken in visit),
-        num_stale_at_start=len(record.stale_entries) if is_told else None,
-        num_stale_evident=sum(evident is not None for evident, _ in cleared) if is_told else None,
-        num_stale_cleared=sum(gone is not None for _, gone in cleared) if is_told else None,
+        num_stale_at_start=len(record.stale_entries) if has_memory else None,
+        num_stale_evident=sum(evident is not None for evident, _ in cleared) if has_memory else None,
+        num_stale_cleared=sum(gone is not None for _, gone in cleared) if has_memory else None,
         rounds_to_clear=_mean(b - a for a, b in _whole(cleared)),
-        metres_to_clear=_mean(walked_m[b] - walked_m[a] for a, b in _whole(cleared)),
-        num_moved=len(record.moved_objects) if is_told else None,
-        num_moved_seen=sum(seen is not None for seen, _ in found) if is_told else None,
-        num_moved_found=sum(there is not None for _, there in found) if is_told else None,
+        metres_to_clear=_mean(travelled_m[b] - travelled_m[a] for a, b in _whole(cleared)),
+        num_moved=len(record.moved_objects) if has_memory else None,
+        num_moved_seen=sum(seen is not None for seen, _ in found) if has_memory else None,
+        num_moved_found=sum(there is not None for _, there in found) if has_memory else None,
         rounds_to_find=_mean(b - a for a, b in _whole(found)),
-        metres_to_find=_mean(walked_m[b] - walked_m[a] for a, b in _whole(found)),
+        metres_to_find=_mean(travelled_m[b] - travelled_m[a] for a, b in _whole(found)),
         num_forgotten=record.num_forgotten,
         num_entries=len(record.entries) if has_entries else None,
         num_stale_entries=num_stale if has_entries else None,
@@ -310,29 +310,29 @@ def metrics_of(record: StageRecord) -> RecordMetrics:
 
 
 def stratum_of(record: StageRecord) -> str:
-    """The paper's strata: `relocated` if the target ever moved since stage 1; `stage_1` is in neither."""
+    """Return the paper's stratum: `relocated` if the target ever moved since stage 1; `stage_1` is in neither."""
     if record.stage == 1:
         return "stage_1"
     return "relocated" if record.target.is_relocated else "not_relocated"
 
 
-_MEASURE_FIELDS = tuple(field.name for field in fields(RecordMetrics))
+_METRIC_FIELDS = tuple(field.name for field in fields(RecordMetrics))
 
 
-def _values(measures: RecordMetrics) -> dict[str, Any]:
-    return {name: getattr(measures, name) for name in _MEASURE_FIELDS}
+def _values(metrics: RecordMetrics) -> dict[str, Any]:
+    return {name: getattr(metrics, name) for name in _METRIC_FIELDS}
 
 
-def _kept(store: "RunStore", agents: Sequence[str] | None) -> Iterator[_Kept]:
-    """By agent, task and stage; derived anew where the store has none of this version."""
+def _stored_metrics(store: "RunStore", agents: Sequence[str] | None) -> Iterator[_StoredMetrics]:
+    """Yield metrics by agent, task and stage; those that the store lacks in this version are derived again."""
     wanted = None if agents is None else set(agents)
     for (agent, task_id, stage), version, text in store.encoded_metrics():
         if wanted is not None and agent not in wanted:
             continue
         if version != METRICS_VERSION or text is None:
             text = encode_metrics(store.record(agent, task_id, stage))
-        kept = json.loads(text)
-        yield _Kept(RecordMetrics(**kept["measures"]), kept["counters"], kept["is_fresh"])
+        values = json.loads(text)
+        yield _StoredMetrics(RecordMetrics(**values["measures"]), values["counters"], values["is_fresh"])
 
 
 def _chosen(taken: RoundRecord) -> tuple[int | None, bool]:
@@ -344,12 +344,12 @@ def _length_m(taken: RoundRecord) -> float:
     return math.fsum(math.dist(a, b) for a, b in pairwise(taken.path_m))
 
 
-def _walked_m(trace: Sequence[RoundRecord]) -> list[float]:
-    """Path length walked before each round."""
-    walked = [0.0]
+def _travelled_m(trace: Sequence[RoundRecord]) -> list[float]:
+    """Return the path length travelled before each round."""
+    travelled = [0.0]
     for taken in trace:
-        walked.append(walked[-1] + _length_m(taken))
-    return walked
+        travelled.append(travelled[-1] + _length_m(taken))
+    return travelled
 
 
 def _whole(spans: Iterable[tuple[int | None, int | None]]) -> Iterator[tuple[int, int]]:

@@ -1,4 +1,4 @@
-"""What a stage cost: time by component, questions, tokens, money and memory. None of it is part of a record."""
+"""Measure the cost of a stage: time by component, questions, tokens, money and memory. Records do not contain it."""
 
 import time
 from collections import defaultdict
@@ -10,12 +10,12 @@ from typing import Literal
 Part = Literal["simulation", "perception", "agent"]
 
 LEVELS = ("agent_peak_rss_mb",)
-"""Fields that are no sums: what an agent's process says of them is not taken off what it said before."""
+"""Fields that are no sums: a stage has the latest value of the agent's process, not the difference to an earlier one."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StageCosts:
-    """Of one stage; `None` where it was not measured. CPU time is of the evaluator's and the agent's processes."""
+    """The costs of one stage; `None` where not measured. CPU time covers the evaluator's and the agent's processes."""
 
     wall_s: float | None = None
     cpu_s: float | None = None
@@ -26,35 +26,35 @@ class StageCosts:
     """Detections and visible occupancy."""
     perception_cpu_s: float | None = None
     agent_wall_s: float | None = None
-    """Asking the agent, its decision model and the way there and back included."""
+    """The agent's answers, with its decision model and the transport of both."""
     agent_cpu_s: float | None = None
     decision_wall_s: float | None = None
-    """Of that, in its decision model."""
+    """The part of `agent_wall_s` that is spent in the decision model."""
     decision_cpu_s: float | None = None
     evaluator_wall_s: float | None = None
-    """All else: judging, recording, the map of the house."""
+    """Everything else, such as judging and recording."""
     evaluator_cpu_s: float | None = None
     num_questions: int | None = None
-    """That a model was asked, tries included; `None` for a decision model that keeps no account."""
+    """Questions to a model, retries included; `None` for a decision model that does not count them."""
     num_replayed: int | None = None
-    """Answered by kept exchanges."""
+    """Questions that were answered from the response cache."""
     input_tokens: int | None = None
     output_tokens: int | None = None
     cost_usd: float | None = None
-    """By the prices given; `None` without."""
+    """The cost by the configured prices; `None` without prices."""
     agent_peak_rss_mb: float | None = None
-    """Of the agent's process, at its most so far: it serves many episodes."""
+    """Peak memory of the agent's process so far; the process serves many episodes."""
     num_retries: int | None = None
 
 
 class Stopwatch:
-    """Wall and CPU time by component; what is in none of them is the evaluator's."""
+    """Measures wall and CPU time by component; the rest is the evaluator's."""
 
     def __init__(self, cpu_s: Callable[[], float] = time.process_time) -> None:
-        """Starts.
+        """Start the clock.
 
         Args:
-            cpu_s: CPU time so far, of all processes that count.
+            cpu_s: Returns the CPU time so far of all processes that count.
         """
         self._clock = cpu_s
         self._spent_s: defaultdict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
@@ -62,7 +62,7 @@ class Stopwatch:
 
     @contextmanager
     def timing(self, part: Part) -> Iterator[None]:
-        """Books what happens inside; not to be nested."""
+        """Count the time inside the block for a component. Blocks must not be nested."""
         wall_s, cpu_s = time.perf_counter(), self._clock()
         try:
             yield
@@ -71,11 +71,11 @@ class Stopwatch:
             spent_s[0] += time.perf_counter() - wall_s
             spent_s[1] += self._clock() - cpu_s
 
-    def costs(self, told: Mapping[str, float] | None = None) -> StageCosts:
-        """All of it until now.
+    def costs(self, others: Mapping[str, float] | None = None) -> StageCosts:
+        """Return all costs until now.
 
         Args:
-            told: More of the stage, by field of `StageCosts`.
+            others: More costs of the stage, by field of `StageCosts`.
         """
         wall_s, cpu_s = time.perf_counter() - self._begun_s[0], self._clock() - self._begun_s[1]
         parts: dict[str, float] = {}
@@ -83,4 +83,4 @@ class Stopwatch:
             parts[f"{part}_wall_s"], parts[f"{part}_cpu_s"] = self._spent_s[part]
         parts["evaluator_wall_s"] = wall_s - sum(spent_s[0] for spent_s in self._spent_s.values())
         parts["evaluator_cpu_s"] = cpu_s - sum(spent_s[1] for spent_s in self._spent_s.values())
-        return StageCosts(wall_s=wall_s, cpu_s=cpu_s, **parts, **(told or {}))  # type: ignore[arg-type]
+        return StageCosts(wall_s=wall_s, cpu_s=cpu_s, **parts, **(others or {}))  # type: ignore[arg-type]

@@ -1,7 +1,7 @@
-"""What a run leaves behind: one `StageRecord` a stage, one `FloorPlan` a stage house.
+"""Define the records of a run: one `StageRecord` per stage, one `FloorPlan` per stage house.
 
-A record holds all that tables, maps and reports need; nothing downstream reads houses, tasks or agents.
-Everything in it is a function of the run's inputs: wall-clock figures live in a table of their own (`store.py`).
+A record holds all data that tables, maps and reports need; nothing downstream reads houses, tasks or agents.
+A record is a function of the run's inputs: wall-clock times are in a table of their own (`store.py`).
 Points are `(x, y, z)` or `(x, z)` in metres, AI2-THOR's world frame; angles are radians.
 """
 
@@ -21,14 +21,14 @@ Point3 = tuple[float, float, float]
 
 
 class _Record(BaseModel):
-    """Frozen and closed: an unknown field is an error, not a surprise."""
+    """A frozen record that rejects unknown fields."""
 
     # Parts of a record are validated again with the whole: `model_copy` does not validate.
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="null", revalidate_instances="always")
 
 
 class EndState(str, Enum):
-    """How a stage ended: exactly one of these. Rates are over `success` and `failure` alone."""
+    """The way a stage ended. Rates are over `success` and `failure` alone."""
 
     SUCCESS = "success"
     FAILURE = "failure"
@@ -44,7 +44,7 @@ class EndState(str, Enum):
 
 
 class ErrorKind(str, Enum):
-    """Whose fault an errored stage is."""
+    """The part of the system that caused an error."""
 
     AGENT = "agent"
     """The agent raised, or answered with what is no action."""
@@ -61,16 +61,16 @@ class ErrorKind(str, Enum):
     TIMEOUT = "timeout"
     """The agent did not answer, or the stage did not end, within the time that the run allows."""
     HARNESS = "harness"
-    """Anything else: a task that cannot be read, a bug of ours."""
+    """Anything else: a task that cannot be read, a bug in evonav."""
 
     @property
     def is_agents(self) -> bool:
-        """Whether it is the agent's own fault: such a failure costs its stage, and the episode goes on."""
+        """True if the agent caused the error: such a failure costs its stage, and the episode continues."""
         return self in (ErrorKind.AGENT, ErrorKind.DECISION, ErrorKind.CRASH, ErrorKind.TIMEOUT)
 
 
 class StageError(_Record):
-    """Why a stage is errored, or why it was not run."""
+    """The reason why a stage is errored or was not run."""
 
     kind: ErrorKind
     message: str
@@ -81,7 +81,7 @@ class StageFailure:
     """An attempt at a stage that has failed."""
 
     stage: int
-    """0: the first that did not end."""
+    """1-based; 0 stands for the first stage that did not end."""
     kind: ErrorKind
     message: str
     traceback: str = ""
@@ -103,7 +103,7 @@ class PoseRecord(_Record):
 
 
 class GoalRecord(_Record):
-    """What the agent was told (less the image)."""
+    """The goal that the agent received, without the image."""
 
     category: str
     instruction: str
@@ -123,7 +123,7 @@ class TargetRecord(_Record):
     is_relocated_now: bool
     """Moved in the transition just before this stage."""
     first_position_m: Point3 | None = None
-    """Where it stood in stage 1, if `is_relocated`."""
+    """Its place in stage 1, if `is_relocated`."""
 
 
 class Relocation(_Record):
@@ -136,16 +136,16 @@ class Relocation(_Record):
 
 
 class TransitionRecord(_Record):
-    """What happened between the previous stage and this one. Oracle."""
+    """The change between the previous stage and this one. Oracle."""
 
     mode: Literal["SALIENT_OBJECT", "RETAIN_GROUP", "FULL_SHUFFLE"] | None = None
     """`None` when the paper's process changed nothing."""
     room_id: str | None = None
     is_agent_in_room: bool = False
-    """Whether the carried pose lies in the evolved room, where change can happen under the agent's eyes."""
+    """True if the agent stands in the evolved room at the start of the stage."""
     relocations: tuple[Relocation, ...] = ()
     num_added: int = 0
-    """Objects that came; by an extension, as those below."""
+    """Objects that an extension added. The two fields below are of extensions, too."""
     num_removed: int = 0
     num_states: int = 0
     """Doors and objects that opened, closed, or went on or off."""
@@ -173,7 +173,7 @@ class EntryRecord(_Record):
 
 
 class MemoryRecord(_Record):
-    """The agent's entries held against the stage's house."""
+    """The agent's entries compared with the stage's house."""
 
     num_entries: int
     num_right: int
@@ -183,13 +183,13 @@ class MemoryRecord(_Record):
     num_seen: int
     """Objects of the house that were in view so far in the episode."""
     num_seen_held: int
-    """Of them, those that a right entry stands for."""
+    """Seen objects that a right entry stands for."""
     position_error_m: float | None
     """Mean distance of right entries' centres from those of their objects' boxes; `None` without any."""
 
 
 class StaleEntryRecord(_Record):
-    """An entry that was stale when the stage began, and when its agent could have known, and did."""
+    """An entry that was stale at the start, the round from which this was evident, and the round of its correction."""
 
     label: str
     centre_m: Point3
@@ -210,23 +210,23 @@ class MovedObjectRecord(_Record):
 
 
 class ActionRecord(_Record):
-    """What the agent answered."""
+    """The agent's answer."""
 
     kind: Literal["move", "navigate_to", "stop"]
     action: str | None = None
-    """Of a `move`: `MOVE_FORWARD`, `TURN_LEFT`, `TURN_RIGHT` or `STOP`."""
+    """The action of a `move`: `MOVE_FORWARD`, `TURN_LEFT`, `TURN_RIGHT` or `STOP`."""
     position_m: Point2 | None = None
-    """Of a `navigate_to`."""
+    """The destination of a `navigate_to`."""
     face_m: Point2 | None = None
-    """Of a `navigate_to`: what it turns towards on arrival, if it said."""
+    """The point that the agent of a `navigate_to` turns towards on arrival, if given."""
     reason: str | None = None
-    """Of a `stop`."""
+    """The reason of a `stop`."""
 
 
 class SensingRecord(_Record):
-    """What the agent was granted of its sensors and its motion in a stage, colours apart.
+    """The sensing and motion that the agent was granted in a stage, without colours.
 
-    With the actions, all that it takes to carry them out again (`evonav.submission.rescore`).
+    Together with the actions, this is enough to carry them out again (`evonav.submission.rescore`).
     """
 
     first_round: tuple[int, float]
@@ -243,15 +243,15 @@ class RoundRecord(_Record):
     round: int
     """0-based."""
     pose: PoseRecord
-    """When it observed."""
+    """The agent's pose at the observation."""
     action: ActionRecord
     path_m: tuple[Point2, ...]
     """Waypoints travelled, the pose's own position first; a single point when the agent stood still."""
     is_action_success: bool
     is_target_visible: bool
-    """Whether the target was in one of this round's views."""
+    """True if the target was in one of this round's views."""
     choice: str
-    """In the agent's words: `object 12`, `frontier 3`, `none`."""
+    """The choice as the agent describes it: `object 12`, `frontier 3`, `none`."""
     chosen_entry: EntryRecord | None
     num_entries: int
     num_frontiers: int
@@ -261,11 +261,11 @@ class RoundRecord(_Record):
 
 
 class StageRecord(_Record):
-    """One stage of one agent's episode. Measures are `None` unless the state is success or failure."""
+    """One stage of one agent's episode. Metrics are `None` unless the state is success or failure."""
 
     schema_version: Literal[1] = 1
     agent: str
-    """The name it was asked for by: `fu`, `stage-reset`, `my_package:MyAgent`."""
+    """The name by which the agent was requested: `fu`, `stage-reset`, `my_package:MyAgent`."""
     task_id: str
     house: str
     stage: Annotated[int, Field(ge=1)]
@@ -273,7 +273,7 @@ class StageRecord(_Record):
     state: EndState
     error: StageError | None = None
     failed_before: tuple[int, ...] = ()
-    """Earlier stages of the episode in which the agent failed: it may know less than it would."""
+    """Earlier stages of the episode in which the agent failed: it may know less than otherwise."""
     memory_lost_at: int | None = None
     """The last stage, up to this one, that the agent began anew, without memory: its process was lost before."""
     goal: GoalRecord
@@ -283,7 +283,7 @@ class StageRecord(_Record):
     requested_start: PoseRecord | None = None
     """The pose carried over (stage 1: the manifest's)."""
     effective_start: PoseRecord | None = None
-    """After snapping to the nearest reachable position; equal to the requested one when that was free."""
+    """The start after snapping to the nearest reachable position; equal to the requested one if that was free."""
     is_snapped: bool = False
     sensing: SensingRecord | None = None
     terminal: PoseRecord | None = None
@@ -311,9 +311,9 @@ class StageRecord(_Record):
     terminal_geodesic_m: float | None = None
     """Length of the shortest path to the target at the end; `None` where there is none."""
     is_geodesic_success: bool | None = None
-    """Whether that is shorter than the success radius."""
+    """True if that is shorter than the success radius."""
     memory_at_start: MemoryRecord | None = None
-    """After the agent was told the goal; `None`, as all that follows, for an agent that tells no entries."""
+    """The memory after the agent received the goal; like the next fields, `None` for an agent without entries."""
     memory_at_end: MemoryRecord | None = None
     num_forgotten: int | None = None
     """Objects that an entry stood for at the start and none at the end, though they stand where they stood."""
@@ -345,9 +345,9 @@ class ObjectFootprint(_Record):
     category: str
     centre_m: Point3
     size_m: Point3
-    """Of the axis-aligned box."""
+    """Size of the axis-aligned box."""
     polygon_m: tuple[Point2, ...]
-    """Corners of the footprint, turned with the object."""
+    """Corners of the object's box; in older records of a box that is turned with the object."""
     outlines_m: tuple[tuple[Point2, ...], ...] = ()
     """Convex outlines of its parts, lower ones first, where they are known: drawn instead of `polygon_m`."""
 
@@ -364,7 +364,7 @@ class Opening(_Record):
 
 
 class FloorPlan(_Record):
-    """A stage's house from above: the ground of every picture. The same for all agents."""
+    """A stage's house from above, the background of maps. It is the same for all agents."""
 
     schema_version: Literal[1] = 1
     task_id: str
@@ -376,4 +376,4 @@ class FloorPlan(_Record):
     openings: tuple[Opening, ...]
     objects: tuple[ObjectFootprint, ...]
     reference_image: str | None = None
-    """What the agent was shown, made small, as a `data:` URI."""
+    """The image that the agent was shown, made small, as a `data:` URI."""

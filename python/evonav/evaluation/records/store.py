@@ -1,9 +1,8 @@
-"""A run on disk: one SQLite file (WAL) whose rows are whole stages.
+"""Store a run on disk: one SQLite file (WAL) whose rows are whole stages.
 
-A finished stage is one transaction: wholly there or not at all. `INSERT` under a primary key makes a stage that is
-reported twice an error instead of a second row. What is not a function of the run's inputs sits apart from the records,
-so that records of equal runs are equal to the byte: wall-clock figures in `timings`, every attempt that failed, with
-its traceback, in `failures`.
+A finished stage is one transaction: it is stored completely or not at all. A stage that is reported twice is an error,
+by its primary key. Data that is not a function of the run's inputs is not in the records, so that records of equal runs
+are equal to the byte: wall-clock times are in `timings`, failed attempts with their tracebacks in `failures`.
 """
 
 import json
@@ -51,7 +50,7 @@ _TABLES = {
 }
 
 # Later than the first runs of this schema version: a run without them is read as if they were empty.
-# Measures are derived from the record (`evonav.evaluation.metrics.stage_metrics`), so that tables need no traces.
+# Metrics are derived from the record (`evonav.evaluation.metrics.stage_metrics`), so that tables need no traces.
 _LATER = {
     "measures": """(
     agent TEXT NOT NULL, task_id TEXT NOT NULL, stage INTEGER NOT NULL,
@@ -73,7 +72,7 @@ _LATER = {
 
 @dataclass(frozen=True, slots=True)
 class FailureRow:
-    """An attempt at a stage that has failed; of an errored stage, the last one is why."""
+    """A failed attempt at a stage; the last one of an errored stage is the reason of its error."""
 
     agent: str
     task_id: str
@@ -83,14 +82,14 @@ class FailureRow:
     traceback: str
     """Empty where a process was lost."""
     is_retried: bool
-    """Whether the stage was tried again after it."""
+    """True if the stage was tried again after it."""
 
 
 class RunStore:
     """Reads and writes `DIR/records.sqlite`. One process writes; any number read meanwhile."""
 
     def __init__(self, run_dir: Path, *, create: bool = False) -> None:
-        """Opens the run in `run_dir`.
+        """Open the run in `run_dir`.
 
         Raises:
             StoreError: There is no run there and `create` is false, the file is not a run of this schema version, or
@@ -98,7 +97,7 @@ class RunStore:
         """
         self.path = run_dir / FILE_NAME
         if not create and not self.path.is_file():
-            raise StoreError(f"{run_dir}: {_what_is_there(run_dir)}")
+            raise StoreError(f"{run_dir}: {_why_no_run(run_dir)}")
         try:
             if create:
                 run_dir.mkdir(parents=True, exist_ok=True)
@@ -142,7 +141,7 @@ class RunStore:
         self.close()
 
     def close(self) -> None:
-        """Closes the file; safe to call twice."""
+        """Close the file; safe to call twice."""
         self._db.close()
 
     def meta(self, key: str) -> Any:  # noqa: ANN401 - JSON
@@ -151,17 +150,17 @@ class RunStore:
         return with_current_paths(json.loads(rows[0][0])) if rows else None
 
     def set_meta(self, key: str, value: Any) -> None:  # noqa: ANN401 - JSON
-        """Sets a JSON value of the run's header."""
+        """Set a JSON value of the run's header."""
         self.set_header({key: value})
 
     def set_header(self, values: Mapping[str, Any]) -> None:
-        """Sets JSON values of the run's header, all or none."""
+        """Set JSON values of the run's header, all or none."""
         with self._transaction():
             rows = [(key, _json(value)) for key, value in values.items()]
             self._db.executemany("INSERT OR REPLACE INTO meta VALUES (?, ?)", rows)
 
     def states(self) -> dict[tuple[str, str, int], EndState]:
-        """End state of every recorded (agent, task, stage)."""
+        """Return the end state of every recorded (agent, task, stage)."""
         rows = self._query("SELECT agent, task_id, stage, state FROM stages")
         return {(agent, task_id, stage): EndState(state) for agent, task_id, stage, state in rows}
 
@@ -183,7 +182,7 @@ class RunStore:
                 self._db.execute(_ADD_FAILURE, row)
 
     def add_retry(self, agent: str, task_id: str, failure: StageFailure) -> None:
-        """Records a failure after which the stage is tried again."""
+        """Record a failure after which the stage is tried again."""
         what = (failure.kind.value, failure.message, failure.traceback, True)
         self._execute(_ADD_FAILURE, (agent, task_id, failure.stage, *what))
 
@@ -196,7 +195,7 @@ class RunStore:
         return set(self._query("SELECT task_id, stage FROM stage_maps"))
 
     def forget_episode(self, agent: str, task_id: str, from_stage: int) -> None:
-        """Drops an episode's stages from `from_stage` on, so that they can be run again."""
+        """Drop an episode's stages from `from_stage` on, so that they can be run again."""
         key = (agent, task_id, from_stage)
         with self._transaction():
             for table in ("stages", "timings", *_LATER):
@@ -205,12 +204,12 @@ class RunStore:
     def records(
         self, agent: str | None = None, task_id: str | None = None, *, is_brief: bool = False
     ) -> Iterator[StageRecord]:
-        """Stage records by agent, task and stage, whatever order they were finished in.
+        """Yield stage records by agent, task and stage.
 
         Args:
-            agent: Only this one's.
-            task_id: Only of this task.
-            is_brief: Leave out traces and entries, which are most of a record and no part of a measure.
+            agent: Read only this agent's records.
+            task_id: Read only this task's records.
+            is_brief: Leave out traces and entries, which are most of a record; stored metrics replace them.
 
         Raises:
             StoreError: A row is not a valid record.
@@ -225,9 +224,9 @@ class RunStore:
 
     @contextmanager
     def snapshot(self) -> Iterator[None]:
-        """What is read inside is of one moment, whatever another process writes meanwhile.
+        """Read one consistent state inside the block, whatever another process writes meanwhile.
 
-        Without a write-ahead log, on a network file system, it is not: there a reader would keep the writer waiting.
+        Without a write-ahead log, on a network file system, there is no snapshot: a reader would block the writer.
         """
         ((mode,),) = self._rows("PRAGMA journal_mode", ())
         if mode != "wal":
@@ -240,7 +239,7 @@ class RunStore:
             self._db.execute("ROLLBACK")
 
     def record_texts(self, agent: str | None = None, task_id: str | None = None) -> Iterator[str]:
-        """The records as stored, in the order of `records`: equal runs give equal texts."""
+        """Yield the records as stored, in the order of `records`: equal runs give equal texts."""
         return self._texts("record", agent, task_id)
 
     def _texts(self, column: str, agent: str | None, task_id: str | None) -> Iterator[str]:
@@ -252,10 +251,10 @@ class RunStore:
             yield text
 
     def record(self, agent: str, task_id: str, stage: int) -> StageRecord:
-        """One record, whole.
+        """Return one whole record.
 
         Raises:
-            StoreError: There is none, or it is not valid.
+            StoreError: There is no such record, or it is not valid.
         """
         text = self.record_text(agent, task_id, stage)
         if text is None:
@@ -266,7 +265,7 @@ class RunStore:
             raise StoreError(f"{self.path}: {error}") from error
 
     def encoded_metrics(self) -> Iterator[tuple[tuple[str, str, int], int | None, str | None]]:
-        """By agent, task and stage: the version of the measures kept beside a record, and these; `None` without."""
+        """Yield agent, task and stage, the version of the stored metrics, and the metrics; `None` without metrics."""
         query = (
             "SELECT agent, task_id, stage, version, measures FROM stages LEFT JOIN measures "
             "USING (agent, task_id, stage) ORDER BY agent, task_id, stage"
@@ -275,13 +274,13 @@ class RunStore:
             yield (agent, task_id, stage), version, measures
 
     def record_text(self, agent: str, task_id: str, stage: int) -> str | None:
-        """One record as stored, or `None`."""
+        """Return one record as stored, or `None`."""
         query = "SELECT record FROM stages WHERE agent = ? AND task_id = ? AND stage = ?"
         rows = self._query(query, (agent, task_id, stage))
         return str(rows[0][0]) if rows else None
 
     def maps(self, task_id: str | None = None) -> Iterator[FloorPlan]:
-        """Stage maps by task and stage."""
+        """Yield floor plans by task and stage."""
         query = "SELECT map FROM stage_maps WHERE ?1 IS NULL OR task_id = ?1 ORDER BY task_id, stage"
         for (text,) in self._rows(query, (task_id,)):
             try:
@@ -290,17 +289,17 @@ class RunStore:
                 raise StoreError(f"{self.path}: {error}") from error
 
     def timings(self) -> dict[tuple[str, str, int], tuple[float, float]]:
-        """Wall and CPU seconds of every recorded stage; not deterministic, hence not in the records."""
+        """Return wall and CPU seconds of every recorded stage; not deterministic, hence not in the records."""
         rows = self._query("SELECT agent, task_id, stage, wall_s, cpu_s FROM timings")
         return {(agent, task_id, stage): (wall_s, cpu_s) for agent, task_id, stage, wall_s, cpu_s in rows}
 
     def costs(self) -> dict[tuple[str, str, int], dict[str, Any]]:
-        """What else the stages cost, by field of `StageCosts`; like `timings`, not in the records."""
+        """Return the other costs of the stages, by field of `StageCosts`; like `timings`, not in the records."""
         rows = self._query("SELECT agent, task_id, stage, costs FROM costs")
         return {(agent, task_id, stage): json.loads(costs) for agent, task_id, stage, costs in rows}
 
     def failures(self) -> list[FailureRow]:
-        """Attempts that failed, by agent, task and stage, in the order in which they happened."""
+        """Return the failed attempts by agent, task and stage, in the order in which they happened."""
         rows = self._query(
             "SELECT agent, task_id, stage, kind, message, traceback, is_retried FROM failures "
             "ORDER BY agent, task_id, stage, id"
@@ -311,7 +310,7 @@ class RunStore:
         ]
 
     def retries(self) -> Counter[tuple[str, str, int]]:
-        """How often stages were tried again, by agent, task and stage."""
+        """Count how often stages were tried again, by agent, task and stage."""
         return Counter((one.agent, one.task_id, one.stage) for one in self.failures() if one.is_retried)
 
     def _rows(self, query: str, values: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
@@ -329,7 +328,7 @@ class RunStore:
 
     @contextmanager
     def _transaction(self, what: str = "") -> Iterator[None]:
-        """All that is done inside, or nothing."""
+        """Commit all changes inside the block, or none."""
         try:
             self._db.execute("BEGIN IMMEDIATE")
             yield
@@ -345,8 +344,8 @@ class RunStore:
             ) from error
 
 
-def _what_is_there(run_dir: Path) -> str:
-    """Why a folder is no run, and which one may have been meant."""
+def _why_no_run(run_dir: Path) -> str:
+    """Explain why a folder is no run, and name one that may have been meant."""
     if not run_dir.is_dir():
         return f"no run here (there is no such folder); `evonav evaluate --out {run_dir}` makes one"
     inner = sorted(path.parent for path in (*run_dir.glob(f"*/{FILE_NAME}"), *run_dir.glob(f"runs/*/{FILE_NAME}")))
