@@ -33,14 +33,14 @@ EXEMPT = ("CHANGELOG.md",)
 # No part of a name is one of these.
 BANNED = frozenset(
     """
-    told said kept held news yardstick yardsticks witness witnesses tracked deeds telling context workplaces
+    told said kept held news yardstick yardsticks witness witnesses witnessed deeds telling workplace workplaces
     reenactment reenacted traced tracer walked forced privileged participants asking explained heeded
     """.split()
 )
 # These are fine as a part of a name (`num_words`), but they are no names.
-BANNED_ALONE = frozenset("words means books sides looks asked exchanges carried rollouts".split())
+BANNED_ALONE = frozenset("words means books sides looks asked carried rollouts".split())
 # Keys and values of files that were written before, and must stay readable.
-FILE_KEYS = frozenset(("forced_stages", "FORCED", "num_held", "num_seen_held"))
+FILE_KEYS = frozenset(("exchanges", "forced_stages", "FORCED", "num_held", "num_seen_held"))
 
 PHRASES = tuple(
     re.compile(phrase, re.IGNORECASE)

@@ -29,7 +29,7 @@ from evonav.decision.metered import Metered
 from evonav.errors import DecisionError
 
 LENGTH = struct.Struct("<Q")
-"""Of the message that follows."""
+"""Format of the size of the message that follows."""
 
 
 def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
@@ -51,7 +51,7 @@ def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
 
 
 def _end_with_parent(life_fd: int) -> None:
-    """Makes this process leave interrupts to the evaluator, and end with it whatever it is at."""
+    """Make this process ignore interrupts and end with the evaluator, also in the middle of a request."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":  # also while an agent holds the interpreter's lock
         with suppress(OSError, AttributeError):
@@ -66,7 +66,7 @@ def _end_with_parent(life_fd: int) -> None:
 
 
 def _end_group() -> None:
-    """Ends this process and what it has started."""
+    """End this process and its children."""
     if os.getpgrp() == os.getpid():
         os.killpg(os.getpid(), signal.SIGKILL)
     os._exit(1)
@@ -80,7 +80,7 @@ class _Block:
         self._map: mmap.mmap | None = None
 
     def copies(self, places: list[tuple[int, int]]) -> list[bytearray]:
-        """Copies of parts, each by offset and size."""
+        """Return copies of parts, each given by offset and size."""
         end = max((offset + size for offset, size in places), default=0)
         if end == 0:
             return [bytearray() for _ in places]
@@ -111,7 +111,7 @@ def _serve(connection: socket.socket, block: _Block) -> None:
 
 
 def _received(connection: socket.socket) -> bytearray | None:
-    """The next message; `None` when there will be none."""
+    """Return the next message; `None` at the end."""
     header = _exactly(connection, LENGTH.size)
     return None if header is None else _exactly(connection, LENGTH.unpack(header)[0])
 
@@ -137,7 +137,7 @@ class _Server:
         self._decision: Metered | None = None
 
     def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, bytes]:
-        """Does as asked; what the agent raises is an answer too."""
+        """Execute a request; an exception of the agent is an answer too."""
         try:
             parts: dict[str, bytes] = getattr(self, f"do_{operation}")(*arguments)
         except DecisionError as error:
@@ -153,14 +153,14 @@ class _Server:
         return self._agent
 
     def do_load(self, name: str, memory_mb: int | None) -> dict[str, bytes]:
-        """Imports what makes agents."""
+        """Import the factory of agents."""
         if memory_mb is not None:
             _limit_memory(memory_mb)
         self._factory = agent_factory(name)
         return {}
 
     def do_make(self, decision: str, seed: int, options: Mapping[str, Any]) -> dict[str, bytes]:
-        """Makes a decision model, and a fresh agent with it; whatever was there before is dropped."""
+        """Make a decision model and a fresh agent with it, in place of earlier ones."""
         assert self._factory is not None, "`load` comes first"
         self._agent = None
         self._decision = Metered(import_callable(decision, "decision model")(seed, **options))
@@ -168,17 +168,17 @@ class _Server:
         return self._sensing()
 
     def do_begin_task(self, task: Any) -> dict[str, bytes]:  # noqa: ANN401 - `TaskInfo`
-        """A new house."""
+        """Begin a task."""
         self.agent.begin_task(task)
         return self._sensing()
 
     def do_begin_stage(self, stage: Any) -> dict[str, bytes]:  # noqa: ANN401 - `StageInput`
-        """A new goal."""
+        """Begin a stage."""
         self.agent.begin_stage(stage)
         return self._sensing()
 
     def do_act(self, observation: Any) -> dict[str, bytes]:  # noqa: ANN401 - `Observation`
-        """A decision round, and the agent's diagnostics of it."""
+        """Run a decision round, and return the action and the agent's diagnostics."""
         agent = self.agent
         parts = {"action": wire.write_action(agent.act(observation))}
         if isinstance(agent, ExplainingAgent):
@@ -191,12 +191,12 @@ class _Server:
         return parts
 
     def do_entries(self) -> dict[str, bytes]:
-        """The object memory, if the agent is an `ExplainingAgent`."""
+        """Return the object memory, if the agent is an `ExplainingAgent`."""
         agent = self.agent
         return {"entries": wire.ENTRIES.write(list(agent.entries()))} if isinstance(agent, ExplainingAgent) else {}
 
     def do_costs(self) -> dict[str, bytes]:
-        """What the decision model has cost since it was made, and the memory that this process has taken."""
+        """Return the decision model's costs since it was made, and this process's peak memory."""
         assert self._decision is not None, "`make` comes first"
         return {"costs": wire.COSTS.write({**self._decision.costs(), **_peak_rss()})}
 

@@ -88,8 +88,8 @@ class RewardedStage:
 def task_result(results: list[dict[str, Any]]) -> dict[str, Any]:
     """Return means over a task's scored stages; NaN if none was scored."""
     scored = [result for result in results if result["state"] != "errored"]
-    means = {
+    averages = {
         name: math.fsum(result[name] for result in scored) / len(scored) if scored else math.nan
         for name in ("success", "spl", "soft_spl")
     }
-    return {"num_stages": len(results), "num_scored": len(scored), **means}
+    return {"num_stages": len(results), "num_scored": len(scored), **averages}

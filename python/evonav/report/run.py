@@ -26,10 +26,10 @@ class StageOutcome:
     """A stage in a line: what an overview needs of it."""
 
     record: StageRecord
-    """Without trace and entries."""
+    """The record without its trace and entries."""
     cause: FailureCause | None
     num_stale_entries: int
-    """In memory at the end."""
+    """Stale entries in memory at the end."""
     stale_path_m: float
     """Walked in rounds that had chosen a stale entry."""
     num_failed_decisions: int = 0
@@ -43,7 +43,7 @@ class Task:
     task_id: str
     num_stages: int
     records: Mapping[tuple[str, int], StageRecord]
-    """By (agent, stage); a stage that is not there was not run yet."""
+    """Records by (agent, stage); a missing stage was not run yet."""
     maps: Mapping[int, FloorPlan]
 
 
@@ -54,18 +54,18 @@ class Run:
     run_dir: Path
     agents: tuple[str, ...]
     num_stages: Mapping[str, int]
-    """By task id, in order."""
+    """Number of stages by task id, in order."""
     config: Mapping[str, Any]
     outcomes: Mapping[tuple[str, str, int], StageOutcome]
-    """By (agent, task, stage)."""
+    """Outcomes by (agent, task, stage)."""
     rows_sha256: Mapping[str, str]
-    """By agent, of its records as stored: equal runs have equal ones."""
+    """Digest of each agent's records as stored; equal runs have equal digests."""
     episodes_sha256: Mapping[tuple[str, str], str]
-    """By agent and task: a page of an episode is of these records or of others."""
+    """Digest of the records of each (agent, task), to tell whether an episode's page shows these records."""
     notes: Mapping[str, Any]
-    """What the run's header tells beside its config: `NOTES`, those that are there."""
+    """The entries of the run's header that `NOTES` names, where present."""
     total_wall_s: float
-    """Of all stages, one after another."""
+    """Sum over all stages."""
     wall_s: Mapping[str, float]
     """Mean of a stage's wall time, by agent; not part of the records."""
     failures: tuple[FailureRow, ...]
@@ -75,7 +75,7 @@ class Run:
 
     @property
     def success_radius_m(self) -> float:
-        """As the run was held to."""
+        """The run's success radius."""
         return success_radius_of(self.config)
 
     @property
@@ -96,7 +96,7 @@ class Run:
         return found
 
     def scored(self, agent: str) -> list[StageOutcome]:
-        """An agent's stages that count in rates."""
+        """Return an agent's stages that count in rates."""
         return [outcome for key, outcome in self.outcomes.items() if key[0] == agent and outcome.record.is_scored]
 
     def cause_counts(self) -> dict[str, Counter[FailureCause | None]]:
@@ -122,7 +122,7 @@ class Run:
 
 
 def load_run(run_dir: Path) -> Run:
-    """Reads a run, finished or not.
+    """Read a run, finished or not.
 
     Raises:
         StoreError: There is no run, it cannot be read, or its rows are not those of its stages, each once: no rate of
@@ -202,7 +202,7 @@ def _outcome(record: StageRecord, row: StageMetrics) -> StageOutcome:
 
 
 def agents_in_order(asked: Sequence[str] | None, recorded: Sequence[str]) -> tuple[str, ...]:
-    """The agents of a run: the paper's in the order of its tables, then the others by name."""
+    """Return the agents of a run: the paper's in the order of its tables, then the others by name."""
     rank = {agent: i for i, agent in enumerate(PAPER_ORDER)}
     return tuple(sorted({*(asked or ()), *recorded}, key=lambda agent: (rank.get(agent, len(rank)), agent)))
 

@@ -43,17 +43,17 @@ class Probe:
         self.agent.sensing = sensing
 
     def begin_task(self, task: TaskInfo) -> None:
-        """A new house."""
+        """Begin a task."""
         self._frame = task.map_frame
         self._call("begin_task", lambda: self.agent.begin_task(task))
 
     def begin_stage(self, stage: StageInput) -> None:
-        """A new goal."""
+        """Begin a stage."""
         self._note("reference_image", stage.reference_image)
         self._call("begin_stage", lambda: self.agent.begin_stage(stage))
 
     def act(self, observation: Observation) -> AgentAction:
-        """A decision round, timed."""
+        """Run a decision round, and measure its time."""
         for view in observation.views:
             self._note("depth_m", view.depth_m)
             self._note("detections.masks", view.detections.masks)
@@ -67,7 +67,7 @@ class Probe:
         return action
 
     def diagnostics(self) -> RoundDiagnostics:
-        """What it says of the round, as JSON would have it."""
+        """Return the agent's diagnostics of the round, as they would be after JSON."""
         if not isinstance(self.agent, ExplainingAgent):
             return RoundDiagnostics()
         agent = self.agent
@@ -95,7 +95,7 @@ class Probe:
         return found
 
     def changed(self) -> str:
-        """Which of the arrays that it was given are not as they were."""
+        """Return the names of the arrays that the agent changed."""
         for name, array, digest in self._given:
             if _digest(array) != digest:
                 self._changed = self._changed or name

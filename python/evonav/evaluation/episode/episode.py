@@ -1,4 +1,4 @@
-"""An episode: one agent through the stages of one task, by the paper's multi-stage protocol (Sec. C.1).
+"""Run an episode: one agent through the stages of one task, by the paper's multi-stage protocol (Sec. C.1).
 
 An agent's failure costs its stage: the same agent goes on with the next one, or, if its process was lost, a fresh agent
 that remembers nothing. The records of later stages say so. A failure of anything else ends the episode.
@@ -28,7 +28,7 @@ class Episode:
 
     def __init__(
         self,
-        case: EpisodeSpec,
+        spec: EpisodeSpec,
         agent_name: str,
         agent: Agent | HostedAgent,
         simulator: Simulator,
@@ -39,10 +39,10 @@ class Episode:
         *,
         perception_seed: int | None = None,
     ) -> None:
-        self._case = case
+        self._spec = spec
         self._agent_name = agent_name
-        self._parts = EpisodeContext(
-            case,
+        self._context = EpisodeContext(
+            spec,
             *_hosted(agent),
             simulator,
             perception,
@@ -52,22 +52,22 @@ class Episode:
             observer,
         )
         self._state = EpisodeState()
-        self._told_costs: Mapping[str, float] = {}
+        self._last_costs: Mapping[str, float] = {}
 
     def run(self) -> Iterator[StageOutcome]:
-        """Runs the stages in order.
+        """Run the stages in order.
 
         Yields:
             The outcome of every stage as it ends. After an error that is not the agent's, the later stages are not
-            run: where the agent would have stood, and what it would have seen, is not known.
+            run, since the agent's pose and observations are unknown.
         """
-        pose = self._case.start
+        pose = self._spec.start
         failure: StageRecord | None = None
         failed: tuple[int, ...] = ()
         memory_lost_at: int | None = None
         is_lost = False
-        for stage in range(1, len(self._case.stages) + 1):
-            record = self._case.blank_record(self._agent_name, stage)
+        for stage in range(1, len(self._spec.stages) + 1):
+            record = self._spec.blank_record(self._agent_name, stage)
             if failure is not None and failure.error is not None:
                 yield StageOutcome(as_not_run(record, failure.error, failure.stage), 0.0, 0.0)
                 continue
@@ -75,7 +75,7 @@ class Episode:
                 memory_lost_at, is_lost = stage, False
             record = record.model_copy(update={"failed_before": failed, "memory_lost_at": memory_lost_at})
             stopwatch = Stopwatch(self._cpu_s)
-            run = Stage(self._parts, self._state, record, pose, stopwatch)
+            run = Stage(self._context, self._state, record, pose, stopwatch)
             record = run.run()
             costs = stopwatch.costs(self._new_costs(run.failure))
             wall_s, cpu_s = costs.wall_s or 0.0, costs.cpu_s or 0.0
@@ -91,27 +91,27 @@ class Episode:
                 failure = record
 
     def _end_pose(self, stage: int) -> Pose:
-        """Where a stage ends: where the agent stands, or where it would have been taken had it not failed."""
-        pose, forced = self._parts.simulator.pose, self._case.stages[stage - 1].guided
-        return pose if forced is None else replace(forced.end, y_m=pose.y_m, horizon_rad=pose.horizon_rad)
+        """Return the pose at which a stage ends; a guided stage ends at its walk's end even if the agent failed."""
+        pose, walk = self._context.simulator.pose, self._spec.stages[stage - 1].guided
+        return pose if walk is None else replace(walk.end, y_m=pose.y_m, horizon_rad=pose.horizon_rad)
 
     def _new_costs(self, failure: ErrorKind | None) -> Mapping[str, float]:
-        """What the agent's decision model has cost in the stage; empty where that is not known."""
+        """Return the costs of the agent's decision model in the stage; empty if they are unknown."""
         if failure in LOSSES:
-            self._told_costs = {}
+            self._last_costs = {}
             return {}
-        told, before = self._parts.agent.costs(), self._told_costs
-        self._told_costs = told
-        return {name: value if name in LEVELS else value - before.get(name, 0) for name, value in told.items()}
+        costs, before = self._context.agent.costs(), self._last_costs
+        self._last_costs = costs
+        return {name: value if name in LEVELS else value - before.get(name, 0) for name, value in costs.items()}
 
     def replace_agent(self, agent: Agent) -> None:
-        """Another agent from the next stage on, as after the loss of a process; for replays in one process."""
+        """Use another agent from the next stage on, as after the loss of a process; for replays in one process."""
         hosted, baseline = _hosted(agent)
-        self._parts = replace(self._parts, agent=hosted, baseline=baseline)
+        self._context = replace(self._context, agent=hosted, baseline=baseline)
 
     def _cpu_s(self) -> float:
-        """Of this process, and of the agent's where it has one."""
-        return process_time() + self._parts.agent.cpu_s
+        """Return the CPU time of this process and of the agent's own process."""
+        return process_time() + self._context.agent.cpu_s
 
 
 def _hosted(agent: Agent | HostedAgent) -> tuple[HostedAgent, OracleBaseline | None]:

@@ -1,4 +1,4 @@
-"""Who looks on at an episode, what hosts its agent, and whose fault it is when a stage cannot go on."""
+"""Observe episodes, and attribute the errors of a stage."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,21 +13,21 @@ from evonav.world.simulator import Simulator
 
 
 class EpisodeObserver(Protocol):
-    """Looks on as an episode runs (`evonav.replay.replay`); nothing of it reaches agent or record.
+    """Observes a running episode (`evonav.replay.replay`) without changing the agent or the record.
 
-    What it raises as `AgentFailedError` fails the stage as if the agent had.
+    If it raises `AgentFailedError`, the stage fails as if the agent had failed.
     """
 
     def stage_begins(self, stage: int, simulator: Simulator) -> None:
-        """A stage's house is loaded; the agent was not told yet."""
+        """Note that a stage's house is loaded; the agent has not received the goal yet."""
         ...
 
     def round_begins(self, observation: Observation) -> None:
-        """What the agent is about to be given."""
+        """Receive the observation that the agent receives next."""
         ...
 
     def round_ends(self, record: RoundRecord) -> None:
-        """The agent has acted, and its action was carried out."""
+        """Receive the record of a round, after the agent's action was executed."""
         ...
 
 
@@ -36,7 +36,7 @@ LOSSES = (ErrorKind.CRASH, ErrorKind.TIMEOUT)
 
 
 class StageFailedError(Exception):
-    """A stage that cannot go on; carries whose fault it is."""
+    """A stage that cannot continue, and the kind of its error."""
 
     def __init__(self, kind: ErrorKind, message: str) -> None:
         super().__init__(message)
@@ -45,7 +45,7 @@ class StageFailedError(Exception):
 
 @contextmanager
 def attribute_errors(kind: ErrorKind) -> Iterator[None]:
-    """Turns what is raised inside into a stage failure of `kind`; errors that name their own cause keep it."""
+    """Turn exceptions into a stage failure of `kind`; errors with a cause of their own keep it."""
     try:
         yield
     except StageFailedError:
@@ -65,6 +65,6 @@ def attribute_errors(kind: ErrorKind) -> Iterator[None]:
 
 
 def traceback_of(failure: StageFailedError) -> str:
-    """Where it came from; of an agent in a process of its own, in that."""
+    """Return the traceback of a failure; for an agent in its own process, that process's."""
     cause = failure.__cause__ or failure
     return (isinstance(cause, AgentFailedError) and cause.traceback) or error_text.traceback_of(cause)

@@ -29,7 +29,7 @@ class Sighting:
 
     is_target_visible: bool
     is_target_seen: bool
-    """True if the target was seen in this or an earlier round of the episode, at any place, and near enough to remember."""
+    """True if the target was seen in this or an earlier round of the episode, anywhere, near enough to remember."""
 
 
 class OracleBaseline:

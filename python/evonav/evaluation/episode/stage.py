@@ -1,4 +1,4 @@
-"""A stage of an episode: start, rounds, measures."""
+"""Run one stage of an episode: start, rounds, score."""
 
 import math
 from collections.abc import Sequence
@@ -35,77 +35,77 @@ from evonav.world.simulator import Simulator
 
 @dataclass(frozen=True, slots=True)
 class EpisodeContext:
-    """Who and what takes part in an episode."""
+    """The parts that stay the same in all stages of an episode."""
 
-    case: EpisodeSpec
+    spec: EpisodeSpec
     agent: HostedAgent
     baseline: OracleBaseline | None
-    """The agent, if it is one."""
+    """The agent itself, if it is an oracle baseline."""
     simulator: Simulator
     perception: Perception
     protocol: ProtocolConfig
     seed: int
-    """The agent's."""
+    """Seed of the agent's random choices."""
     perception_seed: int
     observer: EpisodeObserver | None
 
 
 @dataclass(slots=True)
 class EpisodeState:
-    """What lasts from one stage to the next."""
+    """The state that lasts from one stage to the next."""
 
     has_begun: bool = False
-    """The agent knows the task."""
+    """True once the agent has received the task."""
     tracked: TrackedState = field(default_factory=TrackedState)
 
 
 class Stage:
-    """One stage of an episode: start, rounds, measures."""
+    """One stage of an episode: start, rounds, score."""
 
     def __init__(
-        self, parts: EpisodeContext, carried: EpisodeState, record: StageRecord, requested: Pose, stopwatch: Stopwatch
+        self, context: EpisodeContext, state: EpisodeState, record: StageRecord, requested: Pose, stopwatch: Stopwatch
     ) -> None:
-        """Runs nothing yet.
+        """Prepare a stage.
 
         Args:
-            parts: Of the episode.
-            carried: Is brought up to date.
-            record: A blank one.
-            requested: Where the agent is to start.
-            stopwatch: Books what the stage takes.
+            context: The episode's context.
+            state: The episode's state, which the stage updates.
+            record: A blank record of the stage.
+            requested: Pose at which the agent should start.
+            stopwatch: Adds up the time that the stage takes.
         """
-        self._state = carried
-        self._case = parts.case
-        self._agent = parts.agent
-        self._baseline = parts.baseline
-        self._simulator = parts.simulator
-        self._perception = parts.perception
-        self._protocol = parts.protocol
-        self._seed = parts.seed
-        self._perception_seed = parts.perception_seed
-        self._observer = parts.observer
-        self._stage = self._case.stages[record.stage - 1]
+        self._state = state
+        self._spec = context.spec
+        self._agent = context.agent
+        self._baseline = context.baseline
+        self._simulator = context.simulator
+        self._perception = context.perception
+        self._protocol = context.protocol
+        self._seed = context.seed
+        self._perception_seed = context.perception_seed
+        self._observer = context.observer
+        self._stage = self._spec.stages[record.stage - 1]
         self._record = record
         self._requested = requested
         self._sensing = Sensing()
         self._planner = motion.Planner(self._simulator)
         self._stopwatch = stopwatch
-        self._staleness = StalenessTracker((), "", (), carried.tracked, 1)
+        self._staleness = StalenessTracker((), "", (), state.tracked, 1)
         self._memory_at_start: MemoryRecord | None = None
         self._beliefs: Sequence[EntryBelief] | None = None
-        """Of the last round, if they were asked for."""
+        """The agent's entries after the last round, if they were read."""
         self._trace: list[RoundRecord] = []
         self.failure: ErrorKind | None = None
-        """Why the stage could not be finished."""
+        """Cause of the failure, if the stage failed."""
         self.traceback = ""
 
     def run(self) -> StageRecord:
-        """The stage's record; where it fails, `failure` and `traceback` say why."""
+        """Run the stage and return its record; if it fails, `failure` and `traceback` hold the cause."""
         try:
             with attribute_errors(ErrorKind.HARNESS):
                 self._start()
                 if self._stage.guided is not None:
-                    return self._forced(self._stage.guided)
+                    return self._guided(self._stage.guided)
                 with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
                     reference_m = self._path_to_target_m()
                 progress = self._begin(self._protocol.budget(self._sensing), reference_m)
@@ -118,7 +118,7 @@ class Stage:
             return as_errored(self._with_trace(self._record), failure.kind, str(failure))
 
     def _start(self) -> None:
-        """Loads the stage's house, puts the agent where it ended, and tells it the goal."""
+        """Load the stage's house, place the agent, and send it the goal."""
         stage = self._record.stage
         with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
             start = self._simulator.reset(self._stage.house_json, self._requested)
@@ -156,7 +156,7 @@ class Stage:
         room_id = self._record.transition.room_id
         if room_id is None:
             return False
-        house = self._case.parsed_house(self._record.stage)
+        house = self._spec.parsed_house(self._record.stage)
         return house.room_of(self._requested.x_m, self._requested.z_m) == room_id
 
     def _tell_goal(self) -> None:
@@ -165,8 +165,8 @@ class Stage:
         if not self._state.has_begun:
             self._agent.begin_task(
                 TaskInfo(
-                    task_id=self._case.task_id,
-                    num_stages=len(self._case.stages),
+                    task_id=self._spec.task_id,
+                    num_stages=len(self._spec.stages),
                     max_rounds=self._protocol.budget(self._sensing),
                     map_frame=map_frame(self._simulator.occupancy()),
                     seed=self._seed,
@@ -179,13 +179,13 @@ class Stage:
             self._baseline.reveal_target(self._stage.target.position_m)
 
     def _granted(self) -> Sensing:
-        """What the agent asks of its sensors, within the protocol."""
+        """Return the agent's sensor settings, checked against the protocol."""
         sensing = self._agent.sensing
         self._protocol.check(sensing)
         return sensing
 
     def _path_to_target_m(self) -> list[motion.Point2]:
-        """The planner's path from where the agent stands to the target; empty when there is none."""
+        """Return the planner's path from the agent to the target; empty if there is none."""
         x_m, _, z_m = self._stage.target.position_m
         return self._planner.path_m((x_m, z_m))
 
@@ -224,12 +224,12 @@ class Stage:
                 return action.reason
         return None
 
-    def _forced(self, forced: GuidedWalk) -> StageRecord:
-        """Walks the reference trajectory; the agent is asked in every round as in any stage, and not heeded."""
+    def _guided(self, walk: GuidedWalk) -> StageRecord:
+        """Follow the reference path; the agent's actions are recorded but ignored."""
         sensors = self._sensors()
         is_stepwise = self._sensing.motion == "actions"
         travel_m = self._protocol.waypoint_m if is_stepwise else self._protocol.max_travel_m
-        legs = motion.legs(forced.path_m, travel_m)
+        legs = motion.legs(walk.path_m, travel_m)
         progress = self._begin(len(legs) + 1, ())
         while not progress.is_over:
             number = progress.num_steps
@@ -243,7 +243,7 @@ class Stage:
             if number < len(legs):
                 is_last = number + 1 == len(legs)
                 with attribute_errors(ErrorKind.SIMULATION), self._stopwatch.timing("simulation"):
-                    done = motion.walk(self._simulator, legs[number], forced.end.yaw_rad if is_last else None)
+                    done = motion.walk(self._simulator, legs[number], walk.end.yaw_rad if is_last else None)
             progress.advance(done.length_m, is_stop=False)
             self._end_round(number, sensors.pose, action, done)
             if not done.is_success:
@@ -257,7 +257,7 @@ class Stage:
 
     def _sensors(self) -> Sensors:
         scene = StageScene(
-            task_id=self._case.task_id,
+            task_id=self._spec.task_id,
             goal=self._stage.public,
             agent=self._record.agent,
             seed=self._perception_seed,
@@ -267,7 +267,7 @@ class Stage:
             return Sensors(self._simulator, self._perception, self._sensing, scene, self._staleness, self._stopwatch)
 
     def _answer(self, observation: Observation) -> AgentAction:
-        """What the agent answers to what it is given."""
+        """Return the agent's action for an observation."""
         if self._observer is not None:
             self._observer.round_begins(observation)
         with attribute_errors(ErrorKind.AGENT), self._stopwatch.timing("agent"):
@@ -308,7 +308,7 @@ class Stage:
 
     def _round_record(self, number: int, pose: Pose, action: AgentAction, done: motion.Motion) -> RoundRecord:
         with attribute_errors(ErrorKind.AGENT):
-            told = self._agent.diagnostics()
+            diagnostics = self._agent.diagnostics()
             return RoundRecord(
                 round=number,
                 pose=pose_record(pose),
@@ -316,12 +316,12 @@ class Stage:
                 path_m=done.path_m,
                 is_action_success=done.is_success,
                 is_target_visible=self._staleness.is_target_visible,
-                choice=told.choice,
-                chosen_entry=None if told.chosen_entry is None else self._entry_record(told.chosen_entry),
-                num_entries=told.num_entries,
-                num_frontiers=told.num_frontiers,
-                counters=dict(told.counters),
-                details=dict(told.details),
+                choice=diagnostics.choice,
+                chosen_entry=None if diagnostics.chosen_entry is None else self._entry_record(diagnostics.chosen_entry),
+                num_entries=diagnostics.num_entries,
+                num_frontiers=diagnostics.num_frontiers,
+                counters=dict(diagnostics.counters),
+                details=dict(diagnostics.details),
             )
 
     def _measured(
@@ -359,7 +359,7 @@ class Stage:
         )
 
     def _with_memory(self, record: StageRecord) -> StageRecord:
-        """The record with what the agent holds at the end, judged."""
+        """Return the record with the agent's memory at the end, compared with the house."""
         with attribute_errors(ErrorKind.AGENT):
             beliefs = self._entries() if self._beliefs is None else self._beliefs
         if beliefs is None:

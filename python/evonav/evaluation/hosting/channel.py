@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 MAX_LOG_BYTES = 10_000_000
-"""Of an episode; what an agent prints beyond is dropped, and the log says so."""
+"""Largest log of an episode; further output is dropped, and the log says so."""
 _MAX_LINE_BYTES = 65536
 _ALIGN = 64
 
@@ -32,7 +32,7 @@ class SharedBlock:
         self._map: mmap.mmap | None = None
 
     def write(self, buffers: Sequence[pickle.PickleBuffer]) -> list[tuple[int, int]]:
-        """Copies buffers into it. Returns offset and size of each."""
+        """Copy buffers into the shared memory, and return offset and size of each."""
         views = [buffer.raw() for buffer in buffers]
         places, end = [], 0
         for view in views:
@@ -53,7 +53,7 @@ class SharedBlock:
         return places
 
     def close(self) -> None:
-        """Gives it back; the reader keeps what it has."""
+        """Release the shared memory; the reader keeps its own."""
         if self._map is not None:
             self._map.close()
         os.close(self.descriptor)
@@ -73,18 +73,18 @@ class OutputLog:
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def begin(self) -> None:
-        """After the process was started, or was not."""
+        """Close the descriptors of the child, after it was started or failed to start."""
         os.close(self.descriptor)
         self._thread.start()
 
     def begin_part(self, label: str) -> None:
-        """From here on, lines are of this."""
+        """Set the label of subsequent log lines."""
         if label != self._label:
             self._label = label
             self._left = MAX_LOG_BYTES
 
     def end(self) -> None:
-        """Waits a little for the last words."""
+        """Wait shortly for the last output."""
         self._thread.join(timeout=1.0)
 
     def _run(self) -> None:

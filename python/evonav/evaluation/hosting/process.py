@@ -31,9 +31,9 @@ from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
 
 LOG_NAME = "agents.log"
-"""In a run's folder: all that agents have printed."""
+"""File in a run's folder with everything that agents printed."""
 LOAD_TIMEOUT_S = 300.0
-"""At least, for an agent's module to be imported."""
+"""Shortest limit for importing an agent's module."""
 IS_SUPPORTED = os.name == "posix"
 """Elsewhere agents run in the evaluator's process."""
 MAX_PROCESSES = 8
@@ -42,7 +42,7 @@ MAX_ANSWER_BYTES = 2 * wire.MAX_ENTRIES_BYTES
 _PART_BYTES = 1 << 18
 _LONGEST_WAIT_S = 3600.0
 _POLL_S = 0.05
-"""Between looks whether a process lives, where the system cannot be asked to tell."""
+"""Time between two checks that a process lives, on systems that cannot notify."""
 _START = (
     "import sys; sys.path[:] = sys.argv[4:]; from evonav.agents.serving import main; main(*map(int, sys.argv[1:4]))"
 )
@@ -50,12 +50,12 @@ _START = (
 
 @dataclass(frozen=True, slots=True)
 class AgentHosting:
-    """Where agents run; no part of what makes runs the same."""
+    """Settings of agents' processes; they are no part of a run's identity."""
 
     is_in_process: bool = False
-    """In the evaluator's own process, where nothing is contained but exceptions."""
+    """Run agents in the evaluator's own process, where only exceptions are contained."""
     timeout_s: float = 600.0
-    """For an answer; then the process is ended."""
+    """Longest time for an answer; then the process is ended."""
     memory_mb: int | None = None
     """Address space that an agent's process may have."""
     log: str | None = None
@@ -102,7 +102,7 @@ class AgentProcess:
             if descriptor is not None:
                 self._poll.register(descriptor, select.POLLIN)
         self._num_asked = 0
-        self._is_asking = False
+        self._is_waiting = False
         self._is_closed = False
         try:
             self.ask("load", name, hosting.memory_mb, timeout_s=max(hosting.timeout_s, LOAD_TIMEOUT_S))
@@ -113,7 +113,7 @@ class AgentProcess:
     @property
     def is_usable(self) -> bool:
         """Whether it lives and waits for a request."""
-        return not self._is_closed and not self._is_asking and self._process.poll() is None
+        return not self._is_closed and not self._is_waiting and self._process.poll() is None
 
     @property
     def memory_mb(self) -> float | None:
@@ -139,7 +139,7 @@ class AgentProcess:
         """
         timeout_s = timeout_s or self._hosting.timeout_s
         deadline_s = time.monotonic() + timeout_s
-        self._is_asking = True
+        self._is_waiting = True
         try:
             self._send(operation, arguments, deadline_s)
             cpu_s, parts = wire.read_answer(self._message(deadline_s), self._num_asked)
@@ -152,7 +152,7 @@ class AgentProcess:
             self.close(is_at_once=True)
             message = died or f"malformed response: {clean(str(error))}"
             raise AgentFailedError(ErrorKind.CRASH, message) from None
-        self._is_asking = False
+        self._is_waiting = False
         self.cpu_s = cpu_s
         if (failure := parts.get("failure")) is not None:
             raise failure_of(failure)
@@ -167,7 +167,7 @@ class AgentProcess:
         self._connection.sendall(LENGTH.pack(len(request)) + request)
 
     def _message(self, deadline_s: float) -> bytes:
-        """One message, and nothing after it."""
+        """Read one message, with nothing after it."""
         data, size = bytearray(), LENGTH.size
         while len(data) < size:
             self._wait(deadline_s)
@@ -184,7 +184,7 @@ class AgentProcess:
         return bytes(data[LENGTH.size :])
 
     def _wait(self, deadline_s: float) -> None:
-        """Waits for something to read; not for what a child of a dead agent might still send."""
+        """Wait for something to read, but not for output of a dead agent's children."""
         while True:
             left_s = deadline_s - time.monotonic()
             if left_s <= 0.0:
@@ -214,7 +214,7 @@ class AgentProcess:
             return
         self._is_closed = True
         self._connection.close()
-        if not is_at_once and not self._is_asking:
+        if not is_at_once and not self._is_waiting:
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(timeout=2.0)
         # Its group may live on in a process that it started.
@@ -233,7 +233,7 @@ class AgentProcesses:
     """A worker's processes, by the name of the agent."""
 
     def __init__(self, hosting: AgentHosting) -> None:
-        """Starts nothing yet."""
+        """Remember the settings; processes start when they are needed."""
         self.hosting = hosting
         self._processes: dict[str, AgentProcess] = {}
 
@@ -253,7 +253,7 @@ class AgentProcesses:
         return process
 
     def close(self) -> None:
-        """Ends all; safe to call twice."""
+        """End all processes; safe to call twice."""
         while self._processes:
             self._processes.popitem()[1].close()
 

@@ -15,11 +15,11 @@ from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.statistics import ClusterBootstrap, Interval
 
 RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
-"""Of the sweep over success radii."""
+"""Radii at which success is computed."""
 
 Unit = Literal["%", "", "m", "rounds", "s", "$", "MB"]
 Part = tuple[float, float] | None
-"""What a stage adds to numerator and denominator; `None` where the measure does not apply."""
+"""A stage's contribution to numerator and denominator; `None` if the metric does not apply."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ def _radius(radius_m: float) -> Callable[[StageMetrics], Part]:
 
 
 def _clearing(name: str, count: str) -> Callable[[StageMetrics], Part]:
-    """A stage's mean over what it counted, weighted by the count."""
+    """Return a stage's mean, weighted by its count."""
 
     def part(row: StageMetrics) -> Part:
         value, num = getattr(row, name), getattr(row, count)

@@ -134,7 +134,7 @@ class RecordMetrics:
     position_error_m: float | None
     num_entries_at_start: int | None
     precision_at_start: float | None
-    """The precision at the start, after the agent received the goal: from stage 2 on it shows the cost of the change."""
+    """The precision at the start, when the agent knows the goal: from stage 2 on it shows the cost of the change."""
     recall_at_start: float | None
 
 
@@ -143,7 +143,7 @@ class StageMetrics(StageCosts, RecordMetrics):
     """A stage as one row: the metrics of its record, changes since the stage before, and costs."""
 
     precision_before: float | None
-    """Precision at the end of the stage before, in that stage's house; the change costs its difference to `precision_at_start`."""
+    """Precision at the end of the stage before, in its house; `precision_at_start` is less by what the change cost."""
     num_decisions: int | None
     """Questions that the agent's model answered in this stage, or rounds in which it decided; its own counter."""
     num_failed_decisions: int | None

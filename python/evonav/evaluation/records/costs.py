@@ -10,7 +10,7 @@ from typing import Literal
 Part = Literal["simulation", "perception", "agent"]
 
 LEVELS = ("agent_peak_rss_mb",)
-"""Fields that are no sums: a stage has the latest value of the agent's process, not the difference to an earlier one."""
+"""Fields that are no sums: a stage has the latest value of the agent's process, not the difference to before."""
 
 
 @dataclass(frozen=True, kw_only=True)
