@@ -12,7 +12,6 @@ WORDS = {
     "noisy:poor,miss_rate=0.3,features=false": (NOISY, {"preset": "poor", "miss_rate": 0.3, "features": False}),
     "noisy,confusion=own.toml": (NOISY, {"confusion": "own.toml"}),
     "predicted:unigoal": (PREDICTED, {"stack": "unigoal"}),
-    "predicted,device=cpu": (PREDICTED, {"stack": "auto", "device": "cpu"}),
     "mine.sight:Sight,far_m=3": ("mine.sight:Sight", {"far_m": 3}),
 }
 
@@ -22,6 +21,12 @@ def test_words_say_what_is_made_and_can_be_said_again(word: str) -> None:
     read = read_word(word)
     assert (read.path, dict(read.options)) == WORDS[word]
     assert word_of(read.path, read.options) == word
+
+
+def test_a_device_is_no_part_of_what_is_recorded() -> None:
+    read = read_word("predicted:unigoal,device=cpu")
+    assert (read.options, read.host_options) == ({"stack": "unigoal"}, {"device": "cpu"})
+    assert word_of(read.path, read.options) == "predicted:unigoal"
 
 
 def test_options_go_before_those_of_the_word() -> None:
