@@ -29,7 +29,7 @@ published `procthor` package, which asks Unity about every collision (docs/proct
 A task is some 17 small files, and the file system's own time for them counts: `TMPDIR=/dev/shm` leaves it out.
 """
 HISTORY = Path(os.environ.get("EVONAV_DATA", "")) / "ram81-procthor-100k-history"
-"""Of the data sets that CONTRIBUTING.md lists; without them there is no row."""
+"""Folder of a data set that CONTRIBUTING.md lists; without it, its rows are left out."""
 SOURCES = {
     "bundled, 1-10 rooms": (Path(str(files("evonav") / "data" / "houses.jsonl.gz")), 1000),
     "attr-onav-1k, 2-3 rooms": (HISTORY / "attr-onav-1k-train-1000.jsonl.gz", 1000),

@@ -1,7 +1,4 @@
-"""Perception by models: a detector's findings, filtered, one label a pixel, called by ProcTHOR's types.
-
-Nothing of the simulator but colours and depth goes in: neither instances nor the scene's objects are looked at.
-"""
+"""Perceive with a stack of models, named on the command line and loaded once in each process."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,21 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import InvalidArgumentError
-from evonav.perception.detector import Detector, DetectorView, Embedder, Found
 from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.perception import Percept, Perception, StageScene
 from evonav.perception.stacks import STACKS, StackConfig, StackName, facts_of, load_stack, stack_of
 from evonav.world.simulator import Frame
-
-__all__ = [
-    "Detector",
-    "DetectorPerception",
-    "DetectorView",
-    "Embedder",
-    "Found",
-    "StackPerception",
-    "predicted_perception",
-]
 
 
 @dataclass(slots=True)

@@ -85,8 +85,8 @@ impl<'a> Surroundings<'a> {
 /// Return the relations of object `index` to its support, at most two neighbours, one part of the
 /// room and one object on the wall.
 ///
-/// Of the anchors within the thresholds, those are chosen with which the instruction applies to the
-/// fewest other objects; among equals the nearest. Anchors have other categories than the target,
+/// Chooses, among the anchors within the thresholds, those with which the instruction applies to the
+/// fewest other objects, and the nearest among equals. Anchors have other categories than the target,
 /// and each category occurs once, because an instruction names only categories.
 ///
 /// # Arguments
