@@ -14,7 +14,7 @@ from evonav.evaluation.run.components import Backend
 from evonav.house import bundled_houses
 from evonav.perception import Perception, StageScene
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.perception.words import read_word
+from evonav.perception.shorthand import read_word
 from evonav.tasks.public import StageInput
 from evonav.world.embedded import EmbeddedSimulator
 from evonav.world.pose import Pose

@@ -18,7 +18,7 @@ from results import PAGE, pooled_tasks, run_agents, spread, with_part
 from evonav.evaluation.metrics.navigation import AgentSummary, house_of
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
-from evonav.perception.words import read_word
+from evonav.perception.shorthand import read_word
 from evonav.report.paper.tables import PAPER, PaperResult
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line

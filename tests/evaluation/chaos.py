@@ -19,7 +19,7 @@ from pathlib import Path
 
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 
-VICTIMS = {"driver": None, "worker": "multiprocessing.spawn", "agent": "evonav.agents.serving"}
+VICTIMS = {"driver": None, "worker": "multiprocessing.spawn", "agent": "evonav.agents.hosting.serving"}
 
 
 def children(pid):

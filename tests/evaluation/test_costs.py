@@ -1,6 +1,6 @@
 import pytest
 
-from evonav.agents import wire
+from evonav.agents.hosting import wire
 from evonav.decision.metered import Metered
 from evonav.decision.question import Reply
 from evonav.decision.vlm.account import Account, Price, Usage

@@ -152,7 +152,7 @@ def test_no_path_of_tasks_or_records_is_told_to_an_agents_process(process_loot):
 
 def test_an_agents_process_loads_nothing_of_the_evaluator(process_loot):
     modules = process_loot["modules"]
-    assert "evonav.agents.serving" in modules
+    assert "evonav.agents.hosting.serving" in modules
     assert not [name for name in modules if name.startswith(FORBIDDEN) or name == "toy_house"]
 
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evonav.agents import wire
 from evonav.agents.agent import EntryBelief, Move, NavigateTo, RoundDiagnostics, Sensing, Stop, ViewSchedule
+from evonav.agents.hosting import wire
 from evonav.errors import InvalidArgumentError
 from evonav.world.simulator import Action
 

@@ -59,11 +59,11 @@ def test_no_string_names_a_module_of_a_higher_layer() -> None:
 @pytest.mark.parametrize(
     ("module", "text", "num_found"),
     [
-        ("evonav.perception.words", 'MAKE = "evonav.evaluation.run.components:ground_truth"', 1),
-        ("evonav.perception.words", 'MAKE = "evonav.perception.simulated:noisy_perception"', 0),
-        ("evonav.agents.wire", 'OURS = ("evonav.evaluation.", "evonav.agents.wire")', 1),
+        ("evonav.perception.shorthand", 'MAKE = "evonav.evaluation.run.components:ground_truth"', 1),
+        ("evonav.perception.shorthand", 'MAKE = "evonav.perception.simulated:noisy_perception"', 0),
+        ("evonav.agents.hosting.wire", 'OURS = ("evonav.evaluation.", "evonav.agents.hosting.wire")', 1),
         ("evonav.evaluation.run.components", 'MAKE = "evonav.perception.simulated:noisy_perception"', 0),
-        ("evonav.perception.words", '"""Words of `evonav.evaluation.run`."""', 0),
+        ("evonav.perception.shorthand", '"""Words of `evonav.evaluation.run`."""', 0),
     ],
 )
 def test_import_paths_in_strings_are_found(module: str, text: str, num_found: int) -> None:

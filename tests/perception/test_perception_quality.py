@@ -15,7 +15,7 @@ from evonav.cli import app
 from evonav.component import Component
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.run.components import Backend
-from evonav.perception.words import GROUND_TRUTH
+from evonav.perception.shorthand import GROUND_TRUTH
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
 from evonav.perception_benchmark.page import write_perception_report
 from evonav.perception_benchmark.records import read_record, read_records, record_path

@@ -21,6 +21,7 @@ from evonav.perception.detector import Found, nothing_found
 from evonav.perception.detector_perception import DetectorPerception
 from evonav.perception.filters import FilterConfig
 from evonav.perception.predicted import StackPerception, predicted_perception
+from evonav.perception.shorthand import read_word
 from evonav.perception.stacks import EVERYTHING, JointDetector, StackConfig, SwappedColours, stack_of, weights_of
 from evonav.perception.vocabulary import (
     COCO_UNIGOAL,
@@ -31,7 +32,6 @@ from evonav.perception.vocabulary import (
     TYPE_OF_WORD,
     type_of_word,
 )
-from evonav.perception.words import read_word
 from evonav.sensors.observation import Detections
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import task_files

@@ -8,7 +8,7 @@ from browser import Chromium, needs_browser
 
 from evonav.component import Component
 from evonav.perception.ground_truth import GroundTruthPerception
-from evonav.perception.words import GROUND_TRUTH
+from evonav.perception.shorthand import GROUND_TRUTH
 from evonav.perception_benchmark.benchmark import PerceptionSpec, TourConfig, measure
 from evonav.perception_benchmark.page import write_perception_report
 from evonav.tasks.bundled import bundled_tasks

@@ -3,7 +3,7 @@
 import perception_results as script
 from made_up_run import WriteRun
 
-from evonav.perception.words import read_word
+from evonav.perception.shorthand import read_word
 from evonav.report.run import load_run
 
 

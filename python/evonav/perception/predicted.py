@@ -76,7 +76,7 @@ def predicted_perception(
     """Make the perception `predicted[:STACK]`.
 
     Args:
-        stack: One of `evonav.perception.words.STACKS`; `auto`: UniGoal's for UniGoal, 3D-Mem's for all others.
+        stack: One of `evonav.perception.shorthand.STACKS`; `auto`: UniGoal's for UniGoal, 3D-Mem's for all others.
         models: Folder of weights; default: `EVONAV_MODELS`, else the libraries' own hubs.
         device: `auto`, `cpu`, `cuda` or `cuda:N`.
         options: See `evonav.perception.stacks.StackConfig`; of `mini`, which needs neither models nor a device,

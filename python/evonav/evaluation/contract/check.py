@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from evonav.agents.agent import Agent, Sensing
-from evonav.agents.error_text import describe
+from evonav.agents.hosting.error_text import describe
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.evaluation.contract.probe import Probe
 from evonav.evaluation.episode.episode import Episode

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-from evonav.agents import error_text
+from evonav.agents.hosting import error_text
 from evonav.errors import DecisionError, SimulationError, SimulatorLostError
 from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.records.schema import ErrorKind, RoundRecord

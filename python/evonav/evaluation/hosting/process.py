@@ -1,10 +1,10 @@
 """Agents in processes of their own: they cannot reach oracle data, and what they break is theirs.
 
-A process serves agents of one name, a fresh object an episode (`evonav.agents.serving` is its side). Observations go
-there pickled, their arrays through one block of shared memory; answers come back as JSON (`evonav.agents.wire`), and
-nothing that an agent says is unpickled or believed to be well-formed. The process inherits no descriptor but three and
-its output, is given no path but those of its decision model's files, and leads a process group, so that what an agent
-has started ends with it.
+A process serves agents of one name, a fresh object an episode (`evonav.agents.hosting.serving` is its side).
+Observations go there pickled, their arrays through one block of shared memory; answers come back as JSON
+(`evonav.agents.hosting.wire`), and nothing that an agent says is unpickled or believed to be well-formed. The process
+inherits no descriptor but three and its output, is given no path but those of its decision model's files, and leads a
+process group, so that what an agent has started ends with it.
 
 This is no sandbox: an agent that goes looking can read what this user can read. For that, run evonav in a container.
 """
@@ -21,9 +21,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from evonav.agents import wire
-from evonav.agents.error_text import clean
-from evonav.agents.serving import LENGTH
+from evonav.agents.hosting import wire
+from evonav.agents.hosting.error_text import clean
+from evonav.agents.hosting.serving import LENGTH
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode.errors import AgentFailedError
 from evonav.evaluation.hosting.channel import OutputLog, SharedBlock
@@ -44,7 +44,8 @@ _LONGEST_WAIT_S = 3600.0
 _POLL_S = 0.05
 """Time between two checks that a process lives, on systems that cannot notify."""
 _START = (
-    "import sys; sys.path[:] = sys.argv[4:]; from evonav.agents.serving import main; main(*map(int, sys.argv[1:4]))"
+    "import sys; sys.path[:] = sys.argv[4:]; "
+    "from evonav.agents.hosting.serving import main; main(*map(int, sys.argv[1:4]))"
 )
 
 

@@ -15,7 +15,7 @@ from evonav.evaluation.episode.oracle_baselines import ORACLE_BASELINES, new_ora
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.hosting.process import check_importable
 from evonav.perception import Perception
-from evonav.perception.words import GROUND_TRUTH
+from evonav.perception.shorthand import GROUND_TRUTH
 from evonav.world.simulator import Simulator
 
 TASK_FILES: Component[EpisodeSpec] = Component("evonav.evaluation.run.components:load_case")

@@ -22,7 +22,7 @@ from evonav.evaluation.run.worker import WORK, EpisodeJob, WorkerConfig
 from evonav.parallel.folders import check_same_run, write_atomically, writing
 from evonav.parallel.pool import EngineName, open_pool
 from evonav.parallel.worker import Resources
-from evonav.perception.words import word_of
+from evonav.perception.shorthand import word_of
 from evonav.tasks.listing import TaskFile
 
 __all__ = [

@@ -17,7 +17,7 @@ from evonav.decision.vlm.client import Mode
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.perception import Perception
-from evonav.perception.words import PREDICTED, read_word
+from evonav.perception.shorthand import PREDICTED, read_word
 from evonav.tasks.records import Record
 from evonav.world.simulator import Simulator
 

@@ -17,8 +17,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from evonav.agents import error_text
 from evonav.agents.agent import Agent, AgentAction, Sensing
+from evonav.agents.hosting import error_text
 from evonav.errors import HouseError
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.observer import LOSSES

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from evonav.evaluation.records.schema import EndState
-from evonav.perception.words import word_of
+from evonav.perception.shorthand import word_of
 from evonav.report.run import Run
 
 MAX_LISTED = 12

@@ -1,9 +1,9 @@
-"""Perceptions as people name them on the command line and in sweep files: a word to an import path and its keywords.
+"""Read and write the short names of perceptions on the command line and in sweep files.
 
 gt                               the simulator's masks and labels
 noisy[:PRESET][,KEY=VALUE...]    ground truth with simulated errors: `noisy:poor,miss_rate=0.3`
-predicted[:STACK][,KEY=VALUE...] models: `predicted`, `predicted:unigoal`
-MODULE:FUNCTION[,KEY=VALUE...]   one's own
+predicted[:STACK][,KEY=VALUE...] detections of models: `predicted`, `predicted:unigoal`
+MODULE:FUNCTION[,KEY=VALUE...]   a perception of your own
 """
 
 import json
@@ -23,20 +23,20 @@ PREDICTED = "evonav.perception.predicted:predicted_perception"
 STACKS = ("auto", "3d-mem", "unigoal", "transformers", "mini")
 """Stacks of models; `auto`: UniGoal's for UniGoal, 3D-Mem's for all others."""
 _HOST_OPTIONS = ("models", "device")
-"""Options that depend on this machine: where models' weights lie and what they compute on."""
+"""Options that depend on this machine: the folder of the models' weights, and the device."""
 NAMES = ("gt", "noisy", "predicted")
 GRAMMAR = "gt, noisy[:PRESET][,KEY=VALUE...], predicted[:STACK][,KEY=VALUE...] or module:function"
 
 
 def read_word(word: str, options: Mapping[str, Any] | None = None) -> "Component[Perception]":
-    """Return how to build the perception that a word names.
+    """Return the component of the perception with a short name.
 
     Args:
-        word: See above. A value is JSON or plain words.
-        options: More keywords, as a sweep file's table gives them; they go before the word's own.
+        word: The short name, see the module. A value is JSON, or else a string.
+        options: Further keywords, such as those of a sweep file's table; they override those of the short name.
 
     Raises:
-        InvalidArgumentError: There is no such perception, preset, stack or key, or a value is outside its domain.
+        InvalidArgumentError: There is no such perception or stack, or a keyword is malformed.
     """
     head, *parts = word.strip().split(",")
     kind, colon, variant = (text.strip() for text in head.partition(":"))
@@ -62,7 +62,7 @@ def read_word(word: str, options: Mapping[str, Any] | None = None) -> "Component
 
 
 def word_of(make: str, options: Mapping[str, Any]) -> str:
-    """Return the word for a perception of a run's records: the reverse of `read_word`."""
+    """Return the short name of the perception in a run's records: the inverse of `read_word`."""
     left = dict(options)
     head = {GROUND_TRUTH: "gt", NOISY: "noisy", PREDICTED: "predicted"}.get(make, make)
     variant = left.pop("preset", None) if make == NOISY else left.pop("stack", None) if make == PREDICTED else None

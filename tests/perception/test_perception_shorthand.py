@@ -3,7 +3,7 @@
 import pytest
 
 from evonav.errors import InvalidArgumentError
-from evonav.perception.words import GROUND_TRUTH, NOISY, PREDICTED, read_word, word_of
+from evonav.perception.shorthand import GROUND_TRUTH, NOISY, PREDICTED, read_word, word_of
 
 WORDS = {
     "gt": (GROUND_TRUTH, {}),

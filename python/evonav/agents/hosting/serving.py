@@ -1,8 +1,8 @@
-"""The life of an agent's process: it makes agents of one name and answers for them until the evaluator hangs up.
+"""Run an agent's process: make agents of one name and answer requests until the evaluator closes the connection.
 
-Started by `evonav.evaluation.hosting.process`. Requests are pickled (they come from the evaluator, who is trusted),
-with arrays in one block of shared memory from which they are copied, so that an agent may keep and change them. Answers
-are JSON. The process is given no path of a task and imports nothing that reads one.
+`evonav.evaluation.hosting.process` starts the process. Requests come from the evaluator, who is trusted, so they are
+pickled. Their arrays are copied out of one block of shared memory, so that an agent may keep and change them. Answers
+are JSON. The process gets no path of a task and imports nothing that reads one.
 """
 
 import ctypes
@@ -20,9 +20,9 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, Literal
 
-from evonav.agents import wire
 from evonav.agents.agent import Agent, ExplainingAgent
-from evonav.agents.error_text import clean, describe, traceback_of
+from evonav.agents.hosting import wire
+from evonav.agents.hosting.error_text import clean, describe, traceback_of
 from evonav.agents.registry import agent_factory, new_agent
 from evonav.component import import_callable
 from evonav.decision.metered import Metered
@@ -33,11 +33,11 @@ LENGTH = struct.Struct("<Q")
 
 
 def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
-    """Serves on the inherited descriptors.
+    """Serve requests on the inherited descriptors.
 
     Args:
-        socket_fd: Where requests come from and answers go.
-        life_fd: A pipe that the evaluator closes by dying, if by nothing else.
+        socket_fd: Socket that brings requests and takes answers.
+        life_fd: Pipe that is closed when the evaluator ends, however it ends.
         block_fd: The shared memory.
     """
     for descriptor in (socket_fd, life_fd, block_fd):
@@ -51,9 +51,9 @@ def main(socket_fd: int, life_fd: int, block_fd: int) -> None:
 
 
 def _end_with_parent(life_fd: int) -> None:
-    """Make this process ignore interrupts and end with the evaluator, also in the middle of a request."""
+    """Ignore interrupts, and end this process with the evaluator, also in the middle of a request."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform == "linux":  # also while an agent holds the interpreter's lock
+    if sys.platform == "linux":  # works even while an agent holds the interpreter's lock
         with suppress(OSError, AttributeError):
             ctypes.CDLL(None).prctl(1, signal.SIGKILL)
 
@@ -73,7 +73,7 @@ def _end_group() -> None:
 
 
 class _Block:
-    """The shared memory, from the reader's side."""
+    """The reader's side of the shared memory."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
@@ -97,12 +97,12 @@ def _serve(connection: socket.socket, block: _Block) -> None:
         request = _received(connection)
         if request is None:
             return
-        number, places, message = pickle.loads(request)  # noqa: S301 - of the evaluator
+        number, places, message = pickle.loads(request)  # noqa: S301 - from the evaluator
         operation, arguments = pickle.loads(message, buffers=block.copies(places))  # noqa: S301
         parts = server.answer(operation, arguments)
         del arguments
         if os.getpid() != pid:
-            os._exit(1)  # a fork that an agent made and that came back: there is one answer, its parent's
+            os._exit(1)  # an agent forked and the child returned: only the parent answers
         for stream in (sys.stdout, sys.stderr):
             with suppress(Exception):  # an agent may have closed or replaced it
                 stream.flush()
@@ -111,12 +111,13 @@ def _serve(connection: socket.socket, block: _Block) -> None:
 
 
 def _received(connection: socket.socket) -> bytearray | None:
-    """Return the next message; `None` at the end."""
+    """Return the next message; `None` at the end of the connection."""
     header = _exactly(connection, LENGTH.size)
     return None if header is None else _exactly(connection, LENGTH.unpack(header)[0])
 
 
 def _exactly(connection: socket.socket, size: int) -> bytearray | None:
+    """Return the next `size` bytes; `None` if the connection ends first."""
     data = bytearray(size)
     with memoryview(data) as rest:
         done = 0
@@ -129,7 +130,7 @@ def _exactly(connection: socket.socket, size: int) -> bytearray | None:
 
 
 class _Server:
-    """The agent at work; answers are parts of a message, each already JSON."""
+    """Makes an agent and calls it; an answer is a set of named parts, each already JSON."""
 
     def __init__(self) -> None:
         self._factory: Callable[..., Agent] | None = None
@@ -137,7 +138,7 @@ class _Server:
         self._decision: Metered | None = None
 
     def answer(self, operation: str, arguments: tuple[Any, ...]) -> dict[str, bytes]:
-        """Execute a request; an exception of the agent is an answer too."""
+        """Execute a request; the answer to one that raises is a failure."""
         try:
             parts: dict[str, bytes] = getattr(self, f"do_{operation}")(*arguments)
         except DecisionError as error:
@@ -209,9 +210,9 @@ def _failed(kind: Literal["agent", "decision"], message: str, error: Exception) 
 
 
 def _peak_rss() -> dict[str, float]:
-    """Resident memory at its most; nothing where the system does not tell."""
+    """Return the peak of the resident memory; empty where the system does not report it."""
     try:
-        with open("/proc/self/status") as status:  # noqa: PTH123 - nothing of ours, and read often
+        with open("/proc/self/status") as status:  # noqa: PTH123 - a system file, read often
             found = next((line.split()[1] for line in status if line.startswith("VmHWM")), None)
     except OSError:
         found = None
@@ -219,7 +220,7 @@ def _peak_rss() -> dict[str, float]:
 
 
 def _limit_memory(memory_mb: int) -> None:
-    """Address space that the process may have; more is a `MemoryError`."""
+    """Limit the address space of this process; more raises `MemoryError`."""
     import resource
 
     resource.setrlimit(resource.RLIMIT_AS, (memory_mb << 20, memory_mb << 20))

@@ -11,7 +11,7 @@ MAX_TRACEBACK = 20_000
 NUM_FRAMES = 3
 """Number of places of a traceback, the innermost ones."""
 
-_OURS = ("evonav.agents.error_text", "evonav.agents.wire", "evonav.agents.serving")
+_OURS = ("evonav.agents.hosting.",)
 _ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")
 
 

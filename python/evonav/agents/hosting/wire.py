@@ -16,7 +16,7 @@ from pydantic import AfterValidator, Discriminator, FailFast, Field, Tag, TypeAd
 from pydantic_core import PydanticSerializationError, to_json, to_jsonable_python
 
 from evonav.agents.agent import AgentAction, EntryBelief, Move, NavigateTo, RoundDiagnostics, Sensing, Stop
-from evonav.agents.error_text import MAX_MESSAGE, MAX_TRACEBACK
+from evonav.agents.hosting.error_text import MAX_MESSAGE, MAX_TRACEBACK
 from evonav.errors import InvalidArgumentError
 from evonav.world.simulator import Action
 

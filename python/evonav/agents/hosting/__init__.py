@@ -1,0 +1,1 @@
+"""Serve an agent in a process of its own, and write its answers as JSON."""
