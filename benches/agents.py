@@ -17,7 +17,7 @@ import numpy as np
 from evonav.agents.agent import Agent, AgentAction, ExplainingAgent, NavigateTo, Stop
 from evonav.agents.registry import BUILT_IN
 from evonav.decision.question import Question, Reply
-from evonav.decision.text.decision import TextMatch
+from evonav.decision.text.matcher import TextMatch
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.sensors import Sensors
 from evonav.evaluation.episode.spec import EpisodeSpec

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from evonav.decision.text.features import similarity_of_label
 from evonav.decision.text.language import parse_goal
 from evonav.decision.text.matcher import Matcher
+from evonav.decision.text.ranking import similarity_of_label
 from evonav.evaluation.run.components import load_case
 from evonav.statistics import ClusterBootstrap
 from evonav.tasks.language import noun_of

@@ -6,12 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evonav.agents.frontier_update.questions import ChooseQuestion
-from evonav.agents.three_d_mem.candidates import SnapshotCandidate, SnapshotChoice
-from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
+from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotCandidate, SnapshotChoice, SnapshotQuestion
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.question import AnswerError
-from evonav.decision.text.decision import TextMatch
+from evonav.decision.text.matcher import TextMatch
 from evonav.tasks.public import StageInput
 
 CLASSES = tuple(sorted(("Apple", "Bed", "Chair", "CounterTop", "DiningTable", "Fridge", "Mug", "Sink")))

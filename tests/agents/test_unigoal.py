@@ -11,7 +11,7 @@ from toy_house import OBJECTS, ToySimulator, stage_case
 from evonav.agents.unigoal.agent import UniGoal, UniGoalAsPublished
 from evonav.agents.unigoal.bev import BevMap
 from evonav.agents.unigoal.scene_questions import GroupScoreQuestion, RelationLinesQuestion
-from evonav.decision.text.decision import TextMatch
+from evonav.decision.text.matcher import TextMatch
 from evonav.evaluation.episode.episode import Episode
 from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.protocol import ProtocolConfig

@@ -10,7 +10,7 @@ from evonav.agents.unigoal.object_graph import SceneNode
 from evonav.agents.unigoal.questions import DecomposeQuestion, DescribeQuestion, ObjectsQuestion
 from evonav.agents.unigoal.scene_questions import CorrectionQuestion, LayoutQuestion
 from evonav.decision.query import QuerySession
-from evonav.decision.text.decision import TextMatch
+from evonav.decision.text.matcher import TextMatch
 
 CHAIR_TEXT = "Please navigate to the chair next to the dining table."
 OBJECTS_NAMED = "[vase, table, chair]"

@@ -20,7 +20,7 @@ from evonav.agents.unigoal.scene_questions import (
     RoomQuestion,
 )
 from evonav.decision.question import AnswerError
-from evonav.decision.text.decision import TextMatch
+from evonav.decision.text.matcher import TextMatch
 from evonav.tasks.public import StageInput
 from evonav.tasks.vocabulary import CODE_CATEGORIES, MAP_CATEGORIES
 

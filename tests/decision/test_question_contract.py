@@ -13,7 +13,7 @@ from evonav.component import Component
 from evonav.decision.noisy import GARBAGE
 from evonav.decision.prompts import Picture, Text
 from evonav.decision.question import AnswerError, Question, Reply
-from evonav.decision.text.decision import TextMatch
+from evonav.decision.text.matcher import TextMatch
 from evonav.decision.vlm.decision import read_json, with_schema
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore

@@ -9,8 +9,7 @@ import pytest
 from evonav.agents.frontier_update.agent import FrontierUpdate, FrontierUpdateConfig
 from evonav.decision.candidates import ObjectCandidate
 from evonav.decision.text import minilm
-from evonav.decision.text.features import similarity_of_label, text_feature
-from evonav.decision.text.ranking import rank_by_text
+from evonav.decision.text.ranking import rank_by_text, similarity_of_label, text_feature
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.store import RunStore

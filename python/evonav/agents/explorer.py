@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.decision.candidates import Point2
 from evonav.memory import Frontier, FrontierConfig, OccupancyMap
 from evonav.memory.occupancy import FREE, UNKNOWN
 from evonav.sensors.observation import MapFrame, Observation
-
-Point2 = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,25 +4,18 @@ Specification: the common substrate of the paper's Sec. C.3 and C.4, with 3D-Mem
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from evonav.agents.agent import Belief, EntryBelief, FrontierBelief, NavigateTo, RoundDiagnostics
+from evonav.agents.agent import NavigateTo
 from evonav.agents.explorer import Explorer, ExplorerConfig
 from evonav.agents.viewpoint import observation_point
-from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels
-from evonav.decision.query import QueryLogEntry
+from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
 from evonav.memory import Frontier, ObjectMap, ObjectMapConfig
 from evonav.memory.objects import ObjectEntry
 from evonav.memory.occupancy import FREE
 from evonav.memory.views import StoredView, ViewStore, crop_of, pixels_of
 from evonav.sensors.observation import MapFrame, Observation
-
-Point2 = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,10 +126,6 @@ class Navigator:
         position_m, face_m = self.explorer.go_to(frontier)
         return NavigateTo(position_m, face_m=face_m)
 
-    def heading_view(self) -> Pixels | None:
-        """Return the heading view of the last round, for a prompt."""
-        return pixels_of(self.round_views[-1], self.config.image_px) if self.round_views else None
-
     def candidate(self, entry: ObjectEntry) -> ObjectCandidate:
         """Return an entry of the object memory as questions describe it, without images."""
         return ObjectCandidate(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)
@@ -173,51 +162,3 @@ class Navigator:
             if best is None or cost < best[0]:
                 best = (cost, view)
         return None if best is None else pixels_of(best[1], self.config.image_px)
-
-    def describe_round(
-        self, choice: str, entry_id: int | None, counters: Mapping[str, int], details: Mapping[str, Any]
-    ) -> RoundDiagnostics:
-        """Return a round's diagnostics.
-
-        Args:
-            choice: The agent's choice, in its own terms.
-            entry_id: The chosen entry, if the agent chose one.
-            counters: Cumulative counts.
-            details: Further JSON-ready values.
-        """
-        entry = None if entry_id is None else self.objects.entry(entry_id)
-        return RoundDiagnostics(
-            choice=choice,
-            chosen_entry=None if entry is None else belief_of(entry),
-            num_entries=len(self.objects),
-            num_frontiers=len(self.explorer.frontiers),
-            counters=dict(counters),
-            details=dict(details),
-        )
-
-    def beliefs(self) -> list[EntryBelief]:
-        """Return the object memory."""
-        return [belief_of(entry) for entry in self.objects.entries]
-
-    def belief(self, queries: Sequence[QueryLogEntry], candidate_ids: Sequence[int] = ()) -> Belief:
-        """Return everything that the agent believes, for pictures.
-
-        Args:
-            queries: The questions of the round with their answers.
-            candidate_ids: Ids of the entries that the last question offered.
-        """
-        cells: NDArray[np.uint8] = self.explorer.map.cells
-        return Belief(
-            entries=self.beliefs(),
-            candidate_ids=tuple(candidate_ids),
-            frontiers=[FrontierBelief(f.id, f.position_m, f.direction_rad) for f in self.explorer.frontiers],
-            cells=cells,
-            map_frame=self.explorer.map.map_frame,
-            queries=tuple(queries),
-            explored=self.explorer.map.explored,
-        )
-
-
-def belief_of(entry: ObjectEntry) -> EntryBelief:
-    """Return an entry as records state it."""
-    return EntryBelief(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)

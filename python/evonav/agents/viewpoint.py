@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.decision.candidates import Point2
 from evonav.sensors.observation import MapFrame
 
-Point2 = tuple[float, float]
 _NEIGHBOURS = ((-1, 0), (1, 0), (0, -1), (0, 1))
 
 

@@ -30,7 +30,7 @@ def text_match(seed: int, *, noise: Mapping[str, float] | None = None) -> Decisi
         seed: Seed of the agent.
         noise: Rates of mistakes, by the names of `NoiseRates`; all models accept them.
     """
-    from evonav.decision.text.decision import TextMatch
+    from evonav.decision.text.matcher import TextMatch
 
     return _with_noise(TextMatch(), noise, seed)
 
@@ -146,7 +146,7 @@ def counting(
     noise: Mapping[str, float] | None = None,
 ) -> DecisionModel:
     """Make a text matcher that notes in `ledger` what `vlm` would be asked with the same options; see `vlm`."""
-    from evonav.decision.text.decision import TextMatch
+    from evonav.decision.text.matcher import TextMatch
     from evonav.decision.vlm.client import VlmClient
     from evonav.decision.vlm.counting import Counting
     from evonav.decision.vlm.ledger import Ledger

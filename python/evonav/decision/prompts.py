@@ -1,6 +1,6 @@
 """Build prompts: text and images in turns."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -45,9 +45,9 @@ class Prompt:
     """JSON Schema that the answer must follow (`response_format`), for servers that support it."""
 
     @classmethod
-    def of(cls, *parts: Part) -> "Prompt":
-        """Create a prompt of one turn."""
-        return cls((Turn("user", parts),))
+    def of(cls, *parts: Part | str) -> "Prompt":
+        """Create a prompt of one turn; a string stands for a `Text`."""
+        return cls((Turn("user", tuple(Text(part) if isinstance(part, str) else part for part in parts)),))
 
     @property
     def parts(self) -> list[Part]:
@@ -70,23 +70,22 @@ class Prompt:
         return Prompt(turns, self.schema)
 
 
-def goal_parts(goal: StageInput) -> tuple[Part, ...]:
-    """Return the goal as the reported experiments give it: the unified instruction alone (paper, Sec. C.1)."""
-    return (Text(f"Goal of the robot: {goal.unified_instruction}"),)
+def goal_prompt(goal: StageInput, *contents: str | tuple[str, NDArray[np.uint8] | None]) -> Prompt:
+    """Return the prompt of a question about a goal.
 
+    The goal is the unified instruction alone, as in the reported experiments (paper, Sec. C.1).
 
-def titled(title: str, image: NDArray[np.uint8] | None) -> tuple[Part, ...]:
-    """Return a line, and the image that it describes if there is one."""
-    return (Text(title),) if image is None else (Text(title), Picture(image))
-
-
-def merged(parts: Iterable[Part]) -> tuple[Part, ...]:
-    """Join neighbouring texts by line breaks."""
-    joined: list[Part] = []
-    for part in parts:
-        last = joined[-1] if joined else None
-        if isinstance(part, Text) and isinstance(last, Text):
-            joined[-1] = Text(f"{last.text}\n{part.text}")
-        else:
-            joined.append(part)
-    return tuple(joined)
+    Args:
+        goal: The stage's goal.
+        contents: Texts, and titles with the image below each, if there is one. Texts that follow each other without an
+            image in between are joined by line breaks.
+    """
+    parts: list[Part] = []
+    lines = [f"Goal of the robot: {goal.unified_instruction}"]
+    for content in contents:
+        title, image = (content, None) if isinstance(content, str) else content
+        lines.append(title)
+        if image is not None:
+            parts += [Text("\n".join(lines)), Picture(image)]
+            lines = []
+    return Prompt.of(*parts, *(["\n".join(lines)] if lines else []))

@@ -1,25 +1,23 @@
 """Frontier-Update (paper, Sec. C.4): object entries and a map over all stages; the map is rebuilt when contradicted."""
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from evonav.agents.agent import AgentAction, Belief, EntryBelief, RoundDiagnostics, Sensing, Stop
+from evonav.agents.agent import AgentAction
 from evonav.agents.explorer import nearest_frontier
 from evonav.agents.frontier_update.questions import ChooseQuestion
-from evonav.agents.navigator import Navigator, NavigatorConfig, Target
+from evonav.agents.navigator import NavigatorConfig, Target
+from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.decision.candidates import ObjectCandidate, Point2
-from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
-from evonav.decision.text.decision import TextMatch
 from evonav.decision.text.matcher import Matcher
 from evonav.decision.text.minilm import encoder
 from evonav.decision.text.ranking import rank_by_feature, rank_by_text, rank_entries
 from evonav.memory import Frontier
 from evonav.memory.objects import ObjectEntry
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import TaskInfo
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,35 +37,22 @@ class FrontierUpdateConfig:
     """Rank entries by the instruction's words or by its meaning (extra `evonav[text]`), if images have no features."""
 
 
-class FrontierUpdate:
+class FrontierUpdate(NavigatorAgent):
     """Walks to what it remembers, explores when it remembers nothing that fits, and believes its entries."""
 
     def __init__(self, config: FrontierUpdateConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or FrontierUpdateConfig()
         if self.config.ranking == "text":
             encoder()  # reports a missing extra before the episode
-        model: DecisionModel = decision or TextMatch()
-        self.sensing = Sensing(needs_rgb=model.needs_images)
-        self._queries = QuerySession(model, num_tries=self.config.num_tries)
+        super().__init__(self.config.navigator, decision, num_tries=self.config.num_tries)
         self._matcher = Matcher()
-        self._counters: Counter[str] = Counter()
         self._details: dict[str, Any] = {}
         """Extras for the records, beside the reason of a choice."""
-        self._candidates: tuple[int, ...] = ()
-        self._diagnostics = RoundDiagnostics()
 
     def begin_task(self, task: TaskInfo) -> None:
         """Forget everything."""
-        self._task = task
-        self._counters.clear()
+        super().begin_task(task)
         self._details = {}
-        self._queries.counters.clear()
-        self._navigator = Navigator(task.map_frame, self.config.navigator)
-
-    def begin_stage(self, stage: StageInput) -> None:
-        """Take a new goal; entries, map and frontiers stay."""
-        self._goal = stage
-        self._navigator.begin_stage(stage.stage)
 
     def act(self, observation: Observation) -> AgentAction:
         """Stop at the committed object if it was reached; else look, decide and move on."""
@@ -110,15 +95,14 @@ class FrontierUpdate:
         frontiers = navigator.explorer.frontiers
         if not ranked and not frontiers:
             return self._without_candidates(observation)
-        with_images = self.sensing.needs_rgb
         question = ChooseQuestion(
             goal=self._goal,
             position_m=here,
-            objects=[navigator.with_images(entry) for entry in ranked] if with_images else ranked,
-            frontiers=[navigator.frontier_candidate(f, here, with_images=with_images) for f in frontiers],
+            objects=[navigator.with_images(entry) for entry in ranked] if self.sensing.needs_rgb else ranked,
+            frontiers=self._frontier_candidates(here),
             surroundings=remembered,
             num_rounds_left=observation.num_rounds_left,
-            heading_view=navigator.heading_view() if with_images else None,
+            heading_view=self._heading_view(),
         )
         self._candidates = tuple(candidate.entry_id for candidate in question.objects)
         choice = self._queries.ask(question)
@@ -129,7 +113,7 @@ class FrontierUpdate:
         nearest = nearest_frontier(frontiers, here)
         if nearest is not None and self.config.on_failed_decision == "nearest_frontier":
             return self._go_to_frontier(nearest, "no valid answer")
-        return self._stop("no valid answer", None)
+        return self._stop("no valid answer")
 
     def _ranked(
         self, entries: Sequence[ObjectEntry], remembered: Sequence[ObjectCandidate], observation: Observation
@@ -151,7 +135,7 @@ class FrontierUpdate:
 
     def _without_candidates(self, observation: Observation) -> AgentAction:
         """Act when there is nothing to ask about: neither entries nor frontiers."""
-        return self._stop("nothing to go to", None)
+        return self._stop("nothing to go to")
 
     def _go_to_object(self, chosen: ObjectCandidate, frontiers: list[Frontier], here: Point2) -> AgentAction:
         """Commit to an entry whose surroundings the map knows; else explore towards it."""
@@ -165,22 +149,9 @@ class FrontierUpdate:
             goal_m = chosen.ground_m  # the planner ends at the nearest free point
         return self._approach(Target(chosen.entry_id, goal_m, chosen.ground_m), self._queries.reason)
 
-    def _approach(self, target: Target, reason: str = "") -> AgentAction:
-        self._tell(f"object {target.entry_id}", reason, target.entry_id)
-        return self._navigator.approach(target)
-
-    def _go_to_frontier(self, frontier: Frontier, reason: str) -> AgentAction:
-        self._tell(f"frontier {frontier.id}", reason)
-        return self._navigator.go_to_frontier(frontier)
-
-    def _stop(self, reason: str, entry_id: int | None) -> AgentAction:
-        self._tell("none" if entry_id is None else f"object {entry_id}", reason, entry_id)
-        return Stop(reason)
-
-    def _tell(self, choice: str, reason: str, entry_id: int | None = None) -> None:
-        """Store a round for `diagnostics`."""
+    def _round_counters(self) -> Mapping[str, int]:
         explorer = self._navigator.explorer
-        counters = {
+        return {
             **self._queries.counters,
             "conflicts": explorer.num_conflicts,
             "cells_cleared": explorer.num_cells_cleared,
@@ -188,17 +159,6 @@ class FrontierUpdate:
             "unsupported_choices": 0,
             **self._counters,
         }
-        details = {**({"reason": reason} if reason else {}), **self._details}
-        self._diagnostics = self._navigator.describe_round(choice, entry_id, counters, details)
 
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return the choice and the counters of the last round."""
-        return self._diagnostics
-
-    def entries(self) -> Sequence[EntryBelief]:
-        """Return the object memory."""
-        return self._navigator.beliefs()
-
-    def belief(self) -> Belief:
-        """Return entries, map, frontiers, and the questions of the last round."""
-        return self._navigator.belief(self._queries.log, self._candidates)
+    def _round_details(self, reason: str) -> Mapping[str, Any]:
+        return {**super()._round_details(reason), **self._details}

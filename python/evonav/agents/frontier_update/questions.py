@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from evonav.agents.frontier_update import rules
 from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate, Pixels, Point2
-from evonav.decision.prompts import Prompt, Text, goal_parts, merged, titled
+from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, YesNoQuestion, first_line
+from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
+from evonav.decision.text.ranking import choose_candidate
 from evonav.tasks.public import StageInput
 
 _CHOICE = re.compile(r"(object|frontier)\s+(\d+)\b[.:]?", re.IGNORECASE)
@@ -33,27 +34,21 @@ class ChooseQuestion(ClosedQuestion[Choice]):
 
     def prompt(self) -> Prompt:
         """Show the heading view, each object with its crop and last view, each frontier with its image."""
-        parts = [
-            *goal_parts(self.goal),
-            Text(
-                "The robot searches a home in which things may have been moved since they were last seen. Choose where "
-                "it goes next: to a remembered object that is the goal, or to a frontier behind which the goal may be."
-            ),
-            *titled("What the robot sees ahead:", self.heading_view),
-        ]
+        objects: list[tuple[str, Pixels | None]] = []
         for index, candidate in enumerate(self.objects):
-            parts += titled(f"Object {index}: {candidate.label}", candidate.crop)
+            objects.append((f"Object {index}: {candidate.label}", candidate.crop))
             if candidate.view is not None:
-                parts += titled(f"The view in which object {index} was last seen:", candidate.view)
-        for index, frontier in enumerate(self.frontiers):
-            parts += titled(f"Frontier {index}: {frontier.travel_m:.1f} m away", frontier.image)
-        parts.append(
-            Text(
-                f"There are {len(self.objects)} objects and {len(self.frontiers)} frontiers. Answer on the first line "
-                'with exactly "Object i" or "Frontier i", and give your reason on the second.'
-            )
+                objects.append((f"The view in which object {index} was last seen:", candidate.view))
+        return goal_prompt(
+            self.goal,
+            "The robot searches a home in which things may have been moved since they were last seen. Choose where "
+            "it goes next: to a remembered object that is the goal, or to a frontier behind which the goal may be.",
+            ("What the robot sees ahead:", self.heading_view),
+            *objects,
+            *((f"Frontier {i}: {one.travel_m:.1f} m away", one.image) for i, one in enumerate(self.frontiers)),
+            f"There are {len(self.objects)} objects and {len(self.frontiers)} frontiers. Answer on the first line "
+            'with exactly "Object i" or "Frontier i", and give your reason on the second.',
         )
-        return Prompt.of(*merged(parts))
 
     def parse(self, text: str) -> Choice:
         """Read `Object i` or `Frontier i`, in any case, with an index of the list."""
@@ -78,8 +73,15 @@ class ChooseQuestion(ClosedQuestion[Choice]):
         ]
 
     def by_rule(self, matcher: Matcher) -> tuple[Choice, str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.choose(matcher, self)
+        """Choose an object that the instruction fits; else a frontier; else what the goal should be on or near."""
+        return choose_candidate(
+            matcher,
+            self.goal,
+            self.objects,
+            self.frontiers,
+            self.surroundings,
+            num_rounds_left=self.num_rounds_left,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,21 +111,22 @@ class VerifyQuestion(YesNoQuestion):
 
     def prompt(self) -> Prompt:
         """Show the stored crop, and what the robot sees where it was."""
-        parts = [
-            *goal_parts(self.goal),
-            *titled(f"The robot remembers this object: {self.entry.label}", self.entry.crop),
-            Text("It went to where it remembers it, and now sees:"),
-        ]
-        for index, view in enumerate(self.views):
-            parts += titled(f"View {index}:", view)
-        parts.append(
-            Text(
-                "Does what it sees support that the remembered object is still here? Answer on the first line with "
-                'exactly "yes" or "no", and give your reason on the second.'
-            )
+        return goal_prompt(
+            self.goal,
+            (f"The robot remembers this object: {self.entry.label}", self.entry.crop),
+            "It went to where it remembers it, and now sees:",
+            *((f"View {index}:", view) for index, view in enumerate(self.views)),
+            "Does what it sees support that the remembered object is still here? Answer on the first line with "
+            'exactly "yes" or "no", and give your reason on the second.',
         )
-        return Prompt.of(*merged(parts))
 
     def by_rule(self, matcher: Matcher) -> tuple[bool, str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.verify(matcher, self)
+        """Answer yes if something with the entry's label is seen at the entry's place."""
+        label, config = self.entry.label, matcher.config
+        if self.image_share < config.min_image_share:
+            return True, "too small to be told from here"
+        for seen in self.seen:
+            is_here = seen.overlap > config.min_overlap or seen.distance_m < config.same_place_m
+            if is_here and canonical(seen.label) == canonical(label):
+                return True, f"{seen.label} seen {seen.distance_m:.2f} m from the remembered middle"
+        return False, f"no {label} seen at the remembered place"

@@ -48,7 +48,7 @@ class StageReset(FrontierUpdate):
             occupancy = navigator.explorer.map
             bearing_rad = widest_direction_rad(occupancy.cells == FREE, occupancy.map_frame, here, travel_m)
             if bearing_rad is not None:
-                self._tell("widest direction", "neither objects nor frontiers in sight")
+                self._record_round("widest direction", "neither objects nor frontiers in sight")
                 return NavigateTo(
                     (here[0] + travel_m * math.sin(bearing_rad), here[1] + travel_m * math.cos(bearing_rad))
                 )

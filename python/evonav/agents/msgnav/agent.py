@@ -5,34 +5,23 @@ around with seven views in every round, and forgets nothing: neither cells that 
 there.
 """
 
-from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.agents.agent import (
-    AgentAction,
-    Belief,
-    EntryBelief,
-    NavigateTo,
-    RoundDiagnostics,
-    Sensing,
-    Stop,
-    ViewSchedule,
-)
+from evonav.agents.agent import AgentAction, NavigateTo, Sensing, Stop, ViewSchedule
 from evonav.agents.explorer import ExplorerConfig
 from evonav.agents.msgnav.candidates import GraphObject, PastChoice
 from evonav.agents.msgnav.memory import GraphMemory
 from evonav.agents.msgnav.questions import ArrivalQuestion, FrontierImagesQuestion, GraphQuestion, SubgraphQuestion
 from evonav.agents.msgnav.scene_graph import Subgraph
 from evonav.agents.msgnav.viewpoint import Viewpoint, ViewpointConfig, visible_viewpoint
-from evonav.agents.navigator import Navigator, NavigatorConfig
+from evonav.agents.navigator import NavigatorConfig
+from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.decision.candidates import ObjectCandidate, Point2
-from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
-from evonav.decision.text.decision import TextMatch
 from evonav.memory import Frontier
 from evonav.memory.occupancy import FREE
 from evonav.memory.views import pixels_of
@@ -81,6 +70,11 @@ class MsgNavTarget:
     """`(N, 3)` points when it was chosen."""
 
     @property
+    def entry_id(self) -> int | None:
+        """Id of the target's entry; `None` for an object in an image."""
+        return self.candidate.entry_id if self.view_id is None else None
+
+    @property
     def name(self) -> str:
         """The target's name in diagnostics."""
         if self.view_id is None:
@@ -88,32 +82,30 @@ class MsgNavTarget:
         return f"image {self.view_id}, {self.candidate.label}"
 
 
-class MsgNav:
+class MsgNav(NavigatorAgent):
     """Chooses from a graph, goes where the choice can be seen, asks if it is the goal, and remembers rejections."""
 
     def __init__(self, config: MsgNavConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or MsgNavConfig()
-        model: DecisionModel = decision or TextMatch()
         every_round = ViewSchedule(7, 40.0)
-        self.sensing = Sensing(every_round, every_round, needs_rgb=model.needs_images)
-        self._queries = QuerySession(model, num_tries=self.config.num_tries)
-        self._counters: Counter[str] = Counter()
-        self._diagnostics = RoundDiagnostics()
+        super().__init__(
+            self.config.navigator,
+            decision,
+            num_tries=self.config.num_tries,
+            sensing=Sensing(every_round, every_round),
+        )
 
     def begin_task(self, task: TaskInfo) -> None:
         """Forget everything."""
-        self._task = task
-        self._counters.clear()
-        self._queries.counters.clear()
-        self._memory = GraphMemory(Navigator(task.map_frame, self.config.navigator), max_edge_m=self.config.max_edge_m)
+        super().begin_task(task)
+        self._memory = GraphMemory(self._navigator, max_edge_m=self.config.max_edge_m)
 
     def begin_stage(self, stage: StageInput) -> None:
         """Take a new goal; graph, images and map stay, target and history do not."""
-        self._goal = stage
+        super().begin_stage(stage)
         self._target: MsgNavTarget | None = None
         self._history: list[PastChoice] = []
-        self._candidates: tuple[int, ...] = ()
-        self._memory.navigator.begin_stage(stage.stage)
+        self._candidates = ()
 
     def act(self, observation: Observation) -> AgentAction:
         """Look; go on to the committed target; on arrival, ask whether it is the goal; without a target, decide."""
@@ -124,11 +116,11 @@ class MsgNav:
         if target is not None and (observation.has_arrived or not observation.is_action_success):
             self._target = None
             if self._is_found(target, observation):
-                self._tell(target.name, "verified", target)
+                self._record_round(target.name, "verified", target.entry_id)
                 return Stop("verified")
             self._reject(target)
         elif target is not None:
-            return self._approach(self._aimed(target, observation), "")
+            return self._approach_target(self._aimed(target, observation))
         return self._decide(observation)
 
     def _followed(self) -> MsgNavTarget | None:
@@ -136,7 +128,7 @@ class MsgNav:
         target = self._target
         if target is None or target.view_id is not None:
             return target
-        entry_id = self._memory.navigator.views.resolve(target.candidate.entry_id)
+        entry_id = self._navigator.views.resolve(target.candidate.entry_id)
         self._target = replace(target, candidate=replace(target.candidate, entry_id=entry_id))
         return self._target
 
@@ -150,7 +142,7 @@ class MsgNav:
     def _is_found(self, target: MsgNavTarget, observation: Observation) -> bool:
         """Ask about all views of the last rounds; no valid answer counts as no."""
         memory, config = self._memory, self.config
-        navigator = memory.navigator
+        navigator = self._navigator
         views = memory.recent_views(config.arrival_rounds, config.arrival_views)
         entry = navigator.objects.entry(target.candidate.entry_id) if target.view_id is None else None
         images = [pixels_of(view, config.navigator.image_px) for view in views] if self.sensing.needs_rgb else []
@@ -173,7 +165,7 @@ class MsgNav:
         self._counters["rejected_choices"] += 1
         self._history.append(
             PastChoice(
-                round=self._memory.navigator.round,
+                round=self._navigator.round,
                 kind="object" if target.view_id is None else "image",
                 id=target.candidate.entry_id if target.view_id is None else target.view_id,
                 category=target.candidate.label,
@@ -183,7 +175,7 @@ class MsgNav:
 
     def _decide(self, observation: Observation) -> AgentAction:
         """Select the key subgraph, then choose: an object of it, something in an image, or exploration."""
-        memory, navigator = self._memory, self._memory.navigator
+        memory, navigator = self._memory, self._navigator
         pose = observation.pose
         here = (pose.x_m, pose.z_m)
         nodes = memory.nodes()
@@ -215,7 +207,7 @@ class MsgNav:
         viewpoint = self._viewpoint(points_m, here)
         if viewpoint.found != "circle":
             self._counters[f"viewpoints_{viewpoint.found}"] += 1
-        return self._approach(MsgNavTarget(candidate, viewpoint, view_id, points_m), self._queries.reason)
+        return self._approach_target(MsgNavTarget(candidate, viewpoint, view_id, points_m), self._queries.reason)
 
     def _graph_question(
         self, nodes: Sequence[GraphObject], subgraph: Subgraph, observation: Observation
@@ -236,37 +228,36 @@ class MsgNav:
             edges=edges,
             images=images,
             history=tuple(self._history),
-            round=memory.navigator.round,
-            max_rounds=memory.navigator.round + observation.num_rounds_left,
-            num_frontiers=len(memory.navigator.explorer.frontiers),
+            round=self._navigator.round,
+            max_rounds=self._navigator.round + observation.num_rounds_left,
+            num_frontiers=len(self._navigator.explorer.frontiers),
         )
 
     def _viewpoint(self, points_m: NDArray[np.float32], here: Point2) -> Viewpoint:
         """Return the place from which most of a target can be seen."""
-        navigator = self._memory.navigator
+        navigator = self._navigator
         occupancy = navigator.explorer.map
         return visible_viewpoint(
             navigator.objects, points_m, occupancy.cells == FREE, occupancy.map_frame, here, self.config.viewpoint
         )
 
-    def _approach(self, target: MsgNavTarget, reason: str) -> AgentAction:
+    def _approach_target(self, target: MsgNavTarget, reason: str = "") -> AgentAction:
         """Commit to a target and continue towards it; the heading on arrival is the direction of travel."""
         self._target = target
-        self._memory.navigator.explorer.stop_exploring()
-        self._tell(target.name, reason, target)
+        self._navigator.explorer.stop_exploring()
+        self._record_round(target.name, reason, target.entry_id)
         return NavigateTo(target.viewpoint.position_m)
 
     def _explore(self, here: Point2, remembered: Sequence[ObjectCandidate]) -> AgentAction:
         """Go to the only frontier, or to the one that the model chooses by its image."""
-        navigator = self._memory.navigator
+        navigator = self._navigator
         frontiers = navigator.explorer.frontiers
         if len(frontiers) < 2:
-            return self._go_to_frontier(frontiers[0], "the only one") if frontiers else self._give_up()
-        with_images = self.sensing.needs_rgb
+            return self._go_to_frontier(frontiers[0], "the only one") if frontiers else self._stop("nothing to explore")
         index = self._queries.ask(
             FrontierImagesQuestion(
                 goal=self._goal,
-                frontiers=[navigator.frontier_candidate(f, here, with_images=with_images) for f in frontiers],
+                frontiers=self._frontier_candidates(here),
                 surroundings=remembered,
             )
         )
@@ -276,41 +267,20 @@ class MsgNav:
 
     def _random_frontier(self) -> AgentAction:
         """Go to a frontier drawn from the task's seed, the stage and the round alone, after any invalid answer."""
-        navigator = self._memory.navigator
+        navigator = self._navigator
         frontiers = navigator.explorer.frontiers
         if not frontiers:
-            return self._give_up()
+            return self._stop("nothing to explore")
         self._counters["random_frontiers"] += 1
         stream = np.random.default_rng([self._task.seed % 2**63, navigator.stage, navigator.round])
         return self._go_to_frontier(frontiers[int(stream.integers(len(frontiers)))], "no valid answer: drawn")
 
     def _go_to_frontier(self, frontier: Frontier, reason: str) -> AgentAction:
-        self._history.append(PastChoice(self._memory.navigator.round, "explore"))
-        self._tell(f"frontier {frontier.id}", reason)
-        return self._memory.navigator.go_to_frontier(frontier)
+        self._history.append(PastChoice(self._navigator.round, "explore"))
+        return super()._go_to_frontier(frontier, reason)
 
-    def _give_up(self) -> AgentAction:
-        self._tell("none", "nothing to explore")
-        return Stop("nothing to explore")
-
-    def _tell(self, choice: str, reason: str, target: MsgNavTarget | None = None) -> None:
-        """Store a round for `diagnostics`."""
-        entry_id = target.candidate.entry_id if target is not None and target.view_id is None else None
-        counters = {**self._queries.counters, **self._counters, "edges": len(self._memory.graph)}
-        details = {"reason": reason} if reason else {}
-        self._diagnostics = self._memory.navigator.describe_round(choice, entry_id, counters, details)
-
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return the choice and the counters of the last round."""
-        return self._diagnostics
-
-    def entries(self) -> Sequence[EntryBelief]:
-        """Return the object memory."""
-        return self._memory.navigator.beliefs()
-
-    def belief(self) -> Belief:
-        """Return entries, map, frontiers, and the questions of the last round."""
-        return self._memory.navigator.belief(self._queries.log, self._candidates)
+    def _round_counters(self) -> Mapping[str, int]:
+        return {**self._queries.counters, **self._counters, "edges": len(self._memory.graph)}
 
 
 def _candidate_of(label: str, points_m: NDArray[np.float32]) -> ObjectCandidate:

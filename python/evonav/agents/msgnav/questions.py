@@ -2,26 +2,24 @@
 
 docs/parity.md lists where these questions differ from the original's.
 Images are at most 512 px (`MsgNavConfig`); evonav's views have 300 px, so that they are shown as they were seen.
+
+The rules look at no image. They know an image by the labels that were recorded with it, and the surroundings of an
+agent that has arrived by the points of the last rounds' detections; size, shape and colour are never judged.
 """
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from evonav.agents.msgnav import rules
 from evonav.agents.msgnav.candidates import GraphChoice, GraphImage, GraphObject, PastChoice
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
-from evonav.decision.prompts import Prompt, Text, goal_parts, merged, titled
-from evonav.decision.question import (
-    AnswerError,
-    ClosedQuestion,
-    Question,
-    YesNoQuestion,
-    first_line,
-    lines_of,
-)
-from evonav.decision.text.matcher import Matcher
+from evonav.decision.prompts import Prompt, goal_prompt
+from evonav.decision.question import AnswerError, ClosedQuestion, Question, YesNoQuestion, first_line, lines_of
+from evonav.decision.text.language import Goal, canonical, similarity
+from evonav.decision.text.matcher import Matcher, gap_m
+from evonav.decision.text.ranking import rank_entries
 from evonav.tasks.public import StageInput
 
 _ID = re.compile(r"(?:object\s+)?(\d+)[.,:;]?", re.IGNORECASE)
@@ -51,13 +49,13 @@ class SubgraphQuestion(Question[tuple[int, ...]]):
             for node in self.objects
         ]
         graph = "\n".join(lines)
-        text = (
+        return goal_prompt(
+            self.goal,
             "The robot remembers a home as a graph. Its objects, one a line: id, class, room, ids of the objects "
             f"beside it.\n{graph}\nWhich objects help most to find the goal? Choose different ones, and rather none "
             "that are beside each other: what is beside a chosen object will be shown as well. Answer with ids, one "
-            f"a line, the most helpful one first, at most {self.max_ids}, and with nothing else."
+            f"a line, the most helpful one first, at most {self.max_ids}, and with nothing else.",
         )
-        return Prompt.of(*merged([*goal_parts(self.goal), Text(text)]))
 
     def parse(self, text: str) -> tuple[int, ...]:
         """Read one id a line; lines that name no object of the graph are left out, and so are ids after `max_ids`."""
@@ -85,8 +83,24 @@ class SubgraphQuestion(Question[tuple[int, ...]]):
         return [(node.entry_id,) for node in self.objects if (node.entry_id,) != answer]
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[int, ...], str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.select(matcher, self)
+        """Select the entries that the instruction mentions; then others, one a label, none beside a selected one."""
+        if not self.objects:
+            raise AnswerError("invalid", "there is no object")
+        goal = matcher.parsed(self.goal)
+        candidates = [node.candidate for node in self.objects]
+        chosen: list[int] = []
+        labels: set[str] = set()
+        covered: set[int] = set()
+        for index in rank_entries(matcher, self.goal, candidates, self.position_m):
+            node = self.objects[index]
+            label = canonical(node.candidate.label)
+            is_mentioned = matcher.label_score(goal, node.candidate.label) > 0.0
+            if is_mentioned or (label not in labels and node.entry_id not in covered):
+                chosen.append(node.entry_id)
+                labels.add(label)
+                covered.update(node.neighbour_ids)
+        reason = f"of {len(self.objects)} objects those that have most to do with a {goal.noun}"
+        return tuple(chosen[: self.max_ids]), reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,31 +127,22 @@ class GraphQuestion(Question[GraphChoice]):
         """Show objects and edges as text, images with numbers, and earlier choices."""
         objects = [_object_line(node) for node in self.objects]
         edges = [f"{a}, {b}, [{', '.join(map(str, numbers))}]" for a, b, numbers in self.edges]
-        parts = [
-            *goal_parts(self.goal),
-            Text(
-                "The robot searches a home in which things may have been moved since they were last seen. Objects that "
-                "it remembers, one a line: id, class, x, y and z in metres, room.\n"
-                + ("\n".join(objects) or "none")
-                + "\nPairs of objects that were seen together, one a line: id, id, [numbers of the images].\n"
-                + ("\n".join(edges) or "none")
-            ),
-        ]
-        for number, image in enumerate(self.images):
-            what = "what the robot sees now" if image.is_egocentric else "from its memory"
-            parts += titled(f"Image {number}, {what}:", image.pixels)
         past = [self._past_line(choice) for choice in self.history]
-        parts.append(
-            Text(
-                "What it chose before in this search:\n" + ("\n".join(past) or "nothing") + "\n"
-                f"This is round {self.round + 1} of {self.max_rounds}. Do not repeat what was not correct. Answer on "
-                'the first line with exactly one of "Object id", if this object is the goal; "Image i, category", if '
-                'image i shows the goal and no object above is it, category being a word for it; or "Continue '
-                'Exploration". '
-                "Give your reason on the second line."
-            )
+        what = {True: "what the robot sees now", False: "from its memory"}
+        return goal_prompt(
+            self.goal,
+            "The robot searches a home in which things may have been moved since they were last seen. Objects that "
+            "it remembers, one a line: id, class, x, y and z in metres, room.\n"
+            + ("\n".join(objects) or "none")
+            + "\nPairs of objects that were seen together, one a line: id, id, [numbers of the images].\n"
+            + ("\n".join(edges) or "none"),
+            *((f"Image {i}, {what[image.is_egocentric]}:", image.pixels) for i, image in enumerate(self.images)),
+            "What it chose before in this search:\n" + ("\n".join(past) or "nothing") + "\n"
+            f"This is round {self.round + 1} of {self.max_rounds}. Do not repeat what was not correct. Answer on "
+            'the first line with exactly one of "Object id", if this object is the goal; "Image i, category", if '
+            'image i shows the goal and no object above is it, category being a word for it; or "Continue '
+            'Exploration". Give your reason on the second line.',
         )
-        return Prompt.of(*merged(parts))
 
     def parse(self, text: str) -> GraphChoice:
         """Read `Object id`, `Image i, category` or `Continue Exploration`, of an object or image of the question."""
@@ -180,8 +185,58 @@ class GraphQuestion(Question[GraphChoice]):
         return f"Round {choice.round + 1}: chose {what}, {choice.category} - not correct."
 
     def by_rule(self, matcher: Matcher) -> tuple[GraphChoice, str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.choose(matcher, self)
+        """Choose a fitting object that was not rejected; else one that only an image shows; else explore.
+
+        With no frontier or hardly a round left, any object of the right category is chosen, or else one that the goal
+        should be on or near.
+        """
+        goal, config = matcher.parsed(self.goal), matcher.config
+        around = [node.candidate for node in self.objects]
+        rejected_ids = {past.id for past in self.history if past.kind == "object"}
+        left = [candidate for candidate in around if candidate.entry_id not in rejected_ids]
+        named = [
+            (matcher.relation_share(goal, candidate, around), -index)
+            for index, candidate in enumerate(left)
+            if matcher.names_goal(goal, candidate)
+        ]
+        is_last_chance = self.num_frontiers == 0 or self.max_rounds - self.round <= config.hurry_rounds
+        best = max(named, default=None)
+        fits = best is not None and best[0] >= config.min_relations
+        if best is None or not fits:
+            image = self._unmapped(matcher, goal, around)
+            if image is not None:
+                return image, f"{image.category} seen, but not in the graph"
+        if best is not None and (fits or is_last_chance):
+            candidate = left[-best[1]]
+            return GraphChoice("object", candidate.entry_id), f"{candidate.label}, {best[0]:.0%} of what is said fits"
+        if self.num_frontiers == 0:
+            scored = [(matcher.label_score(goal, candidate.label), -i) for i, candidate in enumerate(left)]
+            score, index = max(scored, default=(0.0, 0))
+            if score > 0.0:
+                return GraphChoice("object", left[-index].entry_id), f"where the {goal.noun} should be"
+        return GraphChoice("explore"), "relations do not hold" if named else "nothing remembered fits"
+
+    def _unmapped(self, matcher: Matcher, goal: Goal, around: Sequence[ObjectCandidate]) -> GraphChoice | None:
+        """Choose the largest detection of the goal's category that belongs to no entry and lies at no known place."""
+        known_m = [candidate.ground_m for candidate in around if matcher.names_goal(goal, candidate)]
+        known_m += [past.place_m for past in self.history if past.place_m is not None]
+
+        def is_known(place_m: Point2) -> bool:
+            return any(math.dist(place_m, other_m) <= matcher.config.near_m for other_m in known_m)
+
+        found = [
+            (seen.area_px, -number, seen.label)
+            for number, image in enumerate(self.images)
+            for seen in image.seen
+            if seen.entry_id is None
+            and seen.centre_m is not None
+            and similarity(goal.noun, seen.label) >= matcher.config.min_similarity
+            and not is_known(seen.centre_m)
+        ]
+        if not found:
+            return None
+        _, number, label = max(found)
+        return GraphChoice("image", -number, canonical(label))
 
 
 def _object_line(node: GraphObject) -> str:
@@ -201,16 +256,13 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
 
     def prompt(self) -> Prompt:
         """Show each frontier with its image."""
-        parts = [*goal_parts(self.goal), Text("The robot searches a home. It may explore one of these frontiers next.")]
-        for index, frontier in enumerate(self.frontiers):
-            parts += titled(f"Frontier {index}:", frontier.image)
-        parts.append(
-            Text(
-                "Behind which one is the goal most likely found? Answer on the first line with exactly "
-                '"Frontier i", and give your reason on the second.'
-            )
+        return goal_prompt(
+            self.goal,
+            "The robot searches a home. It may explore one of these frontiers next.",
+            *((f"Frontier {index}:", frontier.image) for index, frontier in enumerate(self.frontiers)),
+            "Behind which one is the goal most likely found? Answer on the first line with exactly "
+            '"Frontier i", and give your reason on the second.',
         )
-        return Prompt.of(*merged(parts))
 
     def parse(self, text: str) -> int:
         """Read `Frontier i`, with a frontier of the list."""
@@ -229,8 +281,11 @@ class FrontierImagesQuestion(ClosedQuestion[int]):
         return range(len(self.frontiers))
 
     def by_rule(self, matcher: Matcher) -> tuple[int, str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.explore(matcher, self)
+        """Choose the cheapest frontier."""
+        goal = matcher.parsed(self.goal)
+        costs_m = [matcher.frontier_cost_m(goal, frontier, self.surroundings) for frontier in self.frontiers]
+        index = costs_m.index(min(costs_m))
+        return index, f"costs {costs_m[index]:.1f} m"
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,17 +309,26 @@ class ArrivalQuestion(YesNoQuestion):
 
     def prompt(self) -> Prompt:
         """Show the views."""
-        parts = [*goal_parts(self.goal), Text("The robot may have arrived. What it saw, the most recent view first:")]
-        for index, view in enumerate(self.views):
-            parts += titled(f"View {index}:", view)
-        parts.append(
-            Text(
-                "Has it found the goal, in full agreement with what is said of it? Answer on the first line with "
-                '"yes" or "no", and give your reason on the second.'
-            )
+        return goal_prompt(
+            self.goal,
+            "The robot may have arrived. What it saw, the most recent view first:",
+            *((f"View {index}:", view) for index, view in enumerate(self.views)),
+            "Has it found the goal, in full agreement with what is said of it? Answer on the first line with "
+            '"yes" or "no", and give your reason on the second.',
         )
-        return Prompt.of(*merged(parts))
 
     def by_rule(self, matcher: Matcher) -> tuple[bool, str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.arrive(matcher, self)
+        """Answer yes if the goal's category was seen at the place, and its relations hold among the objects seen.
+
+        With no frontier or hardly a round left the category is enough.
+        """
+        goal, config = matcher.parsed(self.goal), matcher.config
+        here = [
+            seen for seen in self.seen if matcher.names_goal(goal, seen) and gap_m(seen, self.target) <= config.near_m
+        ]
+        if not here:
+            return False, f"no {goal.noun} seen here"
+        share = max(matcher.relation_share(goal, seen, self.seen) for seen in here)
+        is_fitting = share >= config.min_relations
+        is_last_chance = self.num_frontiers == 0 or self.num_rounds_left <= config.hurry_rounds
+        return is_fitting or is_last_chance, f"{goal.noun} seen here, {share:.0%} of what is said fits"

@@ -7,10 +7,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.decision.candidates import Point2
 from evonav.memory.objects import ObjectMap, SightConfig
 from evonav.sensors.observation import MapFrame
-
-Point2 = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,24 +1,20 @@
 """3D-Mem (paper, Sec. C.3): choose from snapshots and frontiers by a decision model, and trust the memory."""
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from evonav.agents.agent import AgentAction, Belief, EntryBelief, RoundDiagnostics, Sensing, Stop
+from evonav.agents.agent import AgentAction
 from evonav.agents.explorer import ExplorerConfig
-from evonav.agents.navigator import Navigator, NavigatorConfig, Target
-from evonav.agents.three_d_mem.candidates import SnapshotCandidate
+from evonav.agents.navigator import NavigatorConfig, Target
+from evonav.agents.navigator_agent import NavigatorAgent
 from evonav.agents.three_d_mem.memory import RECLUSTER_REACH_M, Snapshot, SnapshotMemory
-from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotQuestion
+from evonav.agents.three_d_mem.questions import PrefilterQuestion, SnapshotCandidate, SnapshotQuestion
 from evonav.decision.candidates import ObjectCandidate
-from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
-from evonav.decision.text.decision import TextMatch
-from evonav.memory import Frontier
 from evonav.memory.views import crop_of, pixels_of
 from evonav.sensors.observation import Observation
-from evonav.tasks.public import StageInput, TaskInfo
+from evonav.tasks.public import TaskInfo
 
 NO_ANSWER = "aborted: no valid answer"
 """The reason of a stop when the decision model gave no valid answer."""
@@ -42,30 +38,18 @@ class ThreeDMemConfig:
     """Number of tries before a question without a valid answer counts as failed."""
 
 
-class ThreeDMem:
+class ThreeDMem(NavigatorAgent):
     """Walks to an object in a snapshot and stops there, whether or not it is still there."""
 
     def __init__(self, config: ThreeDMemConfig | None = None, decision: DecisionModel | None = None) -> None:
         self.config = config or ThreeDMemConfig()
-        model: DecisionModel = decision or TextMatch()
-        self.sensing = Sensing(needs_rgb=model.needs_images)
-        self._queries = QuerySession(model, num_tries=self.config.num_tries)
-        self._counters: Counter[str] = Counter()
-        self._candidates: tuple[int, ...] = ()
+        super().__init__(self.config.navigator, decision, num_tries=self.config.num_tries)
         self._details: dict[str, Any] = {}
-        self._diagnostics = RoundDiagnostics()
 
     def begin_task(self, task: TaskInfo) -> None:
         """Forget everything."""
-        self._counters.clear()
-        self._queries.counters.clear()
-        self._navigator = Navigator(task.map_frame, self.config.navigator)
+        super().begin_task(task)
         self._snapshots = SnapshotMemory(self.config.recluster_reach_m)
-
-    def begin_stage(self, stage: StageInput) -> None:
-        """Take a new goal; entries, snapshots, map and frontiers stay."""
-        self._goal = stage
-        self._navigator.begin_stage(stage.stage)
 
     def act(self, observation: Observation) -> AgentAction:
         """Stop at the committed object if it was reached; else look, cluster, decide and move on."""
@@ -97,15 +81,14 @@ class ThreeDMem:
         if not shown and not frontiers:
             self._counters["aborts_nothing_left"] += 1
             return self._stop(NOTHING_LEFT)
-        with_images = self.sensing.needs_rgb
         question = SnapshotQuestion(
             goal=self._goal,
             position_m=here,
             snapshots=[self._candidate(snapshot, remembered) for snapshot in shown],
-            frontiers=[navigator.frontier_candidate(f, here, with_images=with_images) for f in frontiers],
+            frontiers=self._frontier_candidates(here),
             surroundings=list(remembered.values()),
             num_rounds_left=observation.num_rounds_left,
-            heading_view=navigator.heading_view() if with_images else None,
+            heading_view=self._heading_view(),
         )
         self._candidates = tuple(entry_id for snapshot in shown for entry_id in snapshot.entry_ids)
         choice = self._queries.ask(question)
@@ -154,42 +137,18 @@ class ThreeDMem:
             goal_m = chosen.ground_m  # the planner ends at the nearest free point
         return self._approach(Target(chosen.entry_id, goal_m, chosen.ground_m), reason)
 
-    def _approach(self, target: Target, reason: str = "") -> AgentAction:
-        self._tell(f"object {target.entry_id}", reason, target.entry_id)
-        return self._navigator.approach(target)
-
-    def _go_to_frontier(self, frontier: Frontier, reason: str) -> AgentAction:
-        self._tell(f"frontier {frontier.id}", reason)
-        return self._navigator.go_to_frontier(frontier)
-
-    def _stop(self, reason: str, entry_id: int | None = None) -> AgentAction:
-        self._tell("none" if entry_id is None else f"object {entry_id}", reason, entry_id)
-        return Stop(reason)
-
-    def _tell(self, choice: str, reason: str, entry_id: int | None = None) -> None:
-        """Store a round for `diagnostics`."""
+    def _round_counters(self) -> Mapping[str, int]:
         explorer = self._navigator.explorer
-        counters = {
+        return {
             **self._queries.counters,
             **self._counters,
             "conflicts": explorer.num_conflicts,
             "cells_cleared": explorer.num_cells_cleared,
         }
-        details = {
+
+    def _round_details(self, reason: str) -> Mapping[str, Any]:
+        return {
             **self._details,
             "num_snapshots": len(self._snapshots.snapshots),
-            **({"reason": reason} if reason else {}),
+            **super()._round_details(reason),
         }
-        self._diagnostics = self._navigator.describe_round(choice, entry_id, counters, details)
-
-    def diagnostics(self) -> RoundDiagnostics:
-        """Return the choice, the prefilter, the snapshots and the counters of the last round."""
-        return self._diagnostics
-
-    def entries(self) -> Sequence[EntryBelief]:
-        """Return the object memory."""
-        return self._navigator.beliefs()
-
-    def belief(self) -> Belief:
-        """Return entries, map, frontiers, and the questions of the last round."""
-        return self._navigator.belief(self._queries.log, self._candidates)

@@ -5,17 +5,34 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from evonav.agents.three_d_mem import rules
-from evonav.agents.three_d_mem.candidates import SnapshotCandidate, SnapshotChoice
 from evonav.decision.candidates import FrontierCandidate, ObjectCandidate, Pixels, Point2
-from evonav.decision.prompts import Part, Prompt, Text, goal_parts, merged, titled
+from evonav.decision.prompts import Prompt, goal_prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
 from evonav.decision.text.matcher import Matcher
+from evonav.decision.text.ranking import choose_candidate, rank_entries
 from evonav.tasks.public import StageInput
 
 _OBJECT = re.compile(r"snapshot\s+(\d+)\s*,\s*object\s+(\d+)\b[.:]?", re.IGNORECASE)
 _FRONTIER = re.compile(r"frontier\s+(\d+)\b[.:]?", re.IGNORECASE)
 _NONE = "none"
+
+
+@dataclass(frozen=True, slots=True)
+class SnapshotCandidate:
+    """A stored view, and those of its objects whose class passed the prefilter."""
+
+    view_id: int
+    objects: Sequence[ObjectCandidate]
+    """The objects, at least one; their crops are from this view."""
+    image: Pixels | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class SnapshotChoice:
+    """An object of a snapshot, or, without a snapshot, a frontier, by the question's indices."""
+
+    snapshot: int | None
+    index: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,19 +47,13 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
 
     def prompt(self) -> Prompt:
         """Show the names. As in the original, the number of names that will be used is not stated."""
-        return Prompt.of(
-            *merged(
-                (
-                    *goal_parts(self.goal),
-                    Text(
-                        "The robot remembers objects of these classes:\n"
-                        + "\n".join(self.class_names)
-                        + "\nRank those that help to reach the goal: the goal's own class, and what is mostly found by "
-                        "it. Answer with names from the list only, one a line, the most useful first; leave out what "
-                        f'does not help. If nothing does, answer "{_NONE}".'
-                    ),
-                )
-            )
+        return goal_prompt(
+            self.goal,
+            "The robot remembers objects of these classes:\n"
+            + "\n".join(self.class_names)
+            + "\nRank those that help to reach the goal: the goal's own class, and what is mostly found by it. Answer "
+            "with names from the list only, one a line, the most useful first; leave out what does not help. If "
+            f'nothing does, answer "{_NONE}".',
         )
 
     def parse(self, text: str) -> tuple[str, ...]:
@@ -72,8 +83,14 @@ class PrefilterQuestion(Question[tuple[str, ...]]):
         return [names for names in dict.fromkeys((answer[1:], others)) if names != answer]
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.prefilter(matcher, self)
+        """Name the classes that the instruction mentions: the goal's own first, then what it should be on or near.
+
+        Where the list holds none of them, none is named, and no snapshot is left: only frontiers are.
+        """
+        goal = matcher.parsed(self.goal)
+        scores = {name: matcher.label_score(goal, name) for name in self.class_names}
+        ranked = sorted((name for name in scores if scores[name] > 0.0), key=lambda name: (-scores[name], name))
+        return tuple(ranked[: self.max_classes]), f"{len(ranked)} of {len(scores)} classes are spoken of"
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,28 +111,22 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
 
     def prompt(self) -> Prompt:
         """Show the heading view, each snapshot with its image and crops, each frontier with its image."""
-        parts: list[Part] = [
-            *goal_parts(self.goal),
-            Text(
-                "The robot explores a home. Snapshots are views that it remembers, each with objects in it; frontiers "
-                "are places from which it can see what it has not explored. Choose where it goes next: to an object in "
-                "a snapshot that is the goal, or to a frontier behind which the goal may be."
-            ),
-            *titled("What the robot sees ahead:", self.heading_view),
-        ]
+        snapshots: list[tuple[str, Pixels | None]] = []
         for index, snapshot in enumerate(self.snapshots):
-            parts += titled(f"Snapshot {index}:", snapshot.image)
+            snapshots.append((f"Snapshot {index}:", snapshot.image))
             for number, candidate in enumerate(snapshot.objects):
-                parts += titled(f"Snapshot {index}, Object {number}: {candidate.label}", candidate.crop)
-        for index, frontier in enumerate(self.frontiers):
-            parts += titled(f"Frontier {index}:", frontier.image)
-        parts.append(
-            Text(
-                f"Snapshots: {len(self.snapshots)}, frontiers: {len(self.frontiers)}. Answer on the first "
-                'line with exactly "Snapshot i, Object j" or "Frontier i", and give your reason on the next.'
-            )
+                snapshots.append((f"Snapshot {index}, Object {number}: {candidate.label}", candidate.crop))
+        return goal_prompt(
+            self.goal,
+            "The robot explores a home. Snapshots are views that it remembers, each with objects in it; frontiers are "
+            "places from which it can see what it has not explored. Choose where it goes next: to an object in a "
+            "snapshot that is the goal, or to a frontier behind which the goal may be.",
+            ("What the robot sees ahead:", self.heading_view),
+            *snapshots,
+            *((f"Frontier {index}:", frontier.image) for index, frontier in enumerate(self.frontiers)),
+            f"Snapshots: {len(self.snapshots)}, frontiers: {len(self.frontiers)}. Answer on the first "
+            'line with exactly "Snapshot i, Object j" or "Frontier i", and give your reason on the next.',
         )
-        return Prompt.of(*merged(parts))
 
     def parse(self, text: str) -> SnapshotChoice:
         """Read `Snapshot i, Object j` or `Frontier i`, in any case, with indices of the question."""
@@ -149,5 +160,18 @@ class SnapshotQuestion(ClosedQuestion[SnapshotChoice]):
         ]
 
     def by_rule(self, matcher: Matcher) -> tuple[SnapshotChoice, str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.choose_snapshot(matcher, self)
+        """Choose as Frontier-Update would among the objects of all snapshots, ranked as it ranks them."""
+        places = [choice for choice in self.choices() if choice.snapshot is not None]
+        objects = [candidate for snapshot in self.snapshots for candidate in snapshot.objects]
+        ranked = rank_entries(matcher, self.goal, objects, self.position_m)
+        choice, reason = choose_candidate(
+            matcher,
+            self.goal,
+            [objects[index] for index in ranked],
+            self.frontiers,
+            self.surroundings,
+            num_rounds_left=self.num_rounds_left,
+        )
+        if choice.kind == "object":
+            return places[ranked[choice.index]], reason
+        return SnapshotChoice(None, choice.index), reason

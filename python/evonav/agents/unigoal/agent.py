@@ -28,17 +28,16 @@ from evonav.agents.unigoal.goals import GoalConfig, GoalWatch
 from evonav.agents.unigoal.graphs import Advice, GraphConfig, GraphReasoner
 from evonav.agents.unigoal.object_graph import SceneNode
 from evonav.agents.unigoal.planner import PlannedStep, PlannerConfig, UniGoalPlanner
+from evonav.decision.candidates import Point2
 from evonav.decision.query import QuerySession
 from evonav.decision.question import DecisionModel
-from evonav.decision.text.decision import TextMatch
+from evonav.decision.text.matcher import TextMatch
 from evonav.memory.occupancy import BLOCKED, FREE
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import StageInput, TaskInfo
 from evonav.tasks.vocabulary import MAP_CATEGORIES, category_image
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action
-
-Point2 = tuple[float, float]
 
 _BELIEF_STRIDE = 2
 """Number of cells of the map in one cell of a picture, along each axis."""
@@ -105,7 +104,7 @@ class UniGoal:
         watch.judge(pose)
         step = self._step(bev, planner, watch, pose)
         self._last_action = step.action
-        self._tell(planner, watch, step)
+        self._record_round(planner, watch, step)
         if step.action is Action.STOP:
             return Stop("arrived")
         return Move(step.action)
@@ -184,7 +183,7 @@ class UniGoal:
             return False
         return len(self._planner.allowed(self._cells_of(self._bev, node))) == 0
 
-    def _tell(self, planner: UniGoalPlanner, watch: GoalWatch, step: PlannedStep) -> None:
+    def _record_round(self, planner: UniGoalPlanner, watch: GoalWatch, step: PlannedStep) -> None:
         """Store a round for `diagnostics`."""
         advice, goal = self._advice, watch.goal
         node = None if goal is None or goal.node_id is None else self._graphs.scene.node(goal.node_id)

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav import _core
+from evonav.decision.candidates import Point2
 from evonav.memory.occupancy import BLOCKED, FREE, UNKNOWN
 from evonav.sensors.observation import MapFrame, View
 
-Point2 = tuple[float, float]
 Cells = NDArray[np.int32]
 """`(N, 2)` `[row, col]` of a map."""
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from evonav.agents.unigoal.object_graph import SceneEdge, SceneNode
+from evonav.decision.candidates import Point2
 
-Point2 = tuple[float, float]
 MatchMode = Literal["code", "paper"]
 """The names of scene nodes that are compared with a goal's words.
 

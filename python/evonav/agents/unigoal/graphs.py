@@ -20,7 +20,7 @@ from evonav.agents.unigoal.scene_questions import (
     RelationLinesQuestion,
     RoomQuestion,
 )
-from evonav.decision.candidates import ObjectCandidate
+from evonav.decision.candidates import Point2
 from evonav.decision.query import QuerySession
 from evonav.decision.text.language import ROOMS, canonical
 from evonav.decision.text.matcher import Matcher
@@ -28,7 +28,6 @@ from evonav.sensors.observation import View
 from evonav.tasks.public import StageInput
 from evonav.tasks.vocabulary import CODE_CATEGORIES, LABEL_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 
-Point2 = tuple[float, float]
 MatchStage = Literal["zero", "partial", "perfect"]
 
 ROOM_ZERO = "bedroom"
@@ -222,7 +221,7 @@ class GraphReasoner:
         """Return a function that gives a node's room: as published, by nearby objects; as released, always room 0."""
         if self.config.mode == "code":
             return lambda _: ROOM_ZERO
-        around = [ObjectCandidate(n.id, n.caption, n.centre_m, n.size_m, n.num_detections) for n in self.scene.nodes]
+        around = [node.candidate for node in self.scene.nodes]
 
         def room_of(node: SceneNode) -> str:
             room = self._matcher.room_around(node.ground_m, around)

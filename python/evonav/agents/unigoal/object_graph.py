@@ -10,12 +10,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from evonav.decision.candidates import ObjectCandidate, Point2, Point3
 from evonav.memory.objects import ObjectMap, ObjectMapConfig
 from evonav.sensors.observation import View
 from evonav.tasks.vocabulary import LABEL_TRANSLATION, relabelled
-
-Point2 = tuple[float, float]
-Point3 = tuple[float, float, float]
 
 
 def overlap_only() -> ObjectMapConfig:
@@ -61,6 +59,11 @@ class SceneNode:
     def ground_m(self) -> Point2:
         """`(x, z)` of its middle."""
         return (self.centre_m[0], self.centre_m[2])
+
+    @property
+    def candidate(self) -> ObjectCandidate:
+        """The node as a remembered object that rules compare."""
+        return ObjectCandidate(self.id, self.caption, self.centre_m, self.size_m, self.num_detections)
 
 
 @dataclass(frozen=True, slots=True)

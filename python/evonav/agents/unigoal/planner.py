@@ -10,7 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from evonav.agents.unigoal.bev import BevMap, Cells, Point2
+from evonav.agents.unigoal.bev import BevMap, Cells
+from evonav.decision.candidates import Point2
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action
 

@@ -1,4 +1,7 @@
-"""Questions of UniGoal about the goal: its objects, their relations, subgraphs, its category."""
+"""Questions of UniGoal about the goal: its objects, their relations, subgraphs, its category.
+
+The rules know words; like a language model without images, they look at none.
+"""
 
 import json
 import re
@@ -6,17 +9,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from evonav.agents.unigoal import rules
 from evonav.agents.unigoal.goal_graph import MAX_GOAL_NODES, GoalEdge, GoalGraph
 from evonav.decision.candidates import Pixels
-from evonav.decision.prompts import Picture, Prompt, Text
+from evonav.decision.prompts import Picture, Prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
+from evonav.decision.text.language import canonical, parse_goal
 from evonav.decision.text.matcher import Matcher
 from evonav.tasks.public import StageInput
-from evonav.tasks.vocabulary import NO_CATEGORY
+from evonav.tasks.vocabulary import CATEGORY_OF_TYPE, MAP_CATEGORIES, NO_CATEGORY
 
 _LIST = re.compile(r"\[([^\[\]]*)\]\.?")
 _RELATION = re.compile(r"(?P<a>.+?) and (?P<b>.+?): (?P<rest>.+)")
+_CATEGORY_OF_NOUN = {
+    **{canonical(category): category for category in MAP_CATEGORIES},
+    **{canonical(kind): category for kind, category in CATEGORY_OF_TYPE.items()},
+}
 
 
 def relation_line(a: str, b: str, subject: str, relation: str, object_: str) -> str:
@@ -52,10 +59,8 @@ class DescribeQuestion(Question[str]):
         """Show the reference image."""
         return Prompt.of(
             Picture(self.image),
-            Text(
-                "A robot is to find the object in the middle of this image. Describe it and how it stands to the "
-                "things around it, in one sentence on one line."
-            ),
+            "A robot is to find the object in the middle of this image. Describe it and how it stands to the "
+            "things around it, in one sentence on one line.",
         )
 
     def parse(self, text: str) -> str:
@@ -70,8 +75,8 @@ class DescribeQuestion(Question[str]):
         return answer
 
     def by_rule(self, matcher: Matcher) -> tuple[str, str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.describe(matcher, self)
+        """Return the category alone: rules do not see images."""
+        return f"the {canonical(self.goal.category)}", "images are not looked at"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,11 +91,9 @@ class ObjectsQuestion(Question[tuple[str, ...]]):
     def prompt(self) -> Prompt:
         """Show the goal in words."""
         return Prompt.of(
-            Text(
-                f"A robot is told: {self.text}\nWhich objects does this speak of? Rooms are no objects. Answer on the "
-                f"first line with exactly [a, b, ...]: nouns without adjectives, the object to find first, at most "
-                f"{MAX_GOAL_NODES}."
-            )
+            f"A robot is told: {self.text}\nWhich objects does this speak of? Rooms are no objects. Answer on the "
+            f"first line with exactly [a, b, ...]: nouns without adjectives, the object to find first, at most "
+            f"{MAX_GOAL_NODES}.",
         )
 
     def parse(self, text: str) -> tuple[str, ...]:
@@ -109,8 +112,10 @@ class ObjectsQuestion(Question[tuple[str, ...]]):
         return f"[{', '.join(answer)}]"
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.objects(matcher, self)
+        """Name the target, and the objects that it should be on or near."""
+        goal = parse_goal(self.text, self.goal.category)
+        nouns = (goal.noun, *(relation.noun for relation in goal.relations if relation.kind != "in"))
+        return tuple(dict.fromkeys(nouns))[:MAX_GOAL_NODES], "read by rule"
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,12 +130,10 @@ class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
     def prompt(self) -> Prompt:
         """Show the goal in words, and its objects."""
         return Prompt.of(
-            Text(
-                f"A robot is told: {self.text}\nThe objects are [{', '.join(self.objects)}]. How do they stand to each "
-                "other? Write one line for each relation that is said, exactly of the form\n"
-                "A and B: A is <relation> B\nwith A and B from the list, such as "
-                '"mug and table: mug is on table". If none is said, answer "none".'
-            )
+            f"A robot is told: {self.text}\nThe objects are [{', '.join(self.objects)}]. How do they stand to each "
+            "other? Write one line for each relation that is said, exactly of the form\n"
+            "A and B: A is <relation> B\nwith A and B from the list, such as "
+            '"mug and table: mug is on table". If none is said, answer "none".',
         )
 
     def parse(self, text: str) -> tuple[GoalEdge, ...]:
@@ -156,8 +159,15 @@ class GoalRelationsQuestion(Question[tuple[GoalEdge, ...]]):
         return "\n".join(lines) or "none"
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[GoalEdge, ...], str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.goal_relations(matcher, self)
+        """Return all relations of the target that the goal states."""
+        goal = parse_goal(self.text, self.goal.category)
+        stated = {"on": "on", "near": "next to"}
+        edges = [
+            GoalEdge(goal.noun, stated[relation.kind], relation.noun)
+            for relation in goal.relations
+            if relation.kind in stated and {goal.noun, relation.noun} <= set(self.objects)
+        ]
+        return tuple(dict.fromkeys(edges)), "read by rule"
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,12 +181,10 @@ class DecomposeQuestion(Question[tuple[GoalGraph, ...]]):
     def prompt(self) -> Prompt:
         """Show the graph as JSON."""
         return Prompt.of(
-            Text(
-                f"This is a graph of objects and relations: {_json_of(self.graph)}\nDivide it into subgraphs of "
-                "objects that stand together. Answer with one line of JSON and nothing before it, exactly of the form\n"
-                '{"subgraph_1": {"nodes": ["a", "b"], "edges": [["a", "on", "b"]]}, "subgraph_2": ...}\n'
-                "Use only nodes and edges of the graph; the object to find belongs to subgraph_1."
-            )
+            f"This is a graph of objects and relations: {_json_of(self.graph)}\nDivide it into subgraphs of "
+            "objects that stand together. Answer with one line of JSON and nothing before it, exactly of the form\n"
+            '{"subgraph_1": {"nodes": ["a", "b"], "edges": [["a", "on", "b"]]}, "subgraph_2": ...}\n'
+            "Use only nodes and edges of the graph; the object to find belongs to subgraph_1.",
         )
 
     def parse(self, text: str) -> tuple[GoalGraph, ...]:
@@ -222,8 +230,20 @@ class DecomposeQuestion(Question[tuple[GoalGraph, ...]]):
         return {"type": "string"}
 
     def by_rule(self, matcher: Matcher) -> tuple[tuple[GoalGraph, ...], str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.decompose(matcher, self)
+        """Return the connected components, the target's first."""
+        graph = self.graph
+        left, parts = list(graph.nodes), []
+        while left:
+            inside: set[str] = set()
+            reached = {left[0]}
+            while not reached <= inside:
+                inside |= reached
+                touching = [edge for edge in graph.edges if inside & {edge.subject, edge.object}]
+                reached = {word for edge in touching for word in (edge.subject, edge.object)}
+            left = [word for word in left if word not in inside]
+            edges = tuple(edge for edge in graph.edges if edge.subject in inside)
+            parts.append(GoalGraph(tuple(word for word in graph.nodes if word in inside), edges))
+        return tuple(parts), "connected components"
 
 
 def _json_of(graph: GoalGraph) -> str:
@@ -245,11 +265,9 @@ class CategoryQuestion(ClosedQuestion[str]):
     def prompt(self) -> Prompt:
         """Show the goal in words, and the categories."""
         return Prompt.of(
-            Text(
-                f"A robot is told: {self.text}\nIt is to find: {self.target}. Its detector knows "
-                f"[{', '.join(self.categories)}]. Which of these is the object? Answer on the first line with exactly "
-                f'one of them, or with "{NO_CATEGORY}" if it is none of them.'
-            )
+            f"A robot is told: {self.text}\nIt is to find: {self.target}. Its detector knows "
+            f"[{', '.join(self.categories)}]. Which of these is the object? Answer on the first line with exactly "
+            f'one of them, or with "{NO_CATEGORY}" if it is none of them.',
         )
 
     def parse(self, text: str) -> str:
@@ -268,5 +286,6 @@ class CategoryQuestion(ClosedQuestion[str]):
         return (*self.categories, NO_CATEGORY)
 
     def by_rule(self, matcher: Matcher) -> tuple[str, str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.category(matcher, self)
+        """Return the category of the target's noun."""
+        found = _CATEGORY_OF_NOUN.get(canonical(self.target), NO_CATEGORY)
+        return (found if found in self.categories else NO_CATEGORY), "looked up"

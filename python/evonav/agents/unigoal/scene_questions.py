@@ -1,24 +1,34 @@
-"""Questions of UniGoal about the scene graph: relations, groups, layout, corrections."""
+"""Questions of UniGoal about the scene graph: relations, groups, layout, corrections.
+
+The rules judge relations of scene nodes by their boxes; they do not guess them from names. Corrections touch relations
+alone: no box can tell what a node is, or whether it is there.
+"""
 
 import math
 import re
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
-from evonav.agents.unigoal import rules
-from evonav.agents.unigoal.goal_graph import GoalGraph
+from evonav.agents.unigoal.goal_graph import GoalGraph, relation_kind
 from evonav.agents.unigoal.object_graph import Group, SceneEdge, SceneNode, Verdict
 from evonav.agents.unigoal.questions import parse_relation, relation_line
 from evonav.decision.candidates import Point2
-from evonav.decision.prompts import Prompt, Text
+from evonav.decision.prompts import Prompt
 from evonav.decision.question import AnswerError, ClosedQuestion, Question, first_line, lines_of
-from evonav.decision.text.matcher import Matcher
+from evonav.decision.text.language import canonical
+from evonav.decision.text.matcher import ROOM_SIGNS, Matcher, gap_m
 from evonav.tasks.public import StageInput
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
 _PLACE = re.compile(rf"(.+?): \(({_NUMBER}), ({_NUMBER})\)\.?")
 _VERDICT = re.compile(r"(keep|delete|rename to ([a-z][a-z -]*))\.?", re.IGNORECASE)
+_APART = "away from"
+_BESIDE_M = 0.7
+"""Distance of the layout between an object and one next to it."""
+
+A = TypeVar("A")
 
 
 def describe_graph(graph: GoalGraph) -> str:
@@ -27,30 +37,59 @@ def describe_graph(graph: GoalGraph) -> str:
     return f"objects [{', '.join(graph.nodes)}]" + (f", relations: {relations}" if relations else "")
 
 
+class LinesQuestion(Question[A]):
+    """A question that is answered by one line for each of a number of things, in their order."""
+
+    things: ClassVar[str]
+    """A noun for the things, for errors."""
+
+    @property
+    @abstractmethod
+    def num_lines(self) -> int:
+        """Number of lines of an answer."""
+
+    @abstractmethod
+    def parse_lines(self, lines: Sequence[str], text: str) -> A:
+        """Parse as many lines as there are things; `text` is the whole answer, for errors."""
+
+    def parse(self, text: str) -> A:
+        """Read one line for each thing."""
+        lines = lines_of(text)
+        if len(lines) != self.num_lines:
+            raise AnswerError("invalid", f"{len(lines)} lines for {self.num_lines} {self.things}", text)
+        return self.parse_lines(lines, text)
+
+    def answer_schema(self) -> Mapping[str, Any]:
+        """Return the schema of an array with a line for each thing."""
+        num = self.num_lines
+        return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
+
+
 @dataclass(frozen=True, slots=True)
-class RelationLinesQuestion(Question[tuple[str, ...]]):
+class RelationLinesQuestion(LinesQuestion[tuple[str, ...]]):
     """Ask for the relations of new nodes of the scene graph to the others, in one call for all pairs."""
 
     kind: ClassVar[str] = "scene-relations"
+    things: ClassVar[str] = "pairs"
     goal: StageInput
     pairs: Sequence[tuple[SceneNode, SceneNode]]
+
+    @property
+    def num_lines(self) -> int:
+        """Number of pairs."""
+        return len(self.pairs)
 
     def prompt(self) -> Prompt:
         """Show the pairs by name; the model is shown no image, as in the original."""
         pairs = "\n".join(f"{a.name} and {b.name}" for a, b in self.pairs)
         return Prompt.of(
-            Text(
-                f"These are pairs of objects in a home:\n{pairs}\nHow do they most likely stand to each other? Answer "
-                f"with exactly {len(self.pairs)} lines, one a pair in the same order, exactly of the form\n"
-                'A and B: A is <relation> B\nsuch as "mug_1 and table_2: mug_1 is on table_2".'
-            )
+            f"These are pairs of objects in a home:\n{pairs}\nHow do they most likely stand to each other? Answer "
+            f"with exactly {len(self.pairs)} lines, one a pair in the same order, exactly of the form\n"
+            'A and B: A is <relation> B\nsuch as "mug_1 and table_2: mug_1 is on table_2".',
         )
 
-    def parse(self, text: str) -> tuple[str, ...]:
-        """Read one line for each pair, in the order of the pairs."""
-        lines = lines_of(text)
-        if len(lines) != len(self.pairs):
-            raise AnswerError("invalid", f"{len(lines)} lines for {len(self.pairs)} pairs", text)
+    def parse_lines(self, lines: Sequence[str], text: str) -> tuple[str, ...]:
+        """Read `A and B: A is <relation> B` for each pair."""
         relations = []
         for line, (a, b) in zip(lines, self.pairs, strict=True):
             read = parse_relation(line)
@@ -64,14 +103,9 @@ class RelationLinesQuestion(Question[tuple[str, ...]]):
         named = [(a.name, b.name, relation) for (a, b), relation in zip(self.pairs, answer, strict=True)]
         return "\n".join(relation_line(a, b, a, relation, b) for a, b, relation in named)
 
-    def answer_schema(self) -> Mapping[str, Any]:
-        """Return the schema of an array with a line for each pair."""
-        num = len(self.pairs)
-        return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
-
     def by_rule(self, matcher: Matcher) -> tuple[tuple[str, ...], str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.scene_relations(matcher, self)
+        """Relate nodes by their boxes: on, under, next to, or apart."""
+        return tuple(_relation(matcher, a, b) for a, b in self.pairs), "judged by boxes"
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +121,8 @@ class RoomQuestion(ClosedQuestion[str]):
     def prompt(self) -> Prompt:
         """Show the goal's subgraph, and the rooms."""
         return Prompt.of(
-            Text(
-                f"A robot looks for {self.subgraph.nodes[0]}: {describe_graph(self.subgraph)}. In which of these rooms "
-                f"is it most likely: [{', '.join(self.rooms)}]? Answer on the first line with exactly one of them."
-            )
+            f"A robot looks for {self.subgraph.nodes[0]}: {describe_graph(self.subgraph)}. In which of these rooms "
+            f"is it most likely: [{', '.join(self.rooms)}]? Answer on the first line with exactly one of them.",
         )
 
     def parse(self, text: str) -> str:
@@ -110,8 +142,13 @@ class RoomQuestion(ClosedQuestion[str]):
         return self.rooms
 
     def by_rule(self, matcher: Matcher) -> tuple[str, str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.room(matcher, self)
+        """Choose the room that the instruction names; else the one where the target usually is; else the first."""
+        stated = matcher.parsed(self.goal).room
+        usual = next((kind for kind, signs in ROOM_SIGNS.items() if canonical(self.subgraph.nodes[0]) in signs), None)
+        for found, reason in ((stated, "named"), (usual, "where it mostly stands")):
+            if found in self.rooms and found is not None:
+                return found, reason
+        return self.rooms[0], "nothing tells"
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,13 +169,11 @@ class GroupScoreQuestion(Question[float]):
         name = {node.id: node.name for node in self.group.nodes}
         relations = [f"{name[e.subject_id]} is {e.relation} {name[e.object_id]}" for e in self.edges]
         return Prompt.of(
-            Text(
-                f"A robot looks for {self.subgraph.nodes[0]}: {describe_graph(self.subgraph)}.\nIt knows a group of "
-                f"objects that stand together: [{', '.join(name.values())}]"
-                + (f", relations: {'; '.join(relations)}" if relations else "")
-                + ".\nHow likely is it to find the goal near this group? Answer on the first line with exactly one "
-                "number from 0 to 1."
-            )
+            f"A robot looks for {self.subgraph.nodes[0]}: {describe_graph(self.subgraph)}.\nIt knows a group of "
+            f"objects that stand together: [{', '.join(name.values())}]"
+            + (f", relations: {'; '.join(relations)}" if relations else "")
+            + ".\nHow likely is it to find the goal near this group? Answer on the first line with exactly one "
+            "number from 0 to 1.",
         )
 
     def parse(self, text: str) -> float:
@@ -162,36 +197,42 @@ class GroupScoreQuestion(Question[float]):
         return [0.0 if answer >= 0.5 else 1.0]
 
     def by_rule(self, matcher: Matcher) -> tuple[float, str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.group_score(matcher, self)
+        """Score how well the best member's caption fits the goal, with a bonus for the right room."""
+        goal = matcher.parsed(self.goal)
+        score = max(matcher.label_score(goal, node.caption) for node in self.group.nodes)
+        if goal.room is not None:
+            around = [node.candidate for node in self.nodes]
+            score += 0.2 * float(matcher.room_around(self.group.centre_m, around) == goal.room)
+        return round(min(1.0, score), 3), "words compared"
 
 
 @dataclass(frozen=True, slots=True)
-class LayoutQuestion(Question[Mapping[str, Point2]]):
+class LayoutQuestion(LinesQuestion[Mapping[str, Point2]]):
     """Ask how the goal's objects lie to each other, seen from above."""
 
     kind: ClassVar[str] = "layout"
+    things: ClassVar[str] = "objects"
     goal: StageInput
     subgraph: GoalGraph
     anchors: Mapping[str, SceneNode]
     """Goal nodes that the scene graph has. Their places are not part of the prompt."""
 
+    @property
+    def num_lines(self) -> int:
+        """Number of the goal's objects."""
+        return len(self.subgraph.nodes)
+
     def prompt(self) -> Prompt:
         """Show the goal's subgraph; the first two anchors fix scale and direction."""
         return Prompt.of(
-            Text(
-                f"This is a goal of a robot: {describe_graph(self.subgraph)}. Guess where the objects lie, seen from "
-                f"above, in metres. Answer with exactly {len(self.subgraph.nodes)} lines, one an object in the same "
-                'order, exactly of the form\nobject: (x, y)\nsuch as "table: (0, 1.5)". '
-                f"No two of [{', '.join(self.anchors)}] may be at the same place."
-            )
+            f"This is a goal of a robot: {describe_graph(self.subgraph)}. Guess where the objects lie, seen from "
+            f"above, in metres. Answer with exactly {len(self.subgraph.nodes)} lines, one an object in the same "
+            'order, exactly of the form\nobject: (x, y)\nsuch as "table: (0, 1.5)". '
+            f"No two of [{', '.join(self.anchors)}] may be at the same place.",
         )
 
-    def parse(self, text: str) -> Mapping[str, Point2]:
-        """Read `object: (x, y)` for each object in order; no two anchors may be at the same place."""
-        lines = lines_of(text)
-        if len(lines) != len(self.subgraph.nodes):
-            raise AnswerError("invalid", f"{len(lines)} lines for {len(self.subgraph.nodes)} objects", text)
+    def parse_lines(self, lines: Sequence[str], text: str) -> Mapping[str, Point2]:
+        """Read `object: (x, y)` for each object; no two anchors may be at the same place."""
         places: dict[str, Point2] = {}
         for line, word in zip(lines, self.subgraph.nodes, strict=True):
             match = _PLACE.fullmatch(line)
@@ -207,27 +248,41 @@ class LayoutQuestion(Question[Mapping[str, Point2]]):
         """Return one line an object."""
         return "\n".join(f"{word}: ({answer[word][0]:.3f}, {answer[word][1]:.3f})" for word in self.subgraph.nodes)
 
-    def answer_schema(self) -> Mapping[str, Any]:
-        """Return the schema of an array with a line for each object."""
-        num = len(self.subgraph.nodes)
-        return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
-
     def by_rule(self, matcher: Matcher) -> tuple[Mapping[str, Point2], str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.layout(matcher, self)
+        """Place anchors where they are, objects on them there, and objects next to them a step towards the others."""
+        at = {word: node.ground_m for word, node in self.anchors.items()}
+        mean = (sum(x for x, _ in at.values()) / len(at), sum(z for _, z in at.values()) / len(at))
+        places = dict(at)
+        for word in self.subgraph.nodes:
+            if word in at:
+                continue
+            offers = [
+                _beside(at[other], mean, relation_kind(edge.relation))
+                for edge in self.subgraph.edges
+                for subject, other in ((edge.subject, edge.object), (edge.object, edge.subject))
+                if subject == word and other in at
+            ] or [mean]
+            places[word] = (sum(x for x, _ in offers) / len(offers), sum(z for _, z in offers) / len(offers))
+        return {word: (round(x, 3), round(z, 3)) for word, (x, z) in places.items()}, "from known places"
 
 
 @dataclass(frozen=True, slots=True)
-class CorrectionQuestion(Question[tuple[Verdict, ...]]):
+class CorrectionQuestion(LinesQuestion[tuple[Verdict, ...]]):
     """Ask which parts of the scene graph around the goal are right."""
 
     kind: ClassVar[str] = "correction"
+    things: ClassVar[str] = "nodes and edges"
     goal: StageInput
     subgraph: GoalGraph
     nodes: Sequence[SceneNode]
     """Nodes within two hops of the match."""
     edges: Sequence[SceneEdge]
     """Edges between the nodes."""
+
+    @property
+    def num_lines(self) -> int:
+        """Number of nodes and edges."""
+        return len(self.nodes) + len(self.edges)
 
     def prompt(self) -> Prompt:
         """Show nodes and edges, numbered."""
@@ -238,19 +293,14 @@ class CorrectionQuestion(Question[tuple[Verdict, ...]]):
         ]
         listed = "\n".join(f"{index}: {thing}" for index, thing in enumerate(things))
         return Prompt.of(
-            Text(
-                f"A robot looks for {describe_graph(self.subgraph)}. It has found this, objects first, then "
-                f"relations:\n{listed}\nSome may be wrong. Answer with exactly {len(things)} lines, one a number in "
-                'the same order: the number, a colon, and exactly "keep", "delete" or "rename to <word>" (for a '
-                "relation: what it is)."
-            )
+            f"A robot looks for {describe_graph(self.subgraph)}. It has found this, objects first, then "
+            f"relations:\n{listed}\nSome may be wrong. Answer with exactly {len(things)} lines, one a number in "
+            'the same order: the number, a colon, and exactly "keep", "delete" or "rename to <word>" (for a '
+            "relation: what it is).",
         )
 
-    def parse(self, text: str) -> tuple[Verdict, ...]:
+    def parse_lines(self, lines: Sequence[str], text: str) -> tuple[Verdict, ...]:
         """Read `<number>: keep | delete | rename to <word>`, a line for each node, then for each edge."""
-        lines, num = lines_of(text), len(self.nodes) + len(self.edges)
-        if len(lines) != num:
-            raise AnswerError("invalid", f"{len(lines)} lines for {num} nodes and edges", text)
         verdicts = []
         for index, line in enumerate(lines):
             number, _, decision = line.partition(":")
@@ -267,11 +317,37 @@ class CorrectionQuestion(Question[tuple[Verdict, ...]]):
         """Return one line a verdict."""
         return "\n".join(f"{index}: {verdict}" for index, verdict in enumerate(answer))
 
-    def answer_schema(self) -> Mapping[str, Any]:
-        """Return the schema of an array with a line for each node and edge."""
-        num = len(self.nodes) + len(self.edges)
-        return {"type": "array", "items": {"type": "string"}, "minItems": num, "maxItems": num}
-
     def by_rule(self, matcher: Matcher) -> tuple[tuple[Verdict, ...], str]:
-        """Return the text matcher's answer and the reason for it."""
-        return rules.correct(matcher, self)
+        """Judge relations as boxes have them now: boxes grow after an edge was made."""
+        node_of = {node.id: node for node in self.nodes}
+        verdicts = [Verdict("keep")] * len(self.nodes)
+        for edge in self.edges:
+            relation = _relation(matcher, node_of[edge.subject_id], node_of[edge.object_id])
+            verdicts.append(Verdict("keep") if relation == edge.relation else Verdict("rename", relation))
+        return tuple(verdicts), "judged by boxes"
+
+
+def _relation(matcher: Matcher, node: SceneNode, other: SceneNode) -> str:
+    """Return how a node stands to another, by their boxes."""
+    a, b = node.candidate, other.candidate
+    apart_m = gap_m(a, b)
+    if apart_m > matcher.config.near_m:
+        return _APART
+    if apart_m == 0.0:
+        # Of two things in one place the one with the higher bottom is on the other.
+        a_bottom_m, b_bottom_m = (thing.centre_m[1] - thing.size_m[1] / 2.0 for thing in (a, b))
+        if a_bottom_m > b_bottom_m and matcher.is_on(a, b):
+            return "on"
+        if b_bottom_m > a_bottom_m and matcher.is_on(b, a):
+            return "under"
+    return "next to"
+
+
+def _beside(place: Point2, towards: Point2, kind: str) -> Point2:
+    if kind != "near":
+        return place
+    dx, dz = towards[0] - place[0], towards[1] - place[1]
+    length = (dx * dx + dz * dz) ** 0.5
+    if length == 0.0:
+        return (place[0] + _BESIDE_M, place[1])
+    return (place[0] + _BESIDE_M * dx / length, place[1] + _BESIDE_M * dz / length)

@@ -1,15 +1,21 @@
-"""Rank remembered objects for a decision model."""
+"""Rank remembered objects for a decision model, and choose by rule between objects and frontiers."""
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evonav.decision.candidates import ObjectCandidate, Point2
-from evonav.decision.text.features import similarity_of_label
+from evonav.decision.candidates import Choice, FrontierCandidate, ObjectCandidate, Point2
+from evonav.decision.question import AnswerError
+from evonav.decision.text.language import canonical
 from evonav.decision.text.matcher import Matcher
+from evonav.decision.text.minilm import encoder
 from evonav.tasks.public import StageInput
+
+_DECIMALS = 4
+"""Decimals of a similarity: the number of threads changes a product in the seventh."""
 
 
 def rank_entries(
@@ -32,6 +38,8 @@ def rank_entries(
 
 def rank_by_text(goal: StageInput, entries: Sequence[ObjectCandidate], position_m: Point2) -> list[int]:
     """Rank as `rank_entries` does, by the meaning of labels and instruction (extra `evonav[text]`).
+
+    It stands for CLIP's image features where a perception has none; the paper (Sec. C.4) compares images with text.
 
     Args:
         goal: The stage's goal.
@@ -71,3 +79,74 @@ def rank_by_feature(
     """
     scores = [-math.inf if feature is None else float(goal @ feature) for feature in features]
     return sorted(range(len(scores)), key=lambda index: (-scores[index], entry_ids[index]))
+
+
+@lru_cache(maxsize=4096)
+def text_feature(text: str) -> NDArray[np.float32]:
+    """Return the `(384,)` unit feature of a sentence.
+
+    Raises:
+        InvalidArgumentError: The extra is missing or broken.
+    """
+    feature = encoder().encode(text)
+    feature.setflags(write=False)
+    return feature
+
+
+def similarity_of_label(instruction: str, label: str) -> float:
+    """Return the cosine between an instruction and a label, -1 to 1.
+
+    Args:
+        instruction: English text.
+        label: ProcTHOR's type or a detector's word.
+
+    Raises:
+        InvalidArgumentError: The extra is missing or broken.
+    """
+    return round(float(text_feature(instruction) @ text_feature(canonical(label))), _DECIMALS)
+
+
+def choose_candidate(
+    matcher: Matcher,
+    stage: StageInput,
+    objects: Sequence[ObjectCandidate],
+    frontiers: Sequence[FrontierCandidate],
+    surroundings: Sequence[ObjectCandidate],
+    *,
+    num_rounds_left: int,
+) -> tuple[Choice, str]:
+    """Choose an object that the instruction fits; else a frontier; else what the goal should be on or near.
+
+    Args:
+        matcher: Reads the goal.
+        stage: The stage whose goal is searched.
+        objects: Remembered objects, the best first.
+        frontiers: Frontiers that can be explored.
+        surroundings: Everything remembered.
+        num_rounds_left: Number of decision rounds that are left in the stage.
+
+    Returns:
+        The choice and the reason for it.
+
+    Raises:
+        AnswerError: No object has to do with the goal, and there is no frontier.
+    """
+    goal = matcher.parsed(stage)
+    config = matcher.config
+    named = [
+        (matcher.relation_share(goal, candidate, surroundings), index)
+        for index, candidate in enumerate(objects)
+        if matcher.names_goal(goal, candidate)
+    ]
+    if named:
+        share, index = max(named, key=lambda pair: (pair[0], -pair[1]))
+        is_last_chance = not frontiers or num_rounds_left <= config.hurry_rounds
+        if share >= config.min_relations or is_last_chance:
+            return Choice("object", index), f"{objects[index].label}, {share:.0%} of what is said fits"
+    if frontiers:
+        index = min(range(len(frontiers)), key=lambda i: (matcher.frontier_cost_m(goal, frontiers[i], surroundings), i))
+        return Choice("frontier", index), "relations do not hold" if named else "nothing remembered fits"
+    for index, candidate in enumerate(objects):
+        if matcher.label_score(goal, candidate.label) > 0.0:
+            return Choice("object", index), f"{candidate.label} is where the {goal.noun} should be"
+    raise AnswerError("invalid", "nothing to go to")

@@ -1,0 +1,128 @@
+"""The base of all agents that use a `Navigator`: they ask a decision model, and describe each round for the records."""
+
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from evonav.agents.agent import AgentAction, Belief, EntryBelief, FrontierBelief, RoundDiagnostics, Sensing, Stop
+from evonav.agents.navigator import Navigator, NavigatorConfig, Target
+from evonav.decision.candidates import FrontierCandidate, Pixels, Point2
+from evonav.decision.query import QuerySession
+from evonav.decision.question import DecisionModel
+from evonav.decision.text.matcher import TextMatch
+from evonav.memory import Frontier
+from evonav.memory.objects import ObjectEntry
+from evonav.memory.views import pixels_of
+from evonav.sensors.observation import Observation
+from evonav.tasks.public import StageInput, TaskInfo
+
+
+class NavigatorAgent(ABC):
+    """An agent with a map, object entries, stored views and a decision model."""
+
+    def __init__(
+        self, config: NavigatorConfig, decision: DecisionModel | None, *, num_tries: int, sensing: Sensing | None = None
+    ) -> None:
+        """Create the agent; its memory is made when a task begins.
+
+        Args:
+            config: Parameters of the navigator.
+            decision: Decision model; default: the text matcher.
+            num_tries: Number of tries before a question without a valid answer counts as failed.
+            sensing: The sensors that the agent needs, apart from colours.
+        """
+        model: DecisionModel = decision or TextMatch()
+        self.sensing = replace(sensing or Sensing(), needs_rgb=model.needs_images)
+        self._navigator_config = config
+        self._queries = QuerySession(model, num_tries=num_tries)
+        self._counters: Counter[str] = Counter()
+        self._candidates: tuple[int, ...] = ()
+        """Ids of the entries that the last question offered."""
+        self._diagnostics = RoundDiagnostics()
+
+    def begin_task(self, task: TaskInfo) -> None:
+        """Forget everything."""
+        self._task = task
+        self._counters.clear()
+        self._queries.counters.clear()
+        self._navigator = Navigator(task.map_frame, self._navigator_config)
+
+    def begin_stage(self, stage: StageInput) -> None:
+        """Take a new goal; the memory stays."""
+        self._goal = stage
+        self._navigator.begin_stage(stage.stage)
+
+    @abstractmethod
+    def act(self, observation: Observation) -> AgentAction:
+        """Decide what to do in one decision round."""
+
+    def _heading_view(self) -> Pixels | None:
+        """Return the heading view of the last round for a prompt, if the model looks at images."""
+        view = self._navigator.round_views[-1]
+        return pixels_of(view, self._navigator.config.image_px) if self.sensing.needs_rgb else None
+
+    def _frontier_candidates(self, here: Point2) -> list[FrontierCandidate]:
+        """Return all frontiers as questions describe them, with images if the model looks at them."""
+        navigator, with_images = self._navigator, self.sensing.needs_rgb
+        return [navigator.frontier_candidate(f, here, with_images=with_images) for f in navigator.explorer.frontiers]
+
+    def _approach(self, target: Target, reason: str = "") -> AgentAction:
+        self._record_round(f"object {target.entry_id}", reason, target.entry_id)
+        return self._navigator.approach(target)
+
+    def _go_to_frontier(self, frontier: Frontier, reason: str) -> AgentAction:
+        self._record_round(f"frontier {frontier.id}", reason)
+        return self._navigator.go_to_frontier(frontier)
+
+    def _stop(self, reason: str, entry_id: int | None = None) -> AgentAction:
+        self._record_round("none" if entry_id is None else f"object {entry_id}", reason, entry_id)
+        return Stop(reason)
+
+    def _record_round(self, choice: str, reason: str, entry_id: int | None = None) -> None:
+        """Store what was chosen for `diagnostics`: the choice in the agent's own terms, and the chosen entry."""
+        navigator = self._navigator
+        entry = None if entry_id is None else navigator.objects.entry(entry_id)
+        self._diagnostics = RoundDiagnostics(
+            choice=choice,
+            chosen_entry=None if entry is None else _belief_of(entry),
+            num_entries=len(navigator.objects),
+            num_frontiers=len(navigator.explorer.frontiers),
+            counters=dict(self._round_counters()),
+            details=dict(self._round_details(reason)),
+        )
+
+    @abstractmethod
+    def _round_counters(self) -> Mapping[str, int]:
+        """Return the cumulative counts for the records of a round."""
+
+    def _round_details(self, reason: str) -> Mapping[str, Any]:
+        """Return further values for the records of a round."""
+        return {"reason": reason} if reason else {}
+
+    def diagnostics(self) -> RoundDiagnostics:
+        """Return the choice, the details and the counters of the last round."""
+        return self._diagnostics
+
+    def entries(self) -> Sequence[EntryBelief]:
+        """Return the object memory."""
+        return [_belief_of(entry) for entry in self._navigator.objects.entries]
+
+    def belief(self) -> Belief:
+        """Return entries, map, frontiers, and the questions of the last round."""
+        explorer = self._navigator.explorer
+        return Belief(
+            entries=self.entries(),
+            candidate_ids=self._candidates,
+            frontiers=[FrontierBelief(f.id, f.position_m, f.direction_rad) for f in explorer.frontiers],
+            cells=explorer.map.cells,
+            map_frame=explorer.map.map_frame,
+            queries=tuple(self._queries.log),
+            explored=explorer.map.explored,
+        )
+
+
+def _belief_of(entry: ObjectEntry) -> EntryBelief:
+    """Return an entry as records state it."""
+    return EntryBelief(entry.id, entry.label, entry.centre_m, entry.size_m, entry.num_detections)
