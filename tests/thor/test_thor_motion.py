@@ -180,6 +180,8 @@ def test_the_camera_stops_at_its_limits() -> None:
     for _ in range(3):
         done(engine, "LookUp")
     assert refused(engine, "LookUp") == "can't look up beyond 30 degrees above the forward horizon"
+    for huge in (1e300, 1e308):
+        assert refused(engine, "LookUp", degrees=huge) == "can't look up beyond 30 degrees above the forward horizon"
     refused(engine, "LookUp", degrees=0.1)
     assert "multiple of 0.1f" in refused(engine, "LookDown", degrees=0.15)
     assert "positive degree value" in refused(engine, "LookDown", degrees=-10)

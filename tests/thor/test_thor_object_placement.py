@@ -12,7 +12,7 @@ import pytest
 from evonav.house import bundled_houses
 from evonav.thor import objects
 from evonav.thor.engine import Engine
-from evonav.thor.events.metadata import MetadataEncoder
+from evonav.thor.events.metadata import pack_event
 
 Json = dict[str, Any]
 
@@ -377,15 +377,19 @@ def test_objects_can_be_placed_at_spawn_coordinates(engine: Engine) -> None:
 
 
 def test_events_list_filtered_objects_after_every_edit(engine: Engine) -> None:
-    """Whatever was packed before, an event is that of an encoder that has packed nothing yet."""
-    kept = MetadataEncoder()
+    """Whatever was packed before, an event is that of a scene for which nothing was packed yet."""
+
+    def unpacked_before() -> bytes:
+        engine.scene.mark_changed()
+        return pack_event(engine, sequence_id=1, has_colors=False)
+
     first, second, *_ = movable(engine)
     for wanted in (frozenset(), frozenset({second["objectId"]}), None):
         engine.object_filter = wanted
-        packed = kept.event(engine, sequence_id=1, has_colors=False)
-        assert packed == MetadataEncoder().event(engine, sequence_id=1, has_colors=False)
+        packed = pack_event(engine, sequence_id=1, has_colors=False)
+        assert packed == unpacked_before()
         listed = {record["objectId"] for record in msgpack.unpackb(packed)["agents"][0]["objects"]}
         assert listed == (set(records(engine)) if wanted is None else set(wanted))
     do(engine, "DisableObject", objectId=first["objectId"])
-    packed = kept.event(engine, sequence_id=1, has_colors=False)
-    assert packed == MetadataEncoder().event(engine, sequence_id=1, has_colors=False)
+    packed = pack_event(engine, sequence_id=1, has_colors=False)
+    assert packed == unpacked_before()

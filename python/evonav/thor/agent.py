@@ -120,6 +120,11 @@ class Agent:
         return Pose(self.x_m, self.y_m, self.z_m, self.yaw_rad, math.radians(self.horizon_deg))
 
     @property
+    def camera(self) -> Pose:
+        """The pose of the agent's camera."""
+        return replace(self.pose, y_m=self.camera_height_m)
+
+    @property
     def yaw_rad(self) -> float:
         """Heading in radians."""
         return math.radians(self.yaw_deg)

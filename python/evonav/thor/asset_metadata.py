@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 
-_Vec3 = tuple[float, float, float]
+from evonav.thor.geometry import Vec3
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +21,9 @@ class AssetMetadata:
     mass_kg: float = 0.0
     materials: tuple[str, ...] | None = None
     """AI2-THOR's `salientMaterials`; a record has a mass only if it has these."""
-    size_m: _Vec3 | None = None
+    size_m: Vec3 | None = None
     """Edges of the asset's box, along its own axes."""
-    pivot_m: _Vec3 = field(default=(0.0, 0.0, 0.0))
+    pivot_m: Vec3 = field(default=(0.0, 0.0, 0.0))
     """Offset of `position` from the centre of the box, in the asset's own frame."""
 
     @property

@@ -11,6 +11,7 @@ from evonav.errors import EvonavError
 from evonav.thor import objects
 from evonav.thor.actions.registry import ActionError
 from evonav.thor.asset_metadata import AssetMetadata, metadata_of_asset
+from evonav.thor.geometry import vector
 from evonav.thor.scene import Scene
 from evonav.thor.surfaces import Surfaces, fresh_surfaces
 
@@ -92,9 +93,9 @@ def set_pose(entry: Entry, centre_m: Sequence[float], rotation: Mapping[str, flo
     yaw_deg = rotation["y"] - float(entry["rotation"]["y"])
     for child, _ in objects.placed_objects({"objects": entry.get("children") or []}):
         child_m = turn @ (centre_of(child) - before_m) + centre_m
-        child["position"] = dict(zip("xyz", child_m.tolist(), strict=True))
+        child["position"] = vector(child_m.tolist())
         child["rotation"] = {**child["rotation"], "y": (float(child["rotation"]["y"]) + yaw_deg) % 360.0}
-    entry["position"] = dict(zip("xyz", map(float, centre_m), strict=True))
+    entry["position"] = vector(map(float, centre_m))
     entry["rotation"] = {axis: float(rotation[axis]) % 360.0 for axis in "xyz"}
     entry["kinematic"] = True
 
@@ -156,7 +157,7 @@ def update_receptacles(scene: Scene, object_ids: Sequence[str]) -> None:
             target = house["objects"] if found is None else receptacles[others[found]].setdefault("children", [])
             target.append(taken)
             lists[entry["id"]] = target
-    scene.mark_receptacles_changed()
+    scene.mark_changed()
 
 
 def find_receptacle(

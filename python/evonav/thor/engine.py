@@ -3,7 +3,7 @@
 import logging
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from pydantic import BaseModel, ConfigDict
@@ -112,16 +112,16 @@ class Engine:
         if self.map_view is not None:
             at = self.map_view.metadata()["position"]
             return (at["x"], at["y"], at["z"])
-        return (self.agent.x_m, self.agent.camera_height_m, self.agent.z_m)
+        return self.agent.camera.position_m
 
     def view(self, *, rgb: bool, instances: bool) -> Frame | Images:
         """Render the agent's camera, which crouching, a forced teleport or the map view may have moved."""
         if self.map_view is not None:
             return self.map_view.render(self.scene, rgb=rgb, instances=instances)
-        simulator, pose = self.scene.simulator, self.agent.pose
-        if self.agent.camera_height_m == simulator.config.camera_height_m:
-            return simulator.render(pose, rgb=rgb, instances=instances)
-        camera, intrinsics = replace(pose, y_m=self.agent.camera_height_m), simulator.intrinsics
+        simulator, camera = self.scene.simulator, self.agent.camera
+        if camera.y_m == simulator.config.camera_height_m:
+            return simulator.render(self.agent.pose, rgb=rgb, instances=instances)
+        intrinsics = simulator.intrinsics
         seen = CameraView(camera, intrinsics.width_px, intrinsics.height_px, intrinsics.vertical_fov_rad)
         return Frame(camera, intrinsics, *simulator.render_camera(seen, rgb=rgb, instances=instances))
 

@@ -9,7 +9,7 @@ also lists parts of furniture (drawers `id___0`). Evonav does not know these: th
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -18,14 +18,16 @@ from numpy.typing import NDArray
 from evonav.thor.actions.registry import ActionError
 from evonav.thor.agent import Agent
 from evonav.thor.asset_metadata import AssetMetadata, metadata_of_asset
+from evonav.thor.geometry import Vec3, box_around, vector
 from evonav.thor.scene import Scene
 from evonav.world.camera import CameraView
 from evonav.world.embedded import EmbeddedSimulator
-from evonav.world.pose import Pose
 from evonav.world.simulator import SceneObject
 
+if TYPE_CHECKING:
+    from evonav.thor.engine import Engine
+
 Record = dict[str, Any]
-_Vec3 = tuple[float, float, float]
 
 FLOOR_ID = "Floor"
 
@@ -48,15 +50,6 @@ _STATES = (
 _FLOOR_REACH_M = 0.7
 
 
-class ObjectView(NamedTuple):
-    """Distance and visibility of an object, seen by an agent."""
-
-    distance_m: float
-    """Distance in metres from the agent's position to the object's, in three dimensions."""
-    is_visible: bool
-    is_interactable: bool
-
-
 def static_records(scene: Scene) -> list[Record]:
     """Return all fields of all objects; `distance`, `visible` and `isInteractable` depend on the agent and are unset.
 
@@ -65,31 +58,22 @@ def static_records(scene: Scene) -> list[Record]:
     return table_of(scene).records
 
 
-def object_views(scene: Scene, agent: Agent, settings: Any) -> list[ObjectView]:  # noqa: ANN401
-    """Return the agent's view of each of `static_records`, in the same order."""
+def views(engine: "Engine") -> Iterator[tuple[Record, float, bool]]:
+    """Yield the static record of each object, its distance from the agent in metres, and whether it is visible.
+
+    A distance is that between the positions in three dimensions. Visible objects are interactable.
+    """
+    scene, agent = engine.scene, engine.agent
     table = table_of(scene)
     distances_m = np.linalg.norm(table.positions_m - (agent.x_m, agent.y_m, agent.z_m), axis=1).tolist()
-    seen = visible_ids(scene, agent, float(settings.visibilityDistance))
-    return [
-        ObjectView(distance_m, record["objectId"] in seen, record["objectId"] in seen)
-        for distance_m, record in zip(distances_m, table.records, strict=True)
-    ]
-
-
-def records(scene: Scene, agent: Agent, settings: Any) -> list[Record]:  # noqa: ANN401
-    """Return all fields of all objects."""
-    return [
-        {**record, "distance": view.distance_m, "visible": view.is_visible, "isInteractable": view.is_interactable}
-        for record, view in zip(static_records(scene), object_views(scene, agent, settings), strict=True)
-    ]
+    seen = visible_ids(scene, agent, engine.settings.visibilityDistance)
+    for record, distance_m in zip(table.records, distances_m, strict=True):
+        yield record, distance_m, record["objectId"] in seen
 
 
 class Table(NamedTuple):
     """All records of a scene, and what is derived with them."""
 
-    version: int
-    simulator: EmbeddedSimulator | None
-    """The simulator that the table was made from."""
     records: list[Record]
     positions_m: NDArray[np.float64]
     """Positions of the objects, `(N, 3)`."""
@@ -99,20 +83,23 @@ class Table(NamedTuple):
     """Object ids by index of the body."""
 
 
-_tables: WeakKeyDictionary[Scene, Table] = WeakKeyDictionary()
+_tables: WeakKeyDictionary[EmbeddedSimulator, Table] = WeakKeyDictionary()
 
 
 def table_of(scene: Scene) -> Table:
     """Return the records of a scene in its present version."""
-    table = _tables.get(scene)
-    if table is None or table.version != scene.version:
-        simulator = None if scene.house is None else scene.simulator
-        if table is None or table.simulator is not simulator:
-            table = _build(scene.house or {}, simulator)
-        records = [dict(record) for record in table.records]
-        _relate(scene.house or {}, records)
-        table = _tables[scene] = table._replace(version=scene.version, records=records)
-    return table
+    return scene.derived(_related_table)
+
+
+def _related_table(scene: Scene) -> Table:
+    if scene.house is None:
+        return _build({}, ())
+    table = _tables.get(scene.simulator)
+    if table is None:
+        table = _tables[scene.simulator] = _build(scene.house, scene.simulator.objects)
+    records = [dict(record) for record in table.records]
+    _relate(scene.house, records)
+    return table._replace(records=records)
 
 
 def record_of(scene: Scene, object_id: str) -> Record:
@@ -134,20 +121,9 @@ def own_size_m(scene: Scene, entry: Mapping[str, Any]) -> NDArray[np.float64]:
     return np.array(asset.size_m or list(record["axisAlignedBoundingBox"]["size"].values()))
 
 
-def bounds_m(scene: Scene) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return the least and the greatest corner of the box around the building."""
-    bodies = [body for body in scene.simulator.objects if body.kind != "object"]
-    half_m = [0.5 * np.array(body.size_m) for body in bodies]
-    low = np.min([body.centre_m - half for body, half in zip(bodies, half_m, strict=True)], axis=0)
-    high = np.max([body.centre_m + half for body, half in zip(bodies, half_m, strict=True)], axis=0)
-    return tuple(low.tolist()), tuple(high.tolist())
-
-
-def _build(house: Mapping[str, Any], simulator: EmbeddedSimulator | None) -> Table:
+def _build(house: Mapping[str, Any], all_bodies: Sequence[SceneObject]) -> Table:
     """Make the records of all objects, without their receptacles."""
-    found = [
-        (index, body) for index, body in enumerate(simulator.objects if simulator else ()) if body.kind != "ceiling"
-    ]
+    found = [(index, body) for index, body in enumerate(all_bodies) if body.kind != "ceiling"]
     bodies = {body.id: body for _, body in found}
     records = [_object_record(entry, bodies[entry["id"]]) for entry, _ in placed_objects(house)]
     openings = [*house.get("doors", ()), *house.get("windows", ())]
@@ -157,7 +133,7 @@ def _build(house: Mapping[str, Any], simulator: EmbeddedSimulator | None) -> Tab
     positions_m = np.array([list(record["position"].values()) for record in records], dtype=np.float64).reshape(-1, 3)
     by_body = {index: body.id for index, body in found}
     instances = {object_id: index + 1 for index, object_id in by_body.items()}
-    return Table(-1, simulator, records, positions_m, instances, by_body)
+    return Table(records, positions_m, instances, by_body)
 
 
 def placed_objects(house: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str | None]]:
@@ -220,8 +196,7 @@ def _opening_record(entry: Mapping[str, Any], body: SceneObject, house: Mapping[
 
 def _structure_records(house: Mapping[str, Any], bodies: Mapping[str, SceneObject]) -> Iterator[Record]:
     rooms = [bodies[room["id"]] for room in house.get("rooms", ())]
-    low = np.min([np.subtract(room.centre_m, np.multiply(room.size_m, 0.5)) for room in rooms], axis=0)
-    high = np.max([np.add(room.centre_m, np.multiply(room.size_m, 0.5)) for room in rooms], axis=0)
+    low, high = box_around(rooms)
     level = {"x": 0.0, "y": 0.0, "z": 0.0}
     floor = AssetMetadata("Floor", frozenset({"receptacle"}))
     record = _record({"id": _floor_id(house)}, "Floor", floor, (0.0, 0.0, 0.0), level)
@@ -244,7 +219,7 @@ def _record(
     entry: Mapping[str, Any],
     object_type: str,
     asset: AssetMetadata,
-    centre_m: _Vec3,
+    centre_m: Vec3,
     rotation: dict[str, float],
 ) -> Record:
     """Make a record without boxes and receptacles; its `position` is the asset's pivot."""
@@ -257,7 +232,7 @@ def _record(
     }
     return {
         "name": str(_value_of(entry, "name", entry["id"])),
-        "position": dict(zip("xyz", pivot_m, strict=True)),
+        "position": vector(pivot_m),
         "rotation": rotation,
         "visible": False,
         "isInteractable": False,
@@ -312,8 +287,8 @@ def aligned_box(centre_m: Sequence[float], size_m: Sequence[float]) -> Record:
     spans = [(centre + 0.5 * size, centre - 0.5 * size) for centre, size in zip(centre_m, size_m, strict=True)]
     return {
         "cornerPoints": [[x, y, z] for x in spans[0] for y in spans[1] for z in spans[2]],
-        "center": dict(zip("xyz", centre_m, strict=True)),
-        "size": dict(zip("xyz", size_m, strict=True)),
+        "center": vector(centre_m),
+        "size": vector(size_m),
     }
 
 
@@ -321,7 +296,7 @@ def aligned_box(centre_m: Sequence[float], size_m: Sequence[float]) -> Record:
 _ORIENTED = [(x, y, z) for y in (-0.5, 0.5) for x, z in ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5))]
 
 
-def oriented_corners(centre_m: _Vec3, size_m: _Vec3, rotation: Mapping[str, float] | None) -> list[list[float]]:
+def oriented_corners(centre_m: Vec3, size_m: Vec3, rotation: Mapping[str, float] | None) -> list[list[float]]:
     """Return the `cornerPoints` of an `objectOrientedBoundingBox`."""
     own_m = np.multiply(_ORIENTED, size_m)
     turned_m = own_m @ rotation_of(rotation).T if rotation else own_m
@@ -358,16 +333,14 @@ def visible_ids(scene: Scene, agent: Agent, distance_m: float) -> set[str]:
     if scene.house is None:
         return set()
     simulator, camera = scene.simulator, scene.simulator.intrinsics
-    x_m, height_m, z_m = eye_m(agent)
-    pose = Pose(x_m, height_m, z_m, agent.yaw_rad, math.radians(agent.horizon_deg))
-    view = CameraView(pose, camera.width_px, camera.height_px, camera.vertical_fov_rad)
+    view = CameraView(agent.camera, camera.width_px, camera.height_px, camera.vertical_fov_rad)
     by_body = table_of(scene).by_body
     return {by_body[body] for body in simulator.visible_objects(view, max_distance_m=distance_m)}
 
 
-def eye_m(agent: Agent) -> _Vec3:
+def eye_m(agent: Agent) -> Vec3:
     """Return the position of the agent's camera."""
-    return (agent.x_m, agent.camera_height_m, agent.z_m)
+    return agent.camera.position_m
 
 
 def camera_axes(agent: Agent) -> NDArray[np.float64]:

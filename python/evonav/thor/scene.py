@@ -2,8 +2,9 @@
 
 import copy
 import json
+from collections.abc import Callable
 from itertools import count
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from evonav.thor.actions.registry import ActionError
 from evonav.world.embedded import EmbeddedSimulator
@@ -12,6 +13,7 @@ from evonav.world.simulator import SimulatorConfig
 Document = dict[str, Any]
 """A house as JSON."""
 
+Derived = TypeVar("Derived")
 _versions = count(1)
 
 
@@ -23,10 +25,11 @@ class Scene:
         self.house: Document | None = None
         self.config = SimulatorConfig()
         self.version = next(_versions)
-        """Number that is unique to this scene and state; everything derived from the house is cached under it."""
+        """Number that is unique to this scene and state."""
         self.disabled: dict[str, Document] = {}
         """Objects that were removed, by id."""
         self._simulator: EmbeddedSimulator | None = None
+        self._derived: dict[Callable[[Scene], object], object] = {}
 
     def load(self, house: Document) -> None:
         """Replace the house.
@@ -36,14 +39,14 @@ class Scene:
         """
         simulator = self._built(house)
         self.house, self._simulator, self.disabled = house, simulator, {}
-        self.version = next(_versions)
+        self.mark_changed()
 
     def begin_edit(self) -> Document:
         """Return the house, to be changed in place."""
         if self.house is None:
             raise ActionError(f"scene {self.name} holds no house: call CreateHouse first")
         self._simulator = None
-        self.version = next(_versions)
+        self.mark_changed()
         return self.house
 
     def apply(self, delta_json: str) -> None:
@@ -54,15 +57,22 @@ class Scene:
         self.begin_edit()
         self.house, self._simulator = json.loads(simulator.house_json), simulator
 
-    def mark_receptacles_changed(self) -> None:
-        """Record that objects stand on other receptacles than before, without a change of the simulator."""
+    def mark_changed(self) -> None:
+        """Record a change of the house, also one that does not change the simulator."""
         self.version = next(_versions)
+        self._derived.clear()
+
+    def derived(self, make: Callable[["Scene"], Derived]) -> Derived:
+        """Return what a function makes of the scene; it is made once for each version of the scene."""
+        if make not in self._derived:
+            self._derived[make] = make(self)
+        return cast("Derived", self._derived[make])
 
     def configure(self, config: SimulatorConfig) -> None:
         """Set the agent's camera and body."""
         if config != self.config:
             self.config, self._simulator = config, None
-            self.version = next(_versions)
+            self.mark_changed()
 
     @property
     def simulator(self) -> EmbeddedSimulator:

@@ -1,21 +1,20 @@
 """Cast rays and test boxes against a scene, for actions that do so rarely."""
 
 from typing import NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evonav.thor.geometry import Vec3
 from evonav.thor.scene import Scene
 
 _F64 = NDArray[np.float64]
-_Vec3 = tuple[float, float, float]
 
 
 class Hit(NamedTuple):
     """The end of a ray."""
 
-    point_m: _Vec3
+    point_m: Vec3
     distance_m: float
     body: int
     """Index of the hit body in `simulator.objects`."""
@@ -30,7 +29,7 @@ class Surfaces:
         self._edges_m = corners_m[:, 1:] - corners_m[:, :1]
         self._normals = np.cross(self._edges_m[:, 0], self._edges_m[:, 1])
 
-    def cast(self, origin_m: _Vec3, direction: _Vec3) -> Hit | None:
+    def cast(self, origin_m: Vec3, direction: Vec3) -> Hit | None:
         """Return what a ray hits first. It hits surfaces from outside only, as Unity's rays do.
 
         Args:
@@ -124,15 +123,9 @@ class Surfaces:
         return inside
 
 
-_cache: WeakKeyDictionary[Scene, tuple[int, Surfaces]] = WeakKeyDictionary()
-
-
 def surfaces_of(scene: Scene) -> Surfaces:
     """Return the surfaces of a scene in its present version. They are shared: do not `lift` in them."""
-    cached = _cache.get(scene)
-    if cached is None or cached[0] != scene.version:
-        cached = _cache[scene] = (scene.version, fresh_surfaces(scene))
-    return cached[1]
+    return scene.derived(fresh_surfaces)
 
 
 def fresh_surfaces(scene: Scene) -> Surfaces:

@@ -10,18 +10,19 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from PIL import ImageColor
 from pydantic import BaseModel, ConfigDict
 
 from evonav.thor.actions.motion import invalid_operation
 from evonav.thor.actions.registry import ActionError, Vector3, action
 from evonav.thor.actions.teleport import out_of_range
 from evonav.thor.engine import Engine
+from evonav.thor.geometry import Vec3, box_around, vector
 from evonav.thor.scene import Scene
 from evonav.world.camera import CameraView, Images
 from evonav.world.pose import Pose
 
 Rgb = tuple[int, int, int]
-_Vec3 = tuple[float, float, float]
 
 NEAR_M, FAR_M = 0.1, 20.0
 """Clip planes of a camera without its own: those of the agent's camera."""
@@ -33,31 +34,14 @@ _MAX_CAMERAS = 64
 _FOV_DEG = (0.6, 177.0)
 _NEAR_M = 1e-4
 
-# The colour names of Unity's `ColorUtility.TryParseHtmlString`.
-_COLOURS = {
-    "red": (255, 0, 0),
-    "cyan": (0, 255, 255),
-    "blue": (0, 0, 255),
-    "darkblue": (0, 0, 160),
-    "lightblue": (173, 216, 230),
-    "purple": (128, 0, 128),
-    "yellow": (255, 255, 0),
-    "lime": (0, 255, 0),
-    "fuchsia": (255, 0, 255),
-    "white": (255, 255, 255),
-    "silver": (192, 192, 192),
-    "grey": (128, 128, 128),
-    "black": (0, 0, 0),
-    "orange": (255, 165, 0),
-    "brown": (165, 42, 42),
-    "maroon": (128, 0, 0),
-    "green": (0, 128, 0),
-    "olive": (128, 128, 0),
-    "navy": (0, 0, 128),
-    "teal": (0, 128, 128),
-    "aqua": (0, 255, 255),
-    "magenta": (255, 0, 255),
-}
+# The colour names of Unity's `ColorUtility.TryParseHtmlString`; all but one are the same colours in CSS.
+_COLOURS = frozenset(
+    {
+        *("red", "cyan", "blue", "darkblue", "lightblue", "purple", "yellow", "lime", "fuchsia", "white", "silver"),
+        *("grey", "black", "orange", "brown", "maroon", "green", "olive", "navy", "teal", "aqua", "magenta"),
+    }
+)
+_DARK_BLUE = (0, 0, 160)
 
 
 class PartialVector3(BaseModel):
@@ -75,8 +59,8 @@ class ThirdPartyCamera:
     """One camera. It is immutable: a change makes another camera."""
 
     camera_id: int
-    position_m: _Vec3
-    rotation_deg: _Vec3
+    position_m: Vec3
+    rotation_deg: Vec3
     """Unity's Euler angles in degrees: pitch down, yaw right, roll counter-clockwise; roll is applied first."""
     field_of_view_deg: float
     """Vertical field of view in degrees."""
@@ -92,8 +76,8 @@ class ThirdPartyCamera:
         """Return AI2-THOR's `ThirdPartyCameraMetadata`."""
         return {
             "thirdPartyCameraId": self.camera_id,
-            "position": _vector(self.position_m),
-            "rotation": _vector(_euler_deg(self.rotation_deg)),
+            "position": vector(self.position_m),
+            "rotation": vector(_euler_deg(self.rotation_deg)),
             "fieldOfView": self.field_of_view_deg,
         }
 
@@ -208,16 +192,12 @@ def get_map_view_camera_properties(engine: Engine) -> dict[str, Any]:
     """Return the properties of a camera that sees the whole house from above."""
     bodies = engine.scene.simulator.objects
     ceilings = [body for body in bodies if body.kind == "ceiling"]
-    boxes = [
-        (np.subtract(b.centre_m, np.divide(b.size_m, 2)), np.add(b.centre_m, np.divide(b.size_m, 2)))
-        for b in ceilings or bodies
-    ]
-    low_m, high_m = np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
+    low_m, high_m = box_around(ceilings or bodies)
     x_m, _, z_m = ((low_m + high_m) / 2).tolist()
     y_m = float(low_m[1] if ceilings else high_m[1])
     return {
-        "position": _vector((x_m, y_m, z_m)),
-        "rotation": _vector((90.0, 0.0, 0.0)),
+        "position": vector((x_m, y_m, z_m)),
+        "rotation": vector((90.0, 0.0, 0.0)),
         "orthographicSize": float(max(high_m[0] - low_m[0], high_m[2] - low_m[2]) / 2),
         "orthographic": True,
     }
@@ -226,8 +206,8 @@ def get_map_view_camera_properties(engine: Engine) -> dict[str, Any]:
 def _changed(
     camera: ThirdPartyCamera,
     *,
-    position_m: _Vec3,
-    rotation_deg: _Vec3,
+    position_m: Vec3,
+    rotation_deg: Vec3,
     field_of_view_deg: float,
     skybox_colour: str | None,
     is_orthographic: bool | None,
@@ -275,35 +255,25 @@ def _skybox(colour: str | None, before: Rgb | None) -> Rgb | None:
         return before
     if colour == "default":
         return None
-    if named := _COLOURS.get(colour.lower()):
-        return named
-    digits = re.fullmatch(r"#([0-9a-fA-F]+)", colour)
-    if digits and len(digits[1]) in (3, 4):
-        return _rgb("".join(2 * digit for digit in digits[1]))
-    if digits and len(digits[1]) in (6, 8):
-        return _rgb(digits[1])
-    raise ActionError(f"ArgumentException: Invalid skyboxColor: {colour}! Cannot be parsed as an HTML color.")
+    name = colour.lower()
+    if name == "darkblue":
+        return _DARK_BLUE
+    if name not in _COLOURS and not re.fullmatch(r"#([0-9a-f]{3,4}|[0-9a-f]{6}|[0-9a-f]{8})", name):
+        raise ActionError(f"ArgumentException: Invalid skyboxColor: {colour}! Cannot be parsed as an HTML color.")
+    red, green, blue = ImageColor.getrgb(name)[:3]
+    return (red, green, blue)
 
 
-def _rgb(digits: str) -> Rgb:
-    return (int(digits[:2], 16), int(digits[2:4], 16), int(digits[4:6], 16))
-
-
-def _filled(given: PartialVector3 | None, before: _Vec3) -> _Vec3:
+def _filled(given: PartialVector3 | None, before: Vec3) -> Vec3:
     if given is None:
         return before
     x, y, z = (old if new is None else new for new, old in zip((given.x, given.y, given.z), before, strict=True))
     return (x, y, z)
 
 
-def _euler_deg(angles_deg: _Vec3) -> _Vec3:
+def _euler_deg(angles_deg: Vec3) -> Vec3:
     """Return angles as Unity reads them back: each in [0, 360), with a pitch of at most 90 degrees."""
     down, right, roll = (angle % 360 for angle in angles_deg)
     if 90 < down < 270:
         down, right, roll = (180 - down) % 360, (right + 180) % 360, (roll + 180) % 360
     return (down, right, roll)
-
-
-def _vector(values: _Vec3) -> dict[str, float]:
-    x, y, z = values
-    return {"x": float(x), "y": float(y), "z": float(z)}

@@ -9,10 +9,12 @@ import numpy as np
 from evonav.thor import objects
 from evonav.thor.actions import paths
 from evonav.thor.actions.motion import invalid_operation
+from evonav.thor.actions.object_queries import target
 from evonav.thor.actions.registry import ActionError, Vector3, action
 from evonav.thor.actions.teleport import out_of_range
 from evonav.thor.agent import Agent
 from evonav.thor.engine import Engine
+from evonav.thor.geometry import Vec3, ground_gap_m, vector
 from evonav.thor.surfaces import surfaces_of
 
 Pose = dict[str, float | bool]
@@ -79,9 +81,8 @@ def get_interactable_poses(
                     if _may_frame(engine, there, record) and objectId in objects.visible_ids(
                         engine.scene, there, reach_m
                     ):
-                        place = {"x": position.x, "y": position.y, "z": position.z}
                         pose = {"rotation": yaw_deg, "standing": is_standing, "horizon": horizon_deg}
-                        poses.append({**place, **pose})
+                        poses.append(position.model_dump() | pose)
                         if len(poses) >= maxPoses:
                             return poses
     return poses
@@ -109,9 +110,7 @@ def get_spawn_coordinates_above_receptacle(
     They are at the height of the receptacle's box; AI2-THOR uses its trigger box, which evonav does not know.
     """
     scene = engine.scene
-    record = objects.record_of(scene, objectId)
-    if not anywhere and objectId not in objects.visible_ids(scene, engine.agent, engine.settings.visibilityDistance):
-        raise ActionError("NullReferenceException: Target object not found within the specified visibility.")
+    record = target(engine, objectId, is_far_allowed=anywhere)
     box, body = record["axisAlignedBoundingBox"], objects.table_of(scene).instances.get(objectId, 0) - 1
     spans = [
         box["center"][axis] + box["size"][axis] * ((np.arange(_POINTS_A_SIDE) + 0.5) / _POINTS_A_SIDE - 0.5)
@@ -123,19 +122,15 @@ def get_spawn_coordinates_above_receptacle(
         for z_m in spans[1].tolist():
             hit = surfaces.cast((x_m, top_m + 1.0, z_m), (0.0, -1.0, 0.0))
             if hit is not None and hit.body == body and (anywhere or _is_reached(engine, (x_m, top_m, z_m), body)):
-                points.append({"x": x_m, "y": top_m, "z": z_m})
+                points.append(vector((x_m, top_m, z_m)))
     return points
 
 
 def _near(record: objects.Record, positions: Sequence[Vector3], reach_m: float) -> list[Vector3]:
     """Return the positions from which the object's box is within reach on the ground plane."""
     box = record["axisAlignedBoundingBox"]
-    (x_m, z_m), (half_x_m, half_z_m) = ((box["center"][a] for a in "xz"), (0.5 * box["size"][a] for a in "xz"))
-    return [
-        at
-        for at in positions
-        if math.hypot(max(abs(at.x - x_m) - half_x_m, 0.0), max(abs(at.z - z_m) - half_z_m, 0.0)) <= reach_m + 1e-6
-    ]
+    centre_m, size_m = (tuple(box[key].values()) for key in ("center", "size"))
+    return [at for at in positions if ground_gap_m((at.x, at.z), centre_m, size_m) <= reach_m + 1e-6]
 
 
 def _may_frame(engine: Engine, agent: Agent, record: objects.Record) -> bool:
@@ -155,7 +150,7 @@ def _may_frame(engine: Engine, agent: Agent, record: objects.Record) -> bool:
     return math.acos(max(-1.0, min(1.0, cosine))) <= cone_rad + math.asin(radius_m / distance_m)
 
 
-def _is_reached(engine: Engine, point_m: tuple[float, float, float], body: int) -> bool:
+def _is_reached(engine: Engine, point_m: Vec3, body: int) -> bool:
     """Return whether a point is in the image, within the visibility distance, and not occluded."""
     eye_m, intrinsics = objects.eye_m(engine.agent), engine.scene.simulator.intrinsics
     right_m, up_m, ahead_m = (np.subtract(point_m, eye_m) @ objects.camera_axes(engine.agent)).tolist()

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from evonav.thor.actions.registry import ActionError, ErrorCode, Vector3, action
 from evonav.thor.agent import canonical_deg, canonical_yaw_deg
 from evonav.thor.engine import Engine
+from evonav.thor.geometry import Point, Vec3, box_around, ground_gap_m
 
 # AI2-THOR's parameters for objects in the agent's hand, other agents, and the motion of arms. They have no effect here.
 _UNUSED_IN_TURNS = {
@@ -130,7 +131,7 @@ def _move_by(
         raise ActionError(f"Agent movement would bring it beyond the max distance of {object_id}")
 
 
-def snapped(engine: Engine, point_m: tuple[float, float]) -> tuple[float, float]:
+def snapped(engine: Engine, point_m: Point) -> Point:
     """Return a point moved to the grid through the world's origin, if `snapToGrid`; halves round to even as in C#."""
     if not engine.settings.snapToGrid:
         return point_m
@@ -139,7 +140,7 @@ def snapped(engine: Engine, point_m: tuple[float, float]) -> tuple[float, float]
     return (x_m, z_m)
 
 
-def _why_blocked(engine: Engine, to_m: tuple[float, float], offset_m: tuple[float, float, float]) -> str:
+def _why_blocked(engine: Engine, to_m: Point, offset_m: Vec3) -> str:
     if not is_within_bounds(engine, to_m):
         return f"Scene bounds do not contain target position: {vector_text((to_m[0], engine.agent.y_m, to_m[1]), 2)}"
     blocker = engine.scene.simulator.blocker(engine.agent.point_m, to_m)
@@ -147,15 +148,10 @@ def _why_blocked(engine: Engine, to_m: tuple[float, float], offset_m: tuple[floa
     return f"{name} is blocking Agent 0 from moving by {vector_text(offset_m, 4)}."
 
 
-def is_within_bounds(engine: Engine, point_m: tuple[float, float]) -> bool:
+def is_within_bounds(engine: Engine, point_m: Point) -> bool:
     """Return whether a point is in the box around the whole scene."""
-    bodies = engine.scene.simulator.objects
-    return all(
-        min(body.centre_m[axis] - body.size_m[axis] / 2 for body in bodies)
-        <= value
-        <= max(body.centre_m[axis] + body.size_m[axis] / 2 for body in bodies)
-        for axis, value in zip((0, 2), point_m, strict=True)
-    )
+    low, high = (corner[[0, 2]] for corner in box_around(engine.scene.simulator.objects))
+    return bool(((low <= point_m) & (point_m <= high)).all())
 
 
 @action("DistanceToObject")
@@ -169,12 +165,7 @@ def _distance_m(engine: Engine, object_id: str) -> float:
     body = next((body for body in engine.scene.simulator.objects if body.id == object_id), None)
     if body is None:
         raise ActionError(f"No object with ID {object_id}")
-    return math.hypot(
-        *(
-            max(abs(value - body.centre_m[axis]) - body.size_m[axis] / 2, 0.0)
-            for axis, value in zip((0, 2), engine.agent.point_m, strict=True)
-        )
-    )
+    return ground_gap_m(engine.agent.point_m, body.centre_m, body.size_m)
 
 
 def _noise_of_move(engine: Engine) -> tuple[float, float]:
@@ -187,21 +178,31 @@ def _noise_of_move(engine: Engine) -> tuple[float, float]:
     return turn_deg, float(normal(settings.movementGaussianMu or 0.001, settings.movementGaussianSigma or 0.005))
 
 
-def vector_text(vector: tuple[float, float, float], digits: int) -> str:
+def vector_text(vector: Vec3, digits: int) -> str:
     """Format a vector as Unity prints it."""
     return "(" + ", ".join(f"{round(value, digits) + 0.0:.{digits}f}" for value in vector) + ")"
 
 
-@action("RotateRight", unused=_UNUSED_IN_TURNS)
-def rotate_right(engine: Engine, *, degrees: float | None = None) -> None:
-    """Turn the agent clockwise seen from above."""
-    _turn(engine, degrees, 1.0)
+def _turner(sign: float) -> Callable[..., None]:
+    """Return the action that turns the agent, clockwise seen from above for sign 1."""
+
+    def turn(engine: Engine, *, degrees: float | None = None) -> None:
+        step_deg = engine.settings.rotateStepDegrees if degrees is None else degrees
+        noise_deg = 0.0
+        if engine.agent.is_locobot:
+            step_deg = step_deg or engine.settings.rotateStepDegrees
+            noise_deg = _noise_of_turn_deg(engine)
+        elif step_deg == 0:
+            raise invalid_operation(
+                "Cannot rotate by 0 degrees as this previously defaulted to rotating by a diferent amount."
+            )
+        engine.agent.yaw_deg = canonical_yaw_deg(engine.agent.yaw_deg + sign * step_deg + noise_deg)
+
+    return turn
 
 
-@action("RotateLeft", unused=_UNUSED_IN_TURNS)
-def rotate_left(engine: Engine, *, degrees: float | None = None) -> None:
-    """Turn the agent counter-clockwise seen from above."""
-    _turn(engine, degrees, -1.0)
+action("RotateRight", unused=_UNUSED_IN_TURNS)(_turner(1.0))
+action("RotateLeft", unused=_UNUSED_IN_TURNS)(_turner(-1.0))
 
 
 @action("Rotate", unused={"manualInteract": bool})
@@ -219,19 +220,6 @@ def rotate_look(engine: Engine, *, rotation: Vector3 | None = None, horizon: flo
     engine.agent.yaw_deg, engine.agent.horizon_deg = canonical_yaw_deg(yaw_deg), canonical_deg(horizon)
 
 
-def _turn(engine: Engine, degrees: float | None, sign: float) -> None:
-    step_deg = engine.settings.rotateStepDegrees if degrees is None else degrees
-    noise_deg = 0.0
-    if engine.agent.is_locobot:
-        step_deg = step_deg or engine.settings.rotateStepDegrees
-        noise_deg = _noise_of_turn_deg(engine)
-    elif step_deg == 0:
-        raise invalid_operation(
-            "Cannot rotate by 0 degrees as this previously defaulted to rotating by a diferent amount."
-        )
-    engine.agent.yaw_deg = canonical_yaw_deg(engine.agent.yaw_deg + sign * step_deg + noise_deg)
-
-
 def _noise_of_turn_deg(engine: Engine) -> float:
     return float(engine.agent.noise.normal(*_turn_noise_deg(engine))) if engine.settings.applyActionNoise else 0.0
 
@@ -241,27 +229,24 @@ def _turn_noise_deg(engine: Engine) -> tuple[float, float]:
     return engine.settings.rotateGaussianMu, engine.settings.rotateGaussianSigma or 0.5
 
 
-@action("LookDown")
-def look_down(engine: Engine, *, degrees: float = 0.0, **_: object) -> None:
-    """Lower the camera, by 30 degrees by default."""
-    horizon_deg = engine.agent.horizon_deg + _look_step_deg(engine, "LookDown", degrees)
-    limit_deg = engine.agent.body.max_downward_deg
-    if round(horizon_deg, 1) > limit_deg:
-        message = f"can't look down beyond {limit_deg:g} degrees below the forward horizon"
-        raise ActionError(message, ErrorCode.LOOK_DOWN_CANT_EXCEED_MIN)
-    engine.agent.horizon_deg = canonical_deg(horizon_deg)
+def _looker(way: str, sign: float, place: str) -> Callable[..., None]:
+    """Return the action that lowers (sign 1) or raises (sign -1) the camera, by 30 degrees by default."""
+
+    def look(engine: Engine, *, degrees: float = 0.0, **_: object) -> None:
+        body = engine.agent.body
+        horizon_deg = engine.agent.horizon_deg + sign * _look_step_deg(engine, f"Look{way.capitalize()}", degrees)
+        limit_deg = body.max_downward_deg if sign > 0 else body.max_upward_deg
+        if round(sign * horizon_deg, 1) > limit_deg:
+            message = f"can't look {way} beyond {limit_deg:g} degrees {place} the forward horizon"
+            # AI2-THOR has the same code for both directions.
+            raise ActionError(message, ErrorCode.LOOK_DOWN_CANT_EXCEED_MIN)
+        engine.agent.horizon_deg = canonical_deg(horizon_deg)
+
+    return look
 
 
-@action("LookUp")
-def look_up(engine: Engine, *, degrees: float = 0.0, **_: object) -> None:
-    """Raise the camera, by 30 degrees by default."""
-    horizon_deg = engine.agent.horizon_deg - _look_step_deg(engine, "LookUp", degrees)
-    limit_deg = engine.agent.body.max_upward_deg
-    if round(-horizon_deg, 1) > limit_deg:
-        message = f"can't look up beyond {limit_deg:g} degrees above the forward horizon"
-        # AI2-THOR has the same code for both directions.
-        raise ActionError(message, ErrorCode.LOOK_DOWN_CANT_EXCEED_MIN)
-    engine.agent.horizon_deg = canonical_deg(horizon_deg)
+action("LookDown")(_looker("down", 1.0, "below"))
+action("LookUp")(_looker("up", -1.0, "above"))
 
 
 def _look_step_deg(engine: Engine, name: str, degrees: float) -> float:
@@ -269,29 +254,23 @@ def _look_step_deg(engine: Engine, name: str, degrees: float) -> float:
         raise ActionError("Must have degrees == 0 for now.")
     if degrees < 0:
         raise ActionError(f"{name} action requires positive degree value. Invalid value used: {degrees:g}")
-    if abs(degrees * 10 - round(degrees * 10)) > 1e-6:
+    if abs(degrees - round(degrees, 1)) > 1e-7:
         raise ActionError(f"{name} action requires degree value to be a multiple of 0.1f")
     return round(degrees, 1) or 30.0
 
 
-@action("Stand")
-def stand(engine: Engine) -> None:
-    """Raise the camera to its standing height."""
-    _check_can_crouch(engine, "Stand")
-    if engine.agent.is_standing:
-        raise ActionError("Already standing.")
-    engine.agent.is_standing = True
+def _stander(name: str, state: str, *, is_standing: bool) -> Callable[..., None]:
+    """Return the action that moves the camera between its two heights; the body's stays, as in AI2-THOR."""
+
+    def stand(engine: Engine) -> None:
+        if engine.agent.is_locobot:
+            raise ActionError(f"Invalid action: {name}", ErrorCode.INVALID_ACTION)
+        if engine.agent.is_standing == is_standing:
+            raise ActionError(f"Already {state}.")
+        engine.agent.is_standing = is_standing
+
+    return stand
 
 
-@action("Crouch")
-def crouch(engine: Engine) -> None:
-    """Lower the camera; the body's height stays, as in AI2-THOR."""
-    _check_can_crouch(engine, "Crouch")
-    if not engine.agent.is_standing:
-        raise ActionError("Already crouching.")
-    engine.agent.is_standing = False
-
-
-def _check_can_crouch(engine: Engine, name: str) -> None:
-    if engine.agent.is_locobot:
-        raise ActionError(f"Invalid action: {name}", ErrorCode.INVALID_ACTION)
+action("Stand")(_stander("Stand", "standing", is_standing=True))
+action("Crouch")(_stander("Crouch", "crouching", is_standing=False))

@@ -15,6 +15,7 @@ from evonav.thor import edits, objects
 from evonav.thor.actions.registry import ActionError, Vector3, action, brief
 from evonav.thor.actions.teleport import out_of_range
 from evonav.thor.engine import Engine
+from evonav.thor.geometry import box_around
 from evonav.thor.scene import Scene
 from evonav.thor.surfaces import fresh_surfaces
 
@@ -209,7 +210,7 @@ def _place_at(scene: Scene, object_id: str, point: Vector3, rotation: Vector3 | 
     size_m = objects.own_size_m(scene, entry)
     axes = objects.rotation_of(turn)
     reach_m = 0.5 * np.abs(axes) @ size_m
-    low, high = objects.bounds_m(scene)
+    low, high = (tuple(m.tolist()) for m in box_around(b for b in scene.simulator.objects if b.kind != "object"))
     if not all(lo <= value <= hi for lo, value, hi in zip(low, (point.x, point.y, point.z), high, strict=True)):
         raise out_of_range(f"Position coordinate ({_text(point)}) is not within scene bounds ({low}, {high})")
     surfaces = fresh_surfaces(scene)

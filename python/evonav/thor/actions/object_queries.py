@@ -9,9 +9,8 @@ from evonav.thor.actions.motion import invalid_operation
 from evonav.thor.actions.registry import ActionError, Vector3, action
 from evonav.thor.actions.teleport import out_of_range
 from evonav.thor.engine import Engine
+from evonav.thor.geometry import Vec3, vector
 from evonav.thor.surfaces import Hit, surfaces_of
-
-_Vec3 = tuple[float, float, float]
 
 
 def object_at(engine: Engine, x: float, y: float) -> tuple[str, Hit]:
@@ -37,6 +36,29 @@ def object_at(engine: Engine, x: float, y: float) -> tuple[str, Hit]:
     return found, hit
 
 
+def target(
+    engine: Engine,
+    object_id: str | None,
+    x: float | None = None,
+    y: float | None = None,
+    *,
+    is_far_allowed: bool = False,
+) -> objects.Record:
+    """Return the record of an action's object, named by its id or by its place in the image.
+
+    Raises:
+        ActionError: The object does not exist, or is not visible unless `is_far_allowed`.
+    """
+    if object_id is None:
+        if x is None or y is None:
+            raise ActionError("objectId, or x and y, must be given")
+        object_id, _ = object_at(engine, x, y)
+    record = objects.record_of(engine.scene, object_id)
+    if not is_far_allowed and object_id not in _visible(engine):
+        raise ActionError("NullReferenceException: Target object not found within the specified visibility.")
+    return record
+
+
 @action("GetObjectInFrame")
 def get_object_in_frame(engine: Engine, *, x: float, y: float, checkVisible: bool = False) -> str:
     """Return the id of the object at a point of the image: 0 to 1 from its upper left corner."""
@@ -52,7 +74,7 @@ def get_coordinate_from_raycast(engine: Engine, *, x: float, y: float) -> dict[s
     if not (0 <= x <= 1 and 0 <= y <= 1):
         raise out_of_range(f"x and y must be in [0:1] not (x={x:g}, y={y:g}).")
     hit = surfaces_of(engine.scene).cast(*_ray(engine, x, y))
-    return _vector(hit.point_m if hit else (0.0, 0.0, 0.0))
+    return vector(hit.point_m if hit else (0.0, 0.0, 0.0))
 
 
 @action("GetObjectHitFromRaycast")
@@ -65,7 +87,7 @@ def get_object_hit_from_raycast(engine: Engine, *, origin: Vector3, destination:
 def perform_raycast(engine: Engine, *, origin: Vector3, destination: Vector3) -> dict[str, object]:
     """Return the first object on the ray from one point through another, and where the ray meets it."""
     object_id, hit = _object_hit(engine, origin, destination)
-    return {"objectId": object_id, "hitPoint": _vector(hit.point_m), "hitDistance": hit.distance_m}
+    return {"objectId": object_id, "hitPoint": vector(hit.point_m), "hitDistance": hit.distance_m}
 
 
 @action("GetVisibleObjects")
@@ -91,7 +113,10 @@ def get_visible_objects(
 @action("GetObjectMetadata")
 def get_object_metadata(engine: Engine, *, objectIds: list[str]) -> list[objects.Record]:
     """Return the records of some objects; unknown ids are left out."""
-    by_id = {record["objectId"]: record for record in objects.records(engine.scene, engine.agent, engine.settings)}
+    by_id = {
+        record["objectId"]: {**record, "distance": distance_m, "visible": is_visible, "isInteractable": is_visible}
+        for record, distance_m, is_visible in objects.views(engine)
+    }
     return [by_id[object_id] for object_id in objectIds if object_id in by_id]
 
 
@@ -112,7 +137,7 @@ def world_to_viewport_point(engine: Engine, *, position: Vector3) -> dict[str, f
     x, y = 0.5 + 0.5 * right_m / (ahead_m * half_width), 0.5 - 0.5 * up_m / (ahead_m * half_height)
     if not (0 <= x <= 1 and 0 <= y <= 1):
         raise invalid_operation("Point not in viewport.")
-    return {"x": x, "y": y, "z": ahead_m}
+    return vector((x, y, ahead_m))
 
 
 def _visible(engine: Engine, distance_m: float | None = None) -> set[str]:
@@ -133,7 +158,7 @@ def _object_hit(engine: Engine, origin: Vector3, destination: Vector3) -> tuple[
     return object_id, hit
 
 
-def _ray(engine: Engine, x: float, y: float) -> tuple[_Vec3, _Vec3]:
+def _ray(engine: Engine, x: float, y: float) -> tuple[Vec3, Vec3]:
     half_width, half_height = _half_extents(engine)
     own = np.array([(2 * x - 1) * half_width, (1 - 2 * y) * half_height, 1.0])
     right, up, ahead = (objects.camera_axes(engine.agent) @ own).tolist()
@@ -145,7 +170,3 @@ def _half_extents(engine: Engine) -> tuple[float, float]:
     intrinsics = engine.scene.simulator.intrinsics
     half_height = math.tan(0.5 * intrinsics.vertical_fov_rad)
     return half_height * intrinsics.width_px / intrinsics.height_px, half_height
-
-
-def _vector(point_m: _Vec3) -> dict[str, float]:
-    return dict(zip("xyz", point_m, strict=True))

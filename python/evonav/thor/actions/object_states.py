@@ -3,13 +3,13 @@
 The shape of furniture is one solid block, so an open fridge is drawn closed.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from pydantic import BaseModel
 
 from evonav.thor import edits, objects
-from evonav.thor.actions import object_queries
+from evonav.thor.actions.object_queries import target
 from evonav.thor.actions.registry import ActionError, action
 from evonav.thor.engine import Engine
 from evonav.thor.scene import Scene
@@ -27,7 +27,7 @@ def open_object(
     **unused: Any,  # noqa: ANN401
 ) -> None:
     """Open an object to a degree of 0 to 1."""
-    record = _target(engine, objectId, x, y, forceAction)
+    record = target(engine, objectId, x, y, is_far_allowed=forceAction)
     if not 0 <= openness <= 1:
         raise ActionError("openness must be in [0.0:1.0]")
     _require(record, "openable", f"{record['objectId']} is not an Openable object")
@@ -48,48 +48,48 @@ def close_object(
     open_object(engine, objectId=objectId, x=x, y=y, forceAction=forceAction, openness=0.0)
 
 
-@action("ToggleObjectOn")
-def toggle_object_on(
-    engine: Engine,
-    *,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
-    """Switch an object on."""
-    _toggle(engine, _target(engine, objectId, x, y, forceAction), is_on=True)
+def _toggler(way: str) -> Callable[..., None]:
+    """Return the action that switches an object `on` or `off`."""
+
+    def toggle(
+        engine: Engine,
+        *,
+        objectId: str | None = None,
+        x: float | None = None,
+        y: float | None = None,
+        forceAction: bool = False,
+    ) -> None:
+        record = target(engine, objectId, x, y, is_far_allowed=forceAction)
+        _require(record, "toggleable", f"{record['objectId']} is not toggleable")
+        if record["isToggled"] == (way == "on"):
+            raise ActionError(f"can't toggle object {way} if it's already {way}!")
+        _set(engine.scene, [record["objectId"]], {"isOn": way == "on"})
+
+    return toggle
 
 
-@action("ToggleObjectOff")
-def toggle_object_off(
-    engine: Engine,
-    *,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-) -> None:
-    """Switch an object off."""
-    _toggle(engine, _target(engine, objectId, x, y, forceAction), is_on=False)
+action("ToggleObjectOn")(_toggler("on"))
+action("ToggleObjectOff")(_toggler("off"))
 
 
-@action("DirtyObject")
-def dirty_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
-    """Make an object dirty."""
-    _flip(engine, _target(engine, objectId, None, None, forceAction), "isDirty", "dirtyable", "CanBeDirty", value=True)
+def _flipper(flag: str, property_name: str, state: str, *, value: bool) -> Callable[..., None]:
+    """Return the action that gives a state to an object with a flag, which messages call by AI2-THOR's name."""
+
+    def flip(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
+        record = target(engine, objectId, is_far_allowed=forceAction)
+        _require(record, flag, f"{objectId} does not have {property_name} property!")
+        if record[state] == value:
+            raise ActionError(f"{objectId} already has {state} {value}")
+        _set(engine.scene, [objectId], {state: value})
+
+    return flip
 
 
-@action("CleanObject")
-def clean_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
-    """Make an object clean."""
-    _flip(engine, _target(engine, objectId, None, None, forceAction), "isDirty", "dirtyable", "CanBeDirty", value=False)
-
-
-@action("CookObject")
-def cook_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
-    """Cook an object."""
-    _flip(engine, _target(engine, objectId, None, None, forceAction), "isCooked", "cookable", "CanBeCooked", value=True)
+action("DirtyObject")(_flipper("dirtyable", "CanBeDirty", "isDirty", value=True))
+action("CleanObject")(_flipper("dirtyable", "CanBeDirty", "isDirty", value=False))
+action("CookObject")(_flipper("cookable", "CanBeCooked", "isCooked", value=True))
+_fill = _flipper("canFillWithLiquid", "CanBeFilled", "isFilledWithLiquid", value=True)
+action("EmptyLiquidFromObject")(_flipper("canFillWithLiquid", "CanBeFilled", "isFilledWithLiquid", value=False))
 
 
 @action("FillObjectWithLiquid")
@@ -99,16 +99,8 @@ def fill_object_with_liquid(
     """Fill an object with water, coffee or wine."""
     if fillLiquid not in ("water", "coffee", "wine"):
         raise ActionError(f"{fillLiquid} is not a valid Liquid Type")
-    record = _target(engine, objectId, None, None, forceAction)
-    _flip(engine, record, "isFilledWithLiquid", "canFillWithLiquid", "CanBeFilled", value=True)
+    _fill(engine, objectId=objectId, forceAction=forceAction)
     _set(engine.scene, [objectId], {"fillLiquid": fillLiquid})
-
-
-@action("EmptyLiquidFromObject")
-def empty_liquid_from_object(engine: Engine, *, objectId: str, forceAction: bool = False) -> None:
-    """Empty an object."""
-    record = _target(engine, objectId, None, None, forceAction)
-    _flip(engine, record, "isFilledWithLiquid", "canFillWithLiquid", "CanBeFilled", value=False)
 
 
 class ObjectStates(BaseModel):
@@ -157,40 +149,9 @@ def set_object_states(
     _set(engine.scene, chosen, {key: float(value) if key == "openness" else value})
 
 
-def _target(
-    engine: Engine, object_id: str | None, x: float | None, y: float | None, force_action: bool
-) -> objects.Record:
-    """Return the object of an action, named by id or by its place in the image."""
-    if object_id is None:
-        if x is None or y is None:
-            raise ActionError("objectId, or x and y, must be given")
-        object_id, _ = object_queries.object_at(engine, x, y)
-    record = objects.record_of(engine.scene, object_id)
-    if not force_action:
-        seen = objects.visible_ids(engine.scene, engine.agent, engine.settings.visibilityDistance)
-        if object_id not in seen:
-            raise ActionError("NullReferenceException: Target object not found within the specified visibility.")
-    return record
-
-
 def _require(record: objects.Record, flag: str, message: str) -> None:
     if not record[flag]:
         raise ActionError(message)
-
-
-def _toggle(engine: Engine, record: objects.Record, *, is_on: bool) -> None:
-    _require(record, "toggleable", f"{record['objectId']} is not toggleable")
-    if record["isToggled"] == is_on:
-        way = "on" if is_on else "off"
-        raise ActionError(f"can't toggle object {way} if it's already {way}!")
-    _set(engine.scene, [record["objectId"]], {"isOn": is_on})
-
-
-def _flip(engine: Engine, record: objects.Record, state: str, flag: str, name: str, *, value: bool) -> None:
-    _require(record, flag, f"{record['objectId']} does not have {name} property!")
-    if record[state] == value:
-        raise ActionError(f"{record['objectId']} already has {state} {value}")
-    _set(engine.scene, [record["objectId"]], {state: value})
 
 
 def _set(scene: Scene, object_ids: Collection[str], values: Mapping[str, object]) -> None:

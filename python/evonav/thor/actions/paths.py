@@ -16,10 +16,8 @@ from evonav.thor.actions import motion
 from evonav.thor.actions.registry import ActionError, Vector3, action
 from evonav.thor.agent import Agent
 from evonav.thor.engine import Engine
+from evonav.thor.geometry import Point, ground_gap_m, vector
 from evonav.world.camera import project
-
-Point = tuple[float, float]
-"""`(x, z)` in metres."""
 
 _NAVMESH_Y_M = 0.01
 """Height of the corners of paths, as recorded (0.006 to 0.015 m over flat floors)."""
@@ -50,7 +48,7 @@ def get_reachable_positions(
     limit = math.floor((_MAX_STEPS if maxStepCount is None else maxStepCount) / (grid_m * grid_m))
     y_m, positions = engine.agent.y_m, []
     for x_m, z_m in _walk(engine, engine.agent.point_m, grid_m, directionsRelativeAgent):
-        positions.append({"x": x_m, "y": y_m, "z": z_m})
+        positions.append(vector((x_m, y_m, z_m)))
         if len(positions) > limit:
             raise motion.invalid_operation("Too many steps taken in GetReachablePositions.")
         if len(positions) > _MAX_POSITIONS:
@@ -197,8 +195,7 @@ def _is_framed(engine: Engine, agent: Agent, record: dict[str, Any]) -> bool:
     """Return whether a corner or the centre of an object's box is in the image, occluded or not."""
     box, intrinsics = record["axisAlignedBoundingBox"], engine.scene.simulator.intrinsics
     points_m = np.array([list(box["center"].values()), *box["cornerPoints"]], dtype=np.float64)
-    camera = replace(agent.pose, y_m=agent.camera_height_m)
-    col, row, _ = project(points_m, camera, intrinsics).T
+    col, row, _ = project(points_m, agent.camera, intrinsics).T
     is_inside = (col > 0) & (col < intrinsics.width_px) & (row > 0) & (row < intrinsics.height_px)
     return bool(is_inside.any())
 
@@ -248,13 +245,10 @@ def _path_to_object(engine: Engine, record: dict[str, Any], start_m: Point, allo
     """Return the path to the first position of the grid, breadth first, from which the object can be seen."""
     settings, object_id = engine.settings, record["objectId"]
     box, reach_m = record["axisAlignedBoundingBox"], settings.visibilityDistance
+    centre_m, size_m = (tuple(box[key].values()) for key in ("center", "size"))
     for point_m in _walk(engine, start_m, settings.gridSize):
-        gaps_m = (
-            max(abs(value - box["center"][axis]) - box["size"][axis] / 2, 0.0)
-            for axis, value in zip("xz", point_m, strict=True)
-        )
-        if math.hypot(*gaps_m) <= reach_m and object_id in _seen(
-            engine, _looking_at(engine.agent, point_m, record["position"]), reach_m
+        if ground_gap_m(point_m, centre_m, size_m) <= reach_m and object_id in objects.visible_ids(
+            engine.scene, _looking_at(engine.agent, point_m, record["position"]), reach_m
         ):
             return _path(engine, start_m, point_m, allowed_error_m)
     camera = engine.scene.simulator.config
@@ -277,10 +271,6 @@ def _looking_at(agent: Agent, point_m: Point, target: dict[str, float]) -> Agent
         yaw_deg=math.degrees(math.atan2(right_m, ahead_m)),
         horizon_deg=math.degrees(math.atan2(down_m, math.hypot(right_m, ahead_m))),
     )
-
-
-def _seen(engine: Engine, agent: Agent, distance_m: float) -> set[str]:
-    return objects.visible_ids(engine.scene, agent, distance_m)
 
 
 def _path(engine: Engine, start_m: Point, target_m: Point, allowed_error_m: float) -> list[Point]:
@@ -324,4 +314,4 @@ def _vector(point_m: Point, digits: int) -> str:
 
 def _path_record(corners_m: list[Point]) -> dict[str, Any]:
     """Return a path as AI2-THOR's formatter writes a NavMeshPath."""
-    return {"corners": [{"x": x_m, "y": _NAVMESH_Y_M, "z": z_m} for x_m, z_m in corners_m], "status": "PathComplete"}
+    return {"corners": [vector((x_m, _NAVMESH_Y_M, z_m)) for x_m, z_m in corners_m], "status": "PathComplete"}

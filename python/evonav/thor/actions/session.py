@@ -12,7 +12,8 @@ from evonav.thor.actions.registry import ActionError, ErrorCode, action
 from evonav.thor.agent import Agent, body_of
 from evonav.thor.engine import Engine, Settings
 from evonav.thor.events.images import FAR_M
-from evonav.thor.events.metadata import Vector, scene_bounds, vector
+from evonav.thor.events.metadata import scene_bounds
+from evonav.thor.geometry import vector
 from evonav.thor.scene import Document, Scene
 
 SCENES = ("Procedural",)
@@ -130,9 +131,9 @@ def change_quality(engine: Engine, *, quality: str) -> None:
 
 
 @action("GetSceneBounds")
-def get_scene_bounds(engine: Engine) -> list[Vector]:
+def get_scene_bounds(engine: Engine) -> list[dict[str, float]]:
     """Return the largest and the smallest corner of the box around everything."""
     bounds = scene_bounds(engine.scene)
     if bounds is None:
         raise ActionError(f"scene {engine.scene.name} holds no house: call CreateHouse first")
-    return [vector(*bounds["cornerPoints"][corner]) for corner in (-1, 0)]
+    return [vector(bounds["cornerPoints"][corner]) for corner in (-1, 0)]

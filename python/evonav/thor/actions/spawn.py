@@ -9,6 +9,7 @@ from evonav.errors import EvonavError
 from evonav.thor.actions.asset_database import is_known
 from evonav.thor.actions.registry import ActionError, ErrorCode, Vector3, action
 from evonav.thor.engine import Engine
+from evonav.thor.geometry import vector
 from evonav.thor.scene import Document, Scene
 
 # Half the side of the floor that replaces the void of AI2-THOR's empty scene.
@@ -69,10 +70,10 @@ def get_in_scene_asset_geometry(
         across = np.cross(faces_m[:, 1] - faces_m[:, 0], faces_m[:, 2] - faces_m[:, 0])
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         vertices_m, faces = faces_m.reshape(-1, 3), np.arange(3 * len(faces_m))
-        mesh["normals"] = _vectors(np.repeat(across, 3, axis=0))
+        mesh["normals"] = [vector(normal) for normal in np.repeat(across, 3, axis=0).tolist()]
     else:
         vertices_m, faces = np.unique(faces_m.reshape(-1, 3), axis=0, return_inverse=True)
-    mesh["vertices"] = _vectors(vertices_m)
+    mesh["vertices"] = [vector(point) for point in vertices_m.tolist()]
     if triangles:
         mesh["triangles"] = faces.ravel().tolist()
     return [mesh]
@@ -121,11 +122,7 @@ def _house_or_stage(scene: Scene) -> Document:
     if scene.house is None:
         corner = _STAGE_HALF_M
         outline = [(-corner, -corner), (-corner, corner), (corner, corner), (corner, -corner)]
-        floor = [{"x": x, "y": 0.0, "z": z} for x, z in outline]
+        floor = [vector((x, 0.0, z)) for x, z in outline]
         room = {"id": "room|stage", "roomType": "Stage", "floorPolygon": floor, "floorMaterial": {"name": ""}}
         scene.house = {"metadata": {}, "rooms": [room], "walls": [], "doors": [], "windows": [], "objects": []}
     return scene.begin_edit()
-
-
-def _vectors(points: np.ndarray[Any, np.dtype[np.float64]]) -> list[dict[str, float]]:
-    return [{"x": x, "y": y, "z": z} for x, y, z in points.tolist()]

@@ -18,7 +18,6 @@ _BACKGROUND: Color = (0, 0, 0)
 class Palette:
     """Colours of one version of a scene."""
 
-    version: int
     entries: list[dict[str, object]]
     """The metadata's `colors`: one entry for each class and each instance, by name."""
     instances_rgba: NDArray[np.uint8]
@@ -41,7 +40,6 @@ def palette_of(scene: Scene) -> Palette:
     for name in dict.fromkeys([*(body.category for body in bodies), *names]):
         entries.append({"name": name, "color": colors[name]})
     return Palette(
-        scene.version,
         entries,
         _table(colors[name] for name in names),
         _table(colors[body.category] for body in bodies),

@@ -1,15 +1,19 @@
 """Encode the engine's answer to an action as the fields of one message."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from evonav.errors import EvonavError
 from evonav.thor.engine import Engine, Result, log_once
 from evonav.thor.events import images
+from evonav.thor.events.colors import palette_of
 from evonav.thor.events.images import ImageKinds
-from evonav.thor.events.metadata import MetadataEncoder, patch
+from evonav.thor.events.metadata import pack_event, patch
 from evonav.thor.scene import Scene
 from evonav.thor.transport.fifo import Field, FieldType
+from evonav.world.camera import Images
+from evonav.world.simulator import Frame
 
 
 class Emitter:
@@ -26,7 +30,6 @@ class Emitter:
         self._engine = engine
         self._has_camera = has_camera
         self._has_patches = has_patches
-        self._metadata = MetadataEncoder()
         self._sequence_id = -1
         self._state: object = None
         self._images: list[Field] = []
@@ -60,7 +63,7 @@ class Emitter:
             self._images = self._rendered(kinds) if kinds else []
             self._state = state
         has_colors = kinds is not None and kinds.needs_instances
-        metadata = self._metadata.event(engine, sequence_id=self._sequence_id, has_colors=has_colors)
+        metadata = pack_event(engine, sequence_id=self._sequence_id, has_colors=has_colors)
         return [(FieldType.METADATA, metadata), *self._images]
 
     def _kinds(self, message: Mapping[str, Any]) -> ImageKinds | None:
@@ -78,16 +81,14 @@ class Emitter:
 
     def _rendered(self, kinds: ImageKinds) -> list[Field]:
         engine = self._engine
-        if engine.scene.house is None:
-            size = (engine.width_px, engine.height_px)
-            fields = images.blank(*size, kinds)
-            for _ in engine.cameras:
-                fields += images.blank(*size, kinds, is_third_party=True)
-            return fields
-        palette = self._metadata.palette(engine.scene)
-        frame = engine.view(rgb=kinds.rgb, instances=kinds.needs_instances)
-        fields = images.encode(frame, kinds, palette)
-        for camera in engine.cameras:
-            seen = camera.render(engine.scene, rgb=kinds.rgb, instances=kinds.needs_instances)
-            fields += images.encode(seen, kinds, palette, is_third_party=True)
+        palette = engine.scene.derived(palette_of)
+        views: list[Callable[..., Frame | Images]] = [engine.view]
+        views += [partial(camera.render, engine.scene) for camera in engine.cameras]
+        fields: list[Field] = []
+        for index, render in enumerate(views):
+            if engine.scene.house is None:
+                seen: Frame | Images = images.blank(engine.width_px, engine.height_px)
+            else:
+                seen = render(rgb=kinds.rgb, instances=kinds.needs_instances)
+            fields += images.encode(seen, kinds, palette, is_third_party=index > 0)
         return fields

@@ -52,21 +52,11 @@ def encode(frame: Frame | Images, kinds: ImageKinds, palette: Palette, *, is_thi
     return fields
 
 
-def blank(width_px: int, height_px: int, kinds: ImageKinds, *, is_third_party: bool = False) -> list[Field]:
+def blank(width_px: int, height_px: int) -> Images:
     """Return the images of a scene without a house."""
-    rgb, depth, instances, classes = _THIRD_PARTY if is_third_party else _AGENT
-    black = np.zeros((height_px, width_px, 4), dtype=np.uint8)
-    black[..., 3] = 255
-    fields: list[Field] = []
-    if kinds.rgb:
-        fields.append((rgb, np.zeros((height_px, width_px, 3), dtype=np.uint8)))
-    if kinds.depth:
-        fields.append((depth, np.full((height_px, width_px), FAR_M, dtype=np.float32)))
-    if kinds.instances:
-        fields.append((instances, black))
-    if kinds.classes:
-        fields.append((classes, black))
-    return fields
+    size = (height_px, width_px)
+    depth_m = np.full(size, FAR_M, dtype=np.float32)
+    return Images(depth_m, np.zeros((*size, 3), dtype=np.uint8), np.zeros(size, dtype=np.int32))
 
 
 def _painted(instances: NDArray[np.int32], rgba: NDArray[np.uint8]) -> NDArray[np.uint32]:

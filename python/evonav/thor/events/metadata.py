@@ -4,7 +4,7 @@ Most metadata depends on the scene alone. It is packed once for each version of 
 """
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import msgpack
@@ -12,23 +12,17 @@ import numpy as np
 from pydantic import BaseModel
 
 from evonav.thor import objects
-from evonav.thor.events.colors import Palette, palette_of
+from evonav.thor.events.colors import palette_of
+from evonav.thor.geometry import box_around, vector
 from evonav.thor.scene import Scene
 
 if TYPE_CHECKING:
     from evonav.thor.engine import Engine, Result
 
-Vector = dict[str, float]
-
 # The packed keys of a record that depend on the agent; a double follows the first.
 _DYNAMIC = ("distance", "visible", "isInteractable")
 _DISTANCE = b"\xa8distance\xcb"
-_NO_YES = (b"\xc2", b"\xc3")
-_SIGHT = {
-    (seen, usable): b"\xa7visible" + _NO_YES[seen] + b"\xaeisInteractable" + _NO_YES[usable]
-    for seen in (False, True)
-    for usable in (False, True)
-}
+_SIGHT = (b"\xa7visible\xc2\xaeisInteractable\xc2", b"\xa7visible\xc3\xaeisInteractable\xc3")
 _DOUBLE = struct.Struct(">d")
 _MAP16 = struct.Struct(">BH")
 _ARRAY32 = struct.Struct(">BI")
@@ -50,65 +44,44 @@ def _packed(value: object) -> bytes:
     return packed
 
 
-class MetadataEncoder:
-    """Packs the metadata of one engine's events."""
+def pack_event(engine: "Engine", *, sequence_id: int, has_colors: bool) -> bytes:
+    """Return all metadata of an event, packed."""
+    action_return = _packed_return(engine.last)
+    fields = agent_fields(engine) | {"sceneBounds": engine.scene.derived(scene_bounds)}
+    colors = engine.scene.derived(_packed_colors) if has_colors else b"\xc0"
+    tail = {"thirdPartyCameras": fields["thirdPartyCameras"], "sequenceId": sequence_id, "activeAgentId": 0}
+    return b"".join(
+        [
+            b"\x84\xa6agents\x91",
+            *(_opened(fields, 3), b"\xacactionReturn", action_return, b"\xa6colors", colors, b"\xa7objects"),
+            *_objects(engine),
+            *(_packed(part) for pair in tail.items() for part in pair),
+        ]
+    )
 
-    def __init__(self) -> None:
-        self._scene_version = -1
-        self._packed: dict[int, bytes] = {}
-        self._bounds: dict[str, Any] | None = None
-        self._palette = Palette(-1, [], np.zeros((1, 4), np.uint8), np.zeros((1, 4), np.uint8))
-        self._colors = b""
 
-    def palette(self, scene: Scene) -> Palette:
-        """Return the colours of the scene in its present version."""
-        if self._palette.version != scene.version:
-            self._palette = palette_of(scene)
-            self._colors = _packed(self._palette.entries)
-        return self._palette
+def _objects(engine: "Engine") -> list[bytes]:
+    wanted = engine.object_filter
+    if wanted == frozenset():
+        return [_ARRAY32.pack(0xDD, 0)]
+    packed = engine.scene.derived(_packed_records)
+    parts = [b""]
+    for index, (record, distance_m, is_visible) in enumerate(objects.views(engine)):
+        if wanted is None or record["objectId"] in wanted:
+            if index not in packed:
+                packed[index] = _static(record)
+            parts += (packed[index], _DISTANCE, _DOUBLE.pack(distance_m), _SIGHT[is_visible])
+    parts[0] = _ARRAY32.pack(0xDD, (len(parts) - 1) // 4)
+    return parts
 
-    def event(self, engine: "Engine", *, sequence_id: int, has_colors: bool) -> bytes:
-        """Return all metadata of an event, packed."""
-        scene = engine.scene
-        self._refresh(scene)
-        colors = b"\xc0"
-        if has_colors:
-            self.palette(scene)
-            colors = self._colors
-        action_return = _packed_return(engine.last)
-        fields = agent_fields(engine) | {"sceneBounds": self._bounds}
-        tail = {"thirdPartyCameras": fields["thirdPartyCameras"], "sequenceId": sequence_id, "activeAgentId": 0}
-        return b"".join(
-            [
-                b"\x84\xa6agents\x91",
-                *(_opened(fields, 3), b"\xacactionReturn", action_return, b"\xa6colors", colors, b"\xa7objects"),
-                *self._objects(engine),
-                *(_packed(part) for pair in tail.items() for part in pair),
-            ]
-        )
 
-    def _objects(self, engine: "Engine") -> list[bytes]:
-        if engine.object_filter == frozenset():
-            return [_ARRAY32.pack(0xDD, 0)]
-        views = objects.object_views(engine.scene, engine.agent, engine.settings)
-        wanted = engine.object_filter
-        parts = [b""]
-        for i, (record, view) in enumerate(zip(objects.static_records(engine.scene), views, strict=True)):
-            if wanted is None or record["objectId"] in wanted:
-                static = self._packed.get(i)
-                if static is None:
-                    static = self._packed[i] = _static(record)
-                distance, sight = _DOUBLE.pack(view.distance_m), _SIGHT[view.is_visible, view.is_interactable]
-                parts += (static, _DISTANCE, distance, sight)
-        parts[0] = _ARRAY32.pack(0xDD, (len(parts) - 1) // 4)
-        return parts
+def _packed_records(scene: Scene) -> dict[int, bytes]:
+    """Return the packed static records by index: none at first, since packing all of them takes long."""
+    return {}
 
-    def _refresh(self, scene: Scene) -> None:
-        if self._scene_version == scene.version:
-            return
-        self._packed = {}
-        self._bounds = scene_bounds(scene)
-        self._scene_version = scene.version
+
+def _packed_colors(scene: Scene) -> bytes:
+    return _packed(scene.derived(palette_of).entries)
 
 
 def patch(result: "Result") -> bytes:
@@ -120,8 +93,8 @@ def patch(result: "Result") -> bytes:
 def agent_fields(engine: "Engine") -> dict[str, Any]:
     """Return `MetadataWrapper` without the objects, the colours and the bounds of the scene."""
     agent = engine.agent
-    position = vector(agent.x_m, agent.y_m, agent.z_m)
-    rotation = vector(0.0, agent.yaw_deg, 0.0)
+    position = vector((agent.x_m, agent.y_m, agent.z_m))
+    rotation = vector((0.0, agent.yaw_deg, 0.0))
     return {
         **_outcome(engine.last),
         "agent": {
@@ -139,7 +112,7 @@ def agent_fields(engine: "Engine") -> dict[str, Any]:
         "screenHeight": engine.height_px,
         "depthFormat": "Meters",
         "fov": engine.field_of_view_deg,
-        "cameraPosition": vector(*engine.camera_position_m),
+        "cameraPosition": vector(engine.camera_position_m),
         "cameraOrthSize": engine.map_view_size_m,
         "thirdPartyCameras": [camera.metadata() for camera in engine.cameras],
         "collided": False,
@@ -149,8 +122,8 @@ def agent_fields(engine: "Engine") -> dict[str, Any]:
         "heldObjectPose": {
             "position": position,
             "rotation": rotation,
-            "localPosition": vector(0.0, 0.0, 0.0),
-            "localRotation": vector(0.0, 0.0, 0.0),
+            "localPosition": vector((0.0, 0.0, 0.0)),
+            "localRotation": vector((0.0, 0.0, 0.0)),
         },
         "arm": None,
         "colorBounds": None,
@@ -169,11 +142,6 @@ def agent_fields(engine: "Engine") -> dict[str, Any]:
         "actionVector3sReturn": [],
         "visibleRange": None,
     }
-
-
-def vector(x: float, y: float, z: float) -> Vector:
-    """Return Unity's `Vector3`."""
-    return {"x": x, "y": y, "z": z}
 
 
 def _outcome(result: "Result") -> dict[str, Any]:
@@ -211,12 +179,10 @@ def scene_bounds(scene: Scene) -> dict[str, Any] | None:
     bodies = scene.simulator.objects if scene.house is not None else ()
     if not bodies:
         return None
-    centres_m = np.array([body.centre_m for body in bodies])
-    halves_m = 0.5 * np.array([body.size_m for body in bodies])
-    low_m, high_m = (centres_m - halves_m).min(axis=0), (centres_m + halves_m).max(axis=0)
-    spans: Sequence[tuple[float, float]] = list(zip(high_m.tolist(), low_m.tolist(), strict=True))
+    low_m, high_m = box_around(bodies)
+    spans = list(zip(high_m.tolist(), low_m.tolist(), strict=True))
     return {
         "cornerPoints": [[x, y, z] for x in spans[0] for y in spans[1] for z in spans[2]],
-        "center": vector(*(0.5 * (low_m + high_m)).tolist()),
-        "size": vector(*(high_m - low_m).tolist()),
+        "center": vector((0.5 * (low_m + high_m)).tolist()),
+        "size": vector((high_m - low_m).tolist()),
     }
