@@ -81,9 +81,7 @@ def _as_told(env: LifelongNavEnv, action) -> AgentAction:
     if env.config.action_mode == "actions":
         chosen = ACTIONS[int(action)]
         return Stop() if chosen is Action.STOP else Move(chosen)
-    pose = env._simulator.pose
-    row = np.array([*pose.position_m, pose.yaw_rad, pose.horizon_rad])
-    target_m = waypoint_m(env.config, action, row, env._origin)
+    target_m = waypoint_m(env.config, action, env._batch._poses[0], env._batch._origins[0])
     return Stop() if target_m is None else NavigateTo(target_m)
 
 
@@ -202,10 +200,16 @@ def test_observations_contain_no_oracle_data():
     assert info.keys() == env.step(0)[4].keys()
 
 
-def test_semantic_images_are_ground_truth_detections_by_category():
-    env = LifelongNavEnv(observations=("semantic",), width_px=64, height_px=64)
-    seen, _ = env.reset(seed=1)
-    detections = GroundTruthPerception().detect(env._simulator.render(rgb=False), env._simulator.objects)
+def test_images_are_the_simulators_and_semantic_ones_its_ground_truth_by_category():
+    env = LifelongNavEnv(observations=("semantic", "depth", "rgb"), width_px=64, height_px=64)
+    seen, info = env.reset(seed=1)
+    task = env.source.task(env.source.find(info["task_id"]))
+    simulator = EmbeddedSimulator(env.config.simulator)
+    simulator.reset(task.stages[0].house_json, task.start)
+    frame = simulator.render()
+    assert np.array_equal(seen["depth"], np.minimum(frame.depth_m, np.float32(20.0)))
+    assert np.array_equal(seen["rgb"], frame.rgb)
+    detections = GroundTruthPerception().detect(frame, simulator.objects)
     names = np.array([*detections.labels, ""])[detections.masks]
     words = np.array(["", *vocabulary()])
     assert (words[seen["semantic"]] == names).all()

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.resources import as_file, files
 from pathlib import Path
 
 import numpy as np
 
 from evonav.errors import InvalidArgumentError
 from evonav.gym.spaces import MAX_STAGES
+from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.files import load_task
 from evonav.tasks.listing import task_roots
 from evonav.tasks.public import StageInput
@@ -99,5 +99,5 @@ def read_task(root: Path) -> NavTask:
 
 
 def _bundled() -> Path:
-    with as_file(files("evonav") / "data" / "tasks") as folder:
+    with bundled_tasks() as folder:
         return folder

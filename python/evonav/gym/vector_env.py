@@ -21,7 +21,6 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.episode import motion
 from evonav.gym import spaces
 from evonav.gym.config import STOP, NavConfig
-from evonav.gym.env import as_row, oracle_info
 from evonav.gym.source import TaskSource
 from evonav.gym.stage import RewardedStage, task_result
 from evonav.gym.worlds import StageWorld, WorldLoader
@@ -46,7 +45,7 @@ class _Episode:
 
 
 class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
-    """B environments that equal `LifelongNavEnv` bit by bit, each with a seed of its own.
+    """B environments of `LifelongNavEnv`, each with a seed of its own.
 
     An episode that has ended restarts at the next step (`AutoresetMode.NEXT_STEP`), whose action is ignored and whose
     reward is 0. A background thread builds the next houses in the meantime.
@@ -131,16 +130,22 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             seed: Seed of environment 0; environment `i` has `seed + i`. Or one seed for each.
             options: `{"task": TASK_ID}` to choose one task for all of them.
         """
-        seeds = [seed] * self.num_envs if seed is None else seed
-        if isinstance(seeds, int):
-            seeds = [seeds + index for index in range(self.num_envs)]
+        if seed is None or isinstance(seed, int):
+            seed = [None if seed is None else seed + index for index in range(self.num_envs)]
+        self.begin(seed, options)
+        return self.observations(), self._infos({})
+
+    def begin(self, seeds: Sequence[int | None], options: dict[str, Any] | None) -> None:
+        """Begin a task in every environment, with a seed for each; see `reset`."""
         if len(seeds) != self.num_envs:
             raise InvalidArgumentError(f"argument `seed` has {len(seeds)} seeds, expected {self.num_envs}")
+        source = self.loader.source
+        numbers = [episode.next_number for episode in self._episodes] or [-1] * self.num_envs
         for index, one in enumerate(seeds):
             if one is not None:
                 self._randoms[index] = seeding.np_random(one)[0]
-        source = self.loader.source
-        numbers = [source.draw(random) for random in self._randoms]
+            if one is not None or not self._episodes:
+                numbers[index] = source.draw(self._randoms[index])
         if options and "task" in options:
             numbers = [source.find(options["task"])] * self.num_envs
         self.loader.forget()
@@ -151,7 +156,6 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         for index, (number, random) in enumerate(zip(numbers, self._randoms, strict=True)):
             self._episodes.append(self._begin_task(index, number, random))
         self._poses = self._batch.poses()
-        return self._observations(), self._infos({})
 
     def step(
         self,
@@ -163,9 +167,17 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             InvalidArgumentError: The number of actions is wrong, or an action is invalid.
             ResetNeeded: No task was begun.
         """
+        rewards, terminations, ended = self.advance(np.asarray(actions))
+        return self.observations(), rewards, terminations, np.zeros(self.num_envs, np.bool_), self._infos(ended)
+
+    def advance(self, actions: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.bool_], dict[int, Infos]]:
+        """Execute an action in every environment; see `step`.
+
+        Returns:
+            Rewards, who has ended an episode, and the infos of those that ended a stage, by number.
+        """
         if not self._episodes:
             raise ResetNeeded("no task was begun: call reset first")
-        actions = np.asarray(actions)
         if len(actions) != self.num_envs:
             raise InvalidArgumentError(f"argument `actions` has {len(actions)} elements, expected {self.num_envs}")
         is_reset = [episode.is_over for episode in self._episodes]
@@ -186,7 +198,11 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
                 terminations[index] = episode.is_over
         if ended or any(is_reset):
             self._poses = self._batch.poses()
-        return self._observations(), rewards, terminations, np.zeros(self.num_envs, np.bool_), self._infos(ended)
+        return rewards, terminations, ended
+
+    def is_over(self, index: int) -> bool:
+        """Return whether an environment's task is over, or was not begun."""
+        return not self._episodes or self._episodes[index].is_over
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Return the agents' views, `(H, W, 3)` each, in mode `rgb_array`."""
@@ -205,7 +221,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         # Each task is drawn one task ahead, so that its house can be built in the meantime.
         next_number = self.loader.source.draw(random)
         rewarded, start = self._begin_stage(index, (number, next_number), at, at.task.start)
-        self._origins[index] = as_row(start)
+        self._origins[index] = (*start.position_m, start.yaw_rad, start.horizon_rad)
         return _Episode(random, number, next_number, at, rewarded, [])
 
     def _begin_stage(
@@ -292,7 +308,8 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
     def _pose(self, index: int) -> Pose:
         return Pose(*self._poses[index].tolist())
 
-    def _observations(self) -> Observations:
+    def observations(self) -> Observations:
+        """Return the observations of all environments."""
         config, seen = self.config, self._drawn()
         seen["pose"] = spaces.relative_poses(self._poses, self._origins)
         goals = [episode.at.data.goal for episode in self._episodes]
@@ -324,13 +341,23 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
 
     def _infos(self, ended: dict[int, Infos]) -> Infos:
         infos: Infos = {}
-        for index, episode in enumerate(self._episodes):
-            at = episode.at
-            info: Infos = {"task_id": at.task.task_id, "stage": at.stage, "num_stages": len(at.task.stages)}
-            if self.config.oracle_info:
-                info["oracle"] = oracle_info(episode.rewarded)
-            infos = self._add_info(infos, info | ended.get(index, {}), index)
+        for index in range(self.num_envs):
+            infos = self._add_info(infos, self.info(index) | ended.get(index, {}), index)
         return infos
+
+    def info(self, index: int) -> Infos:
+        """Return the info of one environment, without what the end of a stage adds."""
+        episode = self._episodes[index]
+        at, progress = episode.at, episode.rewarded.progress
+        info: Infos = {"task_id": at.task.task_id, "stage": at.stage, "num_stages": len(at.task.stages)}
+        if self.config.oracle_info:
+            length_m = progress.reference_length_m
+            info["oracle"] = {
+                "target_m": np.array(progress.target_m),
+                "geodesic_distance_m": episode.rewarded.distance_m,
+                "reference_length_m": math.nan if length_m is None else length_m,
+            }
+        return info
 
 
 def _num_cores() -> int:
