@@ -6,7 +6,7 @@ import pytest
 
 from evonav.component import Component
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.ledger import Ledger
+from evonav.decision.vlm.ledger import Ledger, Usage
 from evonav.decision.vlm.mock_answers import mock_answer
 from evonav.decision.vlm.pacing import Pace
 from evonav.evaluation.protocol import ProtocolConfig
@@ -61,7 +61,7 @@ def test_one_limit_for_all_processes(tmp_path: Path) -> None:
     ledgers[0].reserve("m", 0.6, 1.0)
     with pytest.raises(VlmError, match=r"over_budget: \$0.6000 of \$1 spent"):
         ledgers[1].reserve("m", 0.6, 1.0)
-    ledgers[0].settle("m", 0.6, input_tokens=10, output_tokens=1, cost_usd=0.1, is_answered=True)
+    ledgers[0].settle("m", 0.6, Usage(10, 1), 0.1)
     ledgers[1].reserve("m", 0.6, 1.0)
     (spent,) = ledgers[0].spending()
     assert (spent.num_asked, spent.input_tokens, spent.cost_usd) == (1, 10, pytest.approx(0.1))

@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from evonav.decision.prompts import Picture, Prompt, Text, Turn
-from evonav.decision.vlm.account import Account, Price, Usage, image_tokens, read_prices
+from evonav.decision.vlm.account import Account, Price, image_tokens, read_prices
 from evonav.decision.vlm.client import Answer, VlmClient, VlmConfig
 from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.ledger import Usage
 from evonav.decision.vlm.response_cache import Failure, ResponseCache, key_of
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError
 from vlm_stub import KEY, Stub, images_in, serving

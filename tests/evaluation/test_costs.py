@@ -3,7 +3,8 @@ import pytest
 from evonav.agents.hosting import wire
 from evonav.decision.metered import Metered
 from evonav.decision.question import Reply
-from evonav.decision.vlm.account import Account, Price, Usage
+from evonav.decision.vlm.account import Account, Price
+from evonav.decision.vlm.ledger import Usage
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.metrics.stage_metrics import read_stage_metrics
 from evonav.evaluation.records.costs import Stopwatch

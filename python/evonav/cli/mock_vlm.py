@@ -21,7 +21,7 @@ def mock_vlm(
     """
     import time
 
-    from evonav.decision.rates import read_rates
+    from evonav.decision.noisy import read_rates
     from evonav.decision.vlm.mock_answers import mock_answer
     from evonav.decision.vlm.mock_server import FAULTS, MockServer, faulty, serving, without_schemas
 

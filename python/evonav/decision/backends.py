@@ -97,7 +97,7 @@ def own(
     *,
     path: str,
     cache: str | None = None,
-    mode: str | None = None,
+    mode: Any = None,  # noqa: ANN401 - JSON, checked
     keeps_images: bool = True,
     ledger: str | None = None,
     account: str | None = None,

@@ -1,17 +1,18 @@
 """Models of your own: any object with `ask(prompt) -> str`, with a cache as for a model behind an endpoint."""
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol, cast
 
 from evonav.component import import_callable
 from evonav.decision.prompts import Prompt, Text
 from evonav.decision.question import DecisionModel
-from evonav.decision.vlm.account import Account, Usage
+from evonav.decision.vlm.account import Account
 from evonav.decision.vlm.answer import Answer
-from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure
-from evonav.decision.vlm.images import png_of
-from evonav.decision.vlm.response_cache import Failure, JsonObject, ResponseCache, image_name, key_of
+from evonav.decision.vlm.caching_client import CachingClient, Mode
+from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.ledger import Usage
+from evonav.decision.vlm.response_cache import JsonObject, ResponseCache, image_name
 from evonav.errors import DecisionError, InvalidArgumentError
 
 
@@ -27,8 +28,8 @@ class CustomModel(Protocol):
         ...
 
 
-class CustomClient:
-    """Asks a model of your own, and caches its answers by name and prompt as `VlmClient` does."""
+class CustomClient(CachingClient):
+    """Asks a model of your own, and caches its answers by name and prompt."""
 
     def __init__(
         self,
@@ -36,43 +37,26 @@ class CustomClient:
         model: CustomModel,
         *,
         store: ResponseCache | None = None,
-        mode: str | None = None,
+        mode: Mode | None = None,
         account: Account | None = None,
         keeps_images: bool = True,
     ) -> None:
-        """Create a client.
+        """Create a client; see `CachingClient` for the other arguments.
 
         Args:
             name: Name of the model in the keys of the cache: another name, other exchanges.
             model: The model that answers.
             store: Cache of exchanges.
-            mode: `live`, `auto` or `replay`; default `auto` with a store, else `live`.
+            mode: Default `auto` with a store, else `live`.
             account: Account that counts questions.
             keeps_images: True to store the images' files beside their hashes.
 
         Raises:
             InvalidArgumentError: The mode is unknown, or needs a store.
         """
+        super().__init__(store=store, mode=mode, account=account, keeps_images=keeps_images)
         self.name = name
         self.model = model
-        self.store = store
-        self.mode = mode or ("live" if store is None else "auto")
-        self.account = account or Account()
-        self.keeps_images = keeps_images
-        if self.mode not in ("live", "auto", "replay") or (self.mode != "live" and store is None):
-            raise InvalidArgumentError(f"mode {self.mode!r}: expected live, or auto or replay with a file of exchanges")
-
-    @property
-    def never_asks(self) -> bool:
-        """True if only cached answers are returned."""
-        return self.mode == "replay"
-
-    def check(self) -> None:
-        """Do nothing: there is nothing to check."""
-
-    def is_cached(self, prompt: Prompt, attempt: int = 0) -> bool:
-        """Return whether the outcome of a question is cached."""
-        return self.store is not None and self.store.outcome(key_of(self.cached_request(prompt, attempt))) is not None
 
     def cached_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
         """Return the content that an exchange's key is computed from."""
@@ -87,49 +71,16 @@ class CustomClient:
         ]
         return {"own_model": self.name, "turns": turns, "attempt": attempt}
 
-    def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
-        """Return the model's answer.
-
-        Raises:
-            VlmError: There is none.
-            DecisionError: The model broke.
-            StoreError: The exchanges cannot be read or written.
-        """
-        request = self.cached_request(prompt, attempt)
-        key = key_of(request)
-        outcome = None if self.store is None or self.mode == "live" else self.store.outcome(key)
-        is_replayed = outcome is not None
-        if outcome is not None:
-            self.account.replayed()
-        elif self.never_asks:
-            raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {key}")
-        else:
-            outcome = self._ask_anew(prompt)
-            if self.store is not None and self.mode == "auto":
-                pixels = [picture.pixels for picture in prompt.pictures] if self.keeps_images else []
-                images = {image_name(image): png_of(image) for image in pixels}
-                outcome = self.store.keep_first(request, images, outcome)
-        if isinstance(outcome, Failure):
-            raise VlmError(cast("VlmFailure", outcome.kind), outcome.message)
-        text = str(outcome["text"])
-        if not text.strip():
-            raise VlmError("empty", "an empty answer")
-        return Answer(text, self.name, Usage(), key, is_replayed)
-
-    def _ask_anew(self, prompt: Prompt) -> JsonObject | Failure:
+    def _ask_model(self, prompt: Prompt, attempt: int, images: Mapping[str, bytes]) -> JsonObject:
         reserved_usd = self.account.reserve(Usage())
         usage: Usage | None = None
         try:
             text = self.model.ask(prompt)
             usage = Usage()
         except TimeoutError as error:
-            return Failure("timeout", str(error) or "no answer in time")
+            raise VlmError("timeout", str(error) or "no answer in time") from error
         except ConnectionError as error:
-            return Failure("connection", str(error) or "connection lost")
-        except VlmError as error:
-            if error.kind in LASTING:
-                raise
-            return Failure(error.kind, error.message)
+            raise VlmError("connection", str(error) or "connection lost") from error
         except DecisionError:
             raise
         except Exception as error:
@@ -139,6 +90,12 @@ class CustomClient:
         if not isinstance(text, str):
             raise DecisionError(f"{self.name}: ask: expected a string, got {type(text).__name__}")
         return {"text": text}
+
+    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
+        text = str(response["text"])
+        if not text.strip():
+            raise VlmError("empty", "an empty answer")
+        return Answer(text, self.name, Usage(), key, is_replayed)
 
 
 class _MadeWhenAsked:

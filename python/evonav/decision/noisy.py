@@ -11,7 +11,7 @@ import math
 import random
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, TypeVar
 
@@ -152,3 +152,21 @@ class Noisy:
     def _draws(self, kind: str, attempt: int) -> random.Random:
         name = f"noise\0{self._seed}\0{kind}\0{self._num_asked[kind]}\0{attempt}"
         return random.Random(hashlib.sha256(name.encode()).digest())  # noqa: S311 - not for secrets
+
+
+def read_rates(text: str, known: Sequence[str]) -> dict[str, float]:
+    """Read rates as people write them: `wrong=0.1,lost=0.01`.
+
+    Raises:
+        InvalidArgumentError: A name is unknown, occurs twice, or has no number.
+    """
+    rates: dict[str, float] = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        name, _, value = item.partition("=")
+        if name not in known or name in rates:
+            raise InvalidArgumentError(f"{item}: expected each of {', '.join(known)} once, as name=number")
+        try:
+            rates[name] = float(value)
+        except ValueError:
+            raise InvalidArgumentError(f"{item}: expected a number after {name}=") from None
+    return rates

@@ -4,37 +4,16 @@ from collections.abc import Mapping
 from typing import Literal
 
 from evonav.decision.text.language import canonical
-from evonav.tasks.language import noun_of
+from evonav.tasks.language import PROCTHOR_TYPES, noun_of, phrases_of
 from evonav.tasks.vocabulary import MAP_CATEGORIES
 
 VocabularyName = Literal["procthor", "scannet200", "coco-unigoal", "dino-unigoal"]
 
 
-def _split_phrases(text: str) -> tuple[str, ...]:
-    return tuple(" ".join(word.split()) for word in text.split(";"))
-
-
-PROCTHOR_TYPES = _split_phrases(
-    """
-    AlarmClock; AluminumFoil; Apple; ArmChair; BaseballBat; BasketBall; Bed; Blinds; Book; Boots; Bottle; Bowl;
-    Box; Bread; ButterKnife; CD; Candle; Cart; CellPhone; Chair; Cloth; ClothesDryer; CoffeeMachine;
-    CoffeeTable; CounterTop; CreditCard; Cup; Desk; DeskLamp; Desktop; DiningTable; DishSponge; DogBed; Dresser;
-    Dumbbell; Egg; Faucet; FloorLamp; Footstool; Fork; Fridge; GarbageBag; GarbageCan; HandTowel;
-    HandTowelHolder; HousePlant; Kettle; KeyChain; Knife; Ladle; Laptop; LaundryHamper; Lettuce; LightSwitch;
-    Microwave; Mug; Newspaper; Ottoman; Painting; Pan; PaperTowelRoll; Pen; Pencil; PepperShaker; Pillow; Plate;
-    Plunger; Pot; Potato; RemoteControl; RoomDecor; Safe; SaltShaker; ScrubBrush; ShelvingUnit; ShowerCurtain;
-    ShowerHead; SideTable; Sink; SoapBar; SoapBottle; Sofa; Spatula; Spoon; SprayBottle; Statue; Stool; TVStand;
-    TableTopDecor; TeddyBear; Television; TennisRacket; TissueBox; Toaster; Toilet; ToiletPaper;
-    ToiletPaperHanger; Tomato; Towel; TowelHolder; VacuumCleaner; Vase; WashingMachine; Watch; WateringCan;
-    WineBottle
-    """
-)
-"""ProcTHOR's types of objects; doors, windows and what the house is built of are none."""
-
 PROCTHOR_NOUNS = tuple(noun_of(kind) for kind in PROCTHOR_TYPES)
 """Their names in words: what an open-vocabulary detector is asked for if nothing else is said."""
 
-SCANNET200 = _split_phrases(
+SCANNET200 = phrases_of(
     """
     wall; chair; floor; table; door; couch; cabinet; shelf; desk; office chair; bed; pillow; sink; picture;
     window; toilet; bookshelf; monitor; curtain; book; armchair; coffee table; box; refrigerator; lamp; kitchen
@@ -64,7 +43,7 @@ SCANNET200 = _split_phrases(
 COCO_UNIGOAL = MAP_CATEGORIES
 """UniGoal's 15 of COCO's, in its words."""
 
-DINO_UNIGOAL = _split_phrases(
+DINO_UNIGOAL = phrases_of(
     "table; tv; chair; cabinet; sofa; bed; windows; kitchen; bedroom; living room; mirror; plant; curtain; painting;"
     "picture"
 )

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from evonav.decision.vlm.account import Usage
+from evonav.decision.vlm.ledger import Usage
 from evonav.evaluation.run.cost_estimate import estimate_run
 from evonav.sweeps.file import SweepFile
 from evonav.sweeps.run import CellRun

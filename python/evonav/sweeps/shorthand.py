@@ -89,8 +89,7 @@ def _tasks(word: str, place: str) -> tuple[str, dict[str, Any]]:
 
 
 def _decision(word: str, place: str) -> tuple[str, dict[str, Any]]:
-    from evonav.decision.noisy import NoiseRates
-    from evonav.decision.rates import read_rates
+    from evonav.decision.noisy import NoiseRates, read_rates
 
     kind, colon, rest = word.partition(":")
     if kind == "vlm" and colon:

@@ -112,3 +112,26 @@ def with_article(noun: str) -> str:
 def listed(nouns: list[str]) -> str:
     """Join nouns: `a`, `a and b`, `a, b and c`."""
     return " and ".join([", ".join(nouns[:-1]), nouns[-1]]) if len(nouns) > 1 else "".join(nouns)
+
+
+def phrases_of(text: str) -> tuple[str, ...]:
+    """Return the phrases of a list with semicolons between them."""
+    return tuple(" ".join(phrase.split()) for phrase in text.split(";"))
+
+
+PROCTHOR_TYPES = phrases_of(
+    """
+    AlarmClock; AluminumFoil; Apple; ArmChair; BaseballBat; BasketBall; Bed; Blinds; Book; Boots; Bottle; Bowl;
+    Box; Bread; ButterKnife; CD; Candle; Cart; CellPhone; Chair; Cloth; ClothesDryer; CoffeeMachine;
+    CoffeeTable; CounterTop; CreditCard; Cup; Desk; DeskLamp; Desktop; DiningTable; DishSponge; DogBed; Dresser;
+    Dumbbell; Egg; Faucet; FloorLamp; Footstool; Fork; Fridge; GarbageBag; GarbageCan; HandTowel;
+    HandTowelHolder; HousePlant; Kettle; KeyChain; Knife; Ladle; Laptop; LaundryHamper; Lettuce; LightSwitch;
+    Microwave; Mug; Newspaper; Ottoman; Painting; Pan; PaperTowelRoll; Pen; Pencil; PepperShaker; Pillow; Plate;
+    Plunger; Pot; Potato; RemoteControl; RoomDecor; Safe; SaltShaker; ScrubBrush; ShelvingUnit; ShowerCurtain;
+    ShowerHead; SideTable; Sink; SoapBar; SoapBottle; Sofa; Spatula; Spoon; SprayBottle; Statue; Stool; TVStand;
+    TableTopDecor; TeddyBear; Television; TennisRacket; TissueBox; Toaster; Toilet; ToiletPaper;
+    ToiletPaperHanger; Tomato; Towel; TowelHolder; VacuumCleaner; Vase; WashingMachine; Watch; WateringCan;
+    WineBottle
+    """
+)
+"""ProcTHOR's types of objects; doors, windows and what the house is built of are none."""

@@ -78,8 +78,8 @@ def print_estimate(
     from rich.table import Table
 
     from evonav.cli.display import progress
-    from evonav.decision.vlm.account import Usage
     from evonav.decision.vlm.counting import OUTPUT_TOKENS
+    from evonav.decision.vlm.ledger import Usage
     from evonav.evaluation.run.cost_estimate import estimate_run
 
     options = dict(config.backend.decision.options)

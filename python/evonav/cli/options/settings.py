@@ -201,8 +201,7 @@ def _option_type(annotation: Any) -> Any:  # noqa: ANN401 - a type hint
 
 def _noise(text: str) -> dict[str, float]:
     """Read rates of mistakes, such as wrong=0.1,lost=0.01."""
-    from evonav.decision.noisy import NoiseRates
-    from evonav.decision.rates import read_rates
+    from evonav.decision.noisy import NoiseRates, read_rates
     from evonav.errors import InvalidArgumentError
     from evonav.evaluation.run.settings import SettingError
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 from itertools import zip_longest
 from typing import Literal
 
-from evonav.tasks.language import COLOURS, MATERIALS, SHAPES, SIZES, noun_of, plural_of
+from evonav.tasks.language import COLOURS, MATERIALS, PROCTHOR_TYPES, SHAPES, SIZES, noun_of, plural_of
 
 RelationKind = Literal["in", "on", "near"]
 
@@ -70,22 +70,11 @@ ROOMS = ("bedroom", "kitchen", "living room", "bathroom")
 """ProcTHOR's room types."""
 
 _NOUNS = frozenset(
-    """
-    alarm clock; aluminum foil; apple; arm chair; baseball bat; basket ball; bathtub; bed; blinds; book; boots; bottle;
-    bowl; box; bread; butter knife; cd; candle; cart; cell phone; chair; cloth; clothes dryer; coffee machine;
-    coffee table; countertop; credit card; cup; desk; desk lamp; desktop; dining table; dish sponge; dog bed; doorframe;
-    doorway; dresser; dumbbell; egg; faucet; floor lamp; footstool; fork; fridge; garbage bag; garbage can; hand towel;
-    hand towel holder; house plant; kettle; key chain; knife; ladle; laptop; laundry hamper; lettuce; light switch;
-    microwave; mug; newspaper; ottoman; painting; pan; paper towel roll; pen; pencil; pepper shaker; pillow; plate;
-    plunger; pot; potato; remote control; room decor; safe; salt shaker; scrub brush; shelving unit; shower curtain;
-    shower head; side table; sink; soap bar; soap bottle; sofa; spatula; spoon; spray bottle; statue; stool; tv stand;
-    table top decor; teddy bear; television; tennis racket; tissue box; toaster; toilet; toilet paper;
-    toilet paper hanger; tomato; towel; towel holder; vacuum cleaner; vase; washing machine; watch; watering can;
-    window; wine bottle; bedroom; kitchen; living room; bathroom; table; lamp
-    """.replace("\n", " ")
-    .replace("    ", "")
-    .strip()
-    .split("; ")
+    (
+        *(SYNONYMS.get(noun, noun) for noun in (noun_of(kind).lower() for kind in PROCTHOR_TYPES)),
+        *ROOMS,
+        *("bathtub", "doorframe", "doorway", "window", "table", "lamp"),
+    )
 )
 """ProcTHOR's types and rooms, canonical: common knowledge of the benchmark, used to tell nouns from adjectives."""
 

@@ -25,11 +25,6 @@ MAX_TOKENS = 256
 Array = NDArray[np.float32]
 
 
-def is_installed() -> bool:
-    """Return whether the extra's packages are there; the weights are checked when they are used."""
-    return all(find_spec(module) is not None for module in MODULES)
-
-
 @cache
 def encoder() -> "MiniLm":
     """Return the model, read once a process.

@@ -7,25 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.ledger import Ledger
+from evonav.decision.vlm.ledger import Ledger, Usage
 from evonav.errors import InvalidArgumentError
 
 CHARACTERS_PER_TOKEN = 3.0
 """Smallest average number of characters a token in English (about 4): estimates are rather too high."""
 LOW_DETAIL_TOKENS, TILE_TOKENS, TILE_PX = 85, 170, 512
 """Tokens of images, as gpt-4o counts them: a base, and a number for each tile."""
-
-
-@dataclass(frozen=True, slots=True)
-class Usage:
-    """Tokens of one or more questions."""
-
-    input_tokens: int = 0
-    output_tokens: int = 0
-
-    def __add__(self, other: "Usage") -> "Usage":
-        """Return the sum of both."""
-        return Usage(self.input_tokens + other.input_tokens, self.output_tokens + other.output_tokens)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,15 +138,8 @@ class Account:
                 self.usage += usage
                 self.num_asked += 1
         if self._ledger is not None:
-            used = usage or Usage()
-            self._ledger.settle(
-                self._model,
-                reserved_usd,
-                input_tokens=used.input_tokens,
-                output_tokens=used.output_tokens,
-                cost_usd=0.0 if self.price is None else self.price.of(used),
-                is_answered=usage is not None,
-            )
+            cost_usd = 0.0 if self.price is None or usage is None else self.price.of(usage)
+            self._ledger.settle(self._model, reserved_usd, usage, cost_usd)
 
     def replayed(self) -> None:
         """Count an answer that came from the cache."""

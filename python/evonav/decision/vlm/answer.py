@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from evonav.decision.vlm.account import Usage
 from evonav.decision.vlm.errors import VlmError
-from evonav.decision.vlm.response_cache import Failure, JsonObject
+from evonav.decision.vlm.ledger import Usage
+from evonav.decision.vlm.response_cache import JsonObject
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +54,6 @@ def read_answer(response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
         raise VlmError("empty", f"an empty answer (finish_reason {reason!r})")
     model = response.get("model")
     return Answer(content, model if isinstance(model, str) else "", usage_of(response) or Usage(), key, is_replayed)
-
-
-def is_malformed(outcome: JsonObject | Failure) -> bool:
-    """Return whether it is no response of a model at all; a refusal or a truncated answer is one."""
-    if isinstance(outcome, Failure):
-        return True
-    try:
-        read_answer(outcome, "", is_replayed=False)
-    except VlmError as error:
-        return error.kind == "malformed"
-    return False
 
 
 def _content(content: Any) -> str:  # noqa: ANN401

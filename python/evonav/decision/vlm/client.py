@@ -11,28 +11,26 @@ import base64
 import json
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evonav.decision.prompts import Prompt, Text, Turn
-from evonav.decision.vlm.account import CHARACTERS_PER_TOKEN, Account, Usage, image_tokens
-from evonav.decision.vlm.answer import Answer, is_malformed, read_answer, usage_of
-from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure
-from evonav.decision.vlm.images import png_of
+from evonav.decision.vlm.account import CHARACTERS_PER_TOKEN, Account, image_tokens
+from evonav.decision.vlm.answer import Answer, read_answer, usage_of
+from evonav.decision.vlm.caching_client import CachingClient, Mode
+from evonav.decision.vlm.errors import VlmError
+from evonav.decision.vlm.ledger import Usage
 from evonav.decision.vlm.pacing import Pace
-from evonav.decision.vlm.response_cache import Failure, JsonObject, ResponseCache, image_name, key_of
+from evonav.decision.vlm.response_cache import JsonObject, ResponseCache, image_name, png_of
 from evonav.errors import DecisionError, InvalidArgumentError
 
 if TYPE_CHECKING:
     import openai
 
-Mode = Literal["live", "record", "replay", "auto"]
-"""`live` stores nothing, `record` asks and stores, `replay` never asks, `auto` asks only what is not cached."""
-MODES: tuple[Mode, ...] = ("live", "record", "replay", "auto")
 MAX_ANSWER_BYTES = 2**20
 """Longest response that is read."""
 MIN_SECRET_CHARACTERS = 8
@@ -94,8 +92,8 @@ class VlmConfig:
             raise InvalidArgumentError("model: expected a name, got ''")
 
 
-class VlmClient:
-    """Asks a model, caches its responses, and counts the costs. Any number of threads may use one client."""
+class VlmClient(CachingClient):
+    """Asks a model behind an endpoint. Any number of threads may use one client."""
 
     def __init__(
         self,
@@ -107,84 +105,19 @@ class VlmClient:
         keeps_failures: bool = False,
         keeps_images: bool = True,
     ) -> None:
-        """Create a client; nothing is asked or imported yet.
-
-        Args:
-            config: Model and endpoint.
-            store: Cache of exchanges; every mode but `live` needs one.
-            mode: Default `auto` with a cache, else `live`.
-            account: Default: an account without prices or limit.
-            keeps_failures: True to cache timeouts, lost connections, servers' errors and broken responses in mode
-                `auto`, so that they happen again when a run is resumed or replayed; else they are asked again.
-            keeps_images: Store the images' files beside their hashes, for people; replays need none.
+        """Create a client of the configured model and endpoint; see `CachingClient` for the other arguments.
 
         Raises:
-            InvalidArgumentError: The mode needs a store.
+            InvalidArgumentError: The mode is unknown, or needs a store.
         """
+        super().__init__(
+            store=store, mode=mode, account=account, keeps_failures=keeps_failures, keeps_images=keeps_images
+        )
         self.config = config
-        self.store = store
-        self.mode: Mode = mode or ("live" if store is None else "auto")
-        self.account = account or Account()
-        self.keeps_failures = keeps_failures
-        self.keeps_images = keeps_images
-        if self.mode not in MODES:
-            raise InvalidArgumentError(f"mode: expected one of {', '.join(MODES)}, got {self.mode!r}")
-        if self.mode != "live" and store is None:
-            raise InvalidArgumentError(f"mode {self.mode}: needs a file of exchanges")
         self._slots = threading.BoundedSemaphore(config.max_concurrency)
         self._pace = Pace(config.requests_per_minute, config.tokens_per_minute)
         self._lock = threading.Lock()
         self._sdk: openai.OpenAI | None = None
-
-    def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
-        """Return the model's answer.
-
-        Args:
-            prompt: The question.
-            attempt: Number of earlier tries without a valid answer; another attempt is another request.
-
-        Raises:
-            VlmError: There is no valid answer; `kind` says why.
-            StoreError: The exchanges cannot be read or written.
-            DecisionError: The package `openai` is missing.
-        """
-        cached = self.cached_request(prompt, attempt)
-        key = key_of(cached)
-        outcome = None if self.store is None or self.mode not in ("replay", "auto") else self.store.outcome(key)
-        is_replayed = outcome is not None
-        if outcome is not None:
-            self.account.replayed()
-        elif self.mode == "replay":
-            raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {key}")
-        else:
-            outcome = self._ask_anew(prompt, attempt, cached)
-        if isinstance(outcome, Failure):
-            raise VlmError(cast("VlmFailure", outcome.kind), outcome.message)
-        return read_answer(outcome, key, is_replayed=is_replayed)
-
-    def _ask_anew(self, prompt: Prompt, attempt: int, cached: JsonObject) -> JsonObject | Failure:
-        """Ask the server, and store the outcome if the mode and `keeps_failures` require it."""
-        images = {image_name(picture.pixels): png_of(picture.pixels) for picture in prompt.pictures}
-        request = self.request_of(prompt, lambda pixels: _data_url(images[image_name(pixels)]), attempt)
-        outcome: JsonObject | Failure
-        try:
-            outcome = self._ask_server(request, self.estimate(prompt))
-        except VlmError as error:
-            if not self.keeps_failures or error.kind in LASTING:
-                raise
-            outcome = Failure(error.kind, error.message)
-        if self.store is None or self.mode == "live":
-            return outcome
-        if self.mode == "auto" and (self.keeps_failures or not is_malformed(outcome)):
-            return self.store.keep_first(cached, images if self.keeps_images else {}, outcome)
-        if self.mode == "record" and not isinstance(outcome, Failure) and not is_malformed(outcome):
-            self.store.put(cached, images if self.keeps_images else {}, outcome)
-        return outcome
-
-    @property
-    def never_asks(self) -> bool:
-        """True if only cached answers are returned."""
-        return self.mode == "replay"
 
     def check(self) -> None:
         """Check before the first question that the model can be asked; ask nothing.
@@ -194,10 +127,6 @@ class VlmClient:
         """
         if self.mode != "replay":
             self._client()
-
-    def is_cached(self, prompt: Prompt, attempt: int = 0) -> bool:
-        """Return whether the outcome of a question is cached."""
-        return self.store is not None and self.store.outcome(key_of(self.cached_request(prompt, attempt))) is not None
 
     def cached_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
         """Return the request as it is cached: with names of images, and the attempt if nothing else tells it apart."""
@@ -243,8 +172,10 @@ class VlmClient:
                 tokens += image_tokens((width, height), self.config.image_detail)
         return Usage(int(tokens) + 1, self.config.max_tokens)
 
-    def _ask_server(self, request: JsonObject, estimate: Usage) -> JsonObject:
+    def _ask_model(self, prompt: Prompt, attempt: int, images: Mapping[str, bytes]) -> JsonObject:
         """Ask within the limits of money and of concurrent questions."""
+        request = self.request_of(prompt, lambda pixels: _data_url(images[image_name(pixels)]), attempt)
+        estimate = self.estimate(prompt)
         reserved_usd = self.account.reserve(estimate)
         usage: Usage | None = None
         try:
@@ -256,6 +187,9 @@ class VlmClient:
             return response
         finally:
             self.account.settle(reserved_usd, usage)
+
+    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
+        return read_answer(response, key, is_replayed=is_replayed)
 
     def _post(self, request: JsonObject) -> JsonObject:
         sdk = self._client()

@@ -3,10 +3,9 @@
 from typing import TypeVar
 
 from evonav.decision.question import DecisionModel, Question, Reply
-from evonav.decision.vlm.account import Usage
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.decision import with_schema
-from evonav.decision.vlm.ledger import Ledger
+from evonav.decision.vlm.ledger import Ledger, Usage
 
 A = TypeVar("A")
 
@@ -43,12 +42,5 @@ class Counting:
         if self._is_json:
             prompt = with_schema(prompt, question.answer_schema())
         used = Usage(self._client.estimate(prompt).input_tokens, OUTPUT_TOKENS)
-        self._ledger.settle(
-            f"{self._name} {question.kind}",
-            0.0,
-            input_tokens=used.input_tokens,
-            output_tokens=used.output_tokens,
-            cost_usd=0.0,
-            is_answered=True,
-        )
+        self._ledger.settle(f"{self._name} {question.kind}", 0.0, used)
         return self._model.answer(question, attempt)

@@ -8,11 +8,12 @@ content of `answer` is parsed as any other answer is.
 
 import json
 from collections.abc import Mapping
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, Literal, TypeVar
 
 from evonav.decision.prompts import Prompt, Text, Turn
 from evonav.decision.question import AnswerError, Fault, Question, Reply
 from evonav.decision.vlm.answer import Answer
+from evonav.decision.vlm.caching_client import CachingClient
 from evonav.decision.vlm.errors import VlmError, VlmFailure
 from evonav.errors import DecisionError, InvalidArgumentError, StoreError
 
@@ -43,39 +44,10 @@ _AS_JSON = "Give the answer as JSON: what belongs on the first line as `answer`,
 _LINES_AS_JSON = "Give the answer as JSON: its lines as the items of `answer`, in order, the reason as `reason`."
 
 
-class Asks(Protocol):
-    """A client that answers prompts: `VlmClient`, or `CustomClient` with a model of your own."""
-
-    @property
-    def never_asks(self) -> bool:
-        """True if only cached answers are returned."""
-        ...
-
-    def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
-        """Answer a prompt.
-
-        Raises:
-            VlmError: There is no answer.
-        """
-        ...
-
-    def is_cached(self, prompt: Prompt, attempt: int = 0) -> bool:
-        """Return whether the outcome is cached, so that nothing is asked."""
-        ...
-
-    def check(self) -> None:
-        """Check before the first question that the model can be asked; ask nothing.
-
-        Raises:
-            DecisionError: The model cannot be asked; the message says what to do.
-        """
-        ...
-
-
 class VlmDecision:
     """Answers every question by asking a model."""
 
-    def __init__(self, client: Asks, *, structured: Structured = "auto", needs_images: bool = True) -> None:
+    def __init__(self, client: CachingClient, *, structured: Structured = "auto", needs_images: bool = True) -> None:
         """Create a decision model.
 
         Args:

@@ -23,6 +23,18 @@ CREATE TABLE IF NOT EXISTS spending (
 
 
 @dataclass(frozen=True, slots=True)
+class Usage:
+    """Tokens of one or more questions."""
+
+    input_tokens: int = 0
+    output_tokens: int = 0
+
+    def __add__(self, other: "Usage") -> "Usage":
+        """Return the sum of both."""
+        return Usage(self.input_tokens + other.input_tokens, self.output_tokens + other.output_tokens)
+
+
+@dataclass(frozen=True, slots=True)
 class Spending:
     """The spending on one model."""
 
@@ -67,28 +79,20 @@ class Ledger(SharedFile):
                 raise VlmError("over_budget", message)
             self._add(model, set_aside_usd=cost_usd)
 
-    def settle(
-        self,
-        model: str,
-        reserved_usd: float,
-        *,
-        input_tokens: int,
-        output_tokens: int,
-        cost_usd: float,
-        is_answered: bool,
-    ) -> None:
-        """Replace a reserved cost by what was used.
+    def settle(self, model: str, reserved_usd: float, usage: Usage | None, cost_usd: float = 0.0) -> None:
+        """Replace a reserved cost by what was used; `None` if there was no counted answer.
 
         Raises:
             StoreError: The file cannot be written.
         """
+        used = usage or Usage()
         with self._writing():
             self._add(
                 model,
                 num_asked=1,
-                num_without_answer=int(not is_answered),
-                input_tokens=input_tokens,
-                output_tokens=output_tokens,
+                num_without_answer=int(usage is None),
+                input_tokens=used.input_tokens,
+                output_tokens=used.output_tokens,
                 cost_usd=cost_usd,
                 set_aside_usd=-reserved_usd,
             )

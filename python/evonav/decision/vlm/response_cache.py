@@ -11,11 +11,13 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from evonav.decision.vlm.shared_file import SharedFile
 from evonav.errors import StoreError
@@ -45,6 +47,13 @@ def image_name(pixels: NDArray[np.uint8]) -> str:
     """
     height, width = pixels.shape[:2]
     return "sha256:" + hashlib.sha256(f"{width}x{height} RGB\n".encode() + pixels.tobytes()).hexdigest()
+
+
+def png_of(pixels: NDArray[np.uint8]) -> bytes:
+    """Return a `(H, W, 3)` RGB image as a PNG file."""
+    buffer = BytesIO()
+    Image.fromarray(np.ascontiguousarray(pixels)).save(buffer, "PNG")
+    return buffer.getvalue()
 
 
 def key_of(request: JsonObject) -> str:

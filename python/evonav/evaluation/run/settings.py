@@ -13,7 +13,7 @@ from pydantic import ConfigDict, Field
 
 from evonav.component import Component
 from evonav.decision.question import DecisionModel
-from evonav.decision.vlm.client import Mode
+from evonav.decision.vlm.caching_client import Mode
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.perception import Perception

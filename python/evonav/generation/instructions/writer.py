@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.decision.prompts import Prompt
-from evonav.decision.vlm.account import Usage
 from evonav.decision.vlm.client import VlmClient
 from evonav.decision.vlm.errors import LASTING, VlmError
+from evonav.decision.vlm.ledger import Usage
 from evonav.errors import TaskError
 from evonav.generation.instructions.prompts import (
     appearance_question,

@@ -1,0 +1,148 @@
+"""Ask a model through a cache: the part that all clients of models share."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Literal, cast
+
+from evonav.decision.prompts import Prompt
+from evonav.decision.vlm.account import Account
+from evonav.decision.vlm.answer import Answer
+from evonav.decision.vlm.errors import LASTING, VlmError, VlmFailure
+from evonav.decision.vlm.response_cache import Failure, JsonObject, ResponseCache, image_name, key_of, png_of
+from evonav.errors import InvalidArgumentError
+
+Mode = Literal["live", "record", "replay", "auto"]
+"""`live` stores nothing, `record` asks and stores, `replay` never asks, `auto` asks only what is not cached."""
+MODES: tuple[Mode, ...] = ("live", "record", "replay", "auto")
+
+
+class CachingClient(ABC):
+    """Asks a model, caches its responses, and counts the costs."""
+
+    def __init__(
+        self,
+        *,
+        store: ResponseCache | None = None,
+        mode: Mode | None = None,
+        account: Account | None = None,
+        keeps_failures: bool = True,
+        keeps_images: bool = True,
+    ) -> None:
+        """Create a client; nothing is asked or imported yet.
+
+        Args:
+            store: Cache of exchanges; every mode but `live` needs one.
+            mode: Default `auto` with a cache, else `live`.
+            account: Default: an account without prices or limit.
+            keeps_failures: True to cache timeouts, lost connections, servers' errors and broken responses in mode
+                `auto`, so that they happen again when a run is resumed or replayed; else they are asked again.
+            keeps_images: Store the images' files beside their hashes, for people; replays need none.
+
+        Raises:
+            InvalidArgumentError: The mode is unknown, or needs a store.
+        """
+        self.store = store
+        self.mode: Mode = mode or ("live" if store is None else "auto")
+        self.account = account or Account()
+        self.keeps_failures = keeps_failures
+        self.keeps_images = keeps_images
+        if self.mode not in MODES:
+            raise InvalidArgumentError(f"mode: expected one of {', '.join(MODES)}, got {self.mode!r}")
+        if self.mode != "live" and store is None:
+            raise InvalidArgumentError(f"mode {self.mode}: needs a file of exchanges")
+
+    def ask(self, prompt: Prompt, attempt: int = 0) -> Answer:
+        """Return the model's answer.
+
+        Args:
+            prompt: The question.
+            attempt: Number of earlier tries without a valid answer; another attempt is another request.
+
+        Raises:
+            VlmError: There is no valid answer; `kind` says why.
+            StoreError: The exchanges cannot be read or written.
+            DecisionError: The model cannot be asked.
+        """
+        cached = self.cached_request(prompt, attempt)
+        key = key_of(cached)
+        outcome = None if self.store is None or self.mode not in ("replay", "auto") else self.store.outcome(key)
+        is_replayed = outcome is not None
+        if outcome is not None:
+            self.account.replayed()
+        elif self.mode == "replay":
+            raise VlmError("not_recorded", f"{self.store and self.store.path} has no exchange {key}")
+        else:
+            outcome = self._ask_anew(prompt, attempt, cached)
+        if isinstance(outcome, Failure):
+            raise VlmError(cast("VlmFailure", outcome.kind), outcome.message)
+        return self._read(outcome, key, is_replayed=is_replayed)
+
+    def _ask_anew(self, prompt: Prompt, attempt: int, cached: JsonObject) -> JsonObject | Failure:
+        """Ask the model, and store the outcome if the mode and `keeps_failures` require it."""
+        images = {image_name(picture.pixels): png_of(picture.pixels) for picture in prompt.pictures}
+        outcome: JsonObject | Failure
+        try:
+            outcome = self._ask_model(prompt, attempt, images)
+        except VlmError as error:
+            if not self.keeps_failures or error.kind in LASTING:
+                raise
+            outcome = Failure(error.kind, error.message)
+        if self.store is None or self.mode == "live":
+            return outcome
+        if self.mode == "auto" and (self.keeps_failures or not self._is_malformed(outcome)):
+            return self.store.keep_first(cached, images if self.keeps_images else {}, outcome)
+        if self.mode == "record" and not isinstance(outcome, Failure) and not self._is_malformed(outcome):
+            self.store.put(cached, images if self.keeps_images else {}, outcome)
+        return outcome
+
+    def _is_malformed(self, outcome: JsonObject | Failure) -> bool:
+        """Return whether it is no response of a model at all; a refusal or a truncated answer is one."""
+        if isinstance(outcome, Failure):
+            return True
+        try:
+            self._read(outcome, "", is_replayed=False)
+        except VlmError as error:
+            return error.kind == "malformed"
+        return False
+
+    @property
+    def never_asks(self) -> bool:
+        """True if only cached answers are returned."""
+        return self.mode == "replay"
+
+    def is_cached(self, prompt: Prompt, attempt: int = 0) -> bool:
+        """Return whether the outcome of a question is cached, so that nothing is asked."""
+        return self.store is not None and self.store.outcome(key_of(self.cached_request(prompt, attempt))) is not None
+
+    def check(self) -> None:  # noqa: B027 - by default there is nothing to check
+        """Check before the first question that the model can be asked; ask nothing.
+
+        Raises:
+            DecisionError: The model cannot be asked; the message says what to do.
+        """
+
+    @abstractmethod
+    def cached_request(self, prompt: Prompt, attempt: int = 0) -> JsonObject:
+        """Return the content that an exchange's key is computed from, with names of images."""
+
+    @abstractmethod
+    def _ask_model(self, prompt: Prompt, attempt: int, images: Mapping[str, bytes]) -> JsonObject:
+        """Ask the model itself.
+
+        Args:
+            prompt: The question.
+            attempt: Number of earlier tries without a valid answer.
+            images: PNG files of the prompt's images by `image_name`.
+
+        Raises:
+            VlmError: There is no response.
+            DecisionError: There will be none.
+        """
+
+    @abstractmethod
+    def _read(self, response: JsonObject, key: str, *, is_replayed: bool) -> Answer:
+        """Return the answer in a response.
+
+        Raises:
+            VlmError: There is no complete answer.
+        """
