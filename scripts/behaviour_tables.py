@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.report.run import Run
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
-from evonav.report.tables.table import NONE, Table, percent
+from evonav.report.tables.numbers import NONE, percent
+from evonav.report.tables.table import Table
 
 STRATA = {"stage_1": "stage 1", "relocated": "relocated", "not_relocated": "not relocated"}
 """Names of the paper's strata."""

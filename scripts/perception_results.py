@@ -23,7 +23,8 @@ from evonav.report.paper.tables import PAPER, PaperResult
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
 from evonav.report.run import PAPER_ORDER, Run, load_run
-from evonav.report.tables.table import NONE, Table, percent
+from evonav.report.tables.numbers import NONE, percent
+from evonav.report.tables.table import Table
 from evonav.statistics import Interval, PairedEffect, paired_effect
 
 PERCEPTIONS = (

@@ -24,8 +24,9 @@ from evonav.report.paper.tables import paper_tables
 from evonav.report.plots.render import write_plots
 from evonav.report.plots.specs import CurvePlot, Line
 from evonav.report.run import PAPER_ORDER, Run, load_run
+from evonav.report.tables.numbers import NONE, percent
 from evonav.report.tables.run_tables import effort_table
-from evonav.report.tables.table import NONE, Table, percent
+from evonav.report.tables.table import Table
 from evonav.statistics import wilson
 from evonav.tasks.listing import TaskFile, task_files
 

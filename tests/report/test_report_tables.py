@@ -13,6 +13,7 @@ from rich.console import Console
 from evonav.evaluation.metrics.navigation import agent_pairs, summarise
 from evonav.report.run import load_run
 from evonav.report.tables import table as tables
+from evonav.report.tables.numbers import percent
 from evonav.statistics import paired_effect
 
 F64 = NDArray[np.float64]
@@ -117,9 +118,9 @@ def test_latex_compiles_and_shrinks_to_the_line(tmp_path: Path) -> None:
 
 
 def test_rates_without_spread_claim_no_interval() -> None:
-    assert tables.percent(1.0, None) == "100.0"
-    assert tables.percent(0.5, (0.25, 0.75)) == "50.0 [25.0, 75.0]"
-    assert tables.percent(None, None) == "–"
+    assert percent(1.0, None) == "100.0"
+    assert percent(0.5, (0.25, 0.75)) == "50.0 [25.0, 75.0]"
+    assert percent(None, None) == "–"
 
 
 def test_paired_differences_name_who_succeeded_alone(write_run: WriteRun) -> None:

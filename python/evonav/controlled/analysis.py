@@ -15,7 +15,8 @@ from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_met
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.run import PAPER_ORDER
-from evonav.report.tables.table import NONE, Table
+from evonav.report.tables.numbers import NONE
+from evonav.report.tables.table import Table
 from evonav.statistics import Interval, PairedEffect, paired_effect
 
 BASELINE = "stage-reset"

@@ -5,7 +5,7 @@ import numpy as np
 from evonav.controlled.analysis import MEASURES, Analysis, Measure
 from evonav.controlled.rates import by_rate
 from evonav.report.plots.specs import BarPlot, CurvePlot, Line, Plot, Series
-from evonav.statistics import ClusterBootstrap, Interval
+from evonav.statistics import ClusterBootstrap
 
 ARM_NAMES = ("Fixed", "Not Fixed")
 
@@ -26,28 +26,13 @@ def _arm_plot(analysis: Analysis, name: str, measure: Measure) -> BarPlot:
             values = np.array([[measure(analysis.outcomes[arm, agent][key]) for arm in analysis.arms] for key in keys])
             groups.append(f"{agent}\n({len(keys)})")
             arm_means.append(ClusterBootstrap(analysis.houses(keys, agent)).column_means(values))
-    series = tuple(
-        Series(
-            arm,
-            tuple(100 * (found[j].value or 0.0) for found in arm_means),
-            tuple(_percent(found[j].ci95) for found in arm_means),
-        )
-        for j, arm in enumerate(ARM_NAMES)
-    )
+    series = tuple(Series.of(arm, [found[j] for found in arm_means]) for j, arm in enumerate(ARM_NAMES))
     note = "in parentheses: pairs; whiskers: 95%, bootstrap by house"
     return BarPlot(f"{name}, %", tuple(groups), series, notes=(note,), y_top=100.0, has_values=True)
 
 
 def _rate_plot(analysis: Analysis, name: str, measure: Measure) -> CurvePlot:
-    lines = []
-    for agent in analysis.agents:
-        found = by_rate(analysis, agent, measure)
-        if found:
-            points = tuple((rate, 100 * mean) for rate, mean, _ in found)
-            lines.append(Line(agent, points, tuple(_percent(ends) for _, _, ends in found)))
+    found = {agent: by_rate(analysis, agent, measure) for agent in analysis.agents}
+    lines = [Line.of(agent, means) for agent, means in found.items() if means]
     x_label = "probability that a transition evolves the house"
     return CurvePlot(f"{name} by evolution rate", tuple(lines), x_label, f"{name}, %")
-
-
-def _percent(interval: Interval | None) -> Interval | None:
-    return None if interval is None else (100 * interval[0], 100 * interval[1])

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.controlled.analysis import BASELINE, MEASURES, Analysis, Key, Measure, effect_cells
-from evonav.report.tables.table import Table, percent
-from evonav.statistics import ClusterBootstrap, Interval
+from evonav.report.tables.numbers import estimate_text
+from evonav.report.tables.table import Table
+from evonav.statistics import ClusterBootstrap, Estimate, Interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,17 +45,14 @@ def rate_keys(analysis: Analysis, *agents: str) -> list[Key]:
     return [key for key in analysis.keys(*agents) if key[1] > 1]
 
 
-def by_rate(analysis: Analysis, agent: str, measure: Measure) -> list[tuple[float, float, Interval | None]]:
-    """Rate, mean and interval in each arm, over the stages that the agent has scored in all."""
+def by_rate(analysis: Analysis, agent: str, measure: Measure) -> list[tuple[float, Estimate]]:
+    """Return rate and mean of each arm, over the stages that the agent has scored in all."""
     keys = rate_keys(analysis, agent)
     if not keys:
         return []
     values = np.array([[measure(analysis.outcomes[arm, agent][key]) for arm in analysis.arms] for key in keys])
     found = ClusterBootstrap(analysis.houses(keys, agent)).column_means(values)
-    return [
-        (arm.evolve_probability, mean.value or 0.0, mean.ci95)
-        for arm, mean in zip(analysis.record.arms, found, strict=True)
-    ]
+    return [(arm.evolve_probability, mean) for arm, mean in zip(analysis.record.arms, found, strict=True)]
 
 
 def crossover(analysis: Analysis, agent: str, measure: Measure, *, seed: int = 0) -> Crossover | None:
@@ -105,7 +103,7 @@ def rate_tables(analysis: Analysis) -> list[Table]:
         for agent in analysis.agents:
             found = by_rate(analysis, agent, measure)
             if found:
-                cells = [percent(mean, interval) for _, mean, interval in found]
+                cells = [estimate_text(mean) for _, mean in found]
                 rows.append((agent, str(len(rate_keys(analysis, agent))), *cells))
         columns = ("agent", "stages", *(f"p = {arm.evolve_probability:g}" for arm in analysis.record.arms))
         note = "In %, with 95% intervals (bootstrap by house); stages from the second on, the same in every arm."

@@ -10,7 +10,6 @@ from evonav.perception_benchmark.average_precision import RECALLS
 from evonav.perception_benchmark.records import NUM_COSINE_BINS
 from evonav.perception_benchmark.scores import Scores
 from evonav.report.plots.specs import ConfusionPlot, ConfusionRow, CurvePlot, GroupPlot, Line, Plot, Series
-from evonav.statistics import Estimate, Interval
 
 MAX_CONFUSED = 12
 _GROUPS = (("distance", "distance"), ("size", "size in the image"))
@@ -33,15 +32,7 @@ def perception_plots(found: Sequence[Scores]) -> list[Plot]:
     ]
     title = "Precision and recall at IoU 0.5"
     plots: list[Plot] = [_square_plot(title, curves, "recall", "precision, mean over categories")]
-    calibrations = [
-        Line(
-            one.word,
-            tuple((confidence, each.value or 0.0) for confidence, each in one.calibration),
-            tuple(each.ci95 for _, each in one.calibration),
-        )
-        for one in found
-        if one.calibration
-    ]
+    calibrations = [Line.of(one.word, one.calibration, scale=1) for one in found if one.calibration]
     calibration = _square_plot("Precision by confidence", calibrations, "confidence", "precision")
     plots.append(replace(calibration, has_diagonal=True))
     for by, name in _GROUPS:
@@ -89,14 +80,7 @@ def _group_plot(found: Sequence[Scores], by: str, name: str, measure: str) -> Gr
     groups = tuple(
         f"{group.name}\nn = {group.measures[measure].n}" if measure == "recall" else group.name for group in first
     )
-    series = tuple(
-        Series(
-            one.word,
-            tuple(_percent(group.measures[measure]) for group in one.groups[by]),
-            tuple(_interval(group.measures[measure]) for group in one.groups[by]),
-        )
-        for one in found
-    )
+    series = tuple(Series.of(one.word, [group.measures[measure] for group in one.groups[by]]) for one in found)
     return GroupPlot(f"{measure.capitalize()} by {name}", groups, series, "% with 95% intervals by house")
 
 
@@ -104,11 +88,7 @@ def _memory_plots(found: Sequence[Scores]) -> list[CurvePlot]:
     plots = []
     for name, title in _MEMORY:
         lines = [
-            Line(
-                one.word,
-                tuple((share, measures[name].value or 0.0) for share, measures in one.memory_curve),
-                tuple(measures[name].ci95 for _, measures in one.memory_curve),
-            )
+            Line.of(one.word, [(share, measures[name]) for share, measures in one.memory_curve], scale=1)
             for one in found
             if one.memory_curve
         ]
@@ -137,11 +117,3 @@ def _confusion_plot(one: Scores) -> ConfusionPlot:
         rows.append(ConfusionRow(name, mine["recall"].n, (right, missed, *others)))
     title = f"{one.word}: labels of objects, % of each category (n)"
     return ConfusionPlot(title, ("right", "nothing", *labels), tuple(rows))
-
-
-def _percent(estimate: Estimate) -> float | None:
-    return None if estimate.value is None else 100 * estimate.value
-
-
-def _interval(estimate: Estimate) -> Interval | None:
-    return None if estimate.ci95 is None else (100 * estimate.ci95[0], 100 * estimate.ci95[1])

@@ -1,16 +1,21 @@
 """Tables of perceptions: what they find, what they take it for, and the memory that comes of it."""
 
-import csv
-import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
 
 from evonav.perception_benchmark.other_scores import Group
 from evonav.perception_benchmark.scores import COMPARED, COMPARED_MEMORY, Scores, differences
-from evonav.report.tables.table import NONE, Table
+from evonav.report.export import csv_text
+from evonav.report.tables.numbers import NONE, estimate_text
+from evonav.report.tables.table import Table
 from evonav.statistics import Estimate
 
 MAX_CATEGORIES, MAX_CONFUSIONS = 8, 4
 INTERVALS = "[..]: 95% interval, bootstrap by house."
+WITH_N, SIGNED = {"has_n": True}, {"is_signed": True}
+TWO_DIGITS, THREE_DIGITS = {"scale": 1, "digits": 2}, {"scale": 1, "digits": 3}
+"""Ways to write an estimate: options of `estimate_text`."""
 
 
 def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> list[Table]:
@@ -36,82 +41,77 @@ def perception_tables(found: Sequence[Scores], *, is_brief: bool = False) -> lis
     return [table for table in tables if table.rows]
 
 
-def percent(estimate: Estimate | None, *, has_n: bool = False) -> str:
-    """Return a share in percent with its interval."""
-    if estimate is None or estimate.value is None:
-        return NONE
-    text = f"{100 * estimate.value:.1f}"
-    if estimate.ci95 is not None:
-        text += " [{:.1f}, {:.1f}]".format(*(100 * end for end in estimate.ci95))
-    return f"{text} ({estimate.n})" if has_n else text
+def _table(
+    title: str,
+    rows: Iterable[tuple[str, Mapping[str, Estimate]]],
+    columns: Mapping[str, tuple[str, Mapping[str, Any]]],
+    *notes: str,
+    first: str = "perception",
+) -> Table:
+    """Build a table with one row per perception and one column per metric.
+
+    Args:
+        title: Title of the table.
+        rows: Name and metrics of each row.
+        columns: Name of the metric and options of `estimate_text`, by heading.
+        notes: Notes below the table.
+        first: Heading of the rows' names.
+    """
+    cells = tuple(
+        (name, *(estimate_text(measures.get(measure), **form) for measure, form in columns.values()))
+        for name, measures in rows
+    )
+    return Table(title, (first, *columns), cells, notes)
 
 
-def points(estimate: Estimate | None) -> str:
-    """Return a difference of shares in points with its interval."""
-    if estimate is None or estimate.value is None:
-        return NONE
-    text = f"{100 * estimate.value:+.1f}"
-    if estimate.ci95 is not None:
-        text += " [{:+.1f}, {:+.1f}]".format(*(100 * end for end in estimate.ci95))
-    return text
-
-
-def number(estimate: Estimate | None, decimals: int = 2) -> str:
-    """Return a number with its interval."""
-    if estimate is None or estimate.value is None:
-        return NONE
-    text = f"{estimate.value:.{decimals}f}"
-    if estimate.ci95 is not None:
-        text += f" [{estimate.ci95[0]:.{decimals}f}, {estimate.ci95[1]:.{decimals}f}]"
-    return text
+def _overall(found: Sequence[Scores]) -> Iterator[tuple[str, Mapping[str, Estimate]]]:
+    return ((one.word, one.overall) for one in found)
 
 
 def _headline(found: Sequence[Scores]) -> Table:
-    names = ("ap50", "ap", "precision", "recall", "f1")
-    heads = ("AP50", "AP", "precision", "recall", "F1", "objects", "detections")
-    rows = tuple(
-        (
-            one.word,
-            *(percent(one.overall.get(name)) for name in names),
-            str(one.overall["recall"].n),
-            str(one.overall["precision"].n),
-        )
-        for one in found
-    )
     first = found[0]
-    notes = (
+    table = _table(
+        "What perceptions find",
+        _overall(found),
+        {head: (head.lower(), {}) for head in ("AP50", "AP", "precision", "recall", "F1")},
         f"{first.num_tasks} tasks in {first.num_houses} houses, {first.num_views} views each perception. {INTERVALS}",
         "In %, at IoU 0.5 and with the right label; AP: mean over IoU 0.5 to 0.95.",
     )
-    return Table("What perceptions find", ("perception", *heads), rows, notes)
+    counts = [(str(one.overall["recall"].n), str(one.overall["precision"].n)) for one in found]
+    rows = tuple(row + more for row, more in zip(table.rows, counts, strict=True))
+    return replace(table, columns=(*table.columns, "objects", "detections"), rows=rows)
 
 
 def _differences(found: Sequence[Scores]) -> Table:
     heads = ("AP50", "AP", "precision", "recall", "F1", "located", "memory precision", "memory recall")
-    rows = tuple(
-        (f"{each.word} less {each.less}", *(points(each.measures.get(name)) for name in (*COMPARED, *COMPARED_MEMORY)))
-        for each in differences(found)
+    return _table(
+        "Perceptions against each other",
+        ((f"{each.word} less {each.less}", each.measures) for each in differences(found)),
+        {head: (name, SIGNED) for head, name in zip(heads, (*COMPARED, *COMPARED_MEMORY), strict=True)},
+        f"In points. {INTERVALS} Of the same views; not adjusted for how many are compared.",
+        first="perceptions",
     )
-    note = f"In points. {INTERVALS} Of the same views; not adjusted for how many are compared."
-    return Table("Perceptions against each other", ("perceptions", *heads), rows, (note,))
 
 
 def _parts(found: Sequence[Scores]) -> Table:
-    names = ("located", "labelled", "iou", "ap50_located")
-    rows = tuple((one.word, *(percent(one.overall.get(name)) for name in names)) for one in found)
-    note = (
+    return _table(
+        "Places and labels apart",
+        _overall(found),
+        {
+            "located": ("located", {}),
+            "label right": ("labelled", {}),
+            "mean IoU": ("iou", {}),
+            "places alone": ("ap50_located", {}),
+        },
         "In %. Located: objects at whose place something is told (IoU 0.5), whatever its label. Label right, mean IoU: "
-        "of those. Places alone: AP50 if all labels were right."
-    )
-    return Table(
-        "Places and labels apart", ("perception", "located", "label right", "mean IoU", "places alone"), rows, (note,)
+        "of those. Places alone: AP50 if all labels were right.",
     )
 
 
 def _by_group(found: Sequence[Scores], by: str, quantity: str) -> Table:
     names = [group.name for group in found[0].groups[by]]
     rows = tuple(
-        (one.word, measure, *(percent(group.measures.get(measure), has_n=True) for group in one.groups[by]))
+        (one.word, measure, *(estimate_text(group.measures.get(measure), has_n=True) for group in one.groups[by]))
         for one in found
         for measure in ("recall", "precision")
     )
@@ -123,13 +123,12 @@ def _by_group(found: Sequence[Scores], by: str, quantity: str) -> Table:
 
 
 def _by_outline(found: Sequence[Scores]) -> Table:
-    rows = tuple(
-        (one.word, *(percent(group.measures.get("recall"), has_n=True) for group in one.groups["outline"]))
-        for one in found
+    return _table(
+        "Recall by how much is in the way",
+        ((one.word, {group.name: group.measures["recall"] for group in one.groups["outline"]}) for one in found),
+        {group.name: (group.name, WITH_N) for group in found[0].groups["outline"]},
+        "In % (n), by the part of the object's outline that is cut by nothing nearer, nor by the image's border.",
     )
-    names = [group.name for group in found[0].groups["outline"]]
-    note = "In % (n), by the part of the object's outline that is cut by nothing nearer, nor by the image's border."
-    return Table("Recall by how much is in the way", ("perception", *names), rows, (note,))
 
 
 def _categories(found: Sequence[Scores], most: int | None) -> Table:
@@ -142,7 +141,7 @@ def _categories(found: Sequence[Scores], most: int | None) -> Table:
             one.word,
             str(mine[name]["recall"].n),
             str(mine[name]["precision"].n),
-            *(percent(mine[name][measure]) for measure in measures),
+            *(estimate_text(mine[name][measure]) for measure in measures),
         )
         for name in names[:most]
         for i, (one, mine) in enumerate(zip(found, by_word, strict=True))
@@ -156,7 +155,7 @@ def _confusions(found: Sequence[Scores], most: int) -> Table:
     rows: list[tuple[str, ...]] = []
     for one in found:
         rows += [
-            (one.word, each.category, each.label, str(each.num), percent(each.share, has_n=True))
+            (one.word, each.category, each.label, str(each.num), estimate_text(each.share, has_n=True))
             for each in one.confusions[:most]
         ]
         rows += [(one.word, "(nothing)", label, str(num), NONE) for label, num in one.unexplained[: most // 2]]
@@ -166,94 +165,76 @@ def _confusions(found: Sequence[Scores], most: int) -> Table:
 
 
 def _memory(found: Sequence[Scores]) -> Table:
-    shares = ("surplus", "wrong_label", "phantoms")
-    heads = (
-        "entries",
-        "objects seen",
-        "precision %",
-        "recall %",
-        "error m",
-        "surplus %",
-        "wrong label %",
-        "phantoms %",
-    )
-    rows = tuple(
-        (
-            one.word,
-            number(one.memory["entries"], 1),
-            number(one.memory["seen"], 1),
-            percent(one.memory["memory_precision"]),
-            percent(one.memory["memory_recall"]),
-            number(one.memory["position_error_m"]),
-            *(percent(one.memory[name]) for name in shares),
-        )
-        for one in found
-    )
-    notes = (
+    return _table(
+        "The memory of objects that comes of it",
+        ((one.word, one.memory) for one in found),
+        {
+            "entries": ("entries", {"scale": 1}),
+            "objects seen": ("seen", {"scale": 1}),
+            "precision %": ("memory_precision", {}),
+            "recall %": ("memory_recall", {}),
+            "error m": ("position_error_m", TWO_DIGITS),
+            "surplus %": ("surplus", {}),
+            "wrong label %": ("wrong_label", {}),
+            "phantoms %": ("phantoms", {}),
+        },
         "After the first house's tour, a house. Precision: an object of the entry's label stands within 0.3 m of it; "
         "recall: of objects seen from at most 3.5 m. Error: middle to middle, of entries with their object's label.",
         "Surplus: entries beyond an object's first, per object; wrong label: of entries with an object; phantoms: most "
         "of the entry's detections were of no object.",
     )
-    return Table("The memory of objects that comes of it", ("perception", *heads), rows, notes)
 
 
 def _staleness(found: Sequence[Scores]) -> Table:
-    rows = tuple(
-        (one.word, *(percent(one.memory[name], has_n=True) for name in ("stale_at_start", "stale_after_tour")))
-        for one in found
-        if one.memory["stale_at_start"].n
+    return _table(
+        "Stale entries in the next house",
+        ((one.word, one.memory) for one in found if one.memory["stale_at_start"].n),
+        {"as it begins": ("stale_at_start", WITH_N), "after its tour": ("stale_after_tour", WITH_N)},
+        "Entries that were right in the house before and are not in this one; in % of all entries (n).",
     )
-    note = "Entries that were right in the house before and are not in this one; in % of all entries (n)."
-    return Table("Stale entries in the next house", ("perception", "as it begins", "after its tour"), rows, (note,))
 
 
 def _beliefs(found: Sequence[Scores]) -> Table:
-    columns = ("perception", "ECE %", "depth error %", "depth RMSE m", "depth lost %", "offset m", "turn °")
-    rows = tuple(
-        (
-            one.word,
-            percent(one.overall["ece"]),
-            percent(one.overall["depth_relative"]),
-            number(one.overall["depth_rmse_m"], 3),
-            percent(one.overall["depth_lost"]),
-            number(one.overall["pose_offset_m"], 3),
-            number(one.overall["pose_turn_deg"]),
-        )
-        for one in found
+    return _table(
+        "Confidence, depth and pose",
+        _overall(found),
+        {
+            "ECE %": ("ece", {}),
+            "depth error %": ("depth_relative", {}),
+            "depth RMSE m": ("depth_rmse_m", THREE_DIGITS),
+            "depth lost %": ("depth_lost", {}),
+            "offset m": ("pose_offset_m", THREE_DIGITS),
+            "turn °": ("pose_turn_deg", TWO_DIGITS),
+        },
+        "ECE: mean gap between confidence and precision, in tenths of confidence. Depth error: mean of |error| / "
+        "depth.",
     )
-    note = (
-        "ECE: mean gap between confidence and precision, in tenths of confidence. Depth error: mean of |error| / depth."
-    )
-    return Table("Confidence, depth and pose", columns, rows, (note,))
 
 
 def _features(found: Sequence[Scores]) -> Table:
-    names = ("same_object", "same_category", "other", "text_own", "text_other")
-    rows = tuple(
-        (
-            one.word,
-            *(number(one.overall.get(f"cosine_{name}"), 3) for name in names),
-            percent(one.overall.get("text_right"), has_n=True),
-        )
-        for one in found
-        if one.cosines
+    return _table(
+        "Cosines of features",
+        _overall([one for one in found if one.cosines]),
+        {
+            "same object": ("cosine_same_object", THREE_DIGITS),
+            "same category": ("cosine_same_category", THREE_DIGITS),
+            "other": ("cosine_other", THREE_DIGITS),
+            "its word": ("cosine_text_own", THREE_DIGITS),
+            "other words": ("cosine_text_other", THREE_DIGITS),
+            "nearest word right %": ("text_right", WITH_N),
+        },
     )
-    columns = ("perception", "same object", "same category", "other", "its word", "other words", "nearest word right %")
-    return Table("Cosines of features", columns, rows)
 
 
 def perception_csv(found: Sequence[Scores]) -> str:
     """Return every number as a CSV row, unrounded."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("perception", "by", "group", "measure", "value", "low", "high", "n", "num_houses"))
+    columns = ("perception", "by", "group", "measure", "value", "low", "high", "n", "num_houses")
+    rows: list[tuple[object, ...]] = []
 
     def write(word: str, by: str, group: str, measures: Mapping[str, Estimate]) -> None:
         for name, each in measures.items():
-            low, high = each.ci95 or ("", "")
-            value = "" if each.value is None else each.value
-            writer.writerow((word, by, group, name, value, low, high, each.n, found[0].num_houses))
+            ends = each.ci95 or (None, None)
+            rows.append((word, by, group, name, each.value, *ends, each.n, found[0].num_houses))
 
     for each in differences(found):
         write(each.word, "less", each.less, each.measures)
@@ -263,9 +244,9 @@ def perception_csv(found: Sequence[Scores]) -> str:
         for share, measures in one.memory_curve:
             write(one.word, "memory by share of the tour", f"{share:g}", measures)
         groups: dict[str, Sequence[Group]] = {**one.groups, "depth": one.depth}
-        for by, rows in groups.items():
-            for group in rows:
+        for by, parts in groups.items():
+            for group in parts:
                 write(one.word, by, group.name, group.measures)
         for pair in one.confusions:
             write(one.word, "confusion", f"{pair.category} as {pair.label}", {"share": pair.share})
-    return text.getvalue()
+    return csv_text(columns, rows)

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from evonav.parallel.folders import write_atomically
-from evonav.report.tables.table import INTERVALS, Table, percent
+from evonav.report.tables.numbers import percent
+from evonav.report.tables.table import INTERVALS, Table
 from evonav.sweeps.row import AXES, STATES, SweepRow
 
 

@@ -12,11 +12,12 @@ from evonav.evaluation.metrics.stage_metrics import StageMetrics
 from evonav.evaluation.records.store import RunStore
 from evonav.report.compare.compare import MODES, STRATA, check_measure
 from evonav.report.compare.selection import ComparedAgent
-from evonav.report.compare.wording import RATES, measure_name
+from evonav.report.compare.wording import RATES, measure_name, scale_of
 from evonav.report.export import csv_text
 from evonav.report.plots.specs import CurvePlot, GroupPlot, Line, Plot, Series
-from evonav.report.tables.table import NONE, Table
-from evonav.statistics import ClusterBootstrap, Interval
+from evonav.report.tables.numbers import NONE, estimate_text, number
+from evonav.report.tables.table import Table
+from evonav.statistics import ClusterBootstrap, Estimate
 
 RADII_M = (0.5, 1.0, 1.5, 2.0, 2.5, 3.0)
 RADIUS = "radius"
@@ -29,17 +30,6 @@ NUM_BINS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
-    """One agent on one kind of stage."""
-
-    n: int
-    num_houses: int
-    value: float | None
-    ci95: Interval | None
-    """Bootstrap by house."""
-
-
-@dataclass(frozen=True, slots=True)
 class Breakdown:
     """A measure of every agent by group."""
 
@@ -48,8 +38,8 @@ class Breakdown:
     measure: str
     groups: tuple[str, ...]
     agents: tuple[str, ...]
-    cells: Mapping[tuple[str, str], Cell]
-    """Cells by (group, agent)."""
+    cells: Mapping[tuple[str, str], Estimate]
+    """Means by (group, agent)."""
     note: str
 
 
@@ -106,14 +96,14 @@ def breakdown(compared_agents: Sequence[ComparedAgent], by: str, measure: str = 
     )
 
 
-def _cell(rows: Sequence[StageMetrics], values: Sequence[float]) -> Cell:
+def _cell(rows: Sequence[StageMetrics], values: Sequence[float]) -> Estimate:
     bootstrap = ClusterBootstrap([house_of(row) for row in rows])
     (mean,) = bootstrap.column_means(np.array(values)[:, None])
-    return Cell(mean.n, mean.num_clusters, mean.value, mean.ci95)
+    return mean
 
 
 def _by_radius(compared_agents: Sequence[ComparedAgent]) -> Breakdown:
-    cells: dict[tuple[str, str], Cell] = {}
+    cells: dict[tuple[str, str], Estimate] = {}
     labels = {f"{radius_m:g} m": radius_m for radius_m in RADII_M}
     for compared in compared_agents:
         scored = [row for row in compared.rows.values() if row.is_scored and row.terminal_distance_m is not None]
@@ -234,7 +224,8 @@ def breakdown_table(found: Breakdown, *, is_brief: bool = False) -> Table:
     for group in found.groups:
         cells = [found.cells.get((group, agent)) for agent in found.agents]
         sizes = sorted({cell.n for cell in cells if cell is not None})
-        shown = (_brief(cell, found.measure) if is_brief else cell_words(cell, found.measure) for cell in cells)
+        scale = scale_of(found.measure)
+        shown = (_brief(cell, scale) if is_brief else estimate_text(cell, scale=scale) for cell in cells)
         rows.append((group, "-".join(map(str, sizes[:1] + sizes[1:][-1:])), *shown))
     unit = " %" if found.measure in RATES else ""
     ends = "± half of its 95% interval" if is_brief else "[95% CI]"
@@ -244,21 +235,11 @@ def breakdown_table(found: Breakdown, *, is_brief: bool = False) -> Table:
     return Table(f"{measure_name(found.measure)} by {found.label}", columns, tuple(rows), tuple(notes))
 
 
-def cell_words(cell: Cell | None, measure: str) -> str:
-    """`61.1 [54.0, 68.2]`."""
-    if cell is None or cell.value is None:
-        return NONE
-    scale = 100 if measure in RATES else 1
-    ends = "" if cell.ci95 is None else f" [{scale * cell.ci95[0]:.1f}, {scale * cell.ci95[1]:.1f}]"
-    return f"{scale * cell.value:.1f}{ends}"
-
-
-def _brief(cell: Cell | None, measure: str) -> str:
-    if cell is None or cell.value is None:
-        return NONE
-    scale = 100 if measure in RATES else 1
-    half = None if cell.ci95 is None else scale * (cell.ci95[1] - cell.ci95[0]) / 2
-    return f"{scale * cell.value:.1f}" + ("" if half is None else f" ±{half:.0f}" if scale == 100 else f" ±{half:.2g}")
+def _brief(cell: Estimate | None, scale: float) -> str:
+    if cell is None or cell.value is None or cell.ci95 is None:
+        return NONE if cell is None else number(cell.value, scale=scale)
+    half = scale * (cell.ci95[1] - cell.ci95[0]) / 2
+    return number(cell.value, scale=scale) + (f" ±{half:.0f}" if scale == 100 else f" ±{half:.2g}")
 
 
 def breakdown_csv(found: Sequence[Breakdown]) -> str:
@@ -271,30 +252,24 @@ def breakdown_csv(found: Sequence[Breakdown]) -> str:
                 cell = one.cells.get((group, agent))
                 if cell is not None:
                     low, high = cell.ci95 or (None, None)
-                    rows.append((one.by, group, agent, one.measure, cell.n, cell.num_houses, cell.value, low, high))
+                    rows.append((one.by, group, agent, one.measure, cell.n, cell.num_clusters, cell.value, low, high))
     return csv_text(columns, rows)
 
 
 def breakdown_plot(found: Breakdown) -> Plot:
     """Dots with whiskers; lines for the radius sweep."""
-    scale = 100 if found.measure in RATES else 1
+    scale = scale_of(found.measure)
     name = f"{measure_name(found.measure)}, %" if scale == 100 else measure_name(found.measure)
     if found.by == RADIUS:
         radii = [group for group in found.groups if group.endswith(" m")]
         lines = []
         for agent in found.agents:
-            there = [(group, found.cells[group, agent]) for group in radii if (group, agent) in found.cells]
-            points = tuple((float(group[:-2]), 100 * cell.value) for group, cell in there if cell.value is not None)
-            if points:
-                lines.append(Line(agent, points, tuple(_scaled(cell.ci95, 100) for _, cell in there)))
+            there = [(float(group[:-2]), found.cells[group, agent]) for group in radii if (group, agent) in found.cells]
+            if there:
+                lines.append(Line.of(agent, there))
         return CurvePlot("SR by success radius", tuple(lines), "success radius, m", "SR, %")
     groups = found.groups[:MAX_PLOTTED]
-    series = []
-    for agent in found.agents:
-        cells = [found.cells.get((group, agent)) for group in groups]
-        values = tuple(None if cell is None or cell.value is None else scale * cell.value for cell in cells)
-        ends = tuple(None if cell is None else _scaled(cell.ci95, scale) for cell in cells)
-        series.append(Series(agent, values, ends))
+    series = [Series.of(agent, [found.cells.get((group, agent)) for group in groups], scale) for agent in found.agents]
     sizes = [
         {found.cells[group, agent].n for agent in found.agents if (group, agent) in found.cells} for group in groups
     ]
@@ -305,7 +280,3 @@ def breakdown_plot(found: Breakdown) -> Plot:
     more = len(found.groups) - len(groups)
     heading = f"{measure_name(found.measure)} by {found.label}" + (f" (the {MAX_PLOTTED} largest)" if more > 0 else "")
     return GroupPlot(heading, labels, tuple(series), name)
-
-
-def _scaled(interval: Interval | None, scale: int) -> Interval | None:
-    return None if interval is None else (scale * interval[0], scale * interval[1])

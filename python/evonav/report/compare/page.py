@@ -60,9 +60,7 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
 
 
 def _gap(effect: PairedEffect, name: str, p_name: str = "p") -> Gap:
-    ends = None if effect.ci95 is None else (100 * effect.ci95[0], 100 * effect.ci95[1])
-    detail = f"n = {effect.n}, {p_name} = {p_words(effect.adjusted_p)}".replace("= <", "< ")
-    return Gap(name, detail, 100 * effect.difference, ends, effect.verdict in ("a", "b"))
+    return Gap.of(name, f"n = {effect.n}, {p_name} = {p_words(effect.adjusted_p)}".replace("= <", "< "), effect)
 
 
 def _shown(flip: Flip, out_dir: Path | None) -> dict[str, object]:

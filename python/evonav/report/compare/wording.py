@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 from evonav.report.compare.compare import MEASURES, STRATA, Comparison, Flip
 from evonav.report.export import csv_text
-from evonav.report.tables.table import INTERVALS, NONE, VERDICTS, Table, p_heading, p_words, verdict_words
+from evonav.report.tables.numbers import NONE, points
+from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
 from evonav.statistics import MIN_CLUSTERS, Interval, PairedEffect
 
 RATES = frozenset(
@@ -79,7 +80,7 @@ def measure_table(comparisons: Sequence[Comparison], field: str) -> Table:
         effect = one.all.effects.get(field)
         if effect is not None:
             p = effect.adjusted_p
-            shown = [f"{_scale(field) * mean:.1f}" for mean in (effect.mean_a, effect.mean_b)]
+            shown = [f"{scale_of(field) * mean:.1f}" for mean in (effect.mean_a, effect.mean_b)]
             rows.append((f"{one.b} less {one.a}", *shown, difference(effect, field), p_words(p), says(one, field)))
     columns = ("", "second", "first", "difference [95% CI]", p_heading(len(comparisons)), "")
     sizes = sorted({one.all.n for one in comparisons})
@@ -278,10 +279,8 @@ def comparison_latex(comparisons: Sequence[Comparison]) -> str:
 
 
 def difference(effect: PairedEffect, field: str) -> str:
-    """Return the difference as `+6.3 [-1.2, +13.9]`."""
-    scale = _scale(field)
-    ends = "" if effect.ci95 is None else f" [{scale * effect.ci95[0]:+.1f}, {scale * effect.ci95[1]:+.1f}]"
-    return f"{scale * effect.difference:+.1f}{ends}"
+    """Return the difference in points, or in the unit of a metric that is no rate."""
+    return points(effect, scale_of(field))
 
 
 def amount(value: float, field: str) -> str:
@@ -299,7 +298,8 @@ def _stratum(flip: Flip) -> str:
     return STRATA.get(flip.stratum, flip.stratum)
 
 
-def _scale(field: str) -> int:
+def scale_of(field: str) -> int:
+    """Return 100 for a rate, which is shown in percent, and 1 for another metric."""
     return 100 if field in RATES else 1
 
 

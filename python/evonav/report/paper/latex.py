@@ -13,7 +13,8 @@ from evonav.report.paper.tables import (
     Perception,
 )
 from evonav.report.run import Run
-from evonav.report.tables.table import latex_text, percent
+from evonav.report.tables.numbers import percent
+from evonav.report.tables.table import latex_text
 
 NAMES = {
     "unigoal": "UniGoal",

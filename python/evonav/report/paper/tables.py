@@ -11,17 +11,8 @@ from typing import Literal
 
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates
 from evonav.report.run import PAPER_ORDER, Run
-from evonav.report.tables.table import (
-    INTERVALS,
-    NONE,
-    VERDICTS,
-    Table,
-    p_heading,
-    p_words,
-    percent,
-    points,
-    verdict_words,
-)
+from evonav.report.tables.numbers import NONE, percent, points
+from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
 from evonav.statistics import DETECTABLE_Z, Z_95, power, wilson
 
 Perception = Literal["gt", "prediction"]

@@ -63,14 +63,5 @@ def _compared_agents(run: Run) -> list[ComparedAgent]:
 
 
 def _difference_plot(run: Run) -> GapPlot:
-    gaps = tuple(
-        Gap(
-            f"{pair.b} less {pair.a}",
-            f"n = {pair.n}",
-            100 * pair.sr.difference,
-            None if pair.sr.ci95 is None else (100 * pair.sr.ci95[0], 100 * pair.sr.ci95[1]),
-            pair.sr.verdict in ("a", "b"),
-        )
-        for pair in run.pairs
-    )
+    gaps = tuple(Gap.of(f"{pair.b} less {pair.a}", f"n = {pair.n}", pair.sr) for pair in run.pairs)
     return GapPlot("SR differences, points", gaps, "the second is better", "the first is better")

@@ -1,8 +1,10 @@
 """Describe plots as data: what to draw, not how."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from evonav.statistics import Interval
+from evonav.report.tables.numbers import scaled
+from evonav.statistics import Estimate, Interval, PairedEffect
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,6 +16,13 @@ class Series:
     """One value a group; `None` where there is none."""
     intervals: tuple[Interval | None, ...]
     """The interval of each value."""
+
+    @staticmethod
+    def of(name: str, estimates: Iterable[Estimate | None], scale: float = 100) -> "Series":
+        """Return the series of some estimates, by default in percent."""
+        found = [Estimate(None, None, 0, 0) if one is None else one for one in estimates]
+        values = tuple(None if one.value is None else scale * one.value for one in found)
+        return Series(name, values, tuple(scaled(one.ci95, scale) for one in found))
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +67,13 @@ class Line:
     """The interval of each y; empty: no whiskers."""
     has_dots: bool = True
 
+    @staticmethod
+    def of(name: str, estimates: Iterable[tuple[float, Estimate]], scale: float = 100) -> "Line":
+        """Return the line of some estimates by x, by default in percent; 0 where there is no value."""
+        found = list(estimates)
+        points = tuple((x, scale * (one.value or 0.0)) for x, one in found)
+        return Line(name, points, tuple(scaled(one.ci95, scale) for _, one in found))
+
 
 @dataclass(frozen=True, slots=True)
 class CurvePlot:
@@ -88,6 +104,11 @@ class Gap:
     interval: Interval | None
     is_emphasised: bool = False
     """Whether it is more than a tie."""
+
+    @staticmethod
+    def of(name: str, detail: str, effect: PairedEffect) -> "Gap":
+        """Return the gap of a difference of rates, in percentage points."""
+        return Gap(name, detail, 100 * effect.difference, scaled(effect.ci95), effect.verdict in ("a", "b"))
 
 
 @dataclass(frozen=True, slots=True)

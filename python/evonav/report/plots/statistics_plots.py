@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from evonav.report.plots.specs import BarPlot, Series
+from evonav.report.tables.numbers import scaled
 from evonav.statistics import Interval, wilson
 from evonav.tasks.statistics import Distribution, Estimate, TaskStatistics
 
@@ -117,7 +118,7 @@ def _ratio(found: TaskStatistics) -> BarPlot | None:
 def _series(name: str, shares: Sequence[float], intervals: Sequence[Interval | None] = ()) -> Series:
     """Return shares and their intervals in percent."""
     percentages = tuple(100 * share for share in shares)
-    ends = tuple(None if end is None else (100 * end[0], 100 * end[1]) for end in intervals)
+    ends = tuple(scaled(end) for end in intervals)
     return Series(name, percentages, ends or (None,) * len(percentages))
 
 

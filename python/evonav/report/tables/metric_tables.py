@@ -7,7 +7,8 @@ from evonav.evaluation.metrics.aggregate import MEASURES, MetricSummary, explain
 from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
 from evonav.evaluation.records.store import RunStore
-from evonav.report.tables.table import NONE, Table
+from evonav.report.tables.numbers import NONE, number
+from evonav.report.tables.table import Table
 
 TITLES = {
     "success": "Success, by several definitions",
@@ -61,9 +62,6 @@ def measures_table(rows: Sequence[StageMetrics], kind: str) -> Table:
 def _cell(cell: MetricSummary, num_stages: int) -> str:
     if cell.value is None:
         return NONE
-    scale = 100.0 if cell.measure.unit == "%" else 1.0
-    digits = _DIGITS[cell.measure.unit]
-    text = f"{cell.value * scale:.{digits}f}"
-    if cell.ci95 is not None:
-        text += " [" + ", ".join(f"{end * scale:.{digits}f}" for end in cell.ci95) + "]"
+    unit = cell.measure.unit
+    text = number(cell.value, cell.ci95, scale=100 if unit == "%" else 1, digits=_DIGITS[unit])
     return text if cell.n == num_stages else f"{text} ({cell.n})"

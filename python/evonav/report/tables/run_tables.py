@@ -8,6 +8,7 @@ from evonav.report.compare.breakdown import breakdown_table
 from evonav.report.plots.run_plots import run_breakdowns
 from evonav.report.run import Run
 from evonav.report.tables import table as tables
+from evonav.report.tables.numbers import NONE, percent, points
 from evonav.statistics import MIN_CLUSTERS
 
 
@@ -52,7 +53,7 @@ def effort_table(run: Run) -> tables.Table:
             sum(outcome.num_stale_entries for outcome in scored) / len(scored),
         )
         ended = f"{summary.num_stopped} of {summary.n}"
-        rows.append((summary.agent, tables.percent(summary.soft_spl, None), *(f"{x:.1f}" for x in averages), ended))
+        rows.append((summary.agent, percent(summary.soft_spl, None), *(f"{x:.1f}" for x in averages), ended))
     note = (
         "Means a scored stage. Walked to stale entries: in rounds that chose an object entry with no object of its "
         "label there. Stale entries: in memory at the end of a stage."
@@ -79,7 +80,7 @@ def failure_table(run: Run) -> tables.Table:
             sum(record.memory_lost_at is not None for record in scored),
         )
         if kinds or any(counts):
-            errored = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or tables.NONE
+            errored = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or NONE
             rows.append((agent, errored, *map(str, counts)))
     note = (
         "Failed decisions: no valid answer of the model in all tries; the agent then did what it does without one. "
@@ -99,9 +100,9 @@ def statements(run: Run) -> list[str]:
         return ["Not every agent has been scored on every stage: compare agents by their paired differences alone."]
     equal = [summary.agent for summary in scored if summary.sr == best.sr]
     if len(equal) > 1:
-        lines = [f"{' and '.join(equal)} have the same success rate, {tables.percent(best.sr, None)} %."]
+        lines = [f"{' and '.join(equal)} have the same success rate, {percent(best.sr, None)} %."]
     else:
-        measured = tables.percent(best.sr, best.sr_ci95)
+        measured = percent(best.sr, best.sr_ci95)
         lines = [f"{best.agent} has the highest success rate, {measured} % of {best.n} stages."]
     pairs = [pair for pair in run.pairs if best.agent in (pair.a, pair.b)]
     if pairs and all(pair.sr.num_clusters < MIN_CLUSTERS for pair in pairs):
@@ -109,7 +110,7 @@ def statements(run: Run) -> list[str]:
         return lines
     for pair in pairs:
         lines.append(
-            f"{pair.b} less {pair.a}: {tables.points(pair.sr)} points on the {pair.n} stages that both scored: "
+            f"{pair.b} less {pair.a}: {points(pair.sr)} points on the {pair.n} stages that both scored: "
             f"{tables.verdict_words(pair.a, pair.b, pair.sr)}."
         )
     return lines

@@ -4,8 +4,6 @@ Rates are in percent with their 95% interval by house; a row with errored or not
 *incomplete* in words, since its rates are not final.
 """
 
-import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -17,11 +15,11 @@ from rich.text import Text
 
 from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates, rates
 from evonav.evaluation.records.schema import StageRecord
+from evonav.report.export import csv_text
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause, cause_of
-from evonav.statistics import LEVEL, NUM_RESAMPLES, Interval, PairedEffect
+from evonav.report.tables.numbers import NONE, percent, points
+from evonav.statistics import LEVEL, NUM_RESAMPLES, PairedEffect
 
-NONE = "–"
-"""Text of a cell without a value."""
 INTERVALS = f"Intervals: 95%, houses resampled ({NUM_RESAMPLES:,} times)."
 VERDICTS = (
     "p: two-sided, the agents' names exchanged in whole houses. Holm: p adjusted for the number of pairs. Ahead: p is "
@@ -246,35 +244,16 @@ _CSV_COLUMNS = (
 
 def summary_csv(summaries: Sequence[AgentSummary]) -> str:
     """Return every metric, unrounded: one CSV row per agent and split."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(_CSV_COLUMNS)
+    rows: list[list[object]] = []
     for s in summaries:
         overall = Rates(s.n, s.sr, s.spl, s.sr_ci95, s.spl_ci95, s.sr_wilson95)
         counts = [s.counts.get(state, 0) for state in ("success", "failure", "errored", "not_run")]
-        totals = [_csv_number(s.soft_spl), *counts, s.num_stages, s.num_tasks]
-        is_incomplete = str(s.is_incomplete).lower()
-        writer.writerow([s.agent, "all", *_csv_rates(overall), *totals, is_incomplete])
-        for name, part in s.splits.items():
-            writer.writerow([s.agent, name, *_csv_rates(part), *[""] * len(totals), is_incomplete])
-    return out.getvalue()
-
-
-def percent(value: float | None, interval: Interval | None) -> str:
-    """`61.1 [54.0, 68.2]`, from rates of 0 to 1.
-
-    No interval where resampling cannot tell one: a single house, or houses that all agree.
-    """
-    if value is None:
-        return NONE
-    ends = "" if interval is None else f" [{100 * interval[0]:.1f}, {100 * interval[1]:.1f}]"
-    return f"{100 * value:.1f}{ends}"
-
-
-def points(effect: PairedEffect) -> str:
-    """`+6.3 [-1.2, +13.9]`, in percentage points."""
-    ends = "" if effect.ci95 is None else f" [{100 * effect.ci95[0]:+.1f}, {100 * effect.ci95[1]:+.1f}]"
-    return f"{100 * effect.difference:+.1f}{ends}"
+        for name, part in {"all": overall, **s.splits}.items():
+            ends = (*(part.sr_ci95 or (None, None)), *(part.sr_wilson95 or (None, None)))
+            totals = [s.soft_spl, *counts, s.num_stages, s.num_tasks] if part is overall else [None] * 7
+            shown = [part.n, part.sr, *ends, part.spl, *(part.spl_ci95 or (None, None))]
+            rows.append([s.agent, name, *shown, *totals, s.is_incomplete])
+    return csv_text(_CSV_COLUMNS, rows)
 
 
 def _split_table(title: str, summaries: Sequence[AgentSummary], names: Sequence[str], notes: tuple[str, ...]) -> Table:
@@ -328,13 +307,3 @@ def latex_text(text: str) -> str:
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
-
-
-def _csv_rates(part: Rates) -> list[str | int]:
-    ends = [*(part.sr_ci95 or (None, None)), *(part.sr_wilson95 or (None, None))]
-    spl_ends = part.spl_ci95 or (None, None)
-    return [part.n, *map(_csv_number, (part.sr, *ends, part.spl, *spl_ends))]
-
-
-def _csv_number(value: float | None) -> str:
-    return "" if value is None else repr(value)

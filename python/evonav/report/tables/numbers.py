@@ -1,0 +1,57 @@
+"""Write numbers with their intervals, the same way in tables, plots and sentences."""
+
+from evonav.statistics import Estimate, Interval, PairedEffect
+
+NONE = "–"
+"""Text of a cell without a value."""
+
+
+def number(
+    value: float | None,
+    interval: Interval | None = None,
+    *,
+    scale: float = 1,
+    digits: int = 1,
+    is_signed: bool = False,
+    unit: str = "",
+) -> str:
+    """Return a number with its interval: `61.1 [54.0, 68.2]`.
+
+    Args:
+        value: `None` where there is nothing to show.
+        interval: `None` where resampling gives none: a single house, or houses that all agree.
+        scale: Factor of value and interval.
+        digits: Digits after the point.
+        is_signed: Show the sign of a positive number, too.
+        unit: Text behind the value.
+    """
+    if value is None:
+        return NONE
+    form = f"{'+' if is_signed else ''}.{digits}f"
+    ends = "" if interval is None else f" [{scale * interval[0]:{form}}, {scale * interval[1]:{form}}]"
+    return f"{scale * value:{form}}{unit}{ends}"
+
+
+def percent(value: float | None, interval: Interval | None = None) -> str:
+    """Return a rate of 0 to 1 in percent, with its interval."""
+    return number(value, interval, scale=100)
+
+
+def points(effect: PairedEffect, scale: float = 100) -> str:
+    """Return a difference in percentage points, with its interval: `+6.3 [-1.2, +13.9]`."""
+    return number(effect.difference, effect.ci95, scale=scale, is_signed=True)
+
+
+def estimate_text(
+    estimate: Estimate | None, *, scale: float = 100, digits: int = 1, is_signed: bool = False, has_n: bool = False
+) -> str:
+    """Return an estimate with its interval, by default in percent, and with its n in parentheses if `has_n`."""
+    if estimate is None or estimate.value is None:
+        return NONE
+    text = number(estimate.value, estimate.ci95, scale=scale, digits=digits, is_signed=is_signed)
+    return f"{text} ({estimate.n})" if has_n else text
+
+
+def scaled(interval: Interval | None, scale: float = 100) -> Interval | None:
+    """Return an interval in other units, by default in percent."""
+    return None if interval is None else (scale * interval[0], scale * interval[1])
