@@ -35,7 +35,7 @@ def test_every_scored_stage_is_in_one_group_and_rates_are_those_of_the_metrics(r
     assert found.groups == ("first", "relocated")
     told = rates([record for record in records["ftu"] if record.stage == 2])
     cell = found.cells["relocated", "ftu"]
-    assert (cell.n, cell.num_houses, cell.value) == (told.n, 8, told.sr)
+    assert (cell.n, cell.num_clusters, cell.value) == (told.n, 8, told.sr)
     assert cell.ci95 == told.sr_ci95 is not None
     assert found.cells["first", "ftu"].ci95 is None  # all houses agree
     assert breakdown(sides, "room-count").groups == ("2-3",)

@@ -275,7 +275,7 @@ def test_a_sweep_tells_rates_leads_and_crossover(tmp_path):
         "stage-reset": ([S, S, S, F, F, F],) * 3,
     }
     analysis = load_analysis(write_analysis(tmp_path / "rates", "rates", arms, outcomes))
-    assert [mean for _, mean, _ in by_rate(analysis, "fu", MEASURES["SR"])] == [1.0, 0.5, 0.0]
+    assert [mean.value for _, mean in by_rate(analysis, "fu", MEASURES["SR"])] == [1.0, 0.5, 0.0]
     found = crossover(analysis, "fu", MEASURES["SR"])
     assert found.rate == pytest.approx(0.5)
     # All six houses of one kind: 1 in 64 resamples, which plain percentiles leave out and those widened for six do not.

@@ -11,10 +11,8 @@ from evonav.controlled.layout import ControlledRecord, read_controlled, run_of
 from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import house_of
 from evonav.evaluation.metrics.scoring import SUCCESS_RADIUS_M
-from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
-from evonav.evaluation.records.schema import StageRecord
-from evonav.evaluation.records.store import RunStore
-from evonav.report.run import PAPER_ORDER
+from evonav.evaluation.records.schema import EndState
+from evonav.report.run import RecordedStage, agents_in_order, load_run
 from evonav.report.tables.numbers import NONE
 from evonav.report.tables.table import Table
 from evonav.statistics import Interval, PairedEffect, paired_effect
@@ -30,27 +28,11 @@ SPLITS = {
 
 Key = tuple[str, int]
 """Task and stage."""
-Measure = Callable[["Outcome"], float]
-MEASURES: dict[str, Measure] = {"SR": lambda one: one.success, "SPL": lambda one: one.spl}
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """A scored stage of one agent in one arm."""
-
-    row: StageMetrics
-    record: StageRecord
-    """Record without trace and entries."""
-
-    @property
-    def success(self) -> float:
-        """1 or 0."""
-        return float(bool(self.row.success))
-
-    @property
-    def spl(self) -> float:
-        """SPL of the stage."""
-        return self.row.spl or 0.0
+Measure = Callable[[RecordedStage], float]
+MEASURES: dict[str, Measure] = {
+    "SR": lambda one: float(bool(one.row.success)),
+    "SPL": lambda one: one.row.spl or 0.0,
+}
 
 
 @dataclass(frozen=True)
@@ -61,7 +43,7 @@ class Analysis:
     record: ControlledRecord
     agents: tuple[str, ...]
     """The paper's in its order, then others by name."""
-    outcomes: Mapping[tuple[str, str], Mapping[Key, Outcome]]
+    outcomes: Mapping[tuple[str, str], Mapping[Key, RecordedStage]]
     """Scored stages by arm and agent."""
     num_unscored: int
     """Stages that should count and have no score: errored, or not run."""
@@ -122,28 +104,22 @@ def load_analysis(directory: Path) -> Analysis:
         StoreError: No agent was run in it, or a run cannot be read.
     """
     record = read_controlled(directory)
-    outcomes: dict[tuple[str, str], dict[Key, Outcome]] = {}
+    outcomes: dict[tuple[str, str], dict[Key, RecordedStage]] = {}
     agents: set[str] = set()
     num_unscored = 0
     for arm in record.arms:
         run_dir = run_of(directory, arm.name)
         if not run_dir.is_dir():
             raise StoreError(f"{run_dir}: no run here yet: `evonav controlled evaluate {directory}` first")
-        with RunStore(run_dir) as store:
-            # In this order: the run may be going on.
-            rows = read_stage_metrics(store)
-            records = {(one.agent, one.task_id, one.stage): one for one in store.records(is_brief=True)}
-            for row in rows:
-                agents.add(row.agent)
-                found = outcomes.setdefault((arm.name, row.agent), {})
-                if row.is_scored:
-                    found[row.task_id, row.stage] = Outcome(row, records[row.agent, row.task_id, row.stage])
-                elif row.state != "forced":
-                    num_unscored += 1
+        for (agent, task_id, stage), one in load_run(run_dir).outcomes.items():
+            agents.add(agent)
+            if one.row.is_scored:
+                outcomes.setdefault((arm.name, agent), {})[task_id, stage] = one
+            elif one.record.state is not EndState.GUIDED:
+                num_unscored += 1
     if not agents:
         raise StoreError(f"{directory}: no agent was run: `evonav controlled evaluate {directory}` first")
-    rank = {agent: i for i, agent in enumerate(PAPER_ORDER)}
-    ordered = tuple(sorted(agents, key=lambda agent: (rank.get(agent, len(rank)), agent)))
+    ordered = agents_in_order((), list(agents))
     for arm in record.arms:
         for agent in ordered:
             outcomes.setdefault((arm.name, agent), {})
@@ -157,7 +133,7 @@ def moved_keys(analysis: Analysis, *agents: str) -> list[Key]:
     return [key for key in keys if split_of(analysis.outcomes[last, agents[0]][key]) == "target"]
 
 
-def split_of(evolved: Outcome) -> str:
+def split_of(evolved: RecordedStage) -> str:
     """Return what a pair's change touched: a key of `SPLITS`."""
     record = evolved.record
     if record.target.is_relocated_now:
@@ -165,7 +141,7 @@ def split_of(evolved: Outcome) -> str:
     return "room" if record.transition.room_id == record.target.room_id else "other"
 
 
-def has_moved_far(evolved: Outcome) -> bool:
+def has_moved_far(evolved: RecordedStage) -> bool:
     """Return whether the target left the success radius around its old place; if not, it is found there too."""
     target = evolved.record.target
     if not target.is_relocated_now or target.first_position_m is None:
@@ -220,7 +196,7 @@ def _caveats(analysis: Analysis) -> list[str]:
 def _split_table(analysis: Analysis) -> Table:
     fixed, evolved = analysis.arms
     rows = []
-    parts: list[tuple[str, Callable[[Outcome], bool]]] = [
+    parts: list[tuple[str, Callable[[RecordedStage], bool]]] = [
         (name, lambda one, split=split: split_of(one) == split)  # type: ignore[misc]
         for split, name in SPLITS.items()
     ]

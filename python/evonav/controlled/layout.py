@@ -66,9 +66,7 @@ def write_controlled(record: ControlledRecord, directory: Path) -> Path:
     Raises:
         StoreError: It cannot be written.
     """
-    path = directory / FILE_NAME
-    write_atomically(path, record_bytes(record).decode())
-    return path
+    return write_atomically(directory / FILE_NAME, record_bytes(record))
 
 
 def read_controlled(directory: Path) -> ControlledRecord:

@@ -22,17 +22,17 @@ from evonav.controlled.paired_maps import (
 )
 from evonav.controlled.plots import controlled_plots
 from evonav.controlled.rates import rate_tables
-from evonav.errors import StoreError
+from evonav.parallel.folders import write_atomically
 from evonav.report.maps.floor_plan import furniture, ground, labels, moving_ids
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import map_css, outcome_words
 from evonav.report.maps.svg import join, slug
 from evonav.report.maps.trajectory import change, rounds
-from evonav.report.pages.template import page_environment, picture_uri, policy, text_of
+from evonav.report.pages.template import page_text, picture_uri, text_of
 from evonav.report.plots.render import SUFFIXES, has_renderer, plot_elements, write_plots
 from evonav.report.plots.style import plot_css
 from evonav.report.tables.causes import sentence
-from evonav.report.tables.table import Table
+from evonav.report.tables.table import Table, latex_tables, markdown_tables
 
 PAGE_NAME = "index.html"
 PLOT_NAMES = {"pairs": "fixed-not-fixed", "rates": "rates"}
@@ -68,34 +68,26 @@ def write_controlled_report(directory: Path, out: Path | None = None) -> Path:
     tables = tables_of(analysis)
     plots = controlled_plots(analysis)
     is_pairs = analysis.record.kind == "pairs"
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        (out / "tables.md").write_text("\n".join(f"## {t.title}\n\n{t.markdown()}" for t in tables), encoding="utf-8")
-        (out / "tables.tex").write_text("\n".join(table.latex() for table in tables), encoding="utf-8")
-        if has_renderer():
-            for suffix in SUFFIXES:
-                write_plots(plots, out / f"{PLOT_NAMES[analysis.record.kind]}{suffix}", columns=len(plots))
-        page = page_environment().get_template("controlled.html.j2")
-        path = out / PAGE_NAME
-        path.write_text(
-            page.render(
-                name=directory.resolve().name,
-                kind=analysis.record.kind,
-                record=analysis.record,
-                policy=policy(None),
-                css=text_of("report.css") + map_css() + plot_css(),
-                plots=plot_elements(plots),
-                tables=tables,
-                highlights=_write_highlights(analysis, out) if is_pairs else [],
-                pairs=_write_pairs(analysis, out) if is_pairs else [],
-                agents=analysis.agents,
-                facts=_facts(analysis),
-            ),
-            encoding="utf-8",
-        )
-    except OSError as error:
-        raise StoreError(f"{out}: {error}") from error
-    return path
+    write_atomically(out / "tables.md", markdown_tables(tables))
+    write_atomically(out / "tables.tex", latex_tables(tables))
+    if has_renderer():
+        for suffix in SUFFIXES:
+            write_plots(plots, out / f"{PLOT_NAMES[analysis.record.kind]}{suffix}", columns=len(plots))
+    page = page_text(
+        "controlled.html.j2",
+        text_of("report.css") + map_css() + plot_css(),
+        has_drawings=True,
+        name=directory.resolve().name,
+        kind=analysis.record.kind,
+        record=analysis.record,
+        plots=plot_elements(plots),
+        tables=tables,
+        highlights=_write_highlights(analysis, out) if is_pairs else [],
+        pairs=_write_pairs(analysis, out) if is_pairs else [],
+        agents=analysis.agents,
+        facts=_facts(analysis),
+    )
+    return write_atomically(out / PAGE_NAME, page)
 
 
 def _write_highlights(analysis: Analysis, out: Path) -> list[dict[str, str]]:
@@ -107,10 +99,8 @@ def _write_highlights(analysis: Analysis, out: Path) -> list[dict[str, str]]:
         before.unlink()
     for reason, key in highlighted_pairs(analysis, agent, per_reason=2):
         name = f"{reason}_{slug(key[0])}_{slug(agent)}.svg"
-        folder = out / PICTURES_DIR
-        folder.mkdir(exist_ok=True)
         picture = pair_svg(load_pair(analysis, agent, key))
-        (folder / name).write_text(picture, encoding="utf-8")
+        write_atomically(out / PICTURES_DIR / name, picture)
         found.append(
             {
                 "agent": agent,
@@ -126,15 +116,15 @@ def _write_highlights(analysis: Analysis, out: Path) -> list[dict[str, str]]:
 def _write_pairs(analysis: Analysis, out: Path) -> list[dict[str, Any]]:
     """Write a page for each pair, and return its line in the index."""
     keys = sorted({key for found in analysis.outcomes.values() for key in found})
-    template = page_environment().get_template("controlled_pair.html.j2")
-    (out / PAIRS_DIR).mkdir(exist_ok=True)
     lines = []
     for key in keys:
         agents = [a for a in analysis.agents if all(key in analysis.outcomes[arm, a] for arm in analysis.arms)]
         if not agents:
             continue
         values = _pair_values(analysis, agents, key)
-        (out / PAIRS_DIR / _page_name(key)).write_text(template.render(**values), encoding="utf-8")
+        css = text_of("report.css") + map_css()
+        page = page_text("controlled_pair.html.j2", css, has_drawings=True, **values)
+        write_atomically(out / PAIRS_DIR / _page_name(key), page)
         first = analysis.outcomes[analysis.arms[0], agents[0]][key].record
         cells = [
             [
@@ -189,8 +179,6 @@ def _pair_values(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[st
 
     first = pair[0].record
     return {
-        "css": text_of("report.css") + map_css(),
-        "policy": policy(None),
         "legend": legend(),
         "task_id": key[0],
         "change": split_words(analysis, agents[0], key),

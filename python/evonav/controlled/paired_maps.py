@@ -70,13 +70,13 @@ def highlighted_pairs(analysis: Analysis, agent: str, per_reason: int = 1) -> li
     ranked: dict[str, list[tuple[float, Key]]] = {reason: [] for reason in REASONS}
     for key in analysis.keys(agent):
         before, after = (analysis.outcomes[arm, agent][key] for arm in (fixed, evolved))
-        if not before.success or not has_moved_far(after):
+        if not before.row.success or not has_moved_far(after):
             continue
-        if after.row.num_stale_visits and not after.success:
+        if after.row.num_stale_visits and not after.row.success:
             ranked["misled"].append((-after.row.stale_path_m, key))
         elif after.row.num_stale_visits:
             ranked["recovered"].append((-after.row.stale_path_m, key))
-        elif after.success:
+        elif after.row.success:
             ranked["unharmed"].append((after.row.path_length_m or 0.0, key))
     return [(reason, key) for reason, found in ranked.items() for _, key in sorted(found)[:per_reason]]
 

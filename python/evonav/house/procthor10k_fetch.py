@@ -144,7 +144,6 @@ def _take_from_prior(commit: str, path: Path, sha256: str) -> None:
     stored = Path.home() / ".prior" / "datasets" / "allenai" / NAME / commit / path.name
     if stored.is_file() and sha256_of_file(stored) == sha256:
         with _typed_errors(str(path)):
-            path.parent.mkdir(parents=True, exist_ok=True)
             write_atomically(path, stored.read_bytes())
 
 

@@ -79,24 +79,42 @@ def check_same_run(stored: Mapping[str, Any], requested: Mapping[str, Any], fold
         raise StoreError(f"{folder} holds a run of another configuration ({lines}); use another folder")
 
 
-def write_atomically(path: Path, data: str | bytes) -> None:
-    """Replace a file as a whole: a reader sees the old or the new one, also after a loss of power.
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield the path of a new file beside `path`, which then replaces it: readers see the old or the new one, whole.
+
+    The folder is made if needed. If the block raises an error, `path` stays as it was.
 
     Raises:
         StoreError: It cannot be written.
     """
-    beside = path.with_name(path.name + ".partial")
+    beside = path.with_name(f".{path.stem}.partial{path.suffix}")
     try:
-        with beside.open("wb") as file:
-            file.write(data.encode() if isinstance(data, str) else data)
-            file.flush()
-            os.fsync(file.fileno())
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield beside
         beside.replace(path)
         sync_folder(path.parent)
     except OSError as error:
+        raise StoreError(f"{path}: {error}") from error
+    finally:
         with suppress(OSError):
             beside.unlink(missing_ok=True)
-        raise StoreError(f"{path}: {error}") from error
+
+
+def write_atomically(path: Path, data: str | bytes) -> Path:
+    """Replace a file as a whole: a reader sees the old or the new one, also after a loss of power.
+
+    Returns:
+        `path`, whose folder is made if needed.
+
+    Raises:
+        StoreError: It cannot be written.
+    """
+    with replacing(path) as beside, beside.open("wb") as file:
+        file.write(data.encode() if isinstance(data, str) else data)
+        file.flush()
+        os.fsync(file.fileno())
+    return path
 
 
 def sync_folder(folder: Path) -> None:

@@ -11,9 +11,10 @@ from evonav.perception_benchmark.plots import confusion_plots, feature_plots, pe
 from evonav.perception_benchmark.records import read_header, read_records
 from evonav.perception_benchmark.scores import Scores, differences, scores
 from evonav.perception_benchmark.tables import perception_csv, perception_tables
-from evonav.report.pages.template import page_environment, policy, text_of
+from evonav.report.pages.template import page_text, text_of
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.style import plot_css
+from evonav.report.tables.table import markdown_tables
 
 REPORT_NAME = "report.html"
 
@@ -32,14 +33,10 @@ def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
     tables = perception_tables(found)
     write_atomically(folder / "summary.json", json.dumps(perception_json(found), indent=2) + "\n")
     write_atomically(folder / "summary.csv", perception_csv(found))
-    markdown = "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables)
-    write_atomically(folder / "summary.md", markdown)
-    css = text_of("report.css") + plot_css() + text_of("perception.css")
-    page = page_environment().get_template("perception.html.j2")
-    tasks = [task for task, _ in found[0].pictures]
-    text = page.render(
-        css=css,
-        policy=policy((css,)),
+    write_atomically(folder / "summary.md", markdown_tables(tables))
+    text = page_text(
+        "perception.html.j2",
+        text_of("report.css") + plot_css() + text_of("perception.css"),
         name=folder.resolve().name,
         found=found,
         missing=0 if header is None else len(header.tasks) - found[0].num_tasks,
@@ -47,12 +44,10 @@ def write_perception_report(folder: Path) -> tuple[Path, list[Scores]]:
         plots=plot_elements(perception_plots(found)),
         confusions=plot_elements(confusion_plots(found)),
         features=plot_elements(feature_plots(found)),
-        tasks=tasks,
+        tasks=[task for task, _ in found[0].pictures],
         pictures={(one.word, task): picture for one in found for task, picture in one.pictures},
     )
-    path = folder / REPORT_NAME
-    write_atomically(path, text)
-    return path, found
+    return write_atomically(folder / REPORT_NAME, text), found
 
 
 def perception_json(found: Sequence[Scores]) -> dict[str, Any]:

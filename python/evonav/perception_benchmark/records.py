@@ -200,9 +200,7 @@ def write_record(folder: Path, word: str, task_id: str, text: str) -> None:
     Raises:
         StoreError: It cannot be written.
     """
-    path = record_path(folder, word, task_id)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_atomically(path, gzip.compress(text.encode(), compresslevel=6, mtime=0))
+    write_atomically(record_path(folder, word, task_id), gzip.compress(text.encode(), compresslevel=6, mtime=0))
 
 
 def read_record(path: Path) -> TaskRecord:

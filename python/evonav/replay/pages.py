@@ -10,8 +10,9 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from evonav.errors import InvalidArgumentError, StoreError
+from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
+from evonav.parallel.folders import write_atomically
 from evonav.replay.page_data import PageData
 from evonav.replay.types import ReplayedStage
 from evonav.report.maps.floor_plan import Frame, floors, furniture, item_labels, labels, structure
@@ -20,7 +21,7 @@ from evonav.report.maps.stage_map import outcome_words, page_name, task_frame
 from evonav.report.maps.svg import cm
 from evonav.report.maps.trajectory import change, end_mark, ring, start_mark, target_mark
 from evonav.report.pages.replays import LIST_NAME, ListedPage, listed_pages, page_code, viewer_css, viewer_js
-from evonav.report.pages.template import page_environment, policy, text_of
+from evonav.report.pages.template import page_text, text_of
 
 INDEX_NAME = "index.html"
 MAX_PAGE_BYTES = 10_000_000
@@ -104,10 +105,9 @@ def write_index(pages: Iterable[WrittenPage], out_dir: Path, run_name: str) -> P
         name = page.path.name
         rows[name] = ListedPage(page.agent, page.task_id, name, stages, page.differs, page.records_sha256, page_code())
     ordered = sorted(rows.values(), key=lambda row: (row.task_id, row.agent, row.stages[0][0]))
-    _save(out_dir / LIST_NAME, json.dumps([asdict(row) for row in ordered], indent=1) + "\n")
-    css = text_of("report.css")
-    template = page_environment().get_template("viewer_index.html.j2")
-    return _save(out_dir / INDEX_NAME, template.render(name=run_name, rows=ordered, css=css, policy=policy((css,))))
+    write_atomically(out_dir / LIST_NAME, json.dumps([asdict(row) for row in ordered], indent=1) + "\n")
+    index = page_text("viewer_index.html.j2", text_of("report.css"), name=run_name, rows=ordered)
+    return write_atomically(out_dir / INDEX_NAME, index)
 
 
 def _tabs(stages: Sequence[ReplayedStage], here: Sequence[ReplayedStage]) -> list[tuple[str, int, str, int]]:
@@ -134,8 +134,10 @@ def _page(
     data = PageData()
     for stage in stages:
         data.add_stage(stage, maps, frame, budget)
-    template = page_environment().get_template("viewer.html.j2")
-    return template.render(
+    return page_text(
+        "viewer.html.j2",
+        viewer_css(),
+        viewer_js(),
         task_id=first.task_id,
         house=first.house,
         agent=first.agent,
@@ -143,9 +145,6 @@ def _page(
         drawings=[_drawing(stage, maps, frame, radius_m) for stage in stages],
         view_box=frame.view_box,
         legend=_legend(),
-        css=viewer_css(),
-        js=viewer_js(),
-        policy=policy((viewer_css(),), (viewer_js(),)),
         data=Markup(data.text()),  # noqa: S704 - JSON without `<`
     )
 
@@ -219,16 +218,7 @@ def _write(
     text: str, stages: Sequence[ReplayedStage], out_dir: Path, only: int | None, records_sha256: str
 ) -> WrittenPage:
     first = stages[0].record
-    path = _save(out_dir / page_name(first.task_id, first.agent, only), text)
+    path = write_atomically(out_dir / page_name(first.task_id, first.agent, only), text)
     brief = tuple(stage.record.model_copy(update={"trace": (), "entries": ()}) for stage in stages)
     differs = any(stage.differences for stage in stages)
     return WrittenPage(first.agent, first.task_id, path, brief, differs, records_sha256)
-
-
-def _save(path: Path, text: str) -> Path:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error
-    return path

@@ -14,6 +14,7 @@ from PIL import Image
 
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
+from evonav.parallel.folders import replacing
 from evonav.replay.page_data import choice_words, evaluator_words
 from evonav.replay.types import BLOCKED, ReplayedMap, ReplayedRound, ReplayedStage, ReplayedView
 from evonav.report.maps.stage_map import outcome_words
@@ -62,24 +63,19 @@ def write_recording(
         raise InvalidArgumentError("argument `stages` is empty, expected a stage or more")
     rr = _rerun()
     first = stages[0].record
-    part = path.with_name(f".{path.stem}.part{SUFFIX}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as beside:
         stream = rr.RecordingStream("evonav", recording_id=f"{first.agent} in {first.task_id}")
         try:
-            stream.save(part)
+            stream.save(beside)
             stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
             step = 0
             for stage in stages:
                 step = _Recorder(rr, stream, stage, maps, success_radius_m).record(step)
             stream.flush()
+        except RuntimeError as error:
+            raise StoreError(f"{path}: {error}") from error
         finally:
             stream.disconnect()
-        part.replace(path)
-    except (OSError, RuntimeError) as error:
-        raise StoreError(f"{path}: {error}") from error
-    finally:
-        part.unlink(missing_ok=True)
     return path
 
 

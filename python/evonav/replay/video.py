@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image
 
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.parallel.folders import replacing
 from evonav.report.maps.files import check_png
 
 SUFFIX = ".mp4"
@@ -51,17 +52,8 @@ def write_video(stages: Iterable[Iterable[Image.Image]], path: Path, *, fps: flo
         StoreError: A library is not installed, or the file cannot be written.
     """
     check_video(path, fps, width_px)
-    part = path.with_name(f".{path.stem}.part{SUFFIX}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            num = _write(_with_ends(stages), part, fps, width_px)
-            part.replace(path)
-        finally:
-            part.unlink(missing_ok=True)
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error
-    return num
+    with replacing(path) as beside:
+        return _write(_with_ends(stages), beside, fps, width_px)
 
 
 def _with_ends(stages: Iterable[Iterable[Image.Image]]) -> Iterator[tuple[Image.Image, bool]]:

@@ -16,6 +16,7 @@ from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_met
 from evonav.evaluation.records import costs
 from evonav.evaluation.records.schema import RoundRecord
 from evonav.evaluation.records.store import RunStore
+from evonav.parallel.folders import replacing
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 """Characters that a spreadsheet takes for the start of a formula."""
@@ -111,15 +112,8 @@ def write_table(rows: Iterable[dict[str, Any]], columns: dict[str, str], path: P
     writers = {".csv": _write_csv, ".jsonl": _write_jsonl, ".parquet": _write_parquet}
     if path.suffix not in writers:
         raise StoreError(f"{path}: expected a file {', '.join(writers)}")
-    beside = path.with_name(path.name + ".partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as beside:
         writers[path.suffix](rows, columns, beside)
-        beside.replace(path)
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error
-    finally:
-        beside.unlink(missing_ok=True)
     return path
 
 

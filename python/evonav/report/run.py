@@ -1,9 +1,10 @@
-"""A run as a report needs it: measures of all agents held at once, stages with their traces a task at a time."""
+"""Read a run for reports: the metrics of all agents at once, records with their traces one task at a time."""
 
 import hashlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,27 +19,26 @@ from evonav.report.tables.causes import FailureCause
 PAPER_ORDER = ("unigoal", "3d-mem", "msgnav", "fu", "stage-reset", "ftu")
 """Agents in the order of the paper's tables."""
 NOTES = ("tasks_dir", "task_digests", "sessions")
-"""Of a run's header, no part of what the run is: where its tasks were and their digests, and how it was called."""
+"""Entries of a run's header that do not change its records: the folder and digests of its tasks, and its commands."""
 
 
 @dataclass(frozen=True, slots=True)
-class StageOutcome:
-    """A stage in a line: what an overview needs of it."""
+class RecordedStage:
+    """A recorded stage, with what tables and overviews show of it."""
 
+    row: StageMetrics
     record: StageRecord
     """The record without its trace and entries."""
-    cause: FailureCause | None
-    num_stale_entries: int
-    """Stale entries in memory at the end."""
-    stale_path_m: float
-    """Walked in rounds that had chosen a stale entry."""
-    num_failed_decisions: int = 0
-    """Questions that the agent's model did not answer, in spite of all tries: the agent did what it does then."""
+
+    @property
+    def cause(self) -> FailureCause | None:
+        """The reason why it is no success."""
+        return None if self.row.cause is None else FailureCause(self.row.cause)
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A task with all that its agents did in it."""
+    """The records of all agents in one task."""
 
     task_id: str
     num_stages: int
@@ -47,31 +47,21 @@ class Task:
     maps: Mapping[int, FloorPlan]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Run:
-    """A run's header and measures."""
+    """A run's header and recorded stages; what is computed from them is computed on first use."""
 
     run_dir: Path
     agents: tuple[str, ...]
     num_stages: Mapping[str, int]
     """Number of stages by task id, in order."""
     config: Mapping[str, Any]
-    outcomes: Mapping[tuple[str, str, int], StageOutcome]
-    """Outcomes by (agent, task, stage)."""
-    rows_sha256: Mapping[str, str]
-    """Digest of each agent's records as stored; equal runs have equal digests."""
-    episodes_sha256: Mapping[tuple[str, str], str]
-    """Digest of the records of each (agent, task), to tell whether an episode's page shows these records."""
+    outcomes: Mapping[tuple[str, str, int], RecordedStage]
+    """Recorded stages by (agent, task, stage)."""
     notes: Mapping[str, Any]
     """The entries of the run's header that `NOTES` names, where present."""
-    total_wall_s: float
-    """Sum over all stages."""
-    wall_s: Mapping[str, float]
-    """Mean of a stage's wall time, by agent; not part of the records."""
     failures: tuple[FailureRow, ...]
-    """Attempts that failed, those that were tried again among them; not part of the records."""
-    summaries: tuple[AgentSummary, ...]
-    pairs: tuple[AgentPair, ...]
+    """Failed attempts, including those that were retried; not part of the records."""
 
     @property
     def success_radius_m(self) -> float:
@@ -88,26 +78,73 @@ class Run:
         """Stages that the run consists of, over all agents."""
         return sum(self.num_stages.values()) * len(self.agents)
 
+    @cached_property
+    def summaries(self) -> tuple[AgentSummary, ...]:
+        """One summary per agent.
+
+        Raises:
+            StoreError: An agent has more records than the run has stages.
+        """
+        total = sum(self.num_stages.values())
+        return tuple(summarise(agent, records, total) for agent, records in self.records_by_agent().items())
+
+    @cached_property
+    def pairs(self) -> tuple[AgentPair, ...]:
+        """Every two agents on the stages that both scored."""
+        return tuple(agent_pairs(self.records_by_agent()))
+
+    @property
+    def wall_s(self) -> dict[str, list[float]]:
+        """Wall times of the stages that were begun, by agent; not part of the records."""
+        found: dict[str, list[float]] = {}
+        for (agent, _, _), one in self.outcomes.items():
+            if one.row.wall_s:
+                found.setdefault(agent, []).append(one.row.wall_s)
+        return found
+
+    @property
+    def rows_sha256(self) -> dict[str, str]:
+        """Digest of each agent's records as stored; equal runs have equal digests."""
+        return self._digests[0]
+
+    @property
+    def episodes_sha256(self) -> dict[tuple[str, str], str]:
+        """Digest of the records of each (agent, task), which tells whether an episode's page shows these records."""
+        return self._digests[1]
+
+    @cached_property
+    def _digests(self) -> tuple[dict[str, str], dict[tuple[str, str], str]]:
+        agents = {agent: hashlib.sha256() for agent in self.agents}
+        episodes: dict[tuple[str, str], Any] = {}
+        with RunStore(self.run_dir) as store, store.snapshot():
+            for (agent, task_id, _), text in zip(sorted(store.states()), store.record_texts(), strict=True):
+                agents[agent].update(text.encode() + b"\n")
+                episodes.setdefault((agent, task_id), hashlib.sha256()).update(text.encode())
+        return (
+            {agent: digest.hexdigest() for agent, digest in agents.items()},
+            {key: digest.hexdigest() for key, digest in episodes.items()},
+        )
+
     def records_by_agent(self) -> dict[str, list[StageRecord]]:
-        """Slim records, without traces."""
+        """Return the records of each agent, without traces."""
         found: dict[str, list[StageRecord]] = {agent: [] for agent in self.agents}
         for (agent, _, _), outcome in self.outcomes.items():
             found[agent].append(outcome.record)
         return found
 
-    def scored(self, agent: str) -> list[StageOutcome]:
+    def scored(self, agent: str) -> list[RecordedStage]:
         """Return an agent's stages that count in rates."""
         return [outcome for key, outcome in self.outcomes.items() if key[0] == agent and outcome.record.is_scored]
 
     def cause_counts(self) -> dict[str, Counter[FailureCause | None]]:
-        """Stages by cause, for each agent."""
+        """Count stages by cause, for each agent."""
         counts: dict[str, Counter[FailureCause | None]] = {agent: Counter() for agent in self.agents}
         for (agent, _, _), outcome in self.outcomes.items():
             counts[agent][outcome.cause] += 1
         return counts
 
     def tasks(self) -> Iterator[Task]:
-        """Every task with whole records and maps, one at a time: a run's traces may not fit in memory.
+        """Yield every task with whole records and maps, one at a time: a run's traces may not fit in memory.
 
         Raises:
             StoreError: The run cannot be read.
@@ -125,52 +162,30 @@ def load_run(run_dir: Path) -> Run:
     """Read a run, finished or not.
 
     Raises:
-        StoreError: There is no run, it cannot be read, or its rows are not those of its stages, each once: no rate of
-            such a run would mean anything.
+        StoreError: There is no run, it cannot be read, or a row is not the record of its stage.
     """
     with RunStore(run_dir) as store, store.snapshot():
-        outcomes: dict[tuple[str, str, int], StageOutcome] = {}
+        outcomes: dict[tuple[str, str, int], RecordedStage] = {}
         states = store.states()
-        asked_stages = store.meta("num_stages")
+        planned = store.meta("num_stages")
         agents = agents_in_order(store.meta("agents"), [agent for agent, _, _ in states])
-        digests = {}
-        episodes: dict[tuple[str, str], Any] = {}
         rows = {(row.agent, row.task_id, row.stage): row for row in read_stage_metrics(store)}
         for agent in agents:
-            digest = hashlib.sha256()
             keys = sorted(key for key in states if key[0] == agent)
-            brief = list(store.records(agent, is_brief=True))
-            for key, text, record in zip(keys, store.record_texts(agent), brief, strict=True):
-                digest.update(text.encode())
-                digest.update(b"\n")
-                _check(run_dir, key, states[key], record, asked_stages)
-                outcomes[key] = _outcome(record, rows[key])
-                episodes.setdefault((agent, record.task_id), hashlib.sha256()).update(text.encode())
-            digests[agent] = digest.hexdigest()
-        num_stages = _num_stages(asked_stages, outcomes)
-        config = store.meta("config") or {}
-        notes = {key: value for key in NOTES if (value := store.meta(key)) is not None}
-        timings = store.timings()
-        failures = tuple(store.failures())
-    records: dict[str, list[StageRecord]] = {agent: [] for agent in agents}
-    for (agent, _, _), outcome in outcomes.items():
-        records[agent].append(outcome.record)
-    total = sum(num_stages.values())
-    return Run(
-        run_dir=run_dir,
-        agents=agents,
-        num_stages=num_stages,
-        config=config,
-        outcomes=outcomes,
-        rows_sha256=digests,
-        failures=failures,
-        episodes_sha256={key: episode.hexdigest() for key, episode in episodes.items()},
-        notes=notes,
-        total_wall_s=sum(wall_s for wall_s, _ in timings.values()),
-        wall_s=_mean_wall_s(timings),
-        summaries=tuple(summarise(agent, records[agent], total) for agent in agents),
-        pairs=tuple(agent_pairs(records)),
-    )
+            for key, record in zip(keys, store.records(agent, is_brief=True), strict=True):
+                _check(run_dir, key, states[key], record, planned)
+                outcomes[key] = RecordedStage(rows[key], record)
+        # Tasks that the header does not name have as many stages as their records say.
+        num_stages = {one.record.task_id: one.record.num_stages for one in outcomes.values()} | (planned or {})
+        return Run(
+            run_dir=run_dir,
+            agents=agents,
+            num_stages=dict(sorted(num_stages.items())),
+            config=store.meta("config") or {},
+            outcomes=outcomes,
+            notes={key: value for key in NOTES if (value := store.meta(key)) is not None},
+            failures=tuple(store.failures()),
+        )
 
 
 def _check(
@@ -180,10 +195,10 @@ def _check(
     record: StageRecord,
     num_stages: Mapping[str, int] | None,
 ) -> None:
-    """Refuses a row that is not the one of its stage, or of no stage of the run."""
-    (agent, task_id, stage), held = key, (record.agent, record.task_id, record.stage)
-    if held != key or record.state is not state:
-        what = f"{held[0]}, {held[1]}, stage {held[2]}, {record.state.value}"
+    """Reject a row that holds the record of another stage, or of a stage that the run does not have."""
+    (agent, task_id, stage), found = key, (record.agent, record.task_id, record.stage)
+    if found != key or record.state is not state:
+        what = f"{found[0]}, {found[1]}, stage {found[2]}, {record.state.value}"
         raise StoreError(
             f"{run_dir}: the row of {agent}, {task_id}, stage {stage}, {state.value} holds the record of {what}"
         )
@@ -191,34 +206,7 @@ def _check(
         raise StoreError(f"{run_dir}: stage {stage} of {task_id} by {agent} is no stage of this run")
 
 
-def _outcome(record: StageRecord, row: StageMetrics) -> StageOutcome:
-    return StageOutcome(
-        record=record,
-        cause=None if row.cause is None else FailureCause(row.cause),
-        num_stale_entries=row.num_stale_entries or 0,
-        stale_path_m=row.stale_path_m,
-        num_failed_decisions=row.num_failed_decisions or 0,
-    )
-
-
-def agents_in_order(asked: Sequence[str] | None, recorded: Sequence[str]) -> tuple[str, ...]:
+def agents_in_order(planned: Sequence[str] | None, recorded: Sequence[str]) -> tuple[str, ...]:
     """Return the agents of a run: the paper's in the order of its tables, then the others by name."""
     rank = {agent: i for i, agent in enumerate(PAPER_ORDER)}
-    return tuple(sorted({*(asked or ()), *recorded}, key=lambda agent: (rank.get(agent, len(rank)), agent)))
-
-
-def _mean_wall_s(timings: Mapping[tuple[str, str, int], tuple[float, float]]) -> dict[str, float]:
-    """Mean over the stages that ran: one that was never begun has taken no time."""
-    found: dict[str, list[float]] = {}
-    for (agent, _, _), (wall_s, _) in timings.items():
-        if wall_s > 0.0:
-            found.setdefault(agent, []).append(wall_s)
-    return {agent: sum(times) / len(times) for agent, times in found.items()}
-
-
-def _num_stages(
-    asked: Mapping[str, int] | None, outcomes: Mapping[tuple[str, str, int], StageOutcome]
-) -> dict[str, int]:
-    """Stages of each task, from the run's header; of tasks not named there, from their records."""
-    found = {outcome.record.task_id: outcome.record.num_stages for outcome in outcomes.values()}
-    return dict(sorted({**found, **(asked or {})}.items()))
+    return tuple(sorted({*(planned or ()), *recorded}, key=lambda agent: (rank.get(agent, len(rank)), agent)))

@@ -19,6 +19,7 @@ from evonav.evaluation.baselines import BASELINES
 from evonav.evaluation.metrics.navigation import agent_pairs, summarise, summary_json
 from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.records.store import RunStore
+from evonav.parallel.folders import replacing
 
 FORMAT_VERSION = 1
 SUFFIX = ".evonav.zip"
@@ -101,15 +102,10 @@ def pack(run_dir: Path, out: Path, *, agents: Sequence[str] | None = None, about
     with RunStore(run_dir) as store:
         header, texts = _read_run(store, run_dir, agents)
     header = header.model_copy(update={"about": about or About()})
-    partial = out.with_name(out.name + ".partial")
-    try:
-        with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-            _write(archive, HEADER_NAME, (header.model_dump_json(indent=2) + "\n").encode())
-            for part in header.records:
-                _write(archive, part.member, texts[part.agent])
-        partial.replace(out)
-    except OSError as error:
-        raise StoreError(f"{out}: {error}") from error
+    with replacing(out) as beside, zipfile.ZipFile(beside, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        _write(archive, HEADER_NAME, (header.model_dump_json(indent=2) + "\n").encode())
+        for part in header.records:
+            _write(archive, part.member, texts[part.agent])
     return header
 
 

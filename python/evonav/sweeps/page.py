@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-from evonav.errors import StoreError
-from evonav.report.pages.template import page_environment, policy, text_of
+from evonav.parallel.folders import write_atomically
+from evonav.report.pages.template import page_text, text_of
 from evonav.report.tables.table import Table
 
 
@@ -25,14 +25,6 @@ def write_sweep_page(out_dir: Path, name: str, tables: Sequence[Table], reports:
     Raises:
         StoreError: It cannot be written.
     """
-    css = text_of("report.css")
     cells = [(cell, quote(os.path.relpath(path, out_dir).replace(os.sep, "/"))) for cell, path in reports]
-    page = page_environment().get_template("sweep.html.j2")
-    path = out_dir / "report.html"
-    try:
-        out_dir.mkdir(parents=True, exist_ok=True)
-        text = page.render(name=name, css=css, policy=policy((css,)), tables=tables, cells=cells)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error
-    return path
+    text = page_text("sweep.html.j2", text_of("report.css"), name=name, tables=tables, cells=cells)
+    return write_atomically(out_dir / "report.html", text)

@@ -9,7 +9,7 @@ from typing import Any
 
 from evonav.parallel.folders import write_atomically
 from evonav.report.tables.numbers import percent
-from evonav.report.tables.table import INTERVALS, Table
+from evonav.report.tables.table import INTERVALS, Table, markdown_tables
 from evonav.sweeps.row import AXES, STATES, SweepRow
 
 
@@ -27,9 +27,7 @@ def write_sweep_files(out: Path, rows: Sequence[SweepRow], content: Mapping[str,
     write_atomically(out / "summary.json", json.dumps(content, indent=2, sort_keys=True) + "\n")
     write_atomically(out / "summary.csv", sweep_csv(rows))
     title = content["name"] or out.resolve().name
-    parts = [f"# {title}\n"]
-    parts += [f"## {table.title}\n\n{table.markdown()}" for table in sweep_tables(rows)]
-    write_atomically(out / "summary.md", "\n".join(parts))
+    write_atomically(out / "summary.md", f"# {title}\n\n{markdown_tables(sweep_tables(rows))}")
 
 
 def sweep_tables(rows: Sequence[SweepRow]) -> list[Table]:

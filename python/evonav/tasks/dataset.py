@@ -110,11 +110,9 @@ def write_dataset(record: DatasetRecord, directory: Path | str) -> Path:
     """
     path = Path(directory) / DATASET_NAME
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_atomically(path, record_bytes(record))
-    except (OSError, StoreError) as error:
+        return write_atomically(path, record_bytes(record))
+    except StoreError as error:
         raise TaskError(f"{path}: cannot be written: {error}") from error
-    return path
 
 
 def read_dataset(directory: Path | str) -> DatasetRecord:

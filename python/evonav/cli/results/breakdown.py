@@ -31,6 +31,7 @@ def breakdown(
     from evonav.report.compare import breakdown as made
     from evonav.report.compare.selection import read_compared_agents
     from evonav.report.plots.render import check_plot, write_plots
+    from evonav.report.tables.table import latex_tables, markdown_tables
 
     if plot is not None:
         check_plot(plot)
@@ -42,14 +43,12 @@ def breakdown(
     for one in found:
         console.print(made.breakdown_table(one, is_brief=True).rich())
     texts = (
-        (md, "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables)),
-        (latex, "\n".join(table.latex() for table in tables)),
+        (md, markdown_tables(tables)),
+        (latex, latex_tables(tables)),
         (csv, made.breakdown_csv(found)),
     )
     for path, text in texts:
         if path is not None:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, text)
-            typer.echo(f"written: {path}")
+            typer.echo(f"written: {write_atomically(path, text)}")
     if plot is not None:
         typer.echo(f"written: {write_plots([made.breakdown_plot(one) for one in found], plot)}")

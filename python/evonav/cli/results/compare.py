@@ -83,9 +83,7 @@ def _write(
     ]
     for path, text in texts:
         if path is not None:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, text())
-            written.append(path)
+            written.append(write_atomically(path, text()))
     if plot is not None:
         written.append(write_plots([comparison_plot(found)], plot))
     return written

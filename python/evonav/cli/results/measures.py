@@ -20,6 +20,7 @@ def measures(
 
     from evonav.parallel.folders import write_atomically
     from evonav.report.tables.metric_tables import measures_tables
+    from evonav.report.tables.table import markdown_tables
 
     names = None if agents is None else [name.strip() for name in agents.split(",") if name.strip()]
     tables = [table for table in measures_tables(run, names) if table.rows]
@@ -27,5 +28,5 @@ def measures(
     for table in tables:
         console.print(table.rich())
     if out is not None:
-        write_atomically(out, "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables))
+        write_atomically(out, markdown_tables(tables))
         typer.echo(f"tables: {out}")

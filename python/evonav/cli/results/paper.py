@@ -37,17 +37,19 @@ def paper(
     from evonav.errors import StoreError
     from evonav.parallel.folders import write_atomically
     from evonav.report.paper.latex import paper_latex
-    from evonav.report.paper.tables import paper_markdown, paper_tables, power_table
+    from evonav.report.paper.tables import paper_tables, power_table
     from evonav.report.run import load_run
+    from evonav.report.tables.table import markdown_tables
 
     loaded = load_run(run)
     if not any(summary.n for summary in loaded.summaries):
         raise StoreError(f"{run}: no stage of it is scored yet: `evonav evaluate` goes on with it")
     console = Console()
-    for table in (*paper_tables(loaded, perception.value), power_table(loaded.pairs, perception.value)):
+    tables = [*paper_tables(loaded, perception.value), power_table(loaded.pairs, perception.value)]
+    for table in tables:
         console.print(table.rich())
     if out is not None:
-        write_atomically(out, paper_markdown(loaded, perception.value))
+        write_atomically(out, markdown_tables(table for table in tables if table.rows))
         typer.echo(f"tables: {out}")
     if latex is not None:
         runs: dict[Perception, Run] = {perception.value: loaded}

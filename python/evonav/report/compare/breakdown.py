@@ -187,12 +187,12 @@ def _length_bin(row: StageMetrics, names: Sequence[str]) -> str | None:
 
 def _room_counts(compared_agents: Sequence[ComparedAgent]) -> dict[str, int]:
     counts: dict[str, int] = {}
-    for run_dir in {compared.run_dir: None for compared in compared_agents}:
+    for run_dir in {compared.run.run_dir: None for compared in compared_agents}:
         with RunStore(run_dir) as store:
             for task_id in {
                 row.task_id: None
                 for compared in compared_agents
-                if compared.run_dir == run_dir
+                if compared.run.run_dir == run_dir
                 for row in compared.rows.values()
             }:
                 first = next(store.maps(task_id), None)

@@ -181,7 +181,7 @@ def _pairs(compared_agents: Sequence[ComparedAgent], baseline: str | None) -> li
             )
         return [(first[0], compared) for compared in compared_agents if compared is not first[0]]
     pairs = list(combinations(compared_agents, 2))
-    num_runs = len({compared.run_dir.resolve() for compared in compared_agents})
+    num_runs = len({compared.run.run_dir.resolve() for compared in compared_agents})
     # Two runs of the same six agents: the question is what the settings changed, agent by agent.
     if 1 < num_runs < len(compared_agents):
         same = [(a, b) for a, b in pairs if a.agent == b.agent]
@@ -195,7 +195,7 @@ def _pairs(compared_agents: Sequence[ComparedAgent], baseline: str | None) -> li
 def _fields(compared_agents: Sequence[ComparedAgent], measures: Sequence[str]) -> list[str]:
     if not any(compared.rows for compared in compared_agents):
         raise InvalidArgumentError(
-            f"no recorded stage in {', '.join(str(compared.run_dir) for compared in compared_agents)}"
+            f"no recorded stage in {', '.join(str(compared.run.run_dir) for compared in compared_agents)}"
         )
     for name in measures:
         check_measure(name)
@@ -236,7 +236,7 @@ def _compare(a: ComparedAgent, b: ComparedAgent, fields: Sequence[str], allow_di
 
 def _stages(compared: ComparedAgent) -> set[tuple[str, int]]:
     """Return the stages that the run consists of, recorded or not."""
-    planned = {(task_id, stage) for task_id, num in compared.num_stages.items() for stage in range(1, num + 1)}
+    planned = {(task_id, stage) for task_id, num in compared.run.num_stages.items() for stage in range(1, num + 1)}
     return planned | compared.rows.keys()
 
 
@@ -244,7 +244,7 @@ def _reason(a: ComparedAgent, b: ComparedAgent, key: tuple[str, int], allow_diff
     """Return why a stage is not compared. Where differences are allowed, the house may have changed in other ways."""
     for compared in (a, b):
         if key not in compared.rows:
-            is_foreign = key[0] not in compared.num_stages
+            is_foreign = key[0] not in compared.run.num_stages
             return f"{'no such task' if is_foreign else 'not run yet'} in {compared.name}"
         if compared.rows[key].success is None:
             state = compared.rows[key].state
@@ -291,7 +291,7 @@ def _flip(a: ComparedAgent, b: ComparedAgent, pair: tuple[StageMetrics, StageMet
 
 def _page(compared: ComparedAgent, row: StageMetrics) -> str | None:
     for stage in (None, row.stage):
-        path = compared.run_dir / VIEW_DIR / page_name(row.task_id, compared.agent, stage)
+        path = compared.run.run_dir / VIEW_DIR / page_name(row.task_id, compared.agent, stage)
         if path.is_file():
             return f"{path.as_posix()}#stage={row.stage}&round=1"
     return None
@@ -300,7 +300,7 @@ def _page(compared: ComparedAgent, row: StageMetrics) -> str | None:
 def _view_command(a: ComparedAgent, b: ComparedAgent, row: StageMetrics) -> str:
     agents: dict[Path, list[str]] = {}
     for compared in (a, b):
-        agents.setdefault(compared.run_dir, []).append(compared.agent)
+        agents.setdefault(compared.run.run_dir, []).append(compared.agent)
     commands = (
         ["evonav", "view", str(run_dir), "--task", row.task_id, "--agent", ",".join(names), "--stage", str(row.stage)]
         for run_dir, names in agents.items()

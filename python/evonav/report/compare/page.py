@@ -6,7 +6,7 @@ from pathlib import Path
 
 from evonav.report.compare import wording
 from evonav.report.compare.compare import Comparison, Flip
-from evonav.report.pages.template import page_environment, policy, text_of
+from evonav.report.pages.template import page_text, text_of
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.specs import Gap, GapPlot
 from evonav.report.plots.style import plot_css
@@ -43,19 +43,16 @@ def comparison_page(comparisons: Sequence[Comparison], out_dir: Path | None = No
         }
         for one in comparisons
     ]
-    return (
-        page_environment()
-        .get_template("compare.html.j2")
-        .render(
-            title=f"{comparisons[0].b} and {comparisons[0].a}" if len(comparisons) == 1 else "agents",
-            css=text_of("report.css") + plot_css(),
-            policy=policy(None),
-            statements=wording.findings(comparisons),
-            warnings=wording.warnings(comparisons),
-            pairs=wording.pair_table(comparisons),
-            overview=plot_elements([comparison_plot(comparisons)])[0] if len(comparisons) > 1 else "",
-            sections=sections,
-        )
+    return page_text(
+        "compare.html.j2",
+        text_of("report.css") + plot_css(),
+        has_drawings=True,
+        title=f"{comparisons[0].b} and {comparisons[0].a}" if len(comparisons) == 1 else "agents",
+        statements=wording.findings(comparisons),
+        warnings=wording.warnings(comparisons),
+        pairs=wording.pair_table(comparisons),
+        overview=plot_elements([comparison_plot(comparisons)])[0] if len(comparisons) > 1 else "",
+        sections=sections,
     )
 
 

@@ -1,30 +1,32 @@
 """Select what to compare: agents of runs, named `RUN`, `RUN:AGENT`, or `RUN` followed by names of its agents."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.metrics.stage_metrics import StageMetrics, read_stage_metrics
-from evonav.evaluation.records.store import FILE_NAME, RunStore
+from evonav.evaluation.metrics.stage_metrics import StageMetrics
+from evonav.evaluation.records.store import FILE_NAME
 from evonav.json_diff import json_differences
-from evonav.report.run import agents_in_order
+from evonav.report.run import Run, load_run
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ComparedAgent:
     """An agent of a run."""
 
     name: str
     """Name in tables: the agent, with its run where several runs are compared."""
-    run_dir: Path
+    run: Run
     agent: str
-    config: Mapping[str, Any]
-    num_stages: Mapping[str, int]
-    """Number of stages of every task of the run, by task id."""
-    rows: Mapping[tuple[str, int], StageMetrics]
-    """Recorded stages, by task and stage."""
+
+    @cached_property
+    def rows(self) -> dict[tuple[str, int], StageMetrics]:
+        """Recorded stages, by task and stage."""
+        found = self.run.outcomes.items()
+        return {(task_id, stage): one.row for (agent, task_id, stage), one in found if agent == self.agent}
 
 
 def read_compared_agents(arguments: Sequence[str]) -> list[ComparedAgent]:
@@ -53,10 +55,9 @@ def read_compared_agents(arguments: Sequence[str]) -> list[ComparedAgent]:
             requested[-1][1].append(argument)
     compared_agents: list[ComparedAgent] = []
     for run_dir, agents in ((run_dir, agents) for run_dirs, agents in requested for run_dir in run_dirs):
-        for compared in _agents_of(run_dir, agents):
-            if not any(
-                compared.run_dir == other.run_dir and compared.agent == other.agent for other in compared_agents
-            ):
+        for compared in agents_of(load_run(run_dir), agents):
+            there = [(other.run.run_dir, other.agent) for other in compared_agents]
+            if (compared.run.run_dir, compared.agent) not in there:
                 compared_agents.append(compared)
     return _named(compared_agents)
 
@@ -69,28 +70,17 @@ def _runs_of(folder: Path) -> list[Path]:
     return cells or [folder]
 
 
-def _agents_of(folder: Path, agents: Sequence[str]) -> list[ComparedAgent]:
-    with RunStore(folder) as store:
-        config = store.meta("config") or {}
-        num_stages = store.meta("num_stages") or {}
-        recorded = {agent for agent, _, _ in store.states()}
-        known = agents_in_order(store.meta("agents"), sorted(recorded))
-        for agent in agents:
-            if agent not in known:
-                raise InvalidArgumentError(f"{folder} has no agent {agent!r}; it has {', '.join(known) or 'none'}")
-        chosen = list(agents or known)
-        rows = read_stage_metrics(store, chosen)
-    return [
-        ComparedAgent(
-            name=agent,
-            run_dir=folder,
-            agent=agent,
-            config=config,
-            num_stages=num_stages,
-            rows={(row.task_id, row.stage): row for row in rows if row.agent == agent},
-        )
-        for agent in chosen
-    ]
+def agents_of(run: Run, agents: Sequence[str] = ()) -> list[ComparedAgent]:
+    """Return some agents of a run, by default all.
+
+    Raises:
+        InvalidArgumentError: The run has no agent of that name.
+    """
+    for agent in agents:
+        if agent not in run.agents:
+            there = ", ".join(run.agents) or "none"
+            raise InvalidArgumentError(f"{run.run_dir} has no agent {agent!r}; it has {there}")
+    return [ComparedAgent(agent, run, agent) for agent in agents or run.agents]
 
 
 def _split(argument: str) -> tuple[Path | None, str]:
@@ -105,14 +95,16 @@ def _split(argument: str) -> tuple[Path | None, str]:
 
 def _named(compared_agents: Sequence[ComparedAgent]) -> list[ComparedAgent]:
     """Give names that are unique: the agent, the run before it where runs differ, the whole path where those agree."""
-    folders = {compared.run_dir.resolve() for compared in compared_agents}
+    folders = {compared.run.run_dir.resolve() for compared in compared_agents}
     if len(folders) < 2:
         return list(compared_agents)
     is_short = len({folder.name for folder in folders}) == len(folders)
-    return [
-        replace(compared, name=f"{compared.run_dir.resolve().name if is_short else compared.run_dir}:{compared.agent}")
-        for compared in compared_agents
-    ]
+
+    def name(compared: ComparedAgent) -> str:
+        run_dir = compared.run.run_dir
+        return f"{run_dir.resolve().name if is_short else run_dir}:{compared.agent}"
+
+    return [replace(compared, name=name(compared)) for compared in compared_agents]
 
 
 def config_differences(a: ComparedAgent, b: ComparedAgent) -> dict[str, tuple[str, str]]:
@@ -121,5 +113,5 @@ def config_differences(a: ComparedAgent, b: ComparedAgent) -> dict[str, tuple[st
     def text(value: Any) -> str:  # noqa: ANN401 - JSON
         return "-" if value is None else str(value)
 
-    found = sorted(json_differences(a.config, b.config), key=lambda one: one.path)
+    found = sorted(json_differences(a.run.config, b.run.config), key=lambda one: one.path)
     return {one.path: (text(one.left), text(one.right)) for one in found}

@@ -5,7 +5,16 @@ from collections.abc import Sequence
 from evonav.report.compare.compare import MEASURES, STRATA, Comparison, Flip
 from evonav.report.export import csv_text
 from evonav.report.tables.numbers import NONE, points
-from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
+from evonav.report.tables.table import (
+    INTERVALS,
+    VERDICTS,
+    Table,
+    latex_tables,
+    markdown_tables,
+    p_heading,
+    p_words,
+    verdict_words,
+)
 from evonav.statistics import MIN_CLUSTERS, Interval, PairedEffect
 
 RATES = frozenset(
@@ -263,7 +272,7 @@ def all_tables(comparisons: Sequence[Comparison]) -> list[Table]:
 def comparison_markdown(comparisons: Sequence[Comparison]) -> str:
     """Return sentences, tables, and the command that replays each stage that flipped."""
     parts = ["# Comparison\n", "".join(f"- {line}\n" for line in statements(comparisons))]
-    parts += [f"## {table.title}\n\n{table.markdown()}" for table in all_tables(comparisons)]
+    parts.append(markdown_tables(all_tables(comparisons)))
     for one in comparisons:
         if one.flips:
             commands = "\n".join(flip.command for flip in one.flips)
@@ -274,8 +283,7 @@ def comparison_markdown(comparisons: Sequence[Comparison]) -> str:
 def comparison_latex(comparisons: Sequence[Comparison]) -> str:
     """Return the pairs and every pair's parts as tables for `booktabs`; sentences as comments."""
     lines = "".join(f"% {line}\n" for line in statements(comparisons))
-    tables = [pair_table(comparisons), *(part_table(one) for one in comparisons)]
-    return lines + "\n".join(table.latex() for table in tables)
+    return lines + latex_tables([pair_table(comparisons), *(part_table(one) for one in comparisons)])
 
 
 def difference(effect: PairedEffect, field: str) -> str:

@@ -53,12 +53,7 @@ def write_picture(svg: str, path: Path) -> Path:
     check_picture(path)
     suffix = path.suffix.lower()
     data = svg.encode() if suffix == ".svg" else png_of(svg, zoom=ZOOM) if suffix == ".png" else _pdf(svg)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error
-    write_atomically(path, data)
-    return path
+    return write_atomically(path, data)
 
 
 def png_of(svg: str, *, zoom: float = 1.0, background: str | None = "#ffffff", has_system_fonts: bool = True) -> bytes:

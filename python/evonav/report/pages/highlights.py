@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState
-from evonav.report.run import Run, StageOutcome
+from evonav.report.run import RecordedStage, Run
 from evonav.report.tables.causes import FailureCause
 
 
@@ -66,7 +66,7 @@ def highlights_first(run: Run) -> list[tuple[str, str]]:
     return [episode for _, pair in pairs for episode in pair] + rest
 
 
-def _pair(found: dict[str, StageOutcome]) -> tuple[float, list[str]]:
+def _pair(found: dict[str, RecordedStage]) -> tuple[float, list[str]]:
     """Rate how well a stage shows the benchmark, and name the agents that show it."""
     good = [agent for agent, outcome in found.items() if outcome.record.state is EndState.SUCCESS]
     misled = [agent for agent, outcome in found.items() if outcome.cause is FailureCause.STALE_ENTRY]
@@ -89,7 +89,7 @@ def _score(run: Run, agents: Sequence[str], task_id: str, stages: Sequence[int])
     hero = last[-1]
     has_success = hero.record.state is EndState.SUCCESS
     is_misled = any(outcome.cause is FailureCause.STALE_ENTRY for outcome in last)
-    score = 6.0 * (is_misled and has_success) + 4.0 * (hero.stale_path_m > 0 and has_success)
+    score = 6.0 * (is_misled and has_success) + 4.0 * (hero.row.stale_path_m > 0 and has_success)
     score += 2.0 * hero.record.target.is_relocated_now + 2.0 * has_success + len(stages)
     window = [run.outcomes[agents[-1], task_id, k].record for k in stages]
     score += sum(record.transition.kind != "static" for record in window)

@@ -8,8 +8,8 @@ from typing import Any
 
 from markupsafe import Markup
 
-from evonav.errors import StoreError
 from evonav.evaluation.metrics.navigation import AgentSummary
+from evonav.parallel.folders import replacing, write_atomically
 from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import VIEW_DIR, map_css, map_name, outcome_words, stage_svg
 from evonav.report.maps.svg import slug
@@ -20,11 +20,11 @@ from evonav.report.pages.template import packed, page_environment, policy, text_
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.run_plots import run_plots
 from evonav.report.plots.style import plot_css
-from evonav.report.run import Run, StageOutcome, Task, load_run
+from evonav.report.run import RecordedStage, Run, Task, load_run
 from evonav.report.tables import table as tables
 from evonav.report.tables.causes import CAUSE_NAMES, FailureCause
 from evonav.report.tables.run_metadata import failure_groups, reproduction, run_facts, task_digests
-from evonav.report.tables.run_tables import latex_tables, markdown_tables, run_tables, statements
+from evonav.report.tables.run_tables import run_tables, statements
 from evonav.statistics import Interval
 
 MAX_OPEN_STAGES = 400
@@ -68,23 +68,18 @@ def write_report(
     """
     out_dir = out_dir or run_dir
     run = load_run(run_dir)
-    try:
-        out_dir.mkdir(parents=True, exist_ok=True)
-        found = run_tables(run)
-        (out_dir / "table.md").write_text(markdown_tables(found), encoding="utf-8")
-        (out_dir / "table.tex").write_text(latex_tables(found), encoding="utf-8")
-        (out_dir / "table.csv").write_text(tables.summary_csv(run.summaries), encoding="utf-8")
-        replays = _replays(run, out_dir, max_replay_bytes)
-        page = page_environment().get_template("report.html.j2")
-        path = out_dir / REPORT_NAME
-        part = path.with_name(f".{REPORT_NAME}.part")
-        with part.open("w", encoding="utf-8") as file:
-            tasks = _tasks(run, replays, out_dir / MAP_DIR if has_maps else None)
-            for text in page.generate(**_template_values(run, found), tasks=tasks, replays=replays):
-                file.write(text)
-        part.replace(path)
-    except OSError as error:
-        raise StoreError(f"{out_dir}: {error}") from error
+    found = run_tables(run)
+    with_rows = [table for table in found if table.rows]
+    write_atomically(out_dir / "table.md", tables.markdown_tables(with_rows))
+    write_atomically(out_dir / "table.tex", tables.latex_tables(with_rows))
+    write_atomically(out_dir / "table.csv", tables.summary_csv(run.summaries))
+    replays = _replays(run, out_dir, max_replay_bytes)
+    page = page_environment().get_template("report.html.j2")
+    path = out_dir / REPORT_NAME
+    with replacing(path) as beside, beside.open("w", encoding="utf-8") as file:
+        tasks = _tasks(run, replays, out_dir / MAP_DIR if has_maps else None)
+        for text in page.generate(**_template_values(run, found), tasks=tasks, replays=replays):
+            file.write(text)
     return path
 
 
@@ -129,10 +124,9 @@ def _tasks(run: Run, replays: list[Replay], map_dir: Path | None) -> Iterator[tu
 
 
 def _write_maps(run: Run, task: Task, map_dir: Path) -> None:
-    map_dir.mkdir(exist_ok=True)
     for record in task.records.values():
         drawn = stage_svg(record, task.maps, success_radius_m=run.success_radius_m)
-        (map_dir / map_name(record)).write_text(drawn, encoding="utf-8")
+        write_atomically(map_dir / map_name(record), drawn)
 
 
 def _template_values(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
@@ -175,7 +169,7 @@ def _template_values(run: Run, found: Sequence[tables.Table]) -> dict[str, Any]:
     }
 
 
-def _mark(outcome: StageOutcome | None) -> tuple[str, str]:
+def _mark(outcome: RecordedStage | None) -> tuple[str, str]:
     """State and tooltip of an overview square."""
     if outcome is None:
         return ("none", "no record yet")

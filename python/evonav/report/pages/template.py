@@ -29,6 +29,22 @@ def page_environment() -> Environment:
     )
 
 
+def page_text(
+    template: str, css: Markup, js: Markup | None = None, *, has_drawings: bool = False, **values: object
+) -> str:
+    """Render a page with its style, its script and the policy that allows these alone.
+
+    Args:
+        template: Name of the template.
+        css: Style of the page.
+        js: Script of the page.
+        has_drawings: Whether the page holds drawings, which carry styles of their own.
+        values: Other values of the template.
+    """
+    allowed = policy(None if has_drawings else (css,), () if js is None else (js,))
+    return page_environment().get_template(template).render(css=css, js=js, policy=allowed, **values)
+
+
 def policy(styles: tuple[str, ...] | None, scripts: tuple[str, ...] = ()) -> str:
     """Return the content security policy of a page: these styles and scripts, images in the page itself, nothing else.
 

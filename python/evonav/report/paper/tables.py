@@ -75,12 +75,6 @@ def paper_tables(run: Run, perception: Perception = "gt") -> list[Table]:
     ]
 
 
-def paper_markdown(run: Run, perception: Perception = "gt") -> str:
-    """Return the tables as one Markdown text."""
-    tables = [*paper_tables(run, perception), power_table(run.pairs, perception)]
-    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables if table.rows)
-
-
 def power_table(pairs: Sequence[AgentPair], perception: Perception = "gt") -> Table:
     """Show whether the paper's SR differences could be found on its houses, if they vary as ours do."""
     paper = PAPER[perception]

@@ -84,12 +84,7 @@ def write_plots(plots: Sequence[Plot], path: Path, *, columns: int = 1) -> Path:
         metadata = {"CreationDate": None} if suffix == ".pdf" else {}
         with _figure(plots, columns) as figure:
             data = _saved(figure, format=suffix[1:], dpi=200, metadata=metadata)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StoreError(f"{path}: {error}") from error
-    write_atomically(path, data)
-    return path
+    return write_atomically(path, data)
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from evonav.report.compare.breakdown import Breakdown, breakdown, breakdown_plot
-from evonav.report.compare.selection import ComparedAgent, read_compared_agents
+from evonav.report.compare.selection import agents_of
 from evonav.report.plots.specs import Gap, GapPlot, Plot
 from evonav.report.run import Run
 
@@ -34,7 +34,7 @@ def run_breakdowns(run: Run, names: Sequence[str] = TABLED) -> list[Breakdown]:
     Raises:
         StoreError: The run cannot be read.
     """
-    agents = _compared_agents(run)
+    agents = [one for one in agents_of(run) if any(row.is_scored for row in one.rows.values())]
     found = [breakdown(agents, by) for by in names] if agents else []
     return [one for one in found if one.groups]
 
@@ -52,14 +52,6 @@ def run_plots(run: Run) -> list[RunPlot]:
     for one in run_breakdowns(run, PLOTTED):
         plots.append(RunPlot(breakdown_plot(one), f"{_CAPTIONS[one.by]} 95% intervals, bootstrap by house."))
     return plots
-
-
-def _compared_agents(run: Run) -> list[ComparedAgent]:
-    if run.num_recorded == 0:
-        return []
-    return [
-        side for side in read_compared_agents([str(run.run_dir)]) if any(row.is_scored for row in side.rows.values())
-    ]
 
 
 def _difference_plot(run: Run) -> GapPlot:

@@ -5,6 +5,7 @@ import shlex
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from statistics import fmean
 from typing import Any
 
 from evonav.evaluation.records.schema import EndState
@@ -84,9 +85,11 @@ def run_facts(run: Run) -> list[tuple[str, str]]:
     facts += [("perception", perception)] if (perception := perception_of(run)) else []
     facts += [("tasks recorded", str(len(run.num_stages))), ("agents", ", ".join(run.agents))]
     facts += [(f"sha256 of the records, {agent}", digest) for agent, digest in run.rows_sha256.items()]
-    facts += [(f"mean wall time a stage, {agent}", f"{wall_s:.2f} s") for agent, wall_s in run.wall_s.items()]
-    if run.total_wall_s > 0:
-        facts += [("wall time of all stages, one after another", _duration(run.total_wall_s))]
+    wall_s = run.wall_s
+    facts += [(f"mean wall time a stage, {agent}", f"{fmean(times):.2f} s") for agent, times in wall_s.items()]
+    if wall_s:
+        total_s = sum(map(sum, wall_s.values()))
+        facts += [("wall time of all stages, one after another", _duration(total_s))]
     retries = Counter(failure.kind.value.replace("_", " ") for failure in run.failures if failure.is_retried)
     if retries:
         facts.append(("stages tried again", ", ".join(f"{count} after {kind}" for kind, count in retries.items())))

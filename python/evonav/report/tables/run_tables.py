@@ -1,7 +1,6 @@
 """Build all tables of a run, and sentences that claim no more than the numbers allow."""
 
 from collections import Counter
-from collections.abc import Iterable
 
 from evonav.evaluation.records.schema import EndState
 from evonav.report.compare.breakdown import breakdown_table
@@ -10,16 +9,6 @@ from evonav.report.run import Run
 from evonav.report.tables import table as tables
 from evonav.report.tables.numbers import NONE, percent, points
 from evonav.statistics import MIN_CLUSTERS
-
-
-def markdown_tables(found: Iterable[tables.Table]) -> str:
-    """Tables as one Markdown text."""
-    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in found if table.rows)
-
-
-def latex_tables(found: Iterable[tables.Table]) -> str:
-    """Tables as LaTeX, for the package `booktabs`."""
-    return "\n".join(table.latex() for table in found if table.rows)
 
 
 def run_tables(run: Run) -> list[tables.Table]:
@@ -49,8 +38,8 @@ def effort_table(run: Run) -> tables.Table:
         averages = (
             sum(outcome.record.num_rounds for outcome in scored) / len(scored),
             summary.mean_path_length_m or 0.0,
-            sum(outcome.stale_path_m for outcome in scored) / len(scored),
-            sum(outcome.num_stale_entries for outcome in scored) / len(scored),
+            sum(outcome.row.stale_path_m for outcome in scored) / len(scored),
+            sum(outcome.row.num_stale_entries or 0 for outcome in scored) / len(scored),
         )
         ended = f"{summary.num_stopped} of {summary.n}"
         rows.append((summary.agent, percent(summary.soft_spl, None), *(f"{x:.1f}" for x in averages), ended))
@@ -74,8 +63,8 @@ def failure_table(run: Run) -> tables.Table:
         )
         scored = [outcome.record for outcome in outcomes if outcome.record.is_scored]
         counts = (
-            sum(outcome.num_failed_decisions for outcome in outcomes),
-            sum(outcome.num_failed_decisions > 0 for outcome in outcomes),
+            sum(outcome.row.num_failed_decisions or 0 for outcome in outcomes),
+            sum(bool(outcome.row.num_failed_decisions) for outcome in outcomes),
             sum(bool(record.failed_before) for record in scored),
             sum(record.memory_lost_at is not None for record in scored),
         )

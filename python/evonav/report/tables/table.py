@@ -6,7 +6,7 @@ Rates are in percent with their 95% interval by house; a row with errored or not
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from rich.box import SIMPLE_HEAD
@@ -85,6 +85,16 @@ class Table:
         for i, row in enumerate(self.rows):
             table.add_row(*(Text(cell, style="bold" if (i, j) in self.best else "") for j, cell in enumerate(row)))
         return table
+
+
+def markdown_tables(tables: Iterable[Table]) -> str:
+    """Return tables under their titles, as one Markdown text."""
+    return "\n".join(f"## {table.title}\n\n{table.markdown()}" for table in tables)
+
+
+def latex_tables(tables: Iterable[Table]) -> str:
+    """Return tables as LaTeX, for the package `booktabs`."""
+    return "\n".join(table.latex() for table in tables)
 
 
 def headline(summaries: Sequence[AgentSummary]) -> Table:

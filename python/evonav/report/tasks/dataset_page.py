@@ -1,10 +1,9 @@
 """The page of a set of tasks: its statistics beside the paper's, as HTML, SVG and JSON."""
 
 from pathlib import Path
-from typing import Any
 
-from evonav.errors import StoreError
-from evonav.report.pages.template import page_environment, policy, text_of
+from evonav.parallel.folders import write_atomically
+from evonav.report.pages.template import page_text, text_of
 from evonav.report.plots.render import has_renderer, plot_elements, write_plots
 from evonav.report.plots.statistics_plots import other_plots, paper_plots
 from evonav.report.plots.style import plot_css
@@ -27,17 +26,10 @@ def write_dataset_report(found: TaskStatistics, out_dir: Path) -> Path:
     Raises:
         StoreError: A file cannot be written.
     """
-    page = page_environment().get_template("statistics.html.j2")
-    try:
-        out_dir.mkdir(parents=True, exist_ok=True)
-        (out_dir / DATA_NAME).write_bytes(record_bytes(found))
-        if has_renderer():
-            write_statistics_plot(found, out_dir / PLOT_NAME)
-        path = out_dir / PAGE_NAME
-        path.write_text(page.render(**_template_values(found)), encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{out_dir}: {error}") from error
-    return path
+    write_atomically(out_dir / DATA_NAME, record_bytes(found))
+    if has_renderer():
+        write_statistics_plot(found, out_dir / PLOT_NAME)
+    return write_atomically(out_dir / PAGE_NAME, _page(found))
 
 
 def write_statistics_plot(found: TaskStatistics, path: Path) -> Path:
@@ -57,19 +49,20 @@ def write_statistics_plot(found: TaskStatistics, path: Path) -> Path:
     return write_plots(paper_plots(found), path, columns=3)
 
 
-def _template_values(found: TaskStatistics) -> dict[str, Any]:
+def _page(found: TaskStatistics) -> str:
     groups: dict[str, list[list[str]]] = {}
     for metric in found.measures:
         if metric.raw is not None:
             groups.setdefault(metric.group, []).append(_row(metric))
-    return {
-        "found": found,
-        "policy": policy(None),
-        "css": text_of("report.css") + plot_css(),
-        "plots": plot_elements(paper_plots(found)),
-        "others": plot_elements(other_plots(found)),
-        "groups": groups,
-    }
+    return page_text(
+        "statistics.html.j2",
+        text_of("report.css") + plot_css(),
+        has_drawings=True,
+        found=found,
+        plots=plot_elements(paper_plots(found)),
+        others=plot_elements(other_plots(found)),
+        groups=groups,
+    )
 
 
 def _row(metric: Metric) -> list[str]:

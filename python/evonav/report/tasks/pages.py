@@ -1,18 +1,18 @@
 """Pages of tasks: every stage before and after its hidden change, and a gallery of a data set. They show the oracle."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from markupsafe import Markup
 
-from evonav.errors import StoreError
+from evonav.parallel.folders import write_atomically
 from evonav.report.maps.files import check_picture, write_picture
 from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import file_css, map_css
 from evonav.report.maps.svg import escape, join, slug
 from evonav.report.maps.task_legend import task_legend
-from evonav.report.pages.template import page_environment, policy, text_of
+from evonav.report.pages.template import page_text, text_of
 from evonav.report.tasks.floor_plans import (
     TaskDrawing,
     after_svg,
@@ -31,35 +31,6 @@ PLAN_HEIGHT_PX = 700
 CAPTION_PX = 40
 
 
-@dataclass(frozen=True, slots=True)
-class StageView:
-    """A stage as the template shows it."""
-
-    number: int
-    has_changed: bool
-    changed: str
-    plans: list[tuple[str, str, Markup]]
-    """Caption, view box and content."""
-    image: str
-    instructions: list[tuple[str, str]]
-    facts: list[tuple[str, str]]
-    moves: list[tuple[str, ...]]
-
-
-@dataclass(frozen=True, slots=True)
-class Card:
-    """A task in the gallery."""
-
-    href: str
-    task_id: str
-    num_rooms: int
-    num_stages: int
-    modes: list[str]
-    search_text: str
-    view_box: str
-    svg: Markup
-
-
 def write_task_page(task: Task, path: Path, *, stages: Sequence[int] | None = None, index: str | None = None) -> Path:
     """Write a task as one HTML file that needs no other.
 
@@ -76,7 +47,7 @@ def write_task_page(task: Task, path: Path, *, stages: Sequence[int] | None = No
         HouseError: A stage house is malformed.
         StoreError: The file cannot be written.
     """
-    return _write(path, _task_page(task_drawing(task), stages or range(1, task.num_stages + 1), index))
+    return write_atomically(path, _task_page(task_drawing(task), stages or range(1, task.num_stages + 1), index))
 
 
 def write_stage_picture(task: Task, stage: int, path: Path) -> Path:
@@ -113,22 +84,23 @@ def write_gallery(
     for i, task in enumerate(tasks):
         drawing = task_drawing(task, f"p{i}")
         page = f"{slug(task.task_id)}.html"
-        _write(out_dir / page, _task_page(drawing, range(1, task.num_stages + 1), INDEX_NAME))
+        write_atomically(out_dir / page, _task_page(drawing, range(1, task.num_stages + 1), INDEX_NAME))
         cards.append(_card(drawing, page))
         if on_task is not None:
             on_task(task.task_id)
-    num_stages = sum(card.num_stages for card in cards)
-    values = {
-        "name": name,
-        "summary": f"{len(cards)} tasks, {num_stages} stages",
-        "cards": cards,
-        "modes": sorted({mode for card in cards for mode in card.modes}),
-        "rooms": sorted({card.num_rooms for card in cards}),
-        "css": _css(),
-        "js": text_of("tasks.js"),
-        "policy": policy(None, (text_of("tasks.js"),)),
-    }
-    return _write(out_dir / INDEX_NAME, page_environment().get_template("tasks.html.j2").render(values))
+    num_stages = sum(card["num_stages"] for card in cards)
+    index = page_text(
+        "tasks.html.j2",
+        _css(),
+        text_of("tasks.js"),
+        has_drawings=True,
+        name=name,
+        summary=f"{len(cards)} tasks, {num_stages} stages",
+        cards=cards,
+        modes=sorted({mode for card in cards for mode in card["modes"]}),
+        rooms=sorted({card["num_rooms"] for card in cards}),
+    )
+    return write_atomically(out_dir / INDEX_NAME, index)
 
 
 def stage_svg(drawing: TaskDrawing, stage: int) -> str:
@@ -153,40 +125,37 @@ def stage_svg(drawing: TaskDrawing, stage: int) -> str:
 
 
 def _task_page(drawing: TaskDrawing, stages: Iterable[int], index: str | None) -> str:
-    return (
-        page_environment()
-        .get_template("stages.html.j2")
-        .render(
-            header=drawing.task.header,
-            index=index,
-            css=_css(),
-            policy=policy(None),
-            legend=task_legend(),
-            defs=Markup(definitions(drawing)),  # noqa: S704 - our own SVG
-            view_box=drawing.frame.view_box,
-            stages=[_stage_view(drawing, stage) for stage in stages],
-        )
+    return page_text(
+        "stages.html.j2",
+        _css(),
+        has_drawings=True,
+        header=drawing.task.header,
+        index=index,
+        legend=task_legend(),
+        defs=Markup(definitions(drawing)),  # noqa: S704 - our own SVG
+        stages=[_stage_values(drawing, stage) for stage in stages],
     )
 
 
-def _stage_view(drawing: TaskDrawing, stage: int) -> StageView:
+def _stage_values(drawing: TaskDrawing, stage: int) -> dict[str, object]:
+    """Return a stage as the template shows it; `plans` are caption, view box and content."""
     task, stage_map = drawing.task, drawing.maps[stage]
     public, oracle = task.public_stages[stage - 1], task.oracle(stage)
     plans = _plans(drawing, stage)
-    return StageView(
-        number=stage,
-        has_changed=len(plans) > 1,
-        changed=change_sentence(stage_map, oracle.evolution),
-        plans=[(caption, frame.view_box, Markup(svg)) for caption, frame, svg in plans],  # noqa: S704 - our own SVG
-        image=stage_map.reference_image or "",
-        instructions=[
+    return {
+        "number": stage,
+        "has_changed": len(plans) > 1,
+        "changed": change_sentence(stage_map, oracle.evolution),
+        "plans": [(caption, frame.view_box, Markup(svg)) for caption, frame, svg in plans],  # noqa: S704 - our own SVG
+        "image": stage_map.reference_image or "",
+        "instructions": [
             ("basic instruction", public.basic_instruction),
             ("appearance instruction", public.appearance_instruction),
             ("unified instruction", public.unified_instruction),
         ],
-        facts=stage_facts(stage_map, oracle),
-        moves=move_rows(stage_map, oracle.evolution),
-    )
+        "facts": stage_facts(stage_map, oracle),
+        "moves": move_rows(stage_map, oracle.evolution),
+    }
 
 
 def _plans(drawing: TaskDrawing, stage: int) -> list[tuple[str, Frame, str]]:
@@ -200,31 +169,23 @@ def _plans(drawing: TaskDrawing, stage: int) -> list[tuple[str, Frame, str]]:
     return [*plans, ("the house, and the reference course", drawing.frame, course_svg(drawing, stage))]
 
 
-def _card(drawing: TaskDrawing, href: str) -> Card:
+def _card(drawing: TaskDrawing, href: str) -> dict[str, Any]:
+    """Return a task as the gallery shows it."""
     task = drawing.task
     evolutions = [stage.evolution for stage in task.oracle_stages]
     most = max(range(1, task.num_stages + 1), key=lambda k: (len(evolutions[k - 1].changes), -k))
     searched = [task.task_id, task.header.house.name, *(stage.category for stage in task.public_stages)]
-    return Card(
-        href=href,
-        task_id=task.task_id,
-        num_rooms=task.header.house.num_rooms,
-        num_stages=task.num_stages,
-        modes=sorted({evolution.mode for evolution in evolutions if evolution.outcome == "evolved" and evolution.mode}),
-        search_text=" ".join(searched).lower(),
-        view_box=drawing.frame.view_box,
-        svg=Markup(thumbnail_svg(drawing, most)),  # noqa: S704 - our own SVG
-    )
+    return {
+        "href": href,
+        "task_id": task.task_id,
+        "num_rooms": task.header.house.num_rooms,
+        "num_stages": task.num_stages,
+        "modes": sorted({one.mode for one in evolutions if one.outcome == "evolved" and one.mode}),
+        "search_text": " ".join(searched).lower(),
+        "view_box": drawing.frame.view_box,
+        "svg": Markup(thumbnail_svg(drawing, most)),  # noqa: S704 - our own SVG
+    }
 
 
 def _css() -> Markup:
     return text_of("report.css") + text_of("tasks.css") + map_css()
-
-
-def _write(path: Path, text: str) -> Path:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be written: {error.strerror or error}") from error
-    return path
