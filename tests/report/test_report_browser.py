@@ -148,8 +148,8 @@ def test_no_answer_of_a_model_becomes_a_script(traced: list[ReplayedStage], tmp_
         changes = {"goal": goal, "stop_reason": next(texts)}
         stages.append(replace(stage, rounds=tuple(rounds), record=stage.record.model_copy(update=changes)))
     (page,) = write_episode(stages, tmp_path / "view", budget=9, success_radius_m=2.0)
-    assert page.path.name == page_name(page.task_id, "fu")
-    found = probed(page.path, VIEWER_PROBE, tmp_path)
+    assert page.href == page_name(page.task_id, "fu")
+    found = probed(tmp_path / "view" / page.href, VIEWER_PROBE, tmp_path)
     assert found["errors"] == []
     assert len(found["rounds"]) == 3 * len(stages)
     assert any(shown["chips"] for shown in found["rounds"])

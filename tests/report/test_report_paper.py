@@ -62,7 +62,7 @@ def test_decoded_counts_give_what_the_paper_prints(perception) -> None:
 
 
 def test_stage_one_is_what_is_left_of_the_counts() -> None:
-    first = {agent: known.num_first for agent, known in paper.PAPER["gt"].items()}
+    first = {agent: known.num_successes("stage_1") for agent, known in paper.PAPER["gt"].items()}
     assert first == {"unigoal": 28, "3d-mem": 37, "msgnav": 53, "fu": 56, "stage-reset": 58, "ftu": 61}
 
 

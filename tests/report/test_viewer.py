@@ -284,14 +284,14 @@ def test_one_stage_and_pages_a_stage(
     assert [stage["k"] for stage in data_of(path)["stages"]] == [2]
     monkeypatch.setattr("evonav.replay.pages.MAX_PAGE_BYTES", 1000)
     pages = write_episode(stages, tmp_path / "b", budget=9, success_radius_m=2.0)
-    assert [page.path.name for page in pages] == [page_name(task_id, "fu", k + 1) for k in range(len(stages))]
+    assert [page.href for page in pages] == [page_name(task_id, "fu", k + 1) for k in range(len(stages))]
     for number, page in enumerate(pages, start=1):
-        links = re.findall(r'class="tab" href="([^"]+)"', page.path.read_text("utf-8"))
+        links = re.findall(r'class="tab" href="([^"]+)"', (tmp_path / "b" / page.href).read_text("utf-8"))
         others = [k for k in range(1, len(stages) + 1) if k != number]
         assert links == [f"{page_name(task_id, 'fu', k)}#stage={k}&amp;round=1" for k in others]
     # What changed before a stage is drawn although the stage before has another page.
     changed = next(stage for stage in stages if stage.record.transition.relocations)
-    text = pages[changed.record.stage - 1].path.read_text("utf-8")
+    text = (tmp_path / "b" / pages[changed.record.stage - 1].href).read_text("utf-8")
     assert 'class="items ghost"' in text
 
 

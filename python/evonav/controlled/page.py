@@ -163,7 +163,7 @@ def _pair_values(analysis: Analysis, agents: Sequence[str], key: Key) -> dict[st
     for i, one in enumerate(pair):
         stage_map = one.maps.get(key[1])
         items = [] if stage_map is None else [item for item in stage_map.objects if item.object_id in moving]
-        changed = change(one.record.transition, frame, stage_map=stage_map, previous_map=one.maps.get(key[1] - 1))
+        changed = change(one.record, one.maps, frame)
         names = "" if stage_map is None else labels(stage_map, frame)
         defs.append(f'<g class="map" id="arm{i}">{furniture(items, frame)}{changed}{names}</g>')
 

@@ -11,11 +11,18 @@ from evonav.errors import InvalidArgumentError
 from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.report.maps.files import check_picture, write_picture
-from evonav.report.maps.floor_plan import Frame, ground, labels
+from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.legend import legend_row
-from evonav.report.maps.stage_map import change_words, file_css, outcome_words, success_radius_of, task_frame
+from evonav.report.maps.stage_map import (
+    change_words,
+    file_css,
+    house_drawing,
+    outcome_words,
+    success_radius_of,
+    task_frame,
+)
 from evonav.report.maps.svg import arrow_head, cm, escape, join, polyline, simplified, text_lines, title
-from evonav.report.maps.trajectory import change, course
+from evonav.report.maps.trajectory import course
 from evonav.report.tables.causes import sentence
 
 PANEL_PX, GAP_PX, HEAD_PX, FOOT_PX, IMAGE_PX = 560, 20, 96, 58, 84
@@ -140,7 +147,7 @@ def _panel(rollout: Rollout, frame: Frame, map_px: int, left_px: int) -> str:
     css = "quiet" if record.transition.kind == "static" else "change-words"
     return (
         f'<g transform="translate({left_px} {HEAD_PX})"><svg width="{PANEL_PX}" height="{map_px}" '
-        f'viewBox="{frame.view_box}">{house_drawing(rollout, frame)}{walk_and_course(rollout, frame)}</svg>'
+        f'viewBox="{frame.view_box}">{house_drawing(record, rollout.maps, frame)}{walk_and_course(rollout, frame)}</svg>'
         f'<text class="verdict" y="{map_px + 18}"><tspan class="ink">{arm_words(rollout.arm)}</tspan> '
         f'<tspan class="{verdict}">{escape(outcome_words(record))}</tspan></text>'
         f'<text class="quiet" y="{map_px + 34}">{escape(why)}</text>'
@@ -162,14 +169,6 @@ def change_sentence(rollout: Rollout) -> str:
 def split_words(analysis: Analysis, agent: str, key: Key) -> str:
     """Describe what the pair's change touched."""
     return SPLITS[split_of(analysis.outcomes[analysis.arms[-1], agent][key])]
-
-
-def house_drawing(rollout: Rollout, frame: Frame) -> str:
-    """Draw the house of the evaluated stage, and what changed before."""
-    stage = rollout.record.stage
-    here, before = rollout.maps.get(stage), rollout.maps.get(stage - 1)
-    changed = change(rollout.record.transition, frame, stage_map=here, previous_map=before)
-    return changed if here is None else ground(here, frame) + changed + labels(here, frame)
 
 
 def walk_and_course(rollout: Rollout, frame: Frame) -> str:

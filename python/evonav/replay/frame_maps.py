@@ -10,9 +10,10 @@ from PIL import Image
 
 from evonav.evaluation.records.schema import FloorPlan, StageRecord
 from evonav.replay.types import ReplayedEntry, ReplayedMap, ReplayedRound, ReplayedStage
-from evonav.report.maps.floor_plan import Frame, ground, labels
+from evonav.report.maps.floor_plan import Frame
+from evonav.report.maps.stage_map import house_drawing
 from evonav.report.maps.svg import cm, cross, escape, join, polyline
-from evonav.report.maps.trajectory import change, ring, start_mark, target_mark
+from evonav.report.maps.trajectory import ring, start_mark, target_mark
 from evonav.tasks.language import noun_of
 
 MAX_ENTRY_CM = 600.0
@@ -26,12 +27,8 @@ _TAG_UNITS = 2.6
 
 def house_layer(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, success_radius_m: float) -> str:
     """Return what stays the same in a stage: the house, what moved before, and the target in its radius."""
-    house = maps.get(record.stage)
-    below, names = "", ""
-    if house is not None:
-        below, names = ground(house, frame), labels(house, frame)
-    moved = change(record.transition, frame, stage_map=house, previous_map=maps.get(record.stage - 1))
-    return below + moved + names + ring(record, frame, success_radius_m) + target_mark(record.target, frame)
+    target = ring(record, frame, success_radius_m) + target_mark(record.target, frame)
+    return house_drawing(record, maps, frame) + target
 
 
 def belief_layer(stage: ReplayedStage, step: ReplayedRound, frame: Frame) -> str:

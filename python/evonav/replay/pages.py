@@ -5,13 +5,13 @@ What is drawn comes from `evonav.replay.types`; no agent, model or task is read 
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 
 from markupsafe import Markup
 
 from evonav.errors import InvalidArgumentError
-from evonav.evaluation.records.schema import FloorPlan, StageRecord
+from evonav.evaluation.records.schema import FloorPlan
 from evonav.parallel.folders import write_atomically
 from evonav.replay.page_data import PageData
 from evonav.replay.types import ReplayedStage
@@ -29,33 +29,6 @@ MAX_PAGE_BYTES = 10_000_000
 _SHARED_MARKS = ("start", "end, success", "end, no success", "target", "where it stood in stage 1", "success radius")
 
 
-@dataclass(frozen=True, slots=True)
-class StageDrawing:
-    """Layers of a stage's map that are the same in all rounds."""
-
-    number: int
-    floors: Markup
-    furniture: Markup
-    structure: Markup
-    names: Markup
-    change: Markup
-    target: Markup
-    ends: Markup
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenPage:
-    """A page on disk, for the index."""
-
-    agent: str
-    task_id: str
-    path: Path
-    stages: tuple[StageRecord, ...]
-    """Records without their traces."""
-    differs: bool
-    records_sha256: str
-
-
 def write_episode(
     stages: Sequence[ReplayedStage],
     out_dir: Path,
@@ -64,7 +37,7 @@ def write_episode(
     success_radius_m: float,
     only: int | None = None,
     records_sha256: str = "",
-) -> list[WrittenPage]:
+) -> list[ListedPage]:
     """Write an episode's page, or one per stage where one would be too large.
 
     Args:
@@ -93,17 +66,14 @@ def write_episode(
     return pages
 
 
-def write_index(pages: Iterable[WrittenPage], out_dir: Path, run_name: str) -> Path:
+def write_index(pages: Iterable[ListedPage], out_dir: Path, run_name: str) -> Path:
     """Write `index.html`, which links to these pages and to those that were written there before.
 
     Raises:
         StoreError: It cannot be written.
     """
     rows = {page.href: page for page in listed_pages(out_dir)}
-    for page in pages:
-        stages = [[record.stage, record.state.value, outcome_words(record)] for record in page.stages]
-        name = page.path.name
-        rows[name] = ListedPage(page.agent, page.task_id, name, stages, page.differs, page.records_sha256, page_code())
+    rows |= {page.href: page for page in pages}
     ordered = sorted(rows.values(), key=lambda row: (row.task_id, row.agent, row.stages[0][0]))
     write_atomically(out_dir / LIST_NAME, json.dumps([asdict(row) for row in ordered], indent=1) + "\n")
     index = page_text("viewer_index.html.j2", text_of("report.css"), name=run_name, rows=ordered)
@@ -149,9 +119,9 @@ def _page(
     )
 
 
-def _drawing(stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, radius_m: float) -> StageDrawing:
+def _drawing(stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, radius_m: float) -> dict[str, Markup]:
+    """Return the layers of a stage's map that are the same in all rounds."""
     record, stage_map = stage.record, stage.stage_map
-    previous = maps.get(record.stage - 1)
     ends = ""
     if (start := record.effective_start) is not None:
         ends += start_mark(cm((start.x_m, start.z_m)), frame, "start")
@@ -162,16 +132,16 @@ def _drawing(stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, 
     house = stage_map or FloorPlan(
         task_id=record.task_id, house=record.house, stage=record.stage, rooms=(), walls=(), openings=(), objects=()
     )
-    layers = (
-        floors(house),
-        furniture(house.objects, frame),
-        structure(house, frame),
-        item_labels(house.objects, frame) + labels(house, frame),
-        change(record.transition, frame, stage_map=stage_map, previous_map=previous),
-        ring(record, frame, radius_m) + target_mark(record.target, frame),
-        ends,
-    )
-    return StageDrawing(record.stage, *(Markup(layer) for layer in layers))  # noqa: S704 - our own SVG
+    layers = {
+        "floors": floors(house),
+        "furniture": furniture(house.objects, frame),
+        "structure": structure(house, frame),
+        "names": item_labels(house.objects, frame) + labels(house, frame),
+        "change": change(record, maps, frame),
+        "target": ring(record, frame, radius_m) + target_mark(record.target, frame),
+        "ends": ends,
+    }
+    return {name: Markup(layer) for name, layer in layers.items()}  # noqa: S704 - our own SVG
 
 
 def _legend() -> Markup:
@@ -216,9 +186,16 @@ def _legend() -> Markup:
 
 def _write(
     text: str, stages: Sequence[ReplayedStage], out_dir: Path, only: int | None, records_sha256: str
-) -> WrittenPage:
-    first = stages[0].record
+) -> ListedPage:
+    records = [stage.record for stage in stages]
+    first = records[0]
     path = write_atomically(out_dir / page_name(first.task_id, first.agent, only), text)
-    brief = tuple(stage.record.model_copy(update={"trace": (), "entries": ()}) for stage in stages)
-    differs = any(stage.differences for stage in stages)
-    return WrittenPage(first.agent, first.task_id, path, brief, differs, records_sha256)
+    return ListedPage(
+        agent=first.agent,
+        task_id=first.task_id,
+        href=path.name,
+        stages=[[record.stage, record.state.value, outcome_words(record)] for record in records],
+        differs=any(stage.differences for stage in stages),
+        records_sha256=records_sha256,
+        code=page_code(),
+    )

@@ -1,7 +1,6 @@
 """Draw the pictures of `evonav video`: what the agent saw, what it believed and what was true, side by side."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from importlib.resources import files
 from io import BytesIO
 
 from PIL import Image
@@ -14,6 +13,7 @@ from evonav.report.maps.files import png_of
 from evonav.report.maps.floor_plan import Frame
 from evonav.report.maps.stage_map import change_words, light_css, outcome_words, task_frame
 from evonav.report.maps.svg import escape, join, text_lines
+from evonav.report.pages.template import text_of
 from evonav.report.tables.causes import sentence
 
 SIZE = (1280, 720)
@@ -63,8 +63,7 @@ class _StageFilm:
     def __init__(
         self, stage: ReplayedStage, maps: Mapping[int, FloorPlan], frame: Frame, budget: int, radius_m: float
     ) -> None:
-        film_css = (files("evonav.report") / "templates" / "film.css").read_text(encoding="utf-8")
-        self._style = f"<style>{light_css(film_css)}</style>"
+        self._style = f"<style>{light_css(text_of('film.css'))}</style>"
         self._stage, self._frame, self._budget = stage, frame, budget
         house = self._panel(house_layer(stage.record, maps, frame, radius_m), "#ffffff")
         self._background = self._drawn(_header(stage, maps), SIZE, "#ffffff").convert("RGB")

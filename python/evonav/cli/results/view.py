@@ -11,7 +11,7 @@ from evonav.cli.options.shared import RunFolder
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from evonav.replay.pages import WrittenPage
+    from evonav.report.pages.replays import ListedPage
     from evonav.report.run import Run
 
 
@@ -31,12 +31,14 @@ def view(
     agents = [name.strip() for name in agent.split(",") if name.strip()]
     pages, index = make_pages(run, task, agents, stage=stage, tasks=tasks, exchanges=exchanges, out=out)
     for page in pages:
-        typer.echo(f"page: {page.path}{' (the replay differs from the records)' if page.differs else ''}")
+        typer.echo(
+            f"page: {index.parent / page.href}{' (the replay differs from the records)' if page.differs else ''}"
+        )
     typer.echo(f"index: {index}")
     if open_:
         import webbrowser
 
-        webbrowser.open((pages[0].path if len(pages) == 1 else index).resolve().as_uri())
+        webbrowser.open((index.parent / pages[0].href if len(pages) == 1 else index).resolve().as_uri())
 
 
 def make_pages(
@@ -48,7 +50,7 @@ def make_pages(
     tasks: Path | None = None,
     exchanges: Path | None = None,
     out: Path | None = None,
-) -> "tuple[list[WrittenPage], Path]":
+) -> "tuple[list[ListedPage], Path]":
     """Replay episodes and write their pages and the index.
 
     Args:
@@ -80,7 +82,7 @@ def replay_pages(
     tasks: Path | None = None,
     exchanges: Path | None = None,
     out: Path | None = None,
-) -> "tuple[list[WrittenPage], Path]":
+) -> "tuple[list[ListedPage], Path]":
     """Replay these episodes (agent, task) of a run, and write their pages and the index; see `make_pages`."""
     from evonav.replay.pages import write_episode, write_index
     from evonav.replay.replay import RunReplay

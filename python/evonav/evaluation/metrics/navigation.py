@@ -76,6 +76,12 @@ class AgentSummary:
     splits: dict[str, Rates] = field(default_factory=dict)
     """`stage_1`, `relocated`, `not_relocated` (the paper's strata: stages 2 and on), and one per evolution mode."""
 
+    def rates(self, split: str = "all") -> Rates:
+        """Return the rates over a split of the scored stages, by default over all of them."""
+        if split == "all":
+            return Rates(self.n, self.sr, self.spl, self.sr_ci95, self.spl_ci95, self.sr_wilson95)
+        return self.splits.get(split, Rates(n=0, sr=None, spl=None))
+
 
 @dataclass(frozen=True, slots=True)
 class AgentPair:

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 
 from markupsafe import Markup
 
@@ -11,6 +10,7 @@ from evonav.evaluation.records.schema import EndState, FloorPlan, StageRecord
 from evonav.report.maps.floor_plan import Frame, frame_of, ground, item_labels, labels
 from evonav.report.maps.svg import escape, slug
 from evonav.report.maps.trajectory import change, course
+from evonav.report.pages.template import text_of
 from evonav.report.tables.causes import sentence
 from evonav.tasks.language import noun_of
 
@@ -21,7 +21,7 @@ VIEW_DIR = "view"
 
 def map_css() -> Markup:
     """Return colours and fonts of maps on a page: custom properties, light and dark."""
-    return Markup((files("evonav.report") / "templates" / "map.css").read_text(encoding="utf-8"))  # noqa: S704 - ours
+    return text_of("map.css")
 
 
 def file_css() -> str:
@@ -131,9 +131,13 @@ def stage_drawing(
 ) -> str:
     """Return a stage's house and what happened in it, as the content of an `svg` element."""
     stage_map = maps.get(record.stage)
-    changed = change(record.transition, frame, stage_map=stage_map, previous_map=maps.get(record.stage - 1))
-    below, names = changed, ""
-    if stage_map is not None:
-        below = ground(stage_map, frame) + changed
-        names = (item_labels(stage_map.objects, frame) if has_item_names else "") + labels(stage_map, frame)
-    return below + names + course(record, frame, success_radius_m)
+    names = item_labels(stage_map.objects, frame) if has_item_names and stage_map is not None else ""
+    return house_drawing(record, maps, frame, names) + course(record, frame, success_radius_m)
+
+
+def house_drawing(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame, item_names: str = "") -> str:
+    """Return the house of a stage, with what moved before it and the names of its rooms."""
+    stage_map, changed = maps.get(record.stage), change(record, maps, frame)
+    if stage_map is None:
+        return changed
+    return ground(stage_map, frame) + changed + item_names + labels(stage_map, frame)

@@ -13,7 +13,6 @@ from evonav.evaluation.records.schema import (
     RoundRecord,
     StageRecord,
     TargetRecord,
-    TransitionRecord,
 )
 from evonav.report.maps.floor_plan import Frame, distance_m, furniture
 from evonav.report.maps.svg import Point, arrow_head, cm, cross, join, polyline, simplified, star, title
@@ -42,16 +41,20 @@ def course(record: StageRecord, frame: Frame, success_radius_m: float) -> str:
     )
 
 
-def change(
-    transition: TransitionRecord, frame: Frame, *, stage_map: FloorPlan | None, previous_map: FloorPlan | None
-) -> str:
+def change(record: StageRecord, maps: Mapping[int, FloorPlan], frame: Frame) -> str:
     """Draw relocated objects: where they stood (dashed), where they stand (stressed), and an arrow between.
 
     The same for all agents. What was carried along on a moved piece of furniture is stressed, but has no arrow.
+
+    Args:
+        record: The stage before which they moved.
+        maps: The task's maps by stage; objects of a stage without one are left out.
+        frame: Frame of the picture.
     """
-    relocations = transition.relocations
+    relocations = record.transition.relocations
     if not relocations:
         return ""
+    stage_map, previous_map = maps.get(record.stage), maps.get(record.stage - 1)
     names = {relocation.object_id for relocation in relocations}
     now = _by_id(stage_map)
     before = _by_id(previous_map)

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +13,8 @@ from evonav.report.maps.legend import legend
 from evonav.report.maps.stage_map import VIEW_DIR, map_css, map_name, outcome_words, stage_svg
 from evonav.report.maps.svg import slug
 from evonav.report.pages.highlights import highlights_first
-from evonav.report.pages.replays import ListedPage, listed_pages, viewer_css, viewer_js
-from evonav.report.pages.task_cards import TaskView, filter_data, task_view
+from evonav.report.pages.replays import listed_pages, viewer_css, viewer_js
+from evonav.report.pages.task_cards import filter_data, task_view
 from evonav.report.pages.template import packed, page_environment, policy, text_of
 from evonav.report.plots.render import plot_elements
 from evonav.report.plots.run_plots import run_plots
@@ -33,17 +32,6 @@ MAX_REPLAY_BYTES = 16_000_000
 """Episodes round by round are part of the page up to this size; beyond, the page links to their files."""
 REPORT_NAME = "report.html"
 MAP_DIR = "maps"
-
-
-@dataclass(frozen=True, slots=True)
-class Replay:
-    """An episode's page of `evonav view`."""
-
-    page: ListedPage
-    content: Markup | None
-    """Packed; `None` where it is a file beside the report."""
-    stages: list[tuple[int, str, str, str]]
-    """Number, state, words and address."""
 
 
 def write_report(
@@ -83,8 +71,12 @@ def write_report(
     return path
 
 
-def _replays(run: Run, out_dir: Path, max_bytes: int) -> list[Replay]:
-    """Return the pages of `evonav view` that show this run's records, the highlights first."""
+def _replays(run: Run, out_dir: Path, max_bytes: int) -> list[dict[str, Any]]:
+    """Return the pages of `evonav view` that show this run's records, the highlights first.
+
+    Each has its `page`, its packed `content` (`None` where it is a file beside the report), and its `stages`: number,
+    state, words and address.
+    """
     view_dir = run.run_dir / VIEW_DIR
     order = {episode: i for i, episode in enumerate(highlights_first(run))}
     pages = [
@@ -102,17 +94,19 @@ def _replays(run: Run, out_dir: Path, max_bytes: int) -> list[Replay]:
         file = os.path.relpath(view_dir / page.href, out_dir).replace(os.sep, "/")
         where = f"#replay={page.href}&" if content is not None else f"{file}#"
         stages = [(k, state, outcome, f"{where}stage={k}&round=1") for k, state, outcome in page.stages]
-        found.append(Replay(page, content, stages))
+        found.append({"page": page, "content": content, "stages": stages})
     return found
 
 
-def _tasks(run: Run, replays: list[Replay], map_dir: Path | None) -> Iterator[tuple[TaskView, Markup, bool]]:
+def _tasks(
+    run: Run, replays: list[dict[str, Any]], map_dir: Path | None
+) -> Iterator[tuple[dict[str, Any], Markup, bool]]:
     """Yield every task's view and section, and whether the section is packed."""
     is_packed = run.num_recorded > MAX_OPEN_STAGES
     hrefs = {
-        (replay.page.agent, replay.page.task_id, stage): href
+        (replay["page"].agent, replay["page"].task_id, stage): href
         for replay in replays
-        for stage, _, _, href in replay.stages
+        for stage, _, _, href in replay["stages"]
     }
     macros: Any = page_environment().get_template("macros.html.j2").module
     for i, task in enumerate(run.tasks()):

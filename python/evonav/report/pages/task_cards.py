@@ -1,12 +1,12 @@
 """A task as the page shows it: what was asked, and a map with its outcome for every agent and stage."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import Any
 
 from markupsafe import Markup
 
 from evonav.evaluation.records.schema import EndState, StageRecord
-from evonav.report.maps.floor_plan import Frame, furniture, ground, item_labels, labels, moving_ids
+from evonav.report.maps.floor_plan import furniture, ground, item_labels, labels, moving_ids
 from evonav.report.maps.stage_map import change_words, outcome_words, task_frame
 from evonav.report.maps.svg import clean, join, slug
 from evonav.report.maps.trajectory import change, course, rounds
@@ -14,38 +14,11 @@ from evonav.report.run import Run, Task
 from evonav.report.tables.causes import sentence
 
 
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """A stage of an agent in a task's grid."""
-
-    state: str
-    outcome: str
-    sentence: str
-    facts: str
-    rounds: list[str]
-    svg: Markup
-    change: str
-    href: str | None = None
-    """Link to the page that shows the stage round by round."""
-
-
-@dataclass(frozen=True, slots=True)
-class TaskView:
-    """A task as the template shows it."""
-
-    anchor: str
-    task_id: str
-    house: str
-    num_rooms: int
-    defs: Markup
-    goals: list[tuple[int, StageRecord | None, str, str | None]]
-    """Stage, a record that states the goal, what changed before, and the reference image as a data URI."""
-    rows: list[tuple[str, list[Cell]]]
-    data: dict[str, str]
-
-
-def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, int], str]) -> TaskView:
+def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, int], str]) -> dict[str, Any]:
     """Draw a task: the house once, what moves once a stage, every agent's stages over them.
+
+    Returns the values of the template: its `goals` are stage, a record that states the goal, what changed before and
+    the reference image; its `rows` are an agent and a cell per stage.
 
     Args:
         run: Its run.
@@ -66,45 +39,45 @@ def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, 
     for stage, stage_map in task.maps.items():
         items = [item for item in stage_map.objects if item.object_id in moving]
         recorded = next((record for record in records if record.stage == stage), None)
-        changed = "" if recorded is None else _changed(recorded, task, frame)
+        changed = "" if recorded is None else change(recorded, task.maps, frame)
         defs.append(_shared(f"{prefix}s{stage}", furniture(items, frame) + changed))
         defs.append(_shared(f"{prefix}f{stage}", item_labels(items, frame)))
     stages = range(1, task.num_stages + 1)
 
-    def cell(agent: str, stage: int) -> Cell:
+    def cell(agent: str, stage: int) -> dict[str, Any]:
         record = task.records.get((agent, stage))
         if record is None:
-            return Cell("not_run", "no record yet", "This stage has no record yet.", "", [], Markup(""), "")
-        below = _uses(prefix, stage) if stage in task.maps else _changed(record, task, frame)
+            words = {"outcome": "no record yet", "sentence": "This stage has no record yet."}
+            return {"state": "not_run", **words, "facts": "", "rounds": [], "svg": "", "href": None}
+        below = _uses(prefix, stage) if stage in task.maps else change(record, task.maps, frame)
         name = clean(f"Map of stage {stage} for {agent}")
         opening = Markup('<svg class="map" viewBox="{}" role="img" aria-label="{}">').format(frame.view_box, name)
         drawn = opening + Markup(below + course(record, frame, run.success_radius_m) + "</svg>")  # noqa: S704
-        return Cell(
-            record.state.value,
-            outcome_words(record),
-            sentence(record),
-            _facts(record),
-            rounds(record.trace),
-            drawn,
-            change_words(record, task.maps),
-            hrefs.get((agent, task.task_id, stage)),
-        )
+        return {
+            "state": record.state.value,
+            "outcome": outcome_words(record),
+            "sentence": sentence(record),
+            "facts": _facts(record),
+            "rounds": rounds(record.trace),
+            "svg": drawn,
+            "href": hrefs.get((agent, task.task_id, stage)),
+        }
 
     goals = []
     for stage in stages:
         recorded = next((task.records[agent, stage] for agent in run.agents if (agent, stage) in task.records), None)
         image = task.maps[stage].reference_image if stage in task.maps else None
         goals.append((stage, recorded, "" if recorded is None else change_words(recorded, task.maps), image))
-    return TaskView(
-        anchor=slug(task.task_id),
-        task_id=task.task_id,
-        house=records[0].house if records else "",
-        num_rooms=len(shared[0].rooms) if shared else 0,
-        defs=Markup(join(defs)),  # noqa: S704 - our own SVG
-        goals=goals,
-        rows=[(agent, [cell(agent, stage) for stage in stages]) for agent in run.agents],
-        data=filter_data(run, task.task_id),
-    )
+    return {
+        "anchor": slug(task.task_id),
+        "task_id": task.task_id,
+        "house": records[0].house if records else "",
+        "num_rooms": len(shared[0].rooms) if shared else 0,
+        "defs": Markup(join(defs)),  # noqa: S704 - our own SVG
+        "goals": goals,
+        "rows": [(agent, [cell(agent, stage) for stage in stages]) for agent in run.agents],
+        "data": filter_data(run, task.task_id),
+    }
 
 
 def _shared(name: str, drawing: str) -> str:
@@ -117,11 +90,6 @@ def _uses(prefix: str, stage: int) -> str:
     ids = (prefix, f"{prefix}s{stage}", f"{prefix}n")
     fine = (f"{prefix}f", f"{prefix}f{stage}")
     return join([f'<use href="#{name}"/>' for name in ids] + [f'<use class="fine" href="#{name}"/>' for name in fine])
-
-
-def _changed(record: StageRecord, task: Task, frame: Frame) -> str:
-    maps = task.maps
-    return change(record.transition, frame, stage_map=maps.get(record.stage), previous_map=maps.get(record.stage - 1))
 
 
 def _facts(record: StageRecord) -> str:

@@ -1,17 +1,11 @@
 """The paper's Tables 1 and 2 with a run's figures in them: LaTeX in the paper's layout, the paper's own in grey."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
-from evonav.evaluation.metrics.navigation import AgentSummary, Rates
-from evonav.report.paper.tables import (
-    NUM_NOT_RELOCATED,
-    NUM_RELOCATED,
-    NUM_STAGES,
-    PAPER,
-    PaperResult,
-    Perception,
-)
+from evonav.evaluation.metrics.navigation import Rates
+from evonav.report.paper.tables import NUM_STAGES, PAPER, PaperResult, Perception
 from evonav.report.run import Run
 from evonav.report.tables.numbers import percent
 from evonav.report.tables.table import latex_text
@@ -47,9 +41,13 @@ def paper_latex(runs: Mapping[Perception, Run]) -> str:
     Args:
         runs: Runs by perception; agents that the paper lacks come last, settings without a run show the paper alone.
     """
-    agents = _agents(list(runs.values()))
-    main = {setting: _main_rows(runs.get(setting), PAPER[setting]) for setting in SETTINGS}
-    relocation = {setting: _relocation_rows(runs.get(setting), PAPER[setting]) for setting in SETTINGS}
+    agents = list(dict.fromkeys(agent for run in runs.values() for agent in run.agents))
+    main: dict[Perception, list[_Row]] = {}
+    relocation: dict[Perception, list[_Row]] = {}
+    for setting in SETTINGS:
+        row = partial(_row, runs.get(setting), PAPER[setting])
+        main[setting] = [row(r"SR $\uparrow$"), row(r"SPL $\uparrow$", measure="spl")]
+        relocation[setting] = [row("Relocated", "relocated"), row("Not Relocated", "not_relocated")]
     sizes = latex_text("; ".join(f"{SETTINGS[setting]}: {_run_size(run)}" for setting, run in runs.items()))
     grey = "Grey: as published."
     return "\n".join(
@@ -161,38 +159,16 @@ def _comments(setting: Perception, row: _Row, order: Sequence[str]) -> list[str]
     return lines
 
 
-def _main_rows(run: Run | None, paper: Mapping[str, PaperResult]) -> list[_Row]:
-    ours = _rates(run, lambda s: Rates(s.n, s.sr, s.spl, s.sr_ci95, s.spl_ci95, s.sr_wilson95))
-    sr = {agent: known.num_all / NUM_STAGES for agent, known in paper.items()}
-    spl = {agent: known.spl for agent, known in paper.items()}
-    return [
-        _Row(r"SR $\uparrow$", ours, "sr", sr, NUM_STAGES),
-        _Row(r"SPL $\uparrow$", ours, "spl", spl, NUM_STAGES),
-    ]
-
-
-def _relocation_rows(run: Run | None, paper: Mapping[str, PaperResult]) -> list[_Row]:
-    empty = Rates(n=0, sr=None, spl=None)
-    moved = _rates(run, lambda s: s.splits.get("relocated", empty))
-    unmoved = _rates(run, lambda s: s.splits.get("not_relocated", empty))
-    theirs = {agent: known.num_relocated / NUM_RELOCATED for agent, known in paper.items()}
-    theirs_unmoved = {agent: known.num_not_relocated / NUM_NOT_RELOCATED for agent, known in paper.items()}
-    return [
-        _Row("Relocated", moved, "sr", theirs, NUM_RELOCATED),
-        _Row("Not Relocated", unmoved, "sr", theirs_unmoved, NUM_NOT_RELOCATED),
-    ]
-
-
-def _rates(run: Run | None, of: Callable[[AgentSummary], Rates]) -> dict[str, Rates]:
-    return {} if run is None else {summary.agent: of(summary) for summary in run.summaries}
+def _row(
+    run: Run | None, paper: Mapping[str, PaperResult], name: str, split: str = "all", *, measure: str = "sr"
+) -> _Row:
+    ours = {} if run is None else {summary.agent: summary.rates(split) for summary in run.summaries}
+    theirs = {agent: known.sr(split) if measure == "sr" else known.spl for agent, known in paper.items()}
+    return _Row(name, ours, measure, theirs, NUM_STAGES[split])
 
 
 def _value(found: Rates, measure: str) -> float | None:
     return found.sr if measure == "sr" else found.spl
-
-
-def _agents(runs: Sequence[Run]) -> list[str]:
-    return list(dict.fromkeys(agent for run in runs for agent in run.agents))
 
 
 def _run_size(run: Run) -> str:

@@ -9,16 +9,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary, Rates
+from evonav.evaluation.metrics.navigation import AgentPair, AgentSummary
 from evonav.report.run import PAPER_ORDER, Run
-from evonav.report.tables.numbers import NONE, percent, points
+from evonav.report.tables.numbers import NONE, number, percent, points
 from evonav.report.tables.table import INTERVALS, VERDICTS, Table, p_heading, p_words, verdict_words
 from evonav.statistics import DETECTABLE_Z, Z_95, power, wilson
 
 Perception = Literal["gt", "prediction"]
 
-NUM_STAGES, NUM_RELOCATED, NUM_NOT_RELOCATED, NUM_FIRST = 365, 109, 166, 90
-"""Stages of the paper's 90 tasks, and of its strata."""
+NUM_STAGES = {"all": 365, "relocated": 109, "not_relocated": 166, "stage_1": 90}
+"""Stages of the paper's 90 tasks, by the names of `AgentSummary.rates`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +30,15 @@ class PaperResult:
     num_relocated: int
     num_not_relocated: int
 
-    @property
-    def num_first(self) -> int:
-        """Successes of stage 1, which is in neither stratum."""
-        return self.num_all - self.num_relocated - self.num_not_relocated
+    def num_successes(self, split: str = "all") -> int:
+        """Return the successes in a split; stage 1 is in neither stratum."""
+        moved, unmoved = self.num_relocated, self.num_not_relocated
+        counts = {"all": self.num_all, "relocated": moved, "not_relocated": unmoved}
+        return counts.get(split, self.num_all - moved - unmoved)
+
+    def sr(self, split: str = "all") -> float:
+        """Return the success rate in a split."""
+        return self.num_successes(split) / NUM_STAGES[split]
 
 
 PAPER: dict[Perception, dict[str, PaperResult]] = {
@@ -77,17 +82,17 @@ def paper_tables(run: Run, perception: Perception = "gt") -> list[Table]:
 
 def power_table(pairs: Sequence[AgentPair], perception: Perception = "gt") -> Table:
     """Show whether the paper's SR differences could be found on its houses, if they vary as ours do."""
-    paper = PAPER[perception]
+    paper, num_houses = PAPER[perception], NUM_STAGES["stage_1"]
     rows = []
     for pair in pairs:
         if pair.a not in paper or pair.b not in paper or pair.sr.ci95 is None:
             continue
         width = pair.sr.ci95[1] - pair.sr.ci95[0]
-        gap = (paper[pair.b].num_all - paper[pair.a].num_all) / NUM_STAGES
-        error = width / (2 * Z_95) * math.sqrt(pair.sr.num_clusters / NUM_FIRST)
+        gap = paper[pair.b].sr() - paper[pair.a].sr()
+        error = width / (2 * Z_95) * math.sqrt(pair.sr.num_clusters / num_houses)
         chance = power(gap, error)
         least = DETECTABLE_Z * error
-        needed = "–" if gap == 0 else f"{math.ceil(NUM_FIRST * (least / gap) ** 2)}"
+        needed = "–" if gap == 0 else f"{math.ceil(num_houses * (least / gap) ** 2)}"
         rows.append(
             (
                 f"{pair.b} less {pair.a}",
@@ -100,48 +105,39 @@ def power_table(pairs: Sequence[AgentPair], perception: Perception = "gt") -> Ta
         )
     columns = ("Agents", "SR, paper", "95% interval", "detectable", "power", "houses for 80%")
     notes = (
-        f"Percentage points. Interval and detectable difference of {NUM_FIRST} houses, {NUM_STAGES} stages, if paired "
-        "outcomes vary from house to house as in this run; the paper does not give its pairs. Power: the chance that "
-        "such an experiment finds a true difference as large as the paper's, at 5%, two-sided, no adjustment for "
+        f"Percentage points. Interval and detectable difference of {num_houses} houses, {NUM_STAGES['all']} stages, if "
+        "paired outcomes vary from house to house as in this run; the paper does not give its pairs. Power: the chance "
+        "that such an experiment finds a true difference as large as the paper's, at 5%, two-sided, no adjustment for "
         "several pairs. Houses: how many would find it four times in five.",
     )
     return Table("What the paper's differences could tell", columns, tuple(rows), notes)
 
 
 def _main_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
-    rows = []
-    for s in summaries:
-        known = paper.get(s.agent)
-        rows.append(
-            (
-                s.agent,
-                NONE if known is None else _of(known.num_all, NUM_STAGES),
-                percent(s.sr, s.sr_ci95),
-                NONE if known is None else f"{100 * known.spl:.1f}",
-                percent(s.spl, s.spl_ci95),
-                f"{s.n} of {s.num_stages}" if s.is_incomplete else str(s.n),
-            )
+    rows = tuple(
+        (
+            s.agent,
+            _theirs(paper.get(s.agent)),
+            percent(s.sr, s.sr_ci95),
+            percent(paper[s.agent].spl) if s.agent in paper else NONE,
+            percent(s.spl, s.spl_ci95),
+            f"{s.n} of {s.num_stages}" if s.is_incomplete else str(s.n),
         )
+        for s in summaries
+    )
     columns = ("Agent", "SR % paper", "SR % ours", "SPL % paper", "SPL % ours", "n ours")
-    return Table("Table 1: all stages", columns, tuple(rows), (f"Paper: n = {NUM_STAGES}.", _PAPER_NOTE, _OURS_NOTE))
+    notes = (f"Paper: n = {NUM_STAGES['all']}.", _PAPER_NOTE, _OURS_NOTE)
+    return Table("Table 1: all stages", columns, rows, notes)
 
 
 def _relocation_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
     rows = []
     for s in summaries:
-        known = paper.get(s.agent)
-        moved, unmoved = _split(s, "relocated"), _split(s, "not_relocated")
-        rows.append(
-            (
-                s.agent,
-                NONE if known is None else _of(known.num_relocated, NUM_RELOCATED),
-                _ours(moved),
-                NONE if known is None else _of(known.num_not_relocated, NUM_NOT_RELOCATED),
-                _ours(unmoved),
-                _gap(known),
-                NONE if moved.sr is None or unmoved.sr is None else f"{100 * (moved.sr - unmoved.sr):+.1f}",
-            )
-        )
+        known, moved, unmoved = paper.get(s.agent), s.rates("relocated").sr, s.rates("not_relocated").sr
+        gap = None if known is None else known.sr("relocated") - known.sr("not_relocated")
+        ours = None if moved is None or unmoved is None else moved - unmoved
+        cells = [cell for split in ("relocated", "not_relocated") for cell in (_theirs(known, split), _ours(s, split))]
+        rows.append((s.agent, *cells, *(number(value, scale=100, is_signed=True) for value in (gap, ours))))
     columns = (
         "Agent",
         "relocated, paper",
@@ -152,43 +148,36 @@ def _relocation_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperR
         "gap, ours",
     )
     note = (
-        f"SR %. Relocated: the target had ever moved since stage 1; paper n = {NUM_RELOCATED} and "
-        f"{NUM_NOT_RELOCATED}. Gap: relocated less not relocated, percentage points."
+        f"SR %. Relocated: the target had ever moved since stage 1; paper n = {NUM_STAGES['relocated']} and "
+        f"{NUM_STAGES['not_relocated']}. Gap: relocated less not relocated, percentage points."
     )
     return Table("Table 2: relocated and not relocated targets", columns, tuple(rows), (note,))
 
 
 def _first_stage_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
-    rows = []
-    for s in summaries:
-        known = paper.get(s.agent)
-        rows.append((s.agent, NONE if known is None else _of(known.num_first, NUM_FIRST), _ours(_split(s, "stage_1"))))
+    rows = tuple((s.agent, _theirs(paper.get(s.agent), "stage_1"), _ours(s, "stage_1")) for s in summaries)
     note = (
-        f"SR %. The paper does not print it: its overall counts less those of its strata (n = {NUM_FIRST}). fu and "
-        "stage-reset are the same program at stage 1, and ftu adds a look on arrival: how far these three lie apart is "
-        "the paper's noise."
+        "SR %. The paper does not print it: its overall counts less those of its strata (n = "
+        f"{NUM_STAGES['stage_1']}). fu and stage-reset are the same program at stage 1, and ftu adds a look on "
+        "arrival: how far these three lie apart is the paper's noise."
     )
-    return Table("Stage 1", ("Agent", "paper, decoded", "ours"), tuple(rows), (note,))
+    return Table("Stage 1", ("Agent", "paper, decoded", "ours"), rows, (note,))
 
 
 def _order_table(summaries: Sequence[AgentSummary], paper: dict[str, PaperResult]) -> Table:
     agents = [s for s in summaries if s.agent in paper and s.sr is not None]
-    ours = {
-        "SR": {s.agent: s.sr for s in agents},
-        "SPL": {s.agent: s.spl for s in agents},
-        "SR, relocated": {s.agent: _split(s, "relocated").sr for s in agents},
-        "SR, not relocated": {s.agent: _split(s, "not_relocated").sr for s in agents},
-        "SR, stage 1": {s.agent: _split(s, "stage_1").sr for s in agents},
-    }
-    theirs = {
-        "SR": {s.agent: float(paper[s.agent].num_all) for s in agents},
-        "SPL": {s.agent: paper[s.agent].spl for s in agents},
-        "SR, relocated": {s.agent: float(paper[s.agent].num_relocated) for s in agents},
-        "SR, not relocated": {s.agent: float(paper[s.agent].num_not_relocated) for s in agents},
-        "SR, stage 1": {s.agent: float(paper[s.agent].num_first) for s in agents},
-    }
-    rows = tuple((name, order(theirs[name]), order(values)) for name, values in ours.items())
-    return Table("Order of the agents", ("Measure", "paper", "ours"), rows, ("Best first; = for equal rates.",))
+    splits = {"SR, relocated": "relocated", "SR, not relocated": "not_relocated", "SR, stage 1": "stage_1"}
+    rows = [
+        (
+            name,
+            order({s.agent: paper[s.agent].num_successes(split) for s in agents}),
+            order({s.agent: s.rates(split).sr for s in agents}),
+        )
+        for name, split in {"SR": "all", **splits}.items()
+    ]
+    spl = order({s.agent: paper[s.agent].spl for s in agents}), order({s.agent: s.spl for s in agents})
+    rows.insert(1, ("SPL", *spl))
+    return Table("Order of the agents", ("Measure", "paper", "ours"), tuple(rows), ("Best first; = for equal rates.",))
 
 
 def order(values: Mapping[str, float | None]) -> str:
@@ -206,7 +195,7 @@ def _difference_table(pairs: Sequence[AgentPair], paper: dict[str, PaperResult])
     for pair in pairs:
         if pair.a not in paper or pair.b not in paper:
             continue
-        theirs = (paper[pair.b].num_all - paper[pair.a].num_all) / NUM_STAGES
+        theirs = paper[pair.b].sr() - paper[pair.a].sr()
         ends = pair.sr.ci95
         rows.append(
             (
@@ -234,19 +223,12 @@ def _difference_table(pairs: Sequence[AgentPair], paper: dict[str, PaperResult])
     return Table("Differences between agents", columns, tuple(rows), (note,))
 
 
-def _split(summary: AgentSummary, name: str) -> Rates:
-    return summary.splits.get(name, Rates(n=0, sr=None, spl=None))
-
-
-def _ours(part: Rates) -> str:
-    return NONE if part.sr is None else f"{percent(part.sr, part.sr_ci95)}, n = {part.n}"
-
-
-def _of(successes: int, n: int) -> str:
-    return percent(successes / n, wilson(successes, n))
-
-
-def _gap(known: PaperResult | None) -> str:
+def _theirs(known: PaperResult | None, split: str = "all") -> str:
     if known is None:
         return NONE
-    return f"{100 * (known.num_relocated / NUM_RELOCATED - known.num_not_relocated / NUM_NOT_RELOCATED):+.1f}"
+    return percent(known.sr(split), wilson(known.num_successes(split), NUM_STAGES[split]))
+
+
+def _ours(summary: AgentSummary, split: str) -> str:
+    part = summary.rates(split)
+    return NONE if part.sr is None else f"{percent(part.sr, part.sr_ci95)}, n = {part.n}"

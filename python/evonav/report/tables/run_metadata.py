@@ -4,7 +4,6 @@ import json
 import shlex
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
 from statistics import fmean
 from typing import Any
 
@@ -17,22 +16,12 @@ MAX_LISTED = 12
 _DEFAULT_PARTS = {"decision": "text_match", "simulator": "embedded_simulator"}
 
 
-@dataclass(frozen=True, slots=True)
-class FailureGroup:
-    """Errored stages with the same error."""
+def failure_groups(run: Run) -> list[dict[str, Any]]:
+    """Group errored stages by error, the most frequent first.
 
-    kind: str
-    message: str
-    traceback: str
-    """Traceback of the first of them, where there is one."""
-    agents: tuple[str, ...]
-    stages: tuple[tuple[str, str, int], ...]
-    """Agent, task and stage of the first `MAX_LISTED`."""
-    num_stages: int
-
-
-def failure_groups(run: Run) -> list[FailureGroup]:
-    """Errored stages by error, the most frequent first."""
+    Each group has its `kind` and `message`, the `traceback` of its first stage that has one, its `agents` and
+    `num_stages`, and agent, task and stage of the first `MAX_LISTED` `stages`.
+    """
     found: dict[tuple[str, str], list[tuple[str, str, int]]] = {}
     tracebacks = {(failure.agent, failure.task_id, failure.stage): failure.traceback for failure in run.failures}
     for key, outcome in run.outcomes.items():
@@ -40,18 +29,17 @@ def failure_groups(run: Run) -> list[FailureGroup]:
         if error is not None and outcome.record.state is EndState.ERRORED:
             which = (error.kind.value.replace("_", " "), error.message)
             found.setdefault(which, []).append(key)
-    groups = [
-        FailureGroup(
-            kind=kind,
-            message=message,
-            traceback=next((text for key in stages if (text := tracebacks.get(key))), ""),
-            agents=tuple(dict.fromkeys(agent for agent, _, _ in stages)),
-            stages=tuple(stages[:MAX_LISTED]),
-            num_stages=len(stages),
-        )
-        for (kind, message), stages in found.items()
+    return [
+        {
+            "kind": kind,
+            "message": message,
+            "traceback": next((text for key in stages if (text := tracebacks.get(key))), ""),
+            "agents": tuple(dict.fromkeys(agent for agent, _, _ in stages)),
+            "stages": stages[:MAX_LISTED],
+            "num_stages": len(stages),
+        }
+        for (kind, message), stages in sorted(found.items(), key=lambda group: -len(group[1]))
     ]
-    return sorted(groups, key=lambda group: -group.num_stages)
 
 
 def reproduction(run: Run) -> list[str]:

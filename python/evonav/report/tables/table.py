@@ -256,11 +256,11 @@ def summary_csv(summaries: Sequence[AgentSummary]) -> str:
     """Return every metric, unrounded: one CSV row per agent and split."""
     rows: list[list[object]] = []
     for s in summaries:
-        overall = Rates(s.n, s.sr, s.spl, s.sr_ci95, s.spl_ci95, s.sr_wilson95)
         counts = [s.counts.get(state, 0) for state in ("success", "failure", "errored", "not_run")]
-        for name, part in {"all": overall, **s.splits}.items():
+        for name in ("all", *s.splits):
+            part = s.rates(name)
             ends = (*(part.sr_ci95 or (None, None)), *(part.sr_wilson95 or (None, None)))
-            totals = [s.soft_spl, *counts, s.num_stages, s.num_tasks] if part is overall else [None] * 7
+            totals = [s.soft_spl, *counts, s.num_stages, s.num_tasks] if name == "all" else [None] * 7
             shown = [part.n, part.sr, *ends, part.spl, *(part.spl_ci95 or (None, None))]
             rows.append([s.agent, name, *shown, *totals, s.is_incomplete])
     return csv_text(_CSV_COLUMNS, rows)
@@ -268,8 +268,7 @@ def summary_csv(summaries: Sequence[AgentSummary]) -> str:
 
 def _split_table(title: str, summaries: Sequence[AgentSummary], names: Sequence[str], notes: tuple[str, ...]) -> Table:
     names = [name for name in names if any(name in summary.splits for summary in summaries)]
-    empty = Rates(n=0, sr=None, spl=None)
-    cells = {s.agent: [s.splits.get(name, empty) for name in names] for s in summaries}
+    cells = {s.agent: [s.rates(name) for name in names] for s in summaries}
     return _rates_table(title, [SPLIT_TITLES[name] for name in names], cells, notes)
 
 
