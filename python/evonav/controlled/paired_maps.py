@@ -145,9 +145,10 @@ def _panel(rollout: Rollout, frame: Frame, map_px: int, left_px: int) -> str:
     why = text_lines(sentence(record), 90, 1)[0]
     changed = text_lines(change_sentence(rollout), 90, 1)[0]
     css = "quiet" if record.transition.kind == "static" else "change-words"
+    drawing = house_drawing(record, rollout.maps, frame) + walk_and_course(rollout, frame)
     return (
         f'<g transform="translate({left_px} {HEAD_PX})"><svg width="{PANEL_PX}" height="{map_px}" '
-        f'viewBox="{frame.view_box}">{house_drawing(record, rollout.maps, frame)}{walk_and_course(rollout, frame)}</svg>'
+        f'viewBox="{frame.view_box}">{drawing}</svg>'
         f'<text class="verdict" y="{map_px + 18}"><tspan class="ink">{arm_words(rollout.arm)}</tspan> '
         f'<tspan class="{verdict}">{escape(outcome_words(record))}</tspan></text>'
         f'<text class="quiet" y="{map_px + 34}">{escape(why)}</text>'

@@ -33,6 +33,6 @@ def _arm_plot(analysis: Analysis, name: str, measure: Measure) -> BarPlot:
 
 def _rate_plot(analysis: Analysis, name: str, measure: Measure) -> CurvePlot:
     found = {agent: by_rate(analysis, agent, measure) for agent in analysis.agents}
-    lines = [Line.of(agent, means) for agent, means in found.items() if means]
+    lines = [Line.of(agent, by_arm) for agent, by_arm in found.items() if by_arm]
     x_label = "probability that a transition evolves the house"
     return CurvePlot(f"{name} by evolution rate", tuple(lines), x_label, f"{name}, %")

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def compare(
-    sides: Annotated[
+    runs: Annotated[
         list[str],
         typer.Argument(help="Runs or sweeps (all agents), RUN:AGENT, or a run followed by names of its agents."),
     ],
@@ -38,11 +38,11 @@ def compare(
     from rich.console import Console
 
     from evonav.report.compare import wording
-    from evonav.report.compare.compare import compare as compare_sides
+    from evonav.report.compare.compare import compare as compare_agents
     from evonav.report.compare.selection import read_compared_agents
 
-    found = compare_sides(
-        read_compared_agents(sides), measures=measure or [], baseline=baseline, allow_differences=allow_differences
+    found = compare_agents(
+        read_compared_agents(runs), measures=measure or [], baseline=baseline, allow_differences=allow_differences
     )
     console = Console()
     for table in wording.terminal_tables(found):

@@ -44,11 +44,11 @@ def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, 
         defs.append(_shared(f"{prefix}f{stage}", item_labels(items, frame)))
     stages = range(1, task.num_stages + 1)
 
-    def cell(agent: str, stage: int) -> dict[str, Any]:
+    def cell_of(agent: str, stage: int) -> dict[str, Any]:
         record = task.records.get((agent, stage))
         if record is None:
-            words = {"outcome": "no record yet", "sentence": "This stage has no record yet."}
-            return {"state": "not_run", **words, "facts": "", "rounds": [], "svg": "", "href": None}
+            cell = {"state": "not_run", "outcome": "no record yet", "sentence": "This stage has no record yet."}
+            return {**cell, "facts": "", "rounds": [], "svg": "", "href": None}
         below = _uses(prefix, stage) if stage in task.maps else change(record, task.maps, frame)
         name = clean(f"Map of stage {stage} for {agent}")
         opening = Markup('<svg class="map" viewBox="{}" role="img" aria-label="{}">').format(frame.view_box, name)
@@ -75,7 +75,7 @@ def task_view(run: Run, task: Task, prefix: str, hrefs: Mapping[tuple[str, str, 
         "num_rooms": len(shared[0].rooms) if shared else 0,
         "defs": Markup(join(defs)),  # noqa: S704 - our own SVG
         "goals": goals,
-        "rows": [(agent, [cell(agent, stage) for stage in stages]) for agent in run.agents],
+        "rows": [(agent, [cell_of(agent, stage) for stage in stages]) for agent in run.agents],
         "data": filter_data(run, task.task_id),
     }
 
