@@ -5,12 +5,6 @@ client (`transport`). Angles are in degrees in this package and in radians every
 """
 
 import shlex
-import shutil
-import sys
-import sysconfig
-from pathlib import Path
-
-from evonav.errors import SimulationError
 
 __all__ = ["executable"]
 
@@ -21,11 +15,7 @@ def executable() -> str:
     Raises:
         SimulationError: The program is not installed.
     """
-    folders = (Path(sys.executable).parent, Path(sysconfig.get_path("scripts")))
-    found = next((str(f / "evonav-thor") for f in folders if (f / "evonav-thor").is_file()), None)
-    found = found or shutil.which("evonav-thor")
-    if found is None:
-        places = ", ".join(dict.fromkeys(str(folder) for folder in folders))
-        raise SimulationError(f"evonav-thor is neither in {places} nor on the PATH: install evonav there")
+    from evonav.world.ai2thor_startup import own_engine  # the engine's own process must start without NumPy
+
     # The client splits the path like a shell.
-    return shlex.quote(found)
+    return shlex.quote(str(own_engine()))

@@ -15,7 +15,7 @@ from evonav.world.ai2thor_events import InstanceDecoder, depth_of, rgb_of, with_
 from evonav.world.ai2thor_startup import Ai2ThorOptions, ProcessLog, lost, start_controller
 from evonav.world.embedded import EmbeddedSimulator, nearest_of
 from evonav.world.pose import Pose
-from evonav.world.simulator import Action, Frame, Intrinsics, OccupancyGrid, SceneObject, SimulatorConfig
+from evonav.world.simulator import Action, Frame, OccupancyGrid, SceneObject, SimulatorConfig
 
 if TYPE_CHECKING:
     from evonav.world.ai2thor_process import GuardedController
@@ -64,9 +64,7 @@ class Ai2ThorSimulator:
         for name, value in _BODY.items():
             if (requested := getattr(self.config, name)) != value:
                 raise InvalidArgumentError(f"{name} = {requested}: AI2-THOR's default agent has {value}")
-        self.intrinsics = Intrinsics(
-            self.config.width_px, self.config.height_px, math.radians(self.config.vertical_fov_deg)
-        )
+        self.intrinsics = self.config.intrinsics
         self._controller: GuardedController | None = None
         self._log: ProcessLog | None = None
         # The embedded simulator's reading of the house: its bodies, its start, the place of its map.
@@ -75,7 +73,7 @@ class Ai2ThorSimulator:
         self._objects: tuple[SceneObject, ...] = ()
         self._decoder = InstanceDecoder(())
         self._occupancy: OccupancyGrid | None = None
-        self._start = self._pose = self._placed = Pose(0.0, self._body_y_m, 0.0, 0.0)
+        self._start = self._pose = self._placed = self.config.standing(Pose(0.0, 0.0, 0.0, 0.0))
         # `_pose` is the agent's pose for evonav, `_placed` its pose in AI2-THOR: rendering elsewhere changes only the
         # latter.
 
@@ -141,30 +139,21 @@ class Ai2ThorSimulator:
         if action is Action.STOP:
             return True
         self._place(self._pose)
-        pose, turn_deg = self._pose, self.config.turn_deg
-        if action is Action.MOVE_FORWARD:
-            event = self._do("MoveAhead", moveMagnitude=self.config.move_m)
-            requested = replace(
-                pose,
-                x_m=pose.x_m + self.config.move_m * math.sin(pose.yaw_rad),
-                z_m=pose.z_m + self.config.move_m * math.cos(pose.yaw_rad),
-            )
-        elif action is Action.TURN_RIGHT:
-            event = self._do("RotateRight", degrees=turn_deg)
-            requested = replace(pose, yaw_rad=pose.yaw_rad + math.radians(turn_deg)).canonical()
-        else:
-            event = self._do("RotateLeft", degrees=turn_deg)
-            requested = replace(pose, yaw_rad=pose.yaw_rad - math.radians(turn_deg)).canonical()
+        commands: dict[Action, tuple[str, dict[str, Any]]] = {
+            Action.MOVE_FORWARD: ("MoveAhead", {"moveMagnitude": self.config.move_m}),
+            Action.TURN_RIGHT: ("RotateRight", {"degrees": self.config.turn_deg}),
+            Action.TURN_LEFT: ("RotateLeft", {"degrees": self.config.turn_deg}),
+        }
+        command, amount = commands[action]
+        event = self._do(command, **amount)
         if not event.metadata["lastActionSuccess"]:
             return False
-        self._pose = self._placed = self._adopted(requested, event)
+        self._pose = self._placed = self._adopted(self.config.stepped(self._pose, action), event)
         return True
 
     def teleport(self, pose: Pose) -> bool:
         """Set the pose; `False`, and the pose unchanged, when the agent does not fit there."""
-        if not all(map(math.isfinite, (*pose.position_m, pose.yaw_rad, pose.horizon_rad))):
-            return False
-        if not self._try_place(self._standing(pose)):
+        if not pose.is_finite or not self._try_place(self.config.standing(pose)):
             return False
         self._pose = self._placed
         return True
@@ -179,12 +168,11 @@ class Ai2ThorSimulator:
             InvalidArgumentError: The pose is not finite.
             SimulationError: AI2-THOR refuses the pose.
         """
-        at = self._standing(pose or self._pose)
-        if not all(map(math.isfinite, (at.x_m, at.z_m, at.yaw_rad, at.horizon_rad))):
+        at = self.config.standing(pose or self._pose)
+        if not at.is_finite:
             raise InvalidArgumentError(f"pose = {at}: must be finite")
         event = self._teleported(at, by_force=True, is_rendered=True)
-        seen = self._placed
-        camera = Pose(seen.x_m, self.config.camera_height_m, seen.z_m, seen.yaw_rad, seen.horizon_rad)
+        camera = replace(self._placed, y_m=self.config.camera_height_m)
         depth_m = depth_of(event, self._far_m)
         frame = Frame(camera, self.intrinsics, depth_m, rgb_of(event) if rgb else None)
         return replace(frame, instances=self._decoder.decode(event, frame)) if instances else frame
@@ -192,10 +180,7 @@ class Ai2ThorSimulator:
     def reachable_positions(self) -> NDArray[np.float64]:
         """Return the `(N, 3)` positions of the square grid through the agent that it can reach there, by z, then x."""
         self._place(self._pose)
-        points_m = self._reachable(self._pose, self.config.grid_m)
-        raised = np.full((len(points_m), 3), self._body_y_m)
-        raised[:, [0, 2]] = points_m
-        return raised
+        return self.config.on_floor(self._reachable(self._pose, self.config.grid_m))
 
     def nearest_reachable_position(self, position_m: _Position) -> _Position:
         """Return the reachable position nearest on the ground plane."""
@@ -221,7 +206,7 @@ class Ai2ThorSimulator:
         if not event.metadata["lastActionSuccess"]:
             return np.empty((0, 3))
         corners = event.metadata["actionReturn"]["corners"]
-        return np.array([[c["x"], self._body_y_m, c["z"]] for c in corners], dtype=np.float64).reshape(-1, 3)
+        return self.config.on_floor(np.array([(corner["x"], corner["z"]) for corner in corners]))
 
     def occupancy(self) -> OccupancyGrid:
         """Return the oracle occupancy: a cell is free if the agent reaches its centre along the grid of cell centres.
@@ -241,10 +226,6 @@ class Ai2ThorSimulator:
         self._controller = self._log = None
         self._is_loaded = False
         self._reading.close()
-
-    @property
-    def _body_y_m(self) -> float:
-        return self.config.agent_height_m / 2
 
     @property
     def _far_m(self) -> float:
@@ -318,11 +299,11 @@ class Ai2ThorSimulator:
             and abs(math.remainder(yaw_deg - requested.yaw_deg, 360.0)) < _SAME_DEG
             and abs(horizon_deg - requested.horizon_deg) < _SAME_DEG
         )
-        return requested if is_same else Pose.of_degrees(x_m, self._body_y_m, z_m, yaw_deg, horizon_deg)
+        return requested if is_same else self.config.standing(Pose.of_degrees(x_m, 0.0, z_m, yaw_deg, horizon_deg))
 
     def _enter(self, start: Pose) -> None:
         """Put the agent at the house's start, or at the nearest place that AI2-THOR accepts."""
-        start = self._standing(start)
+        start = self.config.standing(start)
         if not self._try_place(start):
             self._teleported(start, by_force=True)
             points_m = self._reachable(start, self.config.grid_m)
@@ -373,9 +354,6 @@ class Ai2ThorSimulator:
         order = np.argsort(squared_m2, axis=None, kind="stable")
         for index in order[: int((squared_m2 <= _SNAP_M**2).sum())]:
             yield replace(self._start, x_m=float(x_m.flat[index]), z_m=float(z_m.flat[index]))
-
-    def _standing(self, pose: Pose) -> Pose:
-        return Pose(pose.x_m, self._body_y_m, pose.z_m, pose.yaw_rad, pose.horizon_rad).canonical()
 
     def _vector(self, position_m: _Position) -> dict[str, float]:
         """Return a position for the wire, where the agent's height is always AI2-THOR's own."""

@@ -4,7 +4,9 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import sys
+import sysconfig
 import time
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,7 +15,6 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal
 
 from evonav.errors import InvalidArgumentError, SimulationError, SimulatorLostError
-from evonav.world.ai2thor_errors import ProcessEndedError
 from evonav.world.simulator import SimulatorConfig
 
 if TYPE_CHECKING:
@@ -68,6 +69,20 @@ class Ai2ThorOptions:
             )
         if self.executable is not None and self.commit_id is not None:
             raise InvalidArgumentError("executable and commit_id: give one, an executable is a build already")
+
+
+class ProcessEndedError(Exception):
+    """The process ended, or broke the protocol; the message continues `AI2-THOR's process`."""
+
+    @staticmethod
+    def of(returncode: int | None) -> "ProcessEndedError":
+        """Return the error for an exit status; `None` if the process still runs without its pipe."""
+        if returncode is None:
+            return ProcessEndedError("hung up")
+        if returncode < 0:
+            with suppress(ValueError):
+                return ProcessEndedError(f"was killed by {signal.Signals(-returncode).name}")
+        return ProcessEndedError(f"ended with exit code {returncode}")
 
 
 class ProcessLog:
@@ -175,13 +190,24 @@ def _logged(tail: str) -> str:
     return f". The end of its log:\n{tail}" if tail else "; it logged nothing"
 
 
+def own_engine() -> Path:
+    """Return the program of evonav's engine.
+
+    Raises:
+        SimulationError: It is not installed.
+    """
+    folders = (Path(sys.executable).parent, Path(sysconfig.get_path("scripts")))
+    found = next((str(f / "evonav-thor") for f in folders if (f / "evonav-thor").is_file()), None)
+    found = found or shutil.which("evonav-thor")
+    if found is None:
+        places = ", ".join(dict.fromkeys(str(folder) for folder in folders))
+        raise SimulationError(f"evonav-thor is neither in {places} nor on the PATH: install evonav there")
+    return Path(found)
+
+
 def _executable(named: str) -> Path:
     if named == OWN_ENGINE:
-        beside = Path(sys.executable).with_name("evonav-thor")
-        found = str(beside) if beside.is_file() else shutil.which("evonav-thor")
-        if found is None:
-            raise SimulationError("evonav's engine `evonav-thor` is not on PATH: reinstall evonav")
-        return Path(found)
+        return own_engine()
     path = Path(named).expanduser().resolve()
     if not path.exists():
         raise SimulationError(f"{path}: no such executable of AI2-THOR; `{OWN_ENGINE}` names evonav's own engine")

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evonav.errors import SimulationError
+from evonav.world.camera import unproject
 from evonav.world.pose import Pose
 from evonav.world.simulator import Action, Frame, Simulator
 
@@ -198,22 +199,7 @@ def _count_outside_boxes(simulator: Simulator, frame: Frame) -> tuple[int, int]:
     if frame.instances is None:
         return 0, 0
     rows, cols = np.nonzero(frame.instances)
-    depth_m = frame.depth_m[rows, cols].astype(np.float64)
-    focal_px = frame.intrinsics.focal_px
-    right = (cols + 0.5 - frame.intrinsics.width_px / 2) / focal_px
-    down = (rows + 0.5 - frame.intrinsics.height_px / 2) / focal_px
-    pitch_rad, yaw_rad = frame.pose.horizon_rad, frame.pose.yaw_rad
-    level = math.cos(pitch_rad) - down * math.sin(pitch_rad)
-    up = -math.sin(pitch_rad) - down * math.cos(pitch_rad)
-    rays = np.stack(
-        [
-            level * math.sin(yaw_rad) + right * math.cos(yaw_rad),
-            up,
-            level * math.cos(yaw_rad) - right * math.sin(yaw_rad),
-        ],
-        axis=1,
-    )
-    points_m = np.asarray(frame.pose.position_m) + rays * depth_m[:, None]
+    points_m = unproject(frame.depth_m, frame.pose, frame.intrinsics)[rows, cols]
     indices = frame.instances[rows, cols] - 1
     centres_m = np.array([o.centre_m for o in simulator.objects])[indices]
     reach_m = np.array([o.size_m for o in simulator.objects])[indices] / 2 + _BOX_SLACK_M

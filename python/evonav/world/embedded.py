@@ -1,8 +1,8 @@
 """Simulate AI2-THOR's agent in a ProcTHOR house with the Rust core, without Unity."""
 
 import json
-import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from evonav import _core
 from evonav.errors import SimulationError
 from evonav.world.camera import CameraView, Images
 from evonav.world.pose import Pose
-from evonav.world.simulator import Action, Frame, Intrinsics, OccupancyGrid, SceneObject, SimulatorConfig
+from evonav.world.simulator import Action, Frame, OccupancyGrid, SceneObject, SimulatorConfig
 
 _Position = tuple[float, float, float]
 
@@ -40,12 +40,10 @@ class EmbeddedSimulator:
         """
         self.config = config or SimulatorConfig()
         self.allow_unknown_assets = allow_unknown_assets
-        self.intrinsics = Intrinsics(
-            self.config.width_px, self.config.height_px, math.radians(self.config.vertical_fov_deg)
-        )
+        self.intrinsics = self.config.intrinsics
         self._loaded: _core.EmbeddedSimulator | None = None
         self._house_name = "house"
-        self._pose = Pose(0.0, self._body_y_m, 0.0, 0.0)
+        self._pose = self.config.standing(Pose(0.0, 0.0, 0.0, 0.0))
         self._objects: tuple[SceneObject, ...] | None = None
 
     def reset(self, house_json: str, pose: Pose | None = None, *, name: str = "house") -> Pose:
@@ -146,24 +144,18 @@ class EmbeddedSimulator:
 
     def step(self, action: Action) -> bool:
         """Execute one discrete action; `False`, and the pose unchanged, when it collides. `STOP` does nothing."""
-        pose, turn_rad = self._pose, math.radians(self.config.turn_deg)
-        if action is Action.TURN_LEFT:
-            self._pose = _turned(pose, -turn_rad)
-        elif action is Action.TURN_RIGHT:
-            self._pose = _turned(pose, turn_rad)
-        elif action is Action.MOVE_FORWARD:
-            x_m = pose.x_m + self.config.move_m * math.sin(pose.yaw_rad)
-            z_m = pose.z_m + self.config.move_m * math.cos(pose.yaw_rad)
-            if not self._world.can_move((pose.x_m, pose.z_m), (x_m, z_m)):
-                return False
-            self._pose = self._standing(pose, x_m, z_m)
+        requested = self.config.stepped(self._pose, action)
+        if action is Action.MOVE_FORWARD and not self._world.can_move(_on_ground(self._pose), _on_ground(requested)):
+            return False
+        if action is not Action.STOP:
+            self._pose = requested
         return True
 
     def teleport(self, pose: Pose) -> bool:
         """Set the pose; `False`, and the pose unchanged, when the agent does not fit there."""
-        if not _is_finite(pose) or not self._world.is_free((pose.x_m, pose.z_m)):
+        if not pose.is_finite or not self._world.is_free(_on_ground(pose)):
             return False
-        self._pose = self._standing(pose, pose.x_m, pose.z_m)
+        self._pose = self.config.standing(pose)
         return True
 
     def render(self, pose: Pose | None = None, *, rgb: bool = True, instances: bool = True) -> Frame:
@@ -176,8 +168,7 @@ class EmbeddedSimulator:
         depth_m, colours, ids = self._world.render(
             at.position_m, at.yaw_rad, at.horizon_rad, rgb=rgb, instances=instances
         )
-        camera = Pose(at.x_m, self.config.camera_height_m, at.z_m, at.yaw_rad, at.horizon_rad)
-        return Frame(camera, self.intrinsics, depth_m, colours, ids)
+        return Frame(replace(at, y_m=self.config.camera_height_m), self.intrinsics, depth_m, colours, ids)
 
     def render_camera(self, view: CameraView, *, rgb: bool = True, instances: bool = True) -> Images:
         """Render any camera; ceilings are seen from below only, so views from above show the rooms.
@@ -228,19 +219,17 @@ class EmbeddedSimulator:
             horizon_rad=view.pose.horizon_rad,
             roll_rad=view.roll_rad,
             half_height_m=view.orthographic_half_height_m,
-            agent_m=agent_m or (view.pose.x_m, view.pose.z_m),
+            agent_m=agent_m or _on_ground(view.pose),
             max_distance_m=max_distance_m,
         )
 
     def reachable_positions(self) -> NDArray[np.float64]:
         """Return the `(N, 3)` positions of the square grid through the agent that it can reach there."""
-        points_m = self._world.reachable_positions((self._pose.x_m, self._pose.z_m), self.config.grid_m)
-        return self._raised(points_m)
+        return self.config.on_floor(self._world.reachable_positions(_on_ground(self._pose), self.config.grid_m))
 
     def nearest_reachable_position(self, position_m: _Position) -> _Position:
         """Return the reachable position nearest on the ground plane."""
-        reachable_m = self.reachable_positions()
-        return nearest_of(reachable_m, position_m)
+        return nearest_of(self.reachable_positions(), position_m)
 
     def is_free(self, position_m: _Position) -> bool:
         """Return whether the agent's body fits at the position and can move there from the house's start."""
@@ -261,7 +250,7 @@ class EmbeddedSimulator:
 
     def shortest_path(self, start_m: _Position, target_m: _Position) -> NDArray[np.float64]:
         """Return the geodesic's `(M, 3)` corners, `(0, 3)` without one; both ends move to the nearest free point."""
-        return self._raised(self._world.shortest_path((start_m[0], start_m[2]), (target_m[0], target_m[2])))
+        return self.config.on_floor(self._world.shortest_path((start_m[0], start_m[2]), (target_m[0], target_m[2])))
 
     def path_lengths_m(self, start_m: _Position, targets_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the geodesic distances from one position to many.
@@ -325,32 +314,16 @@ class EmbeddedSimulator:
             raise SimulationError("no house: call reset first")
         return self._loaded
 
-    @property
-    def _body_y_m(self) -> float:
-        return self.config.agent_height_m / 2
-
     def _enter(self, core: _core.EmbeddedSimulator, pose: Pose | None) -> Pose:
         self._loaded, self._objects = core, None
         start_m, yaw_rad, horizon_rad = core.start()
         self._pose = Pose(*start_m, yaw_rad=yaw_rad, horizon_rad=horizon_rad).canonical()
         if pose is not None:
-            x_m, z_m = pose.x_m, pose.z_m
-            if not core.is_reachable((x_m, z_m)):
+            if not core.is_reachable(_on_ground(pose)):
                 x_m, _, z_m = self.nearest_reachable_position(pose.position_m)
-            self._pose = self._standing(pose, x_m, z_m)
+                pose = replace(pose, x_m=x_m, z_m=z_m)
+            self._pose = self.config.standing(pose)
         return self._pose
-
-    def _standing(self, pose: Pose, x_m: float, z_m: float) -> Pose:
-        return Pose(x_m, self._body_y_m, z_m, pose.yaw_rad, pose.horizon_rad).canonical()
-
-    def _raised(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        raised = np.full((len(points_m), 3), self._body_y_m)
-        raised[:, [0, 2]] = points_m
-        return raised
-
-
-def _turned(pose: Pose, angle_rad: float) -> Pose:
-    return Pose(pose.x_m, pose.y_m, pose.z_m, pose.yaw_rad + angle_rad, pose.horizon_rad).canonical()
 
 
 def nearest_of(reachable_m: NDArray[np.float64], position_m: _Position) -> _Position:
@@ -362,5 +335,5 @@ def nearest_of(reachable_m: NDArray[np.float64], position_m: _Position) -> _Posi
     return (x_m, y_m, z_m)
 
 
-def _is_finite(pose: Pose) -> bool:
-    return all(math.isfinite(v) for v in (*pose.position_m, pose.yaw_rad, pose.horizon_rad))
+def _on_ground(pose: Pose) -> tuple[float, float]:
+    return (pose.x_m, pose.z_m)

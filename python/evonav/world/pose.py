@@ -31,6 +31,11 @@ class Pose:
         return (self.x_m, self.y_m, self.z_m)
 
     @property
+    def is_finite(self) -> bool:
+        """Whether no number is infinite or NaN."""
+        return all(map(math.isfinite, (*self.position_m, self.yaw_rad, self.horizon_rad)))
+
+    @property
     def yaw_deg(self) -> float:
         """Yaw in `[0, 360)`, rounded to 1e-4 degrees: the value for AI2-THOR."""
         return _round_deg(math.degrees(self.yaw_rad) % 360.0) % 360.0

@@ -1,7 +1,8 @@
 """The simulator protocol, which AI2-THOR and the embedded simulator implement."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Protocol
 
@@ -53,6 +54,27 @@ class SimulatorConfig:
     """Spacing of `reachable_positions`, in metres."""
     occupancy_cell_m: float = 0.1
     """Edge of a cell of the oracle occupancy, in metres."""
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """The camera's intrinsics."""
+        return Intrinsics(self.width_px, self.height_px, math.radians(self.vertical_fov_deg))
+
+    def standing(self, pose: Pose) -> Pose:
+        """Return a pose, its angles canonical, at the height of the middle of a standing body."""
+        return replace(pose, y_m=self.agent_height_m / 2).canonical()
+
+    def on_floor(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return `(N, 3)` positions of the agent at `(N, 2)` points, `(x, z)`."""
+        return np.insert(np.asarray(points_m, dtype=np.float64).reshape(-1, 2), 1, self.agent_height_m / 2, axis=1)
+
+    def stepped(self, pose: Pose, action: Action) -> Pose:
+        """Return the pose that an action leads to if nothing is in the way."""
+        if action is Action.MOVE_FORWARD:
+            x_m = pose.x_m + self.move_m * math.sin(pose.yaw_rad)
+            return replace(pose, x_m=x_m, z_m=pose.z_m + self.move_m * math.cos(pose.yaw_rad))
+        turn_rad = {Action.TURN_LEFT: -1.0, Action.TURN_RIGHT: 1.0}.get(action, 0.0) * math.radians(self.turn_deg)
+        return replace(pose, yaw_rad=pose.yaw_rad + turn_rad).canonical()
 
 
 @dataclass(frozen=True, slots=True)
