@@ -5,12 +5,8 @@ no NaN and no infinity, and keys that are not listed are forbidden. Problems tha
 contradict each other, checksums, physics) are found by `evonav tasks validate`.
 """
 
-import ast
-import inspect
 import json
-import textwrap
-from collections.abc import Iterator, Mapping
-from itertools import pairwise
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -42,10 +38,10 @@ def schema_of(name: str) -> dict[str, Any]:
         raise TaskError(f"schema {name!r}: expected one of {', '.join(MODELS)}")
     model = MODELS[name]
     schema = model.model_json_schema(mode="validation")
-    records = {record.__name__: record for record in _all_records(Record)}
-    for title, part in [(model.__name__, schema), *schema.get("$defs", {}).items()]:
-        for field, text in _documentation(records[title]):
-            part["properties"][field]["description"] = text
+    for part in (schema, *schema.get("$defs", {}).values()):
+        for field in part["properties"].values():
+            if "description" in field:
+                field["description"] = " ".join(field.pop("description").split())
     version = model.model_fields["schema_version"].default
     return {"$schema": DIALECT, "$id": f"urn:evonav:schema:{version}:{name}", **schema}
 
@@ -70,22 +66,3 @@ def write_schemas(directory: Path | str) -> list[Path]:
     except OSError as error:
         raise TaskError(f"{directory}: cannot be written: {error.strerror or error}") from error
     return paths
-
-
-def _all_records(record: type[Record]) -> Iterator[type[Record]]:
-    for one in record.__subclasses__():
-        yield one
-        yield from _all_records(one)
-
-
-def _documentation(record: type[Record]) -> Iterator[tuple[str, str]]:
-    """Yield the fields of a record with the documentation below them in the source."""
-    for base in record.__bases__:
-        if issubclass(base, Record):
-            yield from _documentation(base)
-    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
-    for field, below in pairwise(definition.body if isinstance(definition, ast.ClassDef) else []):
-        if not isinstance(field, ast.AnnAssign) or not isinstance(field.target, ast.Name):
-            continue
-        if isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) and isinstance(below.value.value, str):
-            yield field.target.id, " ".join(below.value.value.split())
