@@ -19,7 +19,6 @@ from evonav.generation.validation import KINDS, Report, validate_files, validate
 from evonav.house import bundled_houses
 from evonav.tasks import Task, load_task, write_task
 from evonav.tasks.dataset import DatasetRecord, entry_of, write_dataset
-from evonav.tasks.files import checksums_of
 from evonav.tasks.records import read_gzip, sha256_of, write_gzip
 
 
@@ -52,7 +51,7 @@ def signed(task: Task, root: Path) -> Path:
     )
     source = task.header.house.model_copy(update={"sha256": stages[0].house_sha256})
     task = dataclasses.replace(task, oracle_stages=stages, header=task.header.model_copy(update={"house": source}))
-    header = task.header.model_copy(update={"checksums": checksums_of(task)})
+    header = task.header.model_copy(update={"checksums": task.checksums})
     return write_task(dataclasses.replace(task, header=header), root.parent)
 
 

@@ -192,7 +192,7 @@ def test_observations_contain_no_oracle_data():
     seen, info = env.reset(seed=0)
     assert set(info) == {"task_id", "stage", "num_stages"}
     task = env.source.task(env.source.find(info["task_id"]))
-    target_m = task.stages[0].target_m
+    target_m = task.oracle(1).target.position_m
     numbers = {name: np.asarray(value).ravel() for name, value in seen.items() if name != "instruction"}
     for name in ("pose", "steps_left", "category", "stage", "is_action_success", "has_arrived"):
         assert not np.isin(np.float32(target_m), numbers[name]).any()
@@ -205,7 +205,7 @@ def test_images_are_the_simulators_and_semantic_ones_its_ground_truth_by_categor
     seen, info = env.reset(seed=1)
     task = env.source.task(env.source.find(info["task_id"]))
     simulator = EmbeddedSimulator(env.config.simulator)
-    simulator.reset(task.stages[0].house_json, task.start)
+    simulator.reset(task.house_json(1), task.start_pose)
     frame = simulator.render()
     assert np.array_equal(seen["depth"], np.minimum(frame.depth_m, np.float32(20.0)))
     assert np.array_equal(seen["rgb"], frame.rgb)

@@ -139,9 +139,9 @@ def test_houses_are_built_once_and_memory_is_bounded():
     again = [loader.get(0, 1).world for _ in range(3)]
     assert again[0] is again[1] is again[2]
     assert loader.num_built == 1
-    num_houses = len({stage.house_sha256 for number in range(4) for stage in source.task(number).stages})
+    num_houses = len({stage.house_sha256 for number in range(4) for stage in source.task(number).oracle_stages})
     for number in range(4):
-        for stage in range(1, len(source.task(number).stages) + 1):
+        for stage in range(1, source.task(number).num_stages + 1):
             loader.prefetch(number, stage)
             assert loader.get(number, stage).stage == stage
     assert loader.num_built == num_houses

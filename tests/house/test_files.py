@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from recorded_data import data_path, needs_data
 
-from evonav import HouseError, InvalidArgumentError
+from evonav.errors import HouseError, InvalidArgumentError
 from evonav.house import House, bundled_houses, load_houses
 
 RECORDED = [

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 import pytest
 from recorded_data import data_path, needs_data
 
-from evonav import HouseError
+from evonav.errors import HouseError
 from evonav.house import House, bundled_houses, load_houses
 from evonav.world.embedded import EmbeddedSimulator
 

@@ -12,7 +12,6 @@ import pytest
 
 from evonav.errors import TaskError
 from evonav.tasks import Task, load_task, load_tasks, write_task
-from evonav.tasks.files import checksums_of
 from evonav.tasks.manifest import PublicStage
 from evonav.tasks.records import read_gzip, record_bytes, write_gzip
 
@@ -127,7 +126,7 @@ def resigned(root: Path) -> None:
         task = load_without_checks(root)
     except TaskError:
         return
-    header["checksums"] = checksums_of(task)
+    header["checksums"] = task.checksums
     (root / "task.json").write_text(json.dumps(header), encoding="utf-8")
 
 
@@ -163,7 +162,7 @@ def test_hundreds_of_mutated_files_are_each_refused_by_name(task: Task, root: Pa
                 num_refused += 1
             else:  # A header's free text, or a number written in another way.
                 assert name == "task.json" or record_bytes(loaded.header) == record_bytes(task.header), place
-                assert checksums_of(loaded) == checksums_of(task), place
+                assert loaded.checksums == task.checksums, place
         path.write_bytes(good)
     assert num_refused > 400
 
@@ -228,7 +227,7 @@ def test_damaged_images_are_refused(root: Path, seed: int) -> None:
     if task is None:
         assert "stage_2.png" in message
     else:  # A flipped bit that no pixel depends on.
-        assert checksums_of(task) == task.header.checksums
+        assert task.checksums == task.header.checksums
 
 
 def test_an_image_of_another_size_is_not_decoded(root: Path) -> None:

@@ -1,6 +1,5 @@
 """Choose the tasks of an environment, and read what it needs of them."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -11,29 +10,8 @@ from evonav.gym.spaces import MAX_STAGES
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.files import load_task
 from evonav.tasks.listing import task_roots
-from evonav.tasks.public import StageInput
+from evonav.tasks.manifest import Task
 from evonav.tasks.subsets import subset_roots
-from evonav.world.pose import Pose
-
-
-@dataclass(frozen=True, slots=True)
-class StageTask:
-    """One stage of a task; everything except the goal is oracle data."""
-
-    goal: StageInput
-    house_json: str
-    house_sha256: str
-    target_m: tuple[float, float]
-    """The target's `(x, z)`."""
-
-
-@dataclass(frozen=True, slots=True)
-class NavTask:
-    """One task, in the form that environments need."""
-
-    task_id: str
-    start: Pose
-    stages: tuple[StageTask, ...]
 
 
 class TaskSource:
@@ -52,7 +30,7 @@ class TaskSource:
         """
         folder = _bundled() if tasks is None else Path(tasks)
         self.roots = tuple(task_roots(folder) if subset is None else subset_roots(folder, subset))
-        self._load = lru_cache(maxsize=256)(read_task)
+        self._load = lru_cache(maxsize=256)(_read)
 
     def __len__(self) -> int:
         return len(self.roots)
@@ -72,7 +50,7 @@ class TaskSource:
                 return number
         raise InvalidArgumentError(f"option `task` is {task_id!r}: {self.roots[0].parent} holds no such task")
 
-    def task(self, number: int) -> NavTask:
+    def task(self, number: int) -> Task:
         """Read a task.
 
         Raises:
@@ -81,21 +59,11 @@ class TaskSource:
         return self._load(self.roots[number])
 
 
-def read_task(root: Path) -> NavTask:
-    """Read a task without evolution, rooms and categories.
-
-    Raises:
-        TaskError: The task is malformed.
-    """
+def _read(root: Path) -> Task:
     task = load_task(root)
     if task.num_stages > MAX_STAGES:
         raise InvalidArgumentError(f"{root}: has {task.num_stages} stages, expected at most {MAX_STAGES}")
-    stages = []
-    for number in range(1, task.num_stages + 1):
-        oracle = task.oracle(number)
-        x_m, _, z_m = oracle.target.position_m
-        stages.append(StageTask(task.public(number), task.house_json(number), oracle.house_sha256, (x_m, z_m)))
-    return NavTask(task.task_id, task.start_pose, tuple(stages))
+    return task
 
 
 def _bundled() -> Path:

@@ -220,7 +220,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         at = self.loader.get(number, 1)
         # Each task is drawn one task ahead, so that its house can be built in the meantime.
         next_number = self.loader.source.draw(random)
-        rewarded, start = self._begin_stage(index, (number, next_number), at, at.task.start)
+        rewarded, start = self._begin_stage(index, (number, next_number), at, at.task.start_pose)
         self._origins[index] = (*start.position_m, start.yaw_rad, start.horizon_rad)
         return _Episode(random, number, next_number, at, rewarded, [])
 
@@ -238,13 +238,13 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
             horizon_rad=start.horizon_rad,
             labels=at.world.labels,
         )
-        path_m = self._batch.plan_one(index, at.data.target_m)
+        path_m = self._batch.plan_one(index, at.target_m)
         if path_m:
             self._batch.aim(index, _core.GeodesicField(simulator.core, path_m[-1]))
-        is_last = at.stage == len(at.task.stages)
+        is_last = at.stage == at.task.num_stages
         self.loader.prefetch(numbers[is_last], 1 if is_last else at.stage + 1)
         length_m = motion.polyline_length_m(path_m) if path_m else None
-        rewarded = RewardedStage.begin(self.config, at.data.target_m, start, length_m, self._batch.distance_m(index))
+        rewarded = RewardedStage.begin(self.config, at.target_m, start, length_m, self._batch.distance_m(index))
         return rewarded, start
 
     def _end_stage(self, index: int, episode: _Episode, end: Pose) -> Infos:
@@ -252,7 +252,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         at = episode.at
         episode.results.append(episode.rewarded.result(at.stage, end))
         ended: Infos = {"stage_result": dict(episode.results[-1])}
-        if at.stage == len(at.task.stages):
+        if at.stage == at.task.num_stages:
             episode.is_over = True
             return ended | {"task_result": task_result(episode.results)}
         episode.at = self.loader.get(episode.number, at.stage + 1)
@@ -312,7 +312,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         """Return the observations of all environments."""
         config, seen = self.config, self._drawn()
         seen["pose"] = spaces.relative_poses(self._poses, self._origins)
-        goals = [episode.at.data.goal for episode in self._episodes]
+        goals = [episode.at.task.public(episode.at.stage) for episode in self._episodes]
         seen["category"] = np.array([spaces.category_index(goal.category) for goal in goals], np.int64)
         seen["stage"] = np.array([episode.at.stage for episode in self._episodes], np.int64)
         steps = [config.budget - episode.rewarded.progress.num_steps for episode in self._episodes]
@@ -349,7 +349,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Observations, Any, Any]):
         """Return the info of one environment, without what the end of a stage adds."""
         episode = self._episodes[index]
         at, progress = episode.at, episode.rewarded.progress
-        info: Infos = {"task_id": at.task.task_id, "stage": at.stage, "num_stages": len(at.task.stages)}
+        info: Infos = {"task_id": at.task.task_id, "stage": at.stage, "num_stages": at.task.num_stages}
         if self.config.oracle_info:
             length_m = progress.reference_length_m
             info["oracle"] = {

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from evonav import _core
 from evonav.errors import SimulationError
 from evonav.gym.config import NavConfig
-from evonav.gym.source import NavTask, StageTask, TaskSource
+from evonav.gym.source import TaskSource
 from evonav.gym.spaces import body_labels
+from evonav.tasks.manifest import Task
 from evonav.world.embedded import EmbeddedSimulator
 
 BYTES_PER_HOUSE_BYTE = 40
@@ -37,14 +38,15 @@ class World:
 class StageWorld:
     """A stage of a task, and its house."""
 
-    task: NavTask
+    task: Task
     stage: int
     world: World
 
     @property
-    def data(self) -> StageTask:
-        """The stage's part of the task."""
-        return self.task.stages[self.stage - 1]
+    def target_m(self) -> tuple[float, float]:
+        """The target's `(x, z)`: oracle data."""
+        x_m, _, z_m = self.task.oracle(self.stage).target.position_m
+        return (x_m, z_m)
 
 
 class WorldLoader:
@@ -93,20 +95,19 @@ class WorldLoader:
 
     def _make(self, number: int, stage: int) -> StageWorld:
         task = self.source.task(number)
-        if stage > len(task.stages):
-            raise SimulationError(f"task {task.task_id} has {len(task.stages)} stages, not {stage}")
-        data = task.stages[stage - 1]
-        world = self._built.pop(data.house_sha256, None) or self._build(task, data)
-        self._built[data.house_sha256] = world
+        if stage > task.num_stages:
+            raise SimulationError(f"task {task.task_id} has {task.num_stages} stages, not {stage}")
+        digest = task.oracle(stage).house_sha256
+        world = self._built.pop(digest, None) or self._build(task.task_id, task.house_json(stage))
+        self._built[digest] = world
         while len(self._built) > 1 and sum(built.num_bytes for built in self._built.values()) > self._max_bytes:
             self._built.popitem(last=False)
         return StageWorld(task, stage, world)
 
-    def _build(self, task: NavTask, data: StageTask) -> World:
+    def _build(self, name: str, house_json: str) -> World:
         simulator = EmbeddedSimulator(self._config.simulator, allow_unknown_assets=self._config.allow_unknown_assets)
-        start = simulator.reset(data.house_json, name=task.task_id)
+        start = simulator.reset(house_json, name=name)
         # Finds all edges of the house's visibility graph, which later paths and distances use.
         _core.GeodesicField(simulator.core, (start.x_m, start.z_m))
         self.num_built += 1
-        labels = body_labels(simulator.core.bodies())
-        return World(simulator, labels, BYTES_PER_HOUSE_BYTE * len(data.house_json))
+        return World(simulator, body_labels(simulator.core.bodies()), BYTES_PER_HOUSE_BYTE * len(house_json))

@@ -13,7 +13,7 @@ from PIL import Image
 
 from evonav.errors import TaskError
 from evonav.tasks.listing import task_roots
-from evonav.tasks.manifest import PublicStage, Task, TaskHeader, contents_of
+from evonav.tasks.manifest import PublicStage, Task, TaskHeader
 from evonav.tasks.oracle import OracleStage
 from evonav.tasks.records import (
     field_error,
@@ -53,11 +53,6 @@ def decode_png(path: Path, size_px: int) -> NDArray[np.uint8]:
         raise TaskError(f"{path}: not a complete PNG image: {error}") from error
     pixels.flags.writeable = False
     return pixels
-
-
-def checksums_of(task: Task) -> dict[str, str]:
-    """Return the checksums for the header."""
-    return {name: sha256_of(data) for name, data in contents_of(task).items()}
 
 
 def write_task(task: Task, directory: Path | str) -> Path:
@@ -172,7 +167,7 @@ def inconsistencies(task: Task, root: Path) -> Iterator[Inconsistency]:
         yield Inconsistency("checksum", 0, error)
     for problem in _control_problems(task):
         yield Inconsistency("contradiction", 0, field_error(header_path, "control", task.header.control, problem))
-    expected_sums = checksums_of(task)
+    expected_sums = task.checksums
     for name in sorted(expected_sums.keys() | task.header.checksums.keys()):
         found_sum = task.header.checksums.get(name)
         if expected_sums.get(name) != found_sum:

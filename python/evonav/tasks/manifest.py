@@ -128,10 +128,14 @@ class Task:
         """Uncompressed contents of the task's files, serialised once; see `contents_of`."""
         return contents_of(self)
 
+    @property
+    def checksums(self) -> dict[str, str]:
+        """Checksums of the task's files, as its header must list them."""
+        return {name: sha256_of(data) for name, data in self.contents.items()}
+
     def with_checksums(self) -> "Task":
         """Return the task with the checksums of its files in its header."""
-        checksums = {name: sha256_of(data) for name, data in self.contents.items()}
-        task = replace(self, header=self.header.model_copy(update={"checksums": checksums}))
+        task = replace(self, header=self.header.model_copy(update={"checksums": self.checksums}))
         vars(task)["contents"] = self.contents  # they do not depend on the header
         return task
 
