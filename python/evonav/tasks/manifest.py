@@ -125,8 +125,17 @@ class Task:
 
     @cached_property
     def contents(self) -> Mapping[str, bytes]:
-        """Uncompressed contents of the task's files, serialised once; see `contents_of`."""
-        return contents_of(self)
+        """Uncompressed contents of the task's files except `task.json`, by relative path, serialised once.
+
+        Checksums are computed from these: JSON as it is, images as their RGB values row by row.
+        """
+        contents: dict[str, bytes] = {}
+        for index, house_json in enumerate(self.houses_json):
+            contents[f"houses/stage_{index + 1}.json.gz"] = house_json.encode()
+            contents[f"oracle/stage_{index + 1}.json"] = record_bytes(self.oracle_stages[index])
+            contents[f"public/stage_{index + 1}.json"] = record_bytes(self.public_stages[index])
+            contents[f"public/stage_{index + 1}.png"] = self.reference_images[index].tobytes()
+        return dict(sorted(contents.items()))
 
     @property
     def checksums(self) -> dict[str, str]:
@@ -175,17 +184,3 @@ class Task:
         if not 1 <= stage <= self.num_stages:
             raise IndexError(f"task {self.task_id}: stage {stage} of {self.num_stages}")
         return stage - 1
-
-
-def contents_of(task: Task) -> dict[str, bytes]:
-    """Return the uncompressed contents of a task's files except `task.json`, by relative path.
-
-    Checksums are computed from these: JSON as it is, images as their RGB values row by row.
-    """
-    contents: dict[str, bytes] = {}
-    for number in range(1, task.num_stages + 1):
-        contents[f"houses/stage_{number}.json.gz"] = task.houses_json[number - 1].encode()
-        contents[f"oracle/stage_{number}.json"] = record_bytes(task.oracle_stages[number - 1])
-        contents[f"public/stage_{number}.json"] = record_bytes(task.public_stages[number - 1])
-        contents[f"public/stage_{number}.png"] = task.reference_images[number - 1].tobytes()
-    return dict(sorted(contents.items()))

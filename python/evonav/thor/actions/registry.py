@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, PydanticUserError, TypeAdapter, Vali
 
 # The functions of these modules register themselves.
 _MODULES = (
-    *("session", "motion", "teleport", "paths", "asset_database", "random_spawn", "spawn"),
+    *("session", "motion", "teleport", "paths", "spawn"),
     *("object_queries", "interactable_poses", "object_placement", "object_states", "cameras"),
 )
 

@@ -7,8 +7,7 @@ from typing import Any
 from evonav.errors import EvonavError
 from evonav.thor.engine import Engine, Result, log_once
 from evonav.thor.events import images
-from evonav.thor.events.colors import palette_of
-from evonav.thor.events.images import ImageKinds
+from evonav.thor.events.images import ImageKinds, palette_of
 from evonav.thor.events.metadata import pack_event, patch
 from evonav.thor.scene import Scene
 from evonav.thor.transport.fifo import Field, FieldType

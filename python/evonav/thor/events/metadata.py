@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from evonav.thor import objects
-from evonav.thor.events.colors import palette_of
+from evonav.thor.events.images import palette_of
 from evonav.thor.geometry import box_around, vector
 from evonav.thor.scene import Scene
 
