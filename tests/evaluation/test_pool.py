@@ -18,7 +18,7 @@ from evonav.evaluation.records.schema import ErrorKind
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.components import Backend
 from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate, evaluate_all
-from evonav.parallel.worker import Resources
+from evonav.parallel.worker import Workforce
 from evonav.tasks.listing import task_files
 
 AGENT = "nearest-frontier"
@@ -40,7 +40,7 @@ def test_runs_share_workers_and_are_as_if_alone(tasks, tmp_path):
     configs = [RunConfig(backend=backend, protocol=ProtocolConfig(max_rounds=3), seed=seed) for seed in (0, 1)]
     together = [RunRequest(("random-walk",), tasks, tmp_path / f"cell-{i}", config) for i, config in enumerate(configs)]
     news = []
-    summaries = evaluate_all(together, num_workers=1, on_progress=lambda *one: news.append(one))
+    summaries = evaluate_all(together, Workforce(1), on_progress=lambda *one: news.append(one))
     assert len((folder / "starts").read_text()) == 2  # one a run, though episodes of both are under way at once
     assert [index for index, one in news if one.latest is None] == [0, 1]
     assert [one.num_done for index, one in news if index == 1] == [0, 1, 2, 3, 4, 5, 6]
@@ -50,7 +50,7 @@ def test_runs_share_workers_and_are_as_if_alone(tasks, tmp_path):
         assert texts(alone) == texts(tmp_path / f"cell-{index}")
     assert texts(tmp_path / "cell-0") != texts(tmp_path / "cell-1")
     with pytest.raises(InvalidArgumentError, match="in one folder"):
-        evaluate_all([together[0], together[0]], num_workers=0)
+        evaluate_all([together[0], together[0]], Workforce(0))
 
 
 def test_an_agent_whose_process_dies_is_tried_again(tasks, tmp_path, monkeypatch):
@@ -118,15 +118,10 @@ def test_ray_records_the_same_though_an_actor_is_killed(tasks, tmp_path, monkeyp
     try:
         thread = threading.Thread(target=kill, daemon=True)
         thread.start()
-        evaluate(
-            [agent],
-            tasks,
-            tmp_path / "run",
-            config=CONFIG,
-            engine="ray",
-            num_workers=2,
-            resources=Resources(num_gpus=0.5),
-            on_progress=note,
+        evaluate_all(
+            [RunRequest((agent,), tuple(tasks), tmp_path / "run", CONFIG)],
+            Workforce(2, "ray", num_gpus=0.5),
+            on_progress=lambda _, news: note(news),
         )
         thread.join(timeout=10.0)
     finally:

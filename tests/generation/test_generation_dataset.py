@@ -18,9 +18,10 @@ import pytest
 
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
 from evonav.generation import dataset
-from evonav.generation.dataset import Workforce, generate_dataset
+from evonav.generation.dataset import generate_dataset
 from evonav.generation.worker import GenerationOptions
 from evonav.house import House
+from evonav.parallel.worker import Workforce
 from evonav.tasks import load_task
 from evonav.tasks.dataset import check_dataset, read_dataset
 from evonav.tasks.parameters import GenerationParameters
@@ -234,7 +235,7 @@ def test_a_damaged_journal_is_told_by_line(houses, clean, tmp_path, number, line
 
 def test_a_house_that_fails_costs_itself_alone(houses, clean, tmp_path, faults):
     faults(_0="raise", _3="die", _6="hang")
-    summary = generate_dataset(houses, tmp_path, options=OPTIONS, workforce=local(2, house_timeout_s=4.0))
+    summary = generate_dataset(houses, tmp_path, options=OPTIONS, workforce=local(2), house_timeout_s=4.0)
     assert summary.reasons == {
         "error": 1, "crash": 1, "timeout": 1, "malformed_house": 1, "too_few_rooms": 1
     }  # fmt: skip
@@ -433,8 +434,8 @@ def test_ray_makes_the_same(houses, clean, tmp_path, monkeypatch, faults):
     assert (tmp_path / "flag").exists()
     assert_same(tmp_path / "out", clean)
     faults(_1="hang", _4="raise", _7="die")
-    workforce = local(2, engine="ray", house_timeout_s=8.0)
-    summary = generate_dataset(houses, tmp_path / "faulty", options=OPTIONS, workforce=workforce)
+    workforce = local(2, engine="ray")
+    summary = generate_dataset(houses, tmp_path / "faulty", options=OPTIONS, workforce=workforce, house_timeout_s=8.0)
     assert summary.reasons == {
         "timeout": 1, "error": 1, "crash": 1, "malformed_house": 1, "too_few_rooms": 1
     }  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 from evonav.errors import InvalidArgumentError
 from evonav.parallel import pool as parallel
 from evonav.parallel.pool import Job, WorkerPool, open_pool
-from evonav.parallel.worker import EngineError, WorkerLostError
+from evonav.parallel.worker import EngineError, WorkerLostError, Workforce
 
 
 def make_echo(settings, alive):
@@ -42,7 +42,7 @@ def answers_of(pool, texts):
 @pytest.mark.parametrize("num_workers", [0, 2])
 def test_every_job_has_its_answer(num_workers):
     texts = [*map(str, range(20)), "raise", "ü" * 100_000]
-    with open_pool("test_parallel:make_echo", "ä", num_workers=num_workers, timeout_s=60.0) as pool:
+    with open_pool("test_parallel:make_echo", "ä", Workforce(num_workers), timeout_s=60.0) as pool:
         answers = answers_of(pool, texts)
     assert len(answers) == len(texts)
     for key, text in enumerate(texts):
@@ -55,7 +55,7 @@ def test_every_job_has_its_answer(num_workers):
 
 def test_workers_that_never_start_are_an_error(monkeypatch):
     monkeypatch.setattr(parallel, "MAX_FAILED_STARTS", 2)
-    with open_pool("test_parallel:make_nothing", "", num_workers=1, timeout_s=60.0) as pool:
+    with open_pool("test_parallel:make_nothing", "", Workforce(1), timeout_s=60.0) as pool:
         pool.submit(Job(0, ""))
         with pytest.raises(EngineError, match=r"workers do not start: the worker process died \(exit code 3\)"):
             pool.next_answer()
@@ -116,17 +116,19 @@ def test_it_is_an_error_once_that_worker_is_lost_too():
 
 def test_arguments_are_checked():
     with pytest.raises(InvalidArgumentError, match="num_workers = -1"):
-        open_pool("test_parallel:make_echo", "", num_workers=-1, timeout_s=1.0)
+        Workforce(-1)
     with pytest.raises(InvalidArgumentError, match="num_workers = 0: too few for engine ray"):
-        open_pool("test_parallel:make_echo", "", engine="ray", num_workers=0, timeout_s=1.0)
+        Workforce(0, "ray")
     with pytest.raises(InvalidArgumentError, match="Ray address"):
-        open_pool("test_parallel:make_echo", "", num_workers=1, timeout_s=1.0, ray_address="localhost:1")
+        Workforce(1, ray_address="localhost:1")
+    with pytest.raises(InvalidArgumentError, match="num_cpus > 0"):
+        Workforce(1, "ray", num_cpus=0.0)
 
 
 def test_without_ray_the_error_names_the_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(EngineError, match=r"pip install 'evonav\[ray\]'"):
-        open_pool("test_parallel:make_echo", "", engine="ray", num_workers=1, timeout_s=1.0)
+        open_pool("test_parallel:make_echo", "", Workforce(1, "ray"), timeout_s=1.0)
 
 
 def make_broken(settings, alive):
@@ -149,7 +151,7 @@ def make_teller(settings, alive):
 
 
 def test_a_worker_that_cannot_be_made_is_an_error_at_once():
-    with open_pool("test_parallel:make_broken", "", num_workers=1, timeout_s=60.0) as pool:
+    with open_pool("test_parallel:make_broken", "", Workforce(1), timeout_s=60.0) as pool:
         pool.submit(Job(0, ""))
         with pytest.raises(EngineError, match="workers do not start: ImportError: no such thing"):
             pool.next_answer()
@@ -157,7 +159,7 @@ def test_a_worker_that_cannot_be_made_is_an_error_at_once():
 
 @pytest.mark.parametrize("num_workers", [0, 1])
 def test_jobs_tell_news_in_order(num_workers):
-    with open_pool("test_parallel:make_teller", "", num_workers=num_workers, timeout_s=60.0) as pool:
+    with open_pool("test_parallel:make_teller", "", Workforce(num_workers), timeout_s=60.0) as pool:
         for key, num, end in ((0, 2, "end"), (1, 3, "")):
             pool.submit(Job(key, str(num)))
             answers = [pool.next_answer() for _ in range(num + 1)]

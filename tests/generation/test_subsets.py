@@ -9,9 +9,10 @@ from typer.testing import CliRunner
 
 from evonav.cli import app
 from evonav.errors import InvalidArgumentError, StoreError, TaskError
-from evonav.generation.dataset import Workforce, generate_dataset
+from evonav.generation.dataset import generate_dataset
 from evonav.generation.worker import GenerationOptions
 from evonav.house import bundled_houses
+from evonav.parallel.worker import Workforce
 from evonav.tasks.dataset import read_dataset
 from evonav.tasks.parameters import GenerationParameters
 from evonav.tasks.subsets import SubsetError, subset_of, subset_roots

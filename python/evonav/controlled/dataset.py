@@ -11,13 +11,13 @@ from evonav._core import __version__
 from evonav.controlled.generate import ControlledOptions, generate_arms
 from evonav.controlled.layout import ControlledRecord, tasks_of, write_controlled
 from evonav.errors import InvalidArgumentError, TaskError
-from evonav.generation.dataset import Workforce
 from evonav.generation.journal import Journal, Outcome
-from evonav.generation.worker import PARTIAL_NAME, is_complete, outcome_of, worker_of
+from evonav.generation.worker import HOUSE_TIMEOUT_S, PARTIAL_NAME, is_complete, outcome_of, worker_of
 from evonav.house import House
 from evonav.house.files import HouseText, HouseTexts
 from evonav.parallel.folders import sha256_of_file, writing
 from evonav.parallel.pool import Job, answers, open_pool
+from evonav.parallel.worker import Workforce
 from evonav.tasks.dataset import (
     DatasetRecord,
     SourceFile,
@@ -89,10 +89,8 @@ def generate_controlled(
             with open_pool(
                 WORK,
                 settings,
-                engine=workforce.engine,
-                num_workers=workforce.num_workers,
-                timeout_s=workforce.house_timeout_s,
-                ray_address=workforce.ray_address,
+                workforce,
+                timeout_s=HOUSE_TIMEOUT_S,
             ) as pool:
                 left = [index for index in range(num_all) if index not in journal.outcomes]
                 for answer in answers(pool, (_job(index, houses, options) for index in left)):

@@ -6,6 +6,7 @@ from pathlib import Path
 from evonav.controlled.layout import read_controlled, run_of, tasks_of
 from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_all
+from evonav.parallel.worker import Workforce
 from evonav.tasks.listing import task_files
 
 
@@ -51,7 +52,7 @@ def evaluate_controlled(
     ]
     summaries = evaluate_all(
         requests,
-        num_workers=num_workers,
+        Workforce(num_workers),
         retry_errored=retry_errored,
         on_progress=lambda index, progress: on_progress(arms[index], progress),
     )

@@ -19,6 +19,7 @@ from evonav.errors import HouseError, InvalidArgumentError, TaskError
 from evonav.generation.house_order import checked_subset, house_order
 from evonav.generation.journal import Journal, Outcome
 from evonav.generation.worker import (
+    HOUSE_TIMEOUT_S,
     PARTIAL_NAME,
     WORK,
     GenerationOptions,
@@ -28,20 +29,10 @@ from evonav.generation.worker import (
 )
 from evonav.house.files import HouseTexts
 from evonav.parallel.folders import sha256_of_file, writing
-from evonav.parallel.pool import Answer, EngineName, Job, Pool, open_pool
+from evonav.parallel.pool import Answer, Job, Pool, open_pool
+from evonav.parallel.worker import Workforce
 from evonav.tasks.dataset import DATASET_NAME, DatasetRecord, SourceFile, read_dataset, write_dataset
 from evonav.tasks.subsets import Subset, SubsetError
-
-
-@dataclass(frozen=True, slots=True)
-class Workforce:
-    """The workers of a run; they affect its duration alone."""
-
-    num_workers: int = 0
-    """Number of processes; with 0, this process does the work and cannot detect a house that hangs."""
-    engine: EngineName = "local"
-    ray_address: str | None = None
-    house_timeout_s: float = 120.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +80,7 @@ def generate_dataset(
     limit: int | None = None,
     subset: str | None = None,
     workforce: Workforce | None = None,
+    house_timeout_s: float = HOUSE_TIMEOUT_S,
     retry_failed: bool = False,
     on_progress: Callable[[GenerationProgress], None] = lambda _: None,
 ) -> GenerationSummary:
@@ -101,7 +93,8 @@ def generate_dataset(
             parameters, and the dataset and split of the houses.
         limit: Number of tasks, from the first houses that give one; must be the folder's own, too.
         subset: Named subset of the split to generate (`evonav.tasks.subsets`); must be the folder's own, too.
-        workforce: The workers; default: this process.
+        workforce: The workers; default: this process, which cannot detect a house that hangs.
+        house_timeout_s: Seconds before a house is abandoned.
         retry_failed: Process houses again at which the generator failed.
         on_progress: Called at the beginning and after every house.
 
@@ -137,10 +130,8 @@ def generate_dataset(
             with open_pool(
                 WORK,
                 WorkerSettings(out=str(out), options=options).model_dump_json(),
-                engine=workforce.engine,
-                num_workers=workforce.num_workers,
-                timeout_s=workforce.house_timeout_s,
-                ray_address=workforce.ray_address,
+                workforce,
+                timeout_s=house_timeout_s,
             ) as pool:
                 if wanted is None:
                     run.generate(pool)

@@ -21,6 +21,8 @@ from evonav.tasks.records import Record
 
 WORK = "evonav.generation.worker:make_worker"
 PARTIAL_NAME = ".partial"
+HOUSE_TIMEOUT_S = 120.0
+"""Default number of seconds before a house is abandoned."""
 """Folder beside the tasks, for those that are being written."""
 MAX_DETAIL = 2000
 """Largest number of characters in the detail of an outcome, as in `dataset.json`."""

@@ -15,11 +15,9 @@ from itertools import islice
 from types import TracebackType
 from typing import Literal, Protocol
 
-from evonav.errors import InvalidArgumentError
 from evonav.parallel.work import end_work, load_work, steps
-from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Host, Resources, Worker, WorkerLostError
+from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Host, Worker, WorkerLostError, Workforce
 
-EngineName = Literal["local", "ray"]
 FailureKind = Literal["crash", "timeout", "error"]
 
 MAX_LOSSES = 2
@@ -76,12 +74,9 @@ class Pool(Protocol):
 def open_pool(
     work: str,
     settings: str,
+    workforce: Workforce,
     *,
-    engine: EngineName = "local",
-    num_workers: int,
     timeout_s: float,
-    ray_address: str | None = None,
-    resources: Resources | None = None,
     max_losses: int = MAX_LOSSES,
 ) -> Pool:
     """Open a pool of workers, to be used in a `with` statement.
@@ -89,31 +84,23 @@ def open_pool(
     Args:
         work: `module:factory`.
         settings: Text with which the factory is called.
-        engine: Processes of this machine, or Ray actors.
-        num_workers: 0 runs jobs in this process (engine `local` only), where a crash is not contained.
+        workforce: The workers.
         timeout_s: Longest silence of a job before it is abandoned.
-        ray_address: Address of a cluster; default: one on this machine.
-        resources: Reserved for each worker, engine `ray` only; default: one CPU.
         max_losses: Number of workers that a job may lose before it fails.
 
     Raises:
         EngineError: Ray is not installed or cannot be reached.
-        InvalidArgumentError: There are too few workers, or an address is given without Ray.
     """
-    if num_workers < (1 if engine == "ray" else 0):
-        raise InvalidArgumentError(f"num_workers = {num_workers}: too few for engine {engine}")
-    if ray_address is not None and engine != "ray":
-        raise InvalidArgumentError(f"a Ray address is for engine ray, not {engine}")
-    if engine == "ray":
+    if workforce.engine == "ray":
         from evonav.parallel.ray import RayHost
 
-        host = RayHost(work, settings, num_workers, ray_address, resources or Resources())
-        return WorkerPool(host, min(num_workers, host.max_workers), timeout_s, max_losses)
-    if num_workers == 0:
+        host = RayHost(work, settings, workforce)
+        return WorkerPool(host, min(workforce.num_workers, host.max_workers), timeout_s, max_losses)
+    if workforce.num_workers == 0:
         return InlinePool(work, settings)
     from evonav.parallel.local import ProcessHost
 
-    return WorkerPool(ProcessHost(work, settings), num_workers, timeout_s, max_losses)
+    return WorkerPool(ProcessHost(work, settings), workforce.num_workers, timeout_s, max_losses)
 
 
 def answers(pool: Pool, jobs: Iterable[Job]) -> Iterator[Answer]:

@@ -9,15 +9,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-from evonav.errors import InvalidArgumentError
 from evonav.parallel.work import Heartbeat, end_work, load_work, steps
-from evonav.parallel.worker import (
-    START_TIMEOUT_S,
-    EngineError,
-    Resources,
-    Worker,
-    WorkerLostError,
-)
+from evonav.parallel.worker import START_TIMEOUT_S, EngineError, Worker, WorkerLostError, Workforce
 
 _END_TIMEOUT_S = 5.0
 
@@ -25,22 +18,19 @@ _END_TIMEOUT_S = 5.0
 class RayHost:
     """Starts actors of a Ray cluster."""
 
-    def __init__(self, work: str, settings: str, num_workers: int, address: str | None, resources: Resources) -> None:
+    def __init__(self, work: str, settings: str, workforce: Workforce) -> None:
         """Join a cluster, or start one on this machine, unless this process is already in one.
 
         Args:
             work: `module:factory`, see `evonav.parallel.pool.open_pool`.
             settings: Text with which the factory is called.
-            num_workers: A cluster that is started here has CPUs for so many workers.
-            address: Address of the cluster to join.
-            resources: Reserved for each worker.
+            workforce: The address of the cluster to join, and what is reserved for each worker. A cluster that is
+                started here has CPUs for all workers.
 
         Raises:
             EngineError: Ray is not installed, or the cluster cannot be reached or has too little for one worker.
-            InvalidArgumentError: `resources` are negative or have no CPU.
         """
-        if not (resources.num_cpus > 0.0 and resources.num_gpus >= 0.0):
-            raise InvalidArgumentError(f"{resources}: a worker needs num_cpus > 0 and num_gpus >= 0")
+        num_cpus, num_gpus, address = workforce.num_cpus, workforce.num_gpus, workforce.ray_address
         try:
             import ray
         except ImportError as error:
@@ -49,24 +39,22 @@ class RayHost:
         self._work, self._settings = work, settings
         self._is_owner = not ray.is_initialized()
         if self._is_owner:
-            num_cpus = math.ceil(num_workers * resources.num_cpus)
-            cluster = {"num_cpus": num_cpus, "include_dashboard": False} if address is None else {"address": address}
+            num_all = math.ceil(workforce.num_workers * num_cpus)
+            cluster = {"num_cpus": num_all, "include_dashboard": False} if address is None else {"address": address}
             try:
                 ray.init(**cluster, log_to_driver=False, logging_level="ERROR")
             except (ConnectionError, RuntimeError, ValueError) as error:
                 raise EngineError(f"Ray cannot be reached at {address or 'this machine'}: {error}") from error
-        self.max_workers = self._room_for(resources)
+        self.max_workers = self._room_for({"CPU": num_cpus, "GPU": num_gpus})
         if self.max_workers < 1:
             self.close()
-            needs = f"{resources.num_cpus:g} CPU" + (f", {resources.num_gpus:g} GPU" if resources.num_gpus else "")
+            needs = f"{num_cpus:g} CPU" + (f", {num_gpus:g} GPU" if num_gpus else "")
             raise EngineError(f"the Ray cluster has too little for one worker ({needs})")
-        options = {"num_cpus": resources.num_cpus, "num_gpus": resources.num_gpus, "max_restarts": 0}
-        self._actor = ray.remote(**options)(_Actor)
+        self._actor = ray.remote(num_cpus=num_cpus, num_gpus=num_gpus, max_restarts=0)(_Actor)
 
-    def _room_for(self, resources: Resources) -> int:
-        """Return how many workers fit into the cluster."""
+    def _room_for(self, needed: dict[str, float]) -> int:
+        """Return how many workers with these needs fit into the cluster."""
         available: dict[str, float] = self._ray.cluster_resources()
-        needed = {"CPU": resources.num_cpus, "GPU": resources.num_gpus}
         return min(math.floor(available.get(name, 0.0) / amount) for name, amount in needed.items() if amount)
 
     def start(self) -> "RayWorker":

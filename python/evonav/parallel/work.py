@@ -36,21 +36,15 @@ def steps(work: Work, text: str) -> Generator[tuple[str, str]]:
             answer = result
         else:
             with closing(result):
-                answer = yield from _progress(result)
+                try:
+                    while True:
+                        yield "progress", next(result)
+                except StopIteration as end:
+                    answer = end.value
     except Exception:
         yield "error", traceback.format_exc()
     else:
         yield "done", answer
-
-
-def _progress(job: Generator[str, None, str]) -> Generator[tuple[str, str], None, str]:
-    while True:
-        try:
-            text = next(job)
-        except StopIteration as end:
-            answer: str = end.value
-            return answer
-        yield "progress", text
 
 
 @dataclass(slots=True)

@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
-from evonav.errors import EvonavError
+from evonav.errors import EvonavError, InvalidArgumentError
+
+EngineName = Literal["local", "ray"]
 
 START_TIMEOUT_S = 300.0
 """Longest time until a worker is ready."""
@@ -15,12 +17,32 @@ class EngineError(EvonavError):
 
 
 @dataclass(frozen=True, slots=True)
-class Resources:
-    """Resources that a Ray cluster reserves for each worker."""
+class Workforce:
+    """The workers of a run; they decide how long it takes, and nothing else."""
 
+    num_workers: int = 0
+    """Number of processes or actors. 0 runs jobs in this process, where a crash or a hang is not contained."""
+    engine: EngineName = "local"
+    """Processes of this machine, or actors of a Ray cluster."""
+    ray_address: str | None = None
+    """Address of a cluster; default: one on this machine."""
     num_cpus: float = 1.0
+    """CPUs that Ray reserves for each worker."""
     num_gpus: float = 0.0
-    """May be a fraction of a GPU."""
+    """GPUs that Ray reserves for each worker; may be a fraction of one."""
+
+    def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            InvalidArgumentError: There are too few workers, an address is given without Ray, or workers have no CPU.
+        """
+        if self.num_workers < (1 if self.engine == "ray" else 0):
+            raise InvalidArgumentError(f"num_workers = {self.num_workers}: too few for engine {self.engine}")
+        if self.ray_address is not None and self.engine != "ray":
+            raise InvalidArgumentError(f"a Ray address is for engine ray, not {self.engine}")
+        if not (self.num_cpus > 0.0 and self.num_gpus >= 0.0):
+            raise InvalidArgumentError(f"{self}: a worker needs num_cpus > 0 and num_gpus >= 0")
 
 
 class WorkerLostError(EngineError):

@@ -16,6 +16,7 @@ from evonav.evaluation.episode.spec import EpisodeSpec
 from evonav.evaluation.run.components import Backend
 from evonav.parallel.folders import check_same_run, writing
 from evonav.parallel.pool import Job, answers, open_pool
+from evonav.parallel.worker import Workforce
 from evonav.perception import Percept, Perception, StageScene
 from evonav.perception_benchmark.matching import TrueObjects, true_objects
 from evonav.perception_benchmark.memory import JudgedMemory
@@ -133,7 +134,7 @@ def measure(
         on_progress(num_done, num_all, "")
         settings = json.dumps({"config": asdict(config), "simulator": simulator})
         if jobs:
-            with open_pool(WORK, settings, num_workers=min(num_workers, len(jobs)), timeout_s=TASK_TIMEOUT_S) as pool:
+            with open_pool(WORK, settings, Workforce(min(num_workers, len(jobs))), timeout_s=TASK_TIMEOUT_S) as pool:
                 texts = (
                     Job(key, json.dumps([asdict(spec), str(task.path), task.digest, has_picture]))
                     for key, (spec, task, has_picture) in enumerate(jobs)

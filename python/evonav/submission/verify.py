@@ -21,6 +21,7 @@ from evonav.evaluation.records.schema import EndState, StageRecord
 from evonav.evaluation.run.components import Backend
 from evonav.json_diff import json_differences
 from evonav.parallel.pool import Job, answers, open_pool
+from evonav.parallel.worker import Workforce
 from evonav.submission.pack import PackedRecords, Submission, SubmissionError, SubmissionFile, packed_summary
 from evonav.tasks.listing import TaskFile
 
@@ -262,7 +263,7 @@ def _rescore(
             episodes.setdefault((agent, record.task_id), []).append(record)
     names = list(episodes)
     work = "evonav.submission.rescore:work"
-    with open_pool(work, json.dumps(settings), num_workers=num_workers, timeout_s=EPISODE_TIMEOUT_S) as pool:
+    with open_pool(work, json.dumps(settings), Workforce(num_workers), timeout_s=EPISODE_TIMEOUT_S) as pool:
         jobs = (
             Job(number, _episode_text(known[task_id].path, mine))
             for number, ((_, task_id), mine) in enumerate(episodes.items())

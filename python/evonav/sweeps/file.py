@@ -22,7 +22,7 @@ from evonav.evaluation.run.settings import (
     SimulatorSettings,
     SpendingSettings,
 )
-from evonav.parallel.pool import EngineName
+from evonav.parallel.worker import EngineName
 from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed
 from evonav.tasks.subsets import SubsetError, parse_subset
 from evonav.toml import read_toml

@@ -28,7 +28,7 @@ from evonav.evaluation.run.run import NUM_RETRIES, Progress, RunConfig, RunReque
 from evonav.evaluation.run.settings import DecisionResources, check_decision
 from evonav.json_diff import json_differences
 from evonav.parallel.folders import write_atomically, writing
-from evonav.parallel.worker import Resources
+from evonav.parallel.worker import Workforce
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import TaskFile, task_files
@@ -277,10 +277,7 @@ def run_sweep(
             _check_simulator(next(run for run in todo if run.cell.simulator == name))
         evaluate_all(
             [run.request for run in todo],
-            engine=sweep.engine,
-            num_workers=num_workers,
-            ray_address=sweep.ray_address,
-            resources=Resources(num_gpus=sweep.worker_gpus),
+            Workforce(num_workers, sweep.engine, sweep.ray_address, num_gpus=sweep.worker_gpus),
             num_retries=NUM_RETRIES if sweep.num_retries is None else sweep.num_retries,
             retry_errored=retry_errored,
             on_progress=lambda index, progress: on_progress(todo[index].cell, progress),

@@ -12,7 +12,7 @@ from typing import Any
 from evonav.evaluation.metrics.navigation import Rates, rates
 from evonav.evaluation.records.schema import StageRecord
 from evonav.evaluation.records.store import FILE_NAME, RunStore
-from evonav.evaluation.run.run import SUMMARY_NAME, write_summary
+from evonav.evaluation.run.summary import SUMMARY_NAME, write_summary
 from evonav.statistics import Interval
 from evonav.sweeps.row import AXES, STATES, SweepRow
 from evonav.sweeps.run import RUNS_NAME, read_claim

@@ -38,7 +38,7 @@ def report(
     if (run / SWEEP_NAME).is_file():
         typer.echo(f"report: {_report_sweep(run, out, _count(replays or 'none'), tasks, exchanges, maps)}")
         return
-    from evonav.evaluation.run.run import write_summary
+    from evonav.evaluation.run.summary import write_summary
 
     num_replays = _count(replays or str(NUM_REPLAYS))
     print_table(write_summary(run))

@@ -64,7 +64,7 @@ def generate(
     from evonav.controlled.dataset import generate_controlled
     from evonav.controlled.generate import ControlledOptions
     from evonav.generation.config import read_parameters
-    from evonav.generation.dataset import Workforce
+    from evonav.parallel.worker import Workforce
 
     options = ControlledOptions(
         seed=seed,

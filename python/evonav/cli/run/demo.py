@@ -9,7 +9,7 @@ from evonav.cli.options.decisions import DryRun, decision_component, print_estim
 from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import AgentNames, Limit, Seed, Workers, count_of, names_of
 from evonav.cli.results.view import make_pages
-from evonav.cli.run.evaluate import exit_if_incomplete, print_results, run_agents, run_tasks
+from evonav.cli.run.evaluate import exit_if_incomplete, print_results, run_tasks, running
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.settings import DecisionSettings, SpendingSettings
@@ -28,7 +28,7 @@ def demo(
 ) -> None:
     """Evaluate the paper's three heuristics on the bundled tasks, and write a report with replays of one task."""
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import RunConfig
+    from evonav.evaluation.run.run import RunConfig, evaluate
     from evonav.report import write_report
 
     num_workers = count_of(workers)
@@ -38,7 +38,10 @@ def demo(
         if dry_run:
             print_estimate(spending, names_of(agents), task_files, config, num_workers)
             return
-        summaries = run_agents(out, names_of(agents), task_files, config, num_workers)
+        with running(out, config) as show:
+            summaries = evaluate(
+                names_of(agents), task_files, out, config=config, num_workers=num_workers, on_progress=show
+            )
     print_results(out, summaries)
     _, index = make_pages(out)
     typer.echo(f"report: {write_report(out)}")

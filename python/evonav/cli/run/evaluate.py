@@ -35,17 +35,16 @@ from evonav.cli.options.shared import (
 )
 
 if TYPE_CHECKING:  # the command must start fast: everything else is imported where it is used
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator
 
     from evonav.evaluation.metrics.navigation import AgentSummary
-    from evonav.evaluation.run.run import RunConfig
+    from evonav.evaluation.run.run import Progress, RunConfig
     from evonav.evaluation.run.settings import (
         DecisionSettings,
         PerceptionSettings,
         SimulatorSettings,
         SpendingSettings,
     )
-    from evonav.parallel.pool import EngineName
     from evonav.tasks.listing import TaskFile
 
 NUM_RETRIES = 2
@@ -82,7 +81,8 @@ def evaluate(
     """
     from evonav.evaluation.hosting.process import AgentHosting
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import RunConfig
+    from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate_all
+    from evonav.parallel.worker import Workforce
 
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
@@ -110,18 +110,14 @@ def evaluate(
         if dry_run:
             print_estimate(spending, names, task_files, config, num_workers)
             return
-        summaries = run_agents(
-            out,
-            names,
-            task_files,
-            config,
-            num_workers,
-            engine=engine.value,
-            ray_address=ray_address,
-            num_gpus=worker_gpus,
-            num_retries=retries,
-            retry_errored=retry_errored,
-        )
+        with running(out, config) as show:
+            (summaries,) = evaluate_all(
+                [RunRequest(tuple(names), tuple(task_files), out, config)],
+                Workforce(num_workers, engine.value, ray_address, num_gpus=worker_gpus),
+                num_retries=retries,
+                retry_errored=retry_errored,
+                on_progress=lambda _, state: show(state),
+            )
     print_results(out, summaries)
     exit_if_incomplete(summaries)
 
@@ -138,9 +134,10 @@ def run_tasks(
     num_workers: int = 0,
 ) -> "Iterator[list[TaskFile]]":
     """Yield the tasks of a run: of a folder, generated from houses into the run's folder, or bundled."""
-    from evonav.generation.dataset import Workforce, generate_dataset, inherited_names
+    from evonav.generation.dataset import generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
     from evonav.house.files import HouseTexts
+    from evonav.parallel.worker import Workforce
     from evonav.tasks.bundled import bundled_tasks
     from evonav.tasks.listing import task_file, task_files
 
@@ -158,7 +155,7 @@ def run_tasks(
                     options=options,
                     limit=limit,
                     subset=subset,
-                    workforce=Workforce(num_workers=num_workers),
+                    workforce=Workforce(num_workers),
                     on_progress=show,
                 )
             yield [task_file(root) for root in generated.roots]
@@ -167,40 +164,14 @@ def run_tasks(
             yield task_files(directory, limit, subset)
 
 
-def run_agents(
-    out: Path,
-    agents: "Sequence[str]",
-    task_files: "list[TaskFile]",
-    config: "RunConfig",
-    num_workers: int,
-    *,
-    engine: "EngineName" = "local",
-    ray_address: str | None = None,
-    num_gpus: float = 0.0,
-    num_retries: int = NUM_RETRIES,
-    retry_errored: bool = False,
-) -> "list[AgentSummary]":
-    """Evaluate agents with a progress bar; an interrupt says how to resume."""
-    from evonav.evaluation.run.run import evaluate
-    from evonav.parallel.worker import Resources
-
+@contextmanager
+def running(out: Path, config: "RunConfig") -> "Iterator[Callable[[Progress], None]]":
+    """Show the progress of a run, which the yielded function updates; an interrupt says how to resume."""
     with interruptible(out):
         with status("Starting the simulator"):
             config.backend.check()
         with progress() as show:
-            return evaluate(
-                agents,
-                task_files,
-                out,
-                config=config,
-                engine=engine,
-                num_workers=num_workers,
-                ray_address=ray_address,
-                resources=Resources(num_gpus=num_gpus),
-                num_retries=num_retries,
-                retry_errored=retry_errored,
-                on_progress=show,
-            )
+            yield show
 
 
 def print_results(out: Path, summaries: "list[AgentSummary]") -> None:

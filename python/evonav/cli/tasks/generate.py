@@ -54,9 +54,10 @@ def generate(
 ) -> None:
     """Generate tasks from multi-room houses; run again to resume."""
     from evonav.generation.config import read_parameters
-    from evonav.generation.dataset import Workforce, generate_dataset, inherited_names
+    from evonav.generation.dataset import generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
     from evonav.house.files import HouseTexts
+    from evonav.parallel.worker import Workforce
 
     check_engine(engine, ray_address)
     texts = HouseTexts(houses)
@@ -68,7 +69,6 @@ def generate(
         split=split or inherited_split,
         allow_unknown_assets=allow_unknown_assets,
     )
-    workforce = Workforce(count_of(workers), engine.value, ray_address, house_timeout)
     with interruptible(out), generation_progress() as show:
         made = generate_dataset(
             texts,
@@ -76,7 +76,8 @@ def generate(
             options=options,
             limit=limit,
             subset=subset,
-            workforce=workforce,
+            workforce=Workforce(count_of(workers), engine.value, ray_address),
+            house_timeout_s=house_timeout,
             retry_failed=retry_failed,
             on_progress=show,
         )

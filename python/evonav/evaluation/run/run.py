@@ -1,7 +1,6 @@
 """Evaluate agents on tasks into one folder, with any number of workers; run again to resume."""
 
 import hashlib
-import json
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field, replace
@@ -11,18 +10,18 @@ from typing import Any
 from evonav._core import __version__
 from evonav.errors import InvalidArgumentError
 from evonav.evaluation.hosting.process import IS_SUPPORTED, LOG_NAME, AgentHosting
-from evonav.evaluation.metrics.navigation import AgentSummary, agent_pairs, summarise, summary_json
+from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.records.schema import EndState
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_agent_name
 from evonav.evaluation.run.provenance import note_session
-from evonav.evaluation.run.scheduler import Progress, RunJobs, run_all
+from evonav.evaluation.run.scheduler import Progress, RunJobs, Schedule
+from evonav.evaluation.run.summary import MODELS_KEY
 from evonav.evaluation.run.worker import WORK, EpisodeJob, WorkerConfig
-from evonav.parallel.folders import check_same_run, write_atomically, writing
-from evonav.parallel.pool import EngineName, open_pool
-from evonav.parallel.worker import Resources
-from evonav.perception.shorthand import word_of
+from evonav.parallel.folders import check_same_run, writing
+from evonav.parallel.pool import open_pool
+from evonav.parallel.worker import Workforce
 from evonav.tasks.listing import TaskFile
 
 __all__ = [
@@ -35,12 +34,8 @@ __all__ = [
     "evaluate_all",
     "perception_seed",
     "run_identity",
-    "write_summary",
 ]
 
-SUMMARY_NAME = "summary.json"
-MODELS_KEY = "perception_models"
-"""Key in a run's header and summary for hashes of weights and versions of libraries, by stack."""
 NUM_RETRIES = 2
 """Number of retries of a stage that lost its worker, its simulator or its agent's process."""
 
@@ -77,25 +72,19 @@ def evaluate(
     run_dir: Path,
     *,
     config: RunConfig | None = None,
-    engine: EngineName = "local",
     num_workers: int = 1,
-    ray_address: str | None = None,
-    resources: Resources | None = None,
     num_retries: int = NUM_RETRIES,
     retry_errored: bool = False,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> list[AgentSummary]:
-    """Evaluate agents on tasks; call it again on the same folder to resume.
+    """Evaluate agents on tasks with workers on this machine; call it again on the same folder to resume.
 
     Args:
         agents: Names, see `evonav agents`.
         tasks: See `task_files`.
         run_dir: Holds `records.sqlite` and `summary.json`.
         config: Must be the run's own when the folder already holds one.
-        engine: Processes of this machine, or Ray actors.
-        num_workers: 0 runs everything in this process.
-        ray_address: Address of a Ray cluster; default: one on this machine.
-        resources: Resources that Ray reserves for each worker; default: one CPU.
+        num_workers: Processes of this machine; 0 runs everything in this process.
         num_retries: Number of retries of a stage, see `evaluate_all`.
         retry_errored: Run errored stages again, and those that were not run because of them.
         on_progress: Called after every recorded stage.
@@ -111,10 +100,7 @@ def evaluate(
     request = RunRequest(tuple(agents), tuple(tasks), run_dir, config or RunConfig())
     (summaries,) = evaluate_all(
         [request],
-        engine=engine,
-        num_workers=num_workers,
-        ray_address=ray_address,
-        resources=resources,
+        Workforce(num_workers),
         num_retries=num_retries,
         retry_errored=retry_errored,
         on_progress=lambda _, progress: on_progress(progress),
@@ -124,11 +110,8 @@ def evaluate(
 
 def evaluate_all(
     requests: Sequence[RunRequest],
+    workforce: Workforce,
     *,
-    engine: EngineName = "local",
-    num_workers: int = 1,
-    ray_address: str | None = None,
-    resources: Resources | None = None,
     num_retries: int = NUM_RETRIES,
     retry_errored: bool = False,
     on_progress: Callable[[int, Progress], None] = lambda _, __: None,
@@ -137,10 +120,7 @@ def evaluate_all(
 
     Args:
         requests: Runs, each in a folder of its own.
-        engine: Processes of this machine, or Ray actors.
-        num_workers: Processes or actors; 0 runs everything in this process.
-        ray_address: Address of a Ray cluster; default: one on this machine.
-        resources: Resources that Ray reserves for each worker; default: one CPU.
+        workforce: The workers that all runs share.
         num_retries: Number of retries of a stage that lost its worker, its simulator or its agent's process, or in
             which evonav itself failed. Every failure is recorded, see `RunStore.failures`.
         retry_errored: Run errored stages again, and those that were not run because of them.
@@ -155,9 +135,7 @@ def evaluate_all(
         PerceptionError: Models of a perception are missing.
         EngineError: Workers do not start.
     """
-    folders = [request.run_dir.absolute() for request in requests]
-    if len(set(folders)) != len(folders):
-        raise InvalidArgumentError("two runs are wanted for in one folder")
+    num_workers = workforce.num_workers
     _check_requests(requests, num_workers)
     for request in requests:
         if not (request.run_dir / FILE_NAME).exists():  # what cannot begin leaves nothing behind
@@ -168,29 +146,19 @@ def evaluate_all(
             stack.enter_context(writing(request.run_dir))
             runs.append(stack.enter_context(closing(_begin(request, num_workers, num_retries, retry_errored))))
             on_progress(index, runs[-1].progress(None))
-        summaries: dict[int, list[AgentSummary]] = {}
-
-        def finish(index: int) -> None:
-            summaries[index] = write_summary(requests[index].run_dir, only=requests[index].agents)
-
-        num_jobs = sum(len(run.jobs) for run in runs)
-        if num_jobs:
+        if num_jobs := sum(len(run.jobs) for run in runs):
+            schedule = Schedule(runs, num_retries)
             with open_pool(
                 WORK,
                 "",
-                engine=engine,
-                num_workers=min(num_workers, num_jobs),
+                replace(workforce, num_workers=min(num_workers, num_jobs)),
                 timeout_s=max(run.limit_s for run in runs),
-                ray_address=ray_address,
-                resources=resources,
-                max_losses=0,  # they are counted here
+                max_losses=0,  # the schedule counts them
             ) as pool:
-                for index, stage in run_all(runs, pool, num_retries, finish):
-                    on_progress(index, runs[index].progress(stage))
-        for index, run in enumerate(runs):
-            if not run.jobs:
-                finish(index)
-        return [summaries[index] for index in range(len(requests))]
+                while schedule.fill(pool):
+                    for index, stage in schedule.take(pool.next_answer()):
+                        on_progress(index, runs[index].progress(stage))
+        return [run.summaries or run.summarise() for run in runs]
 
 
 def _begin(request: RunRequest, num_workers: int, num_retries: int, retry_errored: bool) -> RunJobs:
@@ -250,32 +218,6 @@ def _hosting(request: RunRequest, num_workers: int) -> AgentHosting:
     )
 
 
-def write_summary(run_dir: Path, only: Sequence[str] | None = None) -> list[AgentSummary]:
-    """Compute every agent's metrics from the records, and write `summary.json`.
-
-    Args:
-        run_dir: A run.
-        only: Agents to return, in this order; default all.
-
-    Raises:
-        StoreError: There is no run, or it cannot be read or written.
-    """
-    with RunStore(run_dir) as store:
-        agents: list[str] = store.meta("agents") or []
-        num_stages = sum(store.meta("num_stages").values())
-        records = {agent: list(store.records(agent, is_brief=True)) for agent in agents}
-        backend = (store.meta("config") or {}).get("backend", {})
-        models = store.meta(MODELS_KEY)
-    summaries = {agent: summarise(agent, records[agent], num_stages) for agent in agents}
-    content = summary_json(list(summaries.values()), agent_pairs(records))
-    if make := backend.get("perception"):
-        content["perception"] = word_of(make, backend.get("perception_options", {}))
-    if models:
-        content[MODELS_KEY] = models
-    write_atomically(run_dir / SUMMARY_NAME, json.dumps(content, indent=2, sort_keys=True) + "\n")
-    return [summaries[agent] for agent in only or agents]
-
-
 def agent_seed(seed: int, agent: str, task_id: str) -> int:
     """Return the seed of an agent's random choices, which depends on names and not on order or workers."""
     digest = hashlib.sha256(f"{seed}\0{agent}\0{task_id}".encode()).digest()
@@ -288,8 +230,8 @@ def perception_seed(seed: int, task_id: str) -> int:
 
 
 def _check_requests(requests: Sequence[RunRequest], num_workers: int) -> None:
-    if num_workers < 0:
-        raise InvalidArgumentError(f"num_workers = {num_workers}: must be >= 0")
+    if len({request.run_dir.absolute() for request in requests}) != len(requests):
+        raise InvalidArgumentError("two runs are wanted for in one folder")
     checked: set[tuple[str, bool]] = set()
     for request in requests:
         if not request.agents:

@@ -1,16 +1,18 @@
 """Schedule episode jobs and commit the workers' results."""
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import count
 from pathlib import Path
 
 from evonav.evaluation.episode.outcome import as_errored, as_not_run
 from evonav.evaluation.episode.spec import EpisodeSpec, unreadable_task_spec
+from evonav.evaluation.metrics.navigation import AgentSummary
 from evonav.evaluation.records.encoded import EncodedStage, encode_stage
 from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.summary import write_summary
 from evonav.evaluation.run.worker import RETRIED, EpisodeJob, WorkerConfig, decode_event, floor_plan_if_possible
 from evonav.parallel.pool import Answer, Job, Pool
 from evonav.tasks.listing import TaskFile
@@ -55,8 +57,11 @@ class RunJobs:
         self.config = config
         self.config_text = config.text
         self.limit_s = limit_s
-        self.num_left = len(jobs)
+        self.summaries: list[AgentSummary] | None = None
+        """A summary of each requested agent, once all jobs have ended."""
+        self._num_left = len(jobs)
         self._run_dir = run_dir
+        self._agents = agents
         self._tasks = {task.task_id: task for task in tasks}
         self._states = states
         self._keys = {
@@ -80,6 +85,18 @@ class RunJobs:
         if self._store is not None:
             self._store.close()
         self._store = None
+
+    def end_job(self) -> None:
+        """Note that a job has ended; after the last one, close the store and write the summary."""
+        self._num_left -= 1
+        if self._num_left == 0:
+            self.close()
+            self.summarise()
+
+    def summarise(self) -> list[AgentSummary]:
+        """Write the run's summary, and return those of the requested agents."""
+        self.summaries = write_summary(self._run_dir, only=self._agents)
+        return self.summaries
 
     def progress(self, latest: EncodedStage | None) -> Progress:
         """Return the progress, with the stage that was recorded last."""
@@ -146,62 +163,71 @@ class _Episode:
     """Number of failed attempts by stage."""
 
 
-def run_all(
-    runs: Sequence[RunJobs], pool: Pool, num_retries: int, on_done: Callable[[int], None]
-) -> Iterator[tuple[int, EncodedStage]]:
-    """Run all jobs of several runs and commit their results.
+class Schedule:
+    """The jobs of several runs: those that wait for a worker, and those that a pool runs."""
 
-    Args:
-        runs: The runs.
-        pool: Workers that run the jobs.
-        num_retries: Number of retries of a stage whose worker was lost.
-        on_done: Called with the index of a run when its last job has ended.
+    def __init__(self, runs: Sequence[RunJobs], num_retries: int) -> None:
+        """Let all jobs wait.
 
-    Yields:
-        Index of the run, and a stage that was committed.
-    """
-    waiting = deque(_Episode(index, job) for index, run in enumerate(runs) for job in run.jobs)
-    under_way: dict[int, _Episode] = {}
-    numbers = count()
-    while waiting or under_way:
-        while waiting and len(under_way) < pool.capacity:
-            episode, number = waiting.popleft(), next(numbers)
-            under_way[number] = episode
-            run = runs[episode.index]
+        Args:
+            runs: The runs.
+            num_retries: Number of retries of a stage whose worker was lost.
+        """
+        self._runs = runs
+        self._num_retries = num_retries
+        self._waiting = deque(_Episode(index, job) for index, run in enumerate(runs) for job in run.jobs)
+        self._under_way: dict[int, _Episode] = {}
+        self._numbers = count()
+
+    def fill(self, pool: Pool) -> bool:
+        """Submit waiting jobs, as the pool has room.
+
+        Returns:
+            True while a job is under way, so that there will be another answer.
+        """
+        while self._waiting and len(self._under_way) < pool.capacity:
+            episode, number = self._waiting.popleft(), next(self._numbers)
+            self._under_way[number] = episode
+            run = self._runs[episode.index]
             pool.submit(Job(number, episode.job.text(run.config_text), run.limit_s))
-        answer = pool.next_answer()
-        episode = under_way[answer.key]
-        run = runs[episode.index]
-        if answer.is_end:
-            del under_way[answer.key]
+        return bool(self._under_way)
+
+    def take(self, answer: Answer) -> Iterator[tuple[int, EncodedStage]]:
+        """Commit what a worker reports, and summarise a run whose last job has ended.
+
+        Yields:
+            Index of the run, and a stage that was committed.
+        """
+        episode = self._under_way.pop(answer.key) if answer.is_end else self._under_way[answer.key]
+        run = self._runs[episode.index]
         event = _event_of(answer, run)
+        stages: Iterable[EncodedStage] = ()
         if isinstance(event, EncodedStage):
             episode.stage = event.stage + 1
-            if run.add(event):
-                yield episode.index, event
+            stages = (event,)
         elif event is not None:
             failure = replace(event, stage=event.stage or episode.stage)
-            if not answer.is_end:  # the worker tries again itself
-                _note_retry(run, episode, failure)
-            elif failure.kind in RETRIED and episode.num_tried[failure.stage] < num_retries:
-                episode.num_tried[failure.stage] += 1
-                _note_retry(run, episode, failure)
-                waiting.appendleft(episode)
-                continue
+            is_repeated = answer.is_end and self._is_repeated(episode, failure)
+            if is_repeated or not answer.is_end:  # before its end, the worker tries again itself
+                run.store.add_retry(episode.job.agent, episode.job.task_id, failure)
+                episode.stage = 1
             else:
-                for stage in run.left_behind(episode.job, failure):
-                    if run.add(stage):
-                        yield episode.index, stage
+                stages = run.left_behind(episode.job, failure)
+            if is_repeated:
+                self._waiting.appendleft(episode)
+                return
+        for stage in stages:
+            if run.add(stage):
+                yield episode.index, stage
         if answer.is_end:
-            run.num_left -= 1
-            if run.num_left == 0:
-                run.close()
-                on_done(episode.index)
+            run.end_job()
 
-
-def _note_retry(run: RunJobs, episode: _Episode, failure: StageFailure) -> None:
-    run.store.add_retry(episode.job.agent, episode.job.task_id, failure)
-    episode.stage = 1
+    def _is_repeated(self, episode: _Episode, failure: StageFailure) -> bool:
+        """Return true if a retry of the stage is left, and use it up."""
+        if failure.kind not in RETRIED or episode.num_tried[failure.stage] >= self._num_retries:
+            return False
+        episode.num_tried[failure.stage] += 1
+        return True
 
 
 def _event_of(answer: Answer, run: RunJobs) -> EncodedStage | StageFailure | None:

@@ -10,9 +10,8 @@ process or a failure of the harness; `evonav.evaluation.run.scheduler` retries a
 """
 
 import json
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Callable, Generator, Iterator
-from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -96,11 +95,28 @@ class WorkerContext:
         hosting = config.hosting
         self.config = config
         # An agent in this process has one time limit for a whole stage.
-        self.on_round = (lambda: None) if hosting.is_in_process else alive
+        self._on_round = (lambda: None) if hosting.is_in_process else alive
         self._simulator: Simulator | None = None
         self._processes = None if hosting.is_in_process else AgentProcesses(hosting)
 
-    def agent(self, job: EpisodeJob) -> Agent | HostedAgent:
+    def attempt(self, spec: EpisodeSpec, job: EpisodeJob) -> Iterator[StageOutcome]:
+        """Run an episode from its beginning, with a fresh agent."""
+        perception = self.config.backend.perception.create()
+        if self._simulator is None:
+            self._simulator = self.config.backend.simulator.create()
+        return Episode(
+            spec,
+            job.agent,
+            self._agent(job),
+            self._simulator,
+            perception,
+            self.config.protocol,
+            job.seed,
+            _Heartbeat(self._on_round),
+            perception_seed=job.perception_seed,
+        ).run()
+
+    def _agent(self, job: EpisodeJob) -> Agent | HostedAgent:
         """Make a fresh agent. Oracle baselines are given oracle data and stay in this process."""
         if self._processes is not None and job.agent not in ORACLE_BASELINES:
             return RemoteAgent(self._processes, job.agent, self.config.backend.decision, job.seed)
@@ -109,22 +125,15 @@ class WorkerContext:
         except Exception as error:
             return _FailedAgent(error)
 
-    @contextmanager
-    def simulator(self) -> Iterator[Simulator]:
-        """Lend the simulator; it is closed after an episode that raised."""
-        simulator, self._simulator = self._simulator or self.config.backend.simulator.create(), None
-        try:
-            yield simulator
-        except BaseException:
-            simulator.close()
-            raise
-        self._simulator = simulator
-
-    def close(self) -> None:
-        """Close the simulator and end the agents' processes; safe to call twice."""
+    def close_simulator(self) -> None:
+        """Close the simulator, as after an episode that did not end; the next episode starts another one."""
         if self._simulator is not None:
             self._simulator.close()
         self._simulator = None
+
+    def close(self) -> None:
+        """Close the simulator and end the agents' processes; safe to call twice."""
+        self.close_simulator()
         if self._processes is not None:
             self._processes.close()
 
@@ -169,49 +178,20 @@ class _Heartbeat:
         self._on_round()
 
 
-def run_job(job: EpisodeJob, context: WorkerContext) -> Generator[EncodedStage | StageFailure]:
-    """Run an episode in this process.
+class _Retries:
+    """Counts the retries that are left to an episode."""
 
-    Yields:
-        Finished stages. After a failure that costs only the attempt: the failure, and then the stages from stage 1 on
-        again.
-    """
-    case = context.config.backend.tasks.create(Path(job.path))
-    num_tried: Counter[int] = Counter()
-    is_whole = False
-    while not is_whole:
-        is_whole = True
-        with closing(_attempt(case, job, context)) as outcomes:
-            for outcome in outcomes:
-                failure = outcome.failure
-                if failure is not None and failure.kind in RETRIED:
-                    # What an agent does to itself is tried again so often an episode, not a stage: it costs time.
-                    stage = 0 if failure.kind.is_agents else failure.stage
-                    if num_tried[stage] < context.config.num_retries:
-                        num_tried[stage] += 1
-                        is_whole = False
-                        yield failure
-                        break
-                yield _encoded(outcome, case, sends_floor_plan=job.sends_floor_plans)
+    def __init__(self, num_retries: int) -> None:
+        self._num_left: defaultdict[int, int] = defaultdict(lambda: num_retries)
 
-
-def _attempt(case: EpisodeSpec, job: EpisodeJob, context: WorkerContext) -> Generator[StageOutcome]:
-    config = context.config
-    perception = config.backend.perception.create()
-    with context.simulator() as simulator:
-        agent = context.agent(job)
-        observer = _Heartbeat(context.on_round)
-        yield from Episode(
-            case,
-            job.agent,
-            agent,
-            simulator,
-            perception,
-            config.protocol,
-            job.seed,
-            observer,
-            perception_seed=job.perception_seed,
-        ).run()
+    def take(self, failure: StageFailure) -> bool:
+        """Use up a retry after a failure, if it may be retried and one is left."""
+        if failure.kind not in RETRIED:
+            return False
+        # The limit for failures of the agent's own process is per episode and not per stage: retries take time.
+        stage = 0 if failure.kind.is_agents else failure.stage
+        self._num_left[stage] -= 1
+        return self._num_left[stage] >= 0
 
 
 class EpisodeWork:
@@ -222,14 +202,27 @@ class EpisodeWork:
         self._contexts: dict[str, WorkerContext] = {}
 
     def __call__(self, text: str) -> Generator[str, None, str]:
-        """Run the episode of `EpisodeJob.text`; yield and return events for `decode_event`."""
+        """Run the episode of `EpisodeJob.text`; yield and return events for `decode_event`.
+
+        After a failure that costs only the attempt, the failure is an event, and the stages from stage 1 on come again.
+        """
         head, _, config_text = text.partition("\n")
+        job, context = EpisodeJob(**json.loads(head)), self._context(config_text)
+        num_left = _Retries(context.config.num_retries)
         try:
-            context = self._context(config_text)
-            with closing(run_job(EpisodeJob(**json.loads(head)), context)) as events:
-                for event in events:
-                    yield event.to_text() if isinstance(event, EncodedStage) else _failure_text(event)
+            spec = context.config.backend.tasks.create(Path(job.path))
+            is_whole = False
+            while not is_whole:
+                is_whole = True
+                for outcome in context.attempt(spec, job):
+                    if outcome.failure is not None and num_left.take(outcome.failure):
+                        yield _failure_text(outcome.failure)
+                        is_whole = False
+                        context.close_simulator()
+                        break
+                    yield _encoded(outcome, spec, sends_floor_plan=job.sends_floor_plans).to_text()
         except Exception as error:
+            context.close_simulator()
             message = f"{type(error).__name__}: {error}"
             return _failure_text(StageFailure(0, ErrorKind.HARNESS, message, error_text.traceback_of(error)))
         return "{}"

@@ -13,6 +13,7 @@ from pydantic import TypeAdapter
 from evonav.errors import HouseError, TaskError
 from evonav.house import House
 from evonav.parallel.pool import Answer, Job, answers, open_pool
+from evonav.parallel.worker import Workforce
 from evonav.tasks.manifest import PublicStage, TaskHeader
 from evonav.tasks.oracle import Evolution, OracleStage
 from evonav.tasks.records import parse_record, read_file, read_gzip
@@ -245,7 +246,7 @@ def read_summaries(roots: Sequence[Path], *, num_workers: int = 1) -> Iterator[T
     jobs = (Job(number, json.dumps(chunk)) for number, chunk in enumerate(chunks))
     waiting: dict[int, list[TaskSummary]] = {}
     num_given = 0
-    with open_pool(WORK, "", num_workers=num_workers, timeout_s=CHUNK_TIMEOUT_S) as pool:
+    with open_pool(WORK, "", Workforce(num_workers), timeout_s=CHUNK_TIMEOUT_S) as pool:
         for answer in answers(pool, jobs):
             waiting[answer.key] = _summaries_of(answer, chunks[answer.key])
             while num_given in waiting:

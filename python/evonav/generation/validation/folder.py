@@ -10,6 +10,7 @@ from evonav.errors import TaskError
 from evonav.generation.validation.problems import Problem, Report
 from evonav.generation.validation.task import validate_files
 from evonav.parallel.pool import Answer, Job, answers, open_pool
+from evonav.parallel.worker import Workforce
 from evonav.tasks.dataset import DATASET_NAME, check_dataset, read_dataset
 from evonav.tasks.listing import task_roots
 
@@ -75,7 +76,7 @@ def validate_folder(
     reports: dict[int, Report] = {}
     settings = json.dumps({"allow_unknown_assets": allow_unknown_assets})
     jobs = (Job(index, str(root)) for index, root in enumerate(roots))
-    with open_pool(WORK, settings, num_workers=num_workers, timeout_s=TASK_TIMEOUT_S) as pool:
+    with open_pool(WORK, settings, Workforce(num_workers), timeout_s=TASK_TIMEOUT_S) as pool:
         for answer in answers(pool, jobs):
             reports[answer.key] = _report_of(answer, roots[answer.key].name)
             on_progress(len(reports), len(roots))
