@@ -48,7 +48,7 @@ MISTAKES = {
     f"{EVALUATE} --agnets fu": "--agents",
     f"{EVALUATE} --limit none": "'--limit'",
     f"{EVALUATE} --limit 2 --subset test-90": "give --limit or --subset, not both",
-    f"{EVALUATE} --ray-address auto": "--ray-address is for --engine ray",
+    f"{EVALUATE} --ray-address auto": "--ray-address is for engine ray",
     # an agent
     f"{EVALUATE} --agents ftuu": "did you mean `ftu`?",
     f"{EVALUATE} --agents fu --agents fu": "an agent is named twice: fu, fu",

@@ -12,7 +12,7 @@ from evonav.cli.options.settings import settings_options
 from evonav.errors import InvalidArgumentError
 from evonav.sweeps.file import read_sweep
 
-GROUPS = ("simulation", "perception", "decisions", "spending")
+GROUPS = ("simulation", "perception", "decisions", "spending", "run")
 
 
 @pytest.mark.parametrize("name", GROUPS)
@@ -32,11 +32,8 @@ def test_every_field_is_an_option_with_its_description(name):
     ("options", "table", "problem"),
     [
         (("--thor-gpu", "0"), "simulators.a = {gpu_device = 0}", "is for simulator ai2thor"),
-        (
-            ("--simulator", "ai2thor", "--thor-gpu", "-1"),
-            'simulators.a = {kind = "ai2thor", gpu_device = -1}',
-            "= -1: Input should be greater than or equal to 0",
-        ),
+        (("--max-cost", "0.0"), "max_cost = 0.0", "= 0.0: Input should be greater than 0"),
+        (("--ray-address", "auto"), 'ray_address = "auto"', "is for engine ray"),
         (("--device", "cpu"), 'perceptions.a = {device = "cpu"}', "is for perception predicted"),
         (("--temperature", "0.5"), "decisions.a = {temperature = 0.5}", "is of no use where text decides"),
     ],

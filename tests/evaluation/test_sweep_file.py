@@ -97,7 +97,7 @@ MISTAKES = {
     "empty agents": ('agents = []\ntasks = "bundled"', "agents = []"),
     "agent twice": ('agents = "fu,fu"\ntasks = "bundled"', "agents: 'fu' is named twice"),
     "unknown key": (SMALL + "sedes = [1]", "sedes: no such key; did you mean seeds?"),
-    "unknown key, nothing near": (SMALL + "zzz = 1", "zzz: no such key; there are prices, max_cost, name"),
+    "unknown key, nothing near": (SMALL + "zzz = 1", "zzz: no such key; there are prices, max_cost, workers"),
     "unknown key inside": (SMALL + "[protocol]\nmax_round = 3", "protocol.max_round: no such key; did you mean max_r"),
     "unknown decision key": (
         SMALL + '[decisions.a]\nkind = "vlm"\nmodel = "m"\ntemprature = 0.1',
@@ -110,7 +110,7 @@ MISTAKES = {
     "no seed": (SMALL + "seeds = []", "seeds = []"),
     "true is no seed": (SMALL + "seeds = [true]", "seeds.0 = True"),
     "bad engine": (SMALL + 'engine = "slurm"', "engine = 'slurm'"),
-    "ray address without ray": (SMALL + 'ray_address = "auto"', "ray_address is for engine = 'ray'"),
+    "ray address without ray": (SMALL + 'ray_address = "auto"', "ray_address is for engine ray"),
     "bad kind": (SMALL + 'decisions = "gpt4"', "decisions.gpt4.kind gpt4: expected text, vlm or module:name"),
     "no model": (SMALL + '[decisions.a]\nkind = "vlm"', "decisions.a.model is needed"),
     "model setting for rules": (SMALL + "[decisions.a]\ntemperature = 0.5", "decisions.a.temperature is of no use"),

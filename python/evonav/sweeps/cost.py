@@ -19,13 +19,12 @@ class CellEstimate:
     """`None` without prices."""
 
 
-def cell_estimate(sweep: SweepFile, run: CellRun, num_workers: int) -> CellEstimate:
+def cell_estimate(sweep: SweepFile, run: CellRun) -> CellEstimate:
     """Run a few tasks of a cell with the text matcher and count what its model would be asked.
 
     Args:
         sweep: The file.
         run: A cell with a model as decision model.
-        num_workers: Processes.
 
     Raises:
         InvalidArgumentError: An agent is unknown, or the prices lack the model.
@@ -34,7 +33,7 @@ def cell_estimate(sweep: SweepFile, run: CellRun, num_workers: int) -> CellEstim
     config = run.request.config
     options = dict(config.backend.decision.options)
     price = sweep.price(options["model"])
-    found = estimate_run(run.cell.agents, run.request.tasks, config, options, num_workers=num_workers)
+    found = estimate_run(run.cell.agents, run.request.tasks, config, options, num_workers=sweep.num_workers)
     tokens_in = sum(estimate.input_tokens for estimate in found)
     tokens_out = sum(estimate.output_tokens for estimate in found)
     return CellEstimate(

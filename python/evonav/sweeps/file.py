@@ -6,9 +6,10 @@ sentence with file, key and value.
 
 import difflib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, ValidationError
 
@@ -17,12 +18,12 @@ from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.settings import (
     DecisionSettings,
     PerceptionSettings,
+    RunSettings,
     SettingError,
     Settings,
     SimulatorSettings,
     SpendingSettings,
 )
-from evonav.parallel.worker import EngineName
 from evonav.sweeps.shorthand import MAX_NAME_CHARACTERS, SHORT_FORMS, apply, listed
 from evonav.tasks.subsets import SubsetError, parse_subset
 from evonav.toml import read_toml
@@ -75,7 +76,7 @@ class Pattern(Settings):
     seed: tuple[Seed, ...] = ()
 
 
-class SweepFile(SpendingSettings):
+class SweepFile(RunSettings, SpendingSettings):
     """A sweep: agents x simulators x perceptions x decisions x tasks x seeds."""
 
     model_config = ConfigDict(title="evonav sweep")
@@ -101,24 +102,6 @@ class SweepFile(SpendingSettings):
     """Run only combinations that match one of these patterns. Default: all."""
     exclude: tuple[Pattern, ...] = ()
     """Do not run combinations that match one of these patterns."""
-    workers: int | None = Field(default=None, ge=0)
-    """Number of worker processes or actors; 0 runs in this process. Default: one per core."""
-    engine: EngineName = "local"
-    """Processes of this machine, or Ray."""
-    ray_address: str | None = None
-    """Ray: address of a cluster that shares this file system. Default: start Ray on this machine."""
-    worker_gpus: float = Field(default=0.0, ge=0.0)
-    """Ray: GPUs reserved for each worker, such as 0.5, for perception that needs one."""
-    num_retries: int | None = Field(default=None, ge=0)
-    """Number of retries of a stage that lost its worker, simulator or agent process. Default: 2."""
-    stage_timeout_s: float | None = Field(default=None, gt=0.0)
-    """Seconds before a stage is errored. Default: 900, with a model 14400."""
-    agent_timeout_s: float | None = Field(default=None, ge=0.1)
-    """Seconds to wait for an agent's answer before its stage is errored. Default: 600, with a model 3600."""
-    agent_memory_mb: int | None = Field(default=None, ge=256)
-    """Largest address space of an agent's process, in MB. Default: no limit."""
-    in_process: bool = False
-    """Run agents in the workers' processes: faster for short stages, but a crash of an agent ends its worker."""
 
 
 def read_sweep(path: Path, changes: Sequence[str] = ()) -> SweepFile:
@@ -209,32 +192,36 @@ def _keys_at(place: Sequence[int | str]) -> list[str]:
     return list(model.model_fields)
 
 
+@contextmanager
+def _naming(path: Path, table: str = "") -> Iterator[None]:
+    """Name the file, its table and the field in errors of settings."""
+    try:
+        yield
+    except SettingError as error:
+        raise InvalidArgumentError(f"{path}: {table}{'.' if table else ''}{error.key} {error.problem}") from None
+    except InvalidArgumentError as error:
+        raise InvalidArgumentError(f"{path}: {table}: {error}" if table else f"{path}: {error}") from None
+
+
 def _check(sweep: SweepFile, path: Path) -> None:
     """Check what concerns more than one field."""
-    settings: Sequence[tuple[Literal["simulators", "decisions"], Mapping[str, Any]]] = (
-        ("simulators", sweep.simulators),
-        ("decisions", sweep.decisions),
-    )
-    for axis, table in settings:
-        for name, entry in table.items():
-            place = f"{path}: {axis}.{name}"
-            try:
-                entry.component() if axis == "simulators" else entry.check()
-            except SettingError as error:
-                raise InvalidArgumentError(f"{place}.{error.key} {error.problem}") from None
-            except InvalidArgumentError as error:
-                raise InvalidArgumentError(f"{place}: {error}") from None
-            if axis == "decisions" and entry.mode == "record":
-                raise InvalidArgumentError(
-                    f"{place}.mode = 'record': is for one run; auto keeps answers too, and a sweep goes on with them"
+    for name, simulator in sweep.simulators.items():
+        with _naming(path, f"simulators.{name}"):
+            simulator.component()
+    for name, decision in sweep.decisions.items():
+        with _naming(path, f"decisions.{name}"):
+            decision.check()
+            if decision.mode == "record":
+                raise SettingError(
+                    DecisionSettings,
+                    "mode",
+                    "= 'record': is for one run; auto stores answers too, and a sweep that is resumed uses them",
                 )
     for name, perception in sweep.perceptions.items():
-        try:
+        with _naming(path, f"perceptions.{name}"):
             perception.component()
-        except SettingError as error:
-            raise InvalidArgumentError(f"{path}: perceptions.{name}.{error.key} {error.problem}") from None
-        except InvalidArgumentError as error:
-            raise InvalidArgumentError(f"{path}: perceptions.{name}: {error}") from None
+    with _naming(path):
+        sweep.workforce()
     for name, tasks in sweep.tasks.items():
         if tasks.limit is not None and tasks.subset is not None:
             raise InvalidArgumentError(f"{path}: tasks.{name}: give limit or subset, not both")
@@ -243,9 +230,6 @@ def _check(sweep: SweepFile, path: Path) -> None:
                 parse_subset(tasks.subset)
             except SubsetError as error:
                 raise InvalidArgumentError(f"{path}: tasks.{name}.{error}") from None
-    for key in ("ray_address", "worker_gpus"):
-        if getattr(sweep, key) and sweep.engine != "ray":
-            raise InvalidArgumentError(f"{path}: {key} is for engine = 'ray'")
     if sweep.max_cost is not None and sweep.prices is None:
         raise InvalidArgumentError(f"{path}: max_cost = {sweep.max_cost:g} needs prices, a table of what models cost")
     for which in ("include", "exclude"):

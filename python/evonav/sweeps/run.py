@@ -20,15 +20,13 @@ from typing import Any
 from evonav._core import __version__
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import EvonavError, InvalidArgumentError, StoreError
-from evonav.evaluation.hosting.process import AgentHosting
 from evonav.evaluation.records.former_paths import with_current_paths
 from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend
-from evonav.evaluation.run.run import NUM_RETRIES, Progress, RunConfig, RunRequest, evaluate_all, run_identity
+from evonav.evaluation.run.run import Progress, RunConfig, RunRequest, evaluate_all, run_identity
 from evonav.evaluation.run.settings import DecisionResources, check_decision
 from evonav.json_diff import json_differences
 from evonav.parallel.folders import write_atomically, writing
-from evonav.parallel.worker import Workforce
 from evonav.sweeps.file import BUNDLED, SEPARATOR, Pattern, SweepFile, TaskSet
 from evonav.tasks.bundled import bundled_tasks
 from evonav.tasks.listing import TaskFile, task_files
@@ -147,17 +145,7 @@ def config_of(sweep: SweepFile, cell: Cell, resources: DecisionResources | None)
         perception=sweep.perceptions[cell.perception].component(),
         decision=decision.component(cell.seed, resources),
     )
-    return RunConfig(
-        seed=cell.seed,
-        protocol=sweep.protocol.config(),
-        backend=backend,
-        stage_timeout_s=sweep.stage_timeout_s or decision.stage_timeout_s,
-        hosting=AgentHosting(
-            is_in_process=sweep.in_process,
-            timeout_s=sweep.agent_timeout_s or decision.answer_timeout_s,
-            memory_mb=sweep.agent_memory_mb,
-        ),
-    )
+    return sweep.config(cell.seed, backend, decision, sweep.protocol.config())
 
 
 def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[TaskFile]], out: Path) -> list[CellRun]:
@@ -173,7 +161,7 @@ def cell_runs(sweep: SweepFile, cells: Sequence[Cell], tasks: Mapping[str, list[
     ]
 
 
-def with_resources(sweep: SweepFile, out: Path, run: CellRun, num_workers: int) -> CellRun:
+def with_resources(sweep: SweepFile, out: Path, run: CellRun) -> CellRun:
     """Return a run whose agents can ask their model, after a check that it can be reached.
 
     Raises:
@@ -182,7 +170,7 @@ def with_resources(sweep: SweepFile, out: Path, run: CellRun, num_workers: int) 
     if sweep.decisions[run.cell.decision].kind == "text":
         return run
     resources = DecisionResources(
-        run.request.run_dir, out / LEDGER_NAME, sweep, account=run.cell.name, num_workers=max(1, num_workers)
+        run.request.run_dir, out / LEDGER_NAME, sweep, account=run.cell.name, num_workers=max(1, sweep.num_workers)
     )
     try:
         config = config_of(sweep, run.cell, resources)
@@ -247,7 +235,6 @@ def run_sweep(
     out: Path,
     runs: Sequence[CellRun],
     *,
-    num_workers: int,
     only: Sequence[str] = (),
     retry_errored: bool = False,
     on_progress: Callable[[Cell, Progress], None] = lambda _, __: None,
@@ -258,7 +245,6 @@ def run_sweep(
         sweep: The file.
         out: Folder of the sweep.
         runs: The runs of all cells.
-        num_workers: Processes or actors; 0 runs everything in this process.
         only: Patterns of cells' names; others are left as they are.
         retry_errored: Run errored stages again, and those that were not run because of them.
         on_progress: Called as a cell begins and after each of its recorded stages.
@@ -272,13 +258,13 @@ def run_sweep(
     with writing(out):
         claim(out, sweep, runs)
         todo = [run for run in todo if retry_errored or not _is_recorded(run)]
-        todo = [with_resources(sweep, out, run, num_workers) for run in todo]
+        todo = [with_resources(sweep, out, run) for run in todo]
         for name in dict.fromkeys(run.cell.simulator for run in todo):
             _check_simulator(next(run for run in todo if run.cell.simulator == name))
         evaluate_all(
             [run.request for run in todo],
-            Workforce(num_workers, sweep.engine, sweep.ray_address, num_gpus=sweep.worker_gpus),
-            num_retries=NUM_RETRIES if sweep.num_retries is None else sweep.num_retries,
+            sweep.workforce(),
+            num_retries=sweep.num_retries,
             retry_errored=retry_errored,
             on_progress=lambda index, progress: on_progress(todo[index].cell, progress),
         )

@@ -5,8 +5,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options.settings import settings_options
-
 if TYPE_CHECKING:  # the command must start fast
     from collections.abc import Sequence
 
@@ -29,10 +27,10 @@ DryRun = Annotated[
 def decision_component(
     decisions: "DecisionSettings",
     spending: "SpendingSettings",
-    *,
     out: Path,
     seed: int,
     num_workers: int,
+    *,
     dry_run: bool = False,
 ) -> "Component[DecisionModel]":
     """Return the component of the decision model, after a check that it can be asked from here.
@@ -46,21 +44,19 @@ def decision_component(
         dry_run: Return a model that cannot be asked, for estimates.
 
     Raises:
-        InvalidArgumentError: A setting is invalid.
+        SettingError: A setting is invalid.
         DecisionError: The model cannot be asked from here: a key or package is missing.
         StoreError: The file of exchanges cannot be opened.
     """
     from evonav.evaluation.run.settings import DecisionResources, check_decision
 
-    with settings_options("decisions").errors():
-        decisions.check()
+    decisions.check()
     if decisions.kind != "vlm":
         flags = {"prices": spending.prices is not None, "max-cost": spending.max_cost is not None, "dry-run": dry_run}
         for flag in (name for name, is_given in flags.items() if is_given):
             raise typer.BadParameter(f"--{flag} is for --decision vlm")
     resources = None if dry_run else DecisionResources.of_run(out, spending, num_workers)
-    with settings_options("decisions").errors():
-        decision = decisions.component(seed, resources)
+    decision = decisions.component(seed, resources)
     if resources is not None and decisions.kind != "text":
         check_decision(decision, seed)
     return decision

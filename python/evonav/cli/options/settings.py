@@ -6,8 +6,7 @@ that is called.
 """
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import wraps
@@ -15,6 +14,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 import typer
+from annotated_types import Ge
 from typer.core import TyperGroup
 
 if TYPE_CHECKING:  # the command must start fast
@@ -26,14 +26,16 @@ class Options:
     """The options that one settings model has on the command line."""
 
     model: "type[Settings]"
-    panel: str
-    """Heading in the command's help."""
+    panel: str | None = None
+    """Heading in the command's help; default: that of plain options."""
     names: Mapping[str, str] = field(default_factory=dict)
     """Option by field, where its name differs."""
     fields: tuple[str, ...] = ()
     """The fields that are options; default: all that fit on a command line."""
     parse: Mapping[str, Callable[[str], Any]] = field(default_factory=dict)
     """Functions that read fields which are no plain values."""
+    overrides: bool = False
+    """The options override a file: none has a default, and an option that is given counts even if it is the model's."""
 
     def option(self, name: str) -> str:
         """Return the parameter name of a field's option."""
@@ -47,62 +49,75 @@ class Options:
             name for name in fields if name in self.parse or get_origin(fields[name].annotation) is not dict
         )
 
+    def flag(self, name: str) -> str:
+        """Return the flag of a field's option."""
+        return f"--{self.option(name).replace('_', '-')}"
+
     def parameters(self) -> list[inspect.Parameter]:
         """Return a keyword parameter for each option, as typer reads them."""
-        parameters = []
-        for name in self.chosen:
-            found = self.model.model_fields[name]
-            option, kind = self.option(name), str if name in self.parse else _option_type(found.annotation)
-            flag = option.replace("_", "-")
-            flags = f"--{flag}/--no-{flag}" if found.default is True else f"--{flag}"
-            hint = typer.Option(flags, help=" ".join((found.description or "").split()), rich_help_panel=self.panel)
-            default = "" if name in self.parse else found.default
-            parameters.append(
-                inspect.Parameter(
-                    option, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, hint]
-                )
+        return [
+            inspect.Parameter(
+                self.option(name),
+                inspect.Parameter.KEYWORD_ONLY,
+                default=self._default(name),
+                annotation=Annotated[self._type(name), self._hint(name)],
             )
-        return parameters
+            for name in self.chosen
+        ]
+
+    def _default(self, name: str) -> Any:  # noqa: ANN401 - a default
+        if self.overrides:
+            return None
+        return "" if name in self.parse else self.model.model_fields[name].get_default(call_default_factory=True)
+
+    def _type(self, name: str) -> Any:  # noqa: ANN401 - a type hint
+        kind = str if name in self.parse else _option_type(self.model.model_fields[name].annotation)
+        return kind | None if self.overrides else kind
+
+    def _hint(self, name: str) -> Any:  # noqa: ANN401 - typer's
+        found = self.model.model_fields[name]
+        text = " ".join((found.description or "").split())
+        if self.overrides:
+            what, _, default = text.partition(" Default: ")
+            text = f"{what} Default: the file's{', else ' + default if default else '.'}"
+        flags = f"{self.flag(name)}/--no-{self.flag(name)[2:]}" if found.default is True else self.flag(name)
+        least: Any = next((limit.ge for limit in found.metadata if isinstance(limit, Ge)), None)
+        return typer.Option(flags, min=least, help=text, rich_help_panel=self.panel)
 
     def read(self, given: dict[str, Any]) -> "Settings":
         """Take the options out of `given` and return the settings.
 
         Raises:
+            SettingError: A value cannot be read.
             typer.BadParameter: A value is invalid.
         """
         from pydantic import ValidationError
 
         values: dict[str, Any] = {}
-        with self.errors():
-            for name in self.chosen:
-                value = given.pop(self.option(name))
-                value = value.value if isinstance(value, Enum) else value
-                if name in self.parse:
-                    value = self.parse[name](value)
-                if value != self.model.model_fields[name].get_default(call_default_factory=True):
-                    values[name] = value
+        for name in self.chosen:
+            value = given.pop(self.option(name))
+            value = value.value if isinstance(value, Enum) else value
+            if name in self.parse:
+                value = self.parse[name](value)
+            default = self.model.model_fields[name].get_default(call_default_factory=True)
+            if value != (None if self.overrides else default):
+                values[name] = value
         try:
             return self.model.model_validate(values)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
-            option = self.option(str(first["loc"][0])).replace("_", "-")
-            raise typer.BadParameter(f"--{option} = {first['input']!r}: {first['msg']}") from None
-
-    @contextmanager
-    def errors(self) -> Iterator[None]:
-        """Name the option in errors about a field."""
-        from evonav.evaluation.run.settings import SettingError
-
-        try:
-            yield
-        except SettingError as error:
-            raise typer.BadParameter(f"--{self.option(error.key).replace('_', '-')} {error.problem}") from None
+            raise typer.BadParameter(
+                f"{self.flag(str(first['loc'][0]))} = {first['input']!r}: {first['msg']}"
+            ) from None
 
 
 def settings_options(name: str) -> Options:
-    """Return the options of a settings argument: decisions, spending, simulation, perception or models."""
+    """Return the options that the argument of a command with this name has."""
     from evonav.evaluation.run import settings
 
+    run_names = {"num_retries": "retries", "agent_timeout_s": "agent_timeout", "agent_memory_mb": "agent_memory"}
+    pool = ("workers", "engine", "ray_address")
+    agents = ("in_process", "agent_timeout_s")
     return {
         "decisions": Options(
             settings.DecisionSettings,
@@ -126,6 +141,15 @@ def settings_options(name: str) -> Options:
         ),
         "perception": Options(settings.PerceptionSettings, "Perception", {"make": "perception"}),
         "models": Options(settings.PerceptionSettings, "Perception", fields=("models", "device")),
+        "workers": Options(settings.RunSettings, fields=("workers",)),
+        "pool": Options(settings.RunSettings, fields=pool),
+        "local_run": Options(settings.RunSettings, names=run_names, fields=("workers", *agents)),
+        "run": Options(
+            settings.RunSettings,
+            names=run_names,
+            fields=(*pool, "worker_gpus", "num_retries", *agents, "agent_memory_mb"),
+        ),
+        "changes": Options(settings.RunSettings, fields=(*pool, "worker_gpus"), overrides=True),
     }[name]
 
 
@@ -145,7 +169,15 @@ def with_settings(*names: str) -> Callable[[Callable[..., None]], Callable[..., 
             groups = {name: settings_options(name) for name in names}
 
             def run(**given: Any) -> None:  # noqa: ANN401 - values of options
-                command(**{name: options.read(given) for name, options in groups.items()}, **given)
+                from evonav.evaluation.run.settings import SettingError
+
+                try:
+                    command(**{name: options.read(given) for name, options in groups.items()}, **given)
+                except SettingError as error:
+                    found = [options for options in groups.values() if options.model is error.settings]
+                    if not found:
+                        raise
+                    raise typer.BadParameter(f"{found[0].flag(error.key)} {error.problem}") from None
 
             added = [parameter for options in groups.values() for parameter in options.parameters()]
             return _signed(run, command, [*plain, *added])
@@ -203,9 +235,9 @@ def _noise(text: str) -> dict[str, float]:
     """Read rates of mistakes, such as wrong=0.1,lost=0.01."""
     from evonav.decision.noisy import NoiseRates, read_rates
     from evonav.errors import InvalidArgumentError
-    from evonav.evaluation.run.settings import SettingError
+    from evonav.evaluation.run.settings import DecisionSettings, SettingError
 
     try:
         return read_rates(text, list(NoiseRates.__dataclass_fields__))
     except InvalidArgumentError as error:
-        raise SettingError("noise", str(error)) from None
+        raise SettingError(DecisionSettings, "noise", str(error)) from None

@@ -14,16 +14,15 @@ from evonav.cli.options.shared import (
     Limit,
     Seed,
     Subset,
-    Workers,
-    count_of,
 )
 
 if TYPE_CHECKING:  # the command must start fast
-    from evonav.evaluation.run.settings import PerceptionSettings
+    from evonav.evaluation.run.settings import PerceptionSettings, RunSettings
 
 
-@with_settings("models")
+@with_settings("workers", "models")
 def perception(
+    workers: "RunSettings",
     models: "PerceptionSettings",
     tasks: Annotated[
         Path | None,
@@ -53,7 +52,6 @@ def perception(
     ] = 2,
     seed: Seed = 0,
     allow_unknown_assets: AnyAsset = False,
-    workers: Workers = None,
 ) -> None:
     """Measure perceptions against the truth: their detections, and the memory built from them.
 
@@ -95,7 +93,7 @@ def perception(
                 out,
                 config=TourConfig(views_per_room, houses, seed),
                 simulator=f"evonav.evaluation.run.components:{name}",
-                num_workers=count_of(workers),
+                num_workers=workers.num_workers,
                 on_progress=lambda done, num, latest: bar.update(
                     line, completed=done, total=num, description=latest or "tours"
                 ),

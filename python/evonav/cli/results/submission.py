@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options.shared import Limit, Subset, Tasks, Workers, count_of
+from evonav.cli.options.settings import with_settings
+from evonav.cli.options.shared import Limit, Subset, Tasks
 
 if TYPE_CHECKING:
+    from evonav.evaluation.run.settings import RunSettings
     from evonav.submission.verify import Verdict
 
 EXIT_REJECTED = 1
@@ -39,7 +41,9 @@ def pack(
     )
 
 
+@with_settings("workers")
 def verify(
+    workers: "RunSettings",
     file: Annotated[Path, typer.Argument(help="A packed run.")],
     tasks: Tasks = None,
     limit: Limit = None,
@@ -51,7 +55,6 @@ def verify(
             help="Recompute the scores without carrying out the actions: takes seconds, but proves less.",
         ),
     ] = False,
-    workers: Workers = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the verdict as JSON.")] = False,
 ) -> None:
     """Score a packed run again by carrying out its actions; exit code 1 if anything was altered or is missing."""
@@ -72,7 +75,7 @@ def verify(
             file,
             task_files(tasks or bundled, limit, subset),
             scores_only=scores_only,
-            num_workers=count_of(workers),
+            num_workers=workers.num_workers,
             on_progress=lambda done, total: bar.update(line, completed=done, total=total),
         )
     if as_json:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.options.decisions import decision_component
-from evonav.cli.options.settings import settings_options, with_settings
+from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import Seed
 
 if TYPE_CHECKING:  # the command must start fast
@@ -35,12 +35,11 @@ def check_agent(
     from evonav.evaluation.contract.check import check_agent
     from evonav.evaluation.run.components import Backend
 
-    with settings_options("perception").errors():
-        perceived = perception.component()
+    perceived = perception.component()
     with TemporaryDirectory() as folder, status(f"Running {agent}"):  # a model's exchanges are kept between episodes
         backend = Backend(
             perception=perceived,
-            decision=decision_component(decisions, spending, out=Path(folder), seed=seed, num_workers=1),
+            decision=decision_component(decisions, spending, Path(folder), seed, 1),
         )
         report = check_agent(agent, backend=backend, seed=seed, timeout_s=timeout)
     table = Table(title=f"{agent}: {'keeps the contract' if report.is_ok else 'breaks the contract'}")

@@ -8,27 +8,22 @@ import typer
 
 from evonav.cli.display import interruptible, print_table, status
 from evonav.cli.options.decisions import decision_component
-from evonav.cli.options.settings import SettingsGroup, settings_options, with_settings
+from evonav.cli.options.settings import SettingsGroup, with_settings
 from evonav.cli.options.shared import (
+    EXIT_INCOMPLETE,
     HOUSES,
     AgentNames,
-    AgentTimeout,
     AnyAsset,
-    InProcess,
     Limit,
     OneAgent,
     RetryErrored,
     Seed,
-    Workers,
-    count_of,
     names_of,
 )
 
 if TYPE_CHECKING:  # the command must start fast
     from evonav.evaluation.run.run import Progress
-    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, SpendingSettings
-
-EXIT_INCOMPLETE = 3
+    from evonav.evaluation.run.settings import DecisionSettings, PerceptionSettings, RunSettings, SpendingSettings
 
 controlled_app = typer.Typer(
     name="controlled",
@@ -41,7 +36,9 @@ Directory = Annotated[Path, typer.Argument(help="Folder of the analysis, which `
 
 
 @controlled_app.command()
+@with_settings("workers")
 def generate(
+    workers: "RunSettings",
     source: Annotated[Path, typer.Argument(help=f"Houses ({HOUSES}), or a folder of tasks whose houses are used.")],
     out: Annotated[Path, typer.Option(help="Folder of the analysis; an unfinished analysis is resumed.")],
     rates: Annotated[
@@ -57,14 +54,12 @@ def generate(
         Path | None,
         typer.Option(help="TOML file with parameters of the generator (docs/extensions.md). Default: the paper's."),
     ] = None,
-    workers: Workers = None,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
     """Generate the same tasks in several arms that differ in one thing only; run again to resume."""
     from evonav.controlled.dataset import generate_controlled
     from evonav.controlled.generate import ControlledOptions
     from evonav.generation.config import read_parameters
-    from evonav.parallel.worker import Workforce
 
     options = ControlledOptions(
         seed=seed,
@@ -84,7 +79,7 @@ def generate(
             out,
             options=options,
             limit=limit,
-            workforce=Workforce(count_of(workers)),
+            workforce=workers.workforce(),
             on_progress=lambda done, total: show(f"{done} of {total}"),
         )
     record = made.record
@@ -95,39 +90,31 @@ def generate(
 
 
 @controlled_app.command()
-@with_settings("perception", "decisions", "spending")
+@with_settings("local_run", "perception", "decisions", "spending")
 def evaluate(
     directory: Directory,
+    local_run: "RunSettings",
     perception: "PerceptionSettings",
     decisions: "DecisionSettings",
     spending: "SpendingSettings",
     agents: AgentNames = None,
     agent: OneAgent = None,
     seed: Seed = 0,
-    workers: Workers = None,
     retry_errored: RetryErrored = False,
-    in_process: InProcess = False,
-    agent_timeout: AgentTimeout = None,
 ) -> None:
     """Evaluate agents in every arm, into DIRECTORY/runs/ARM; run again to resume, or to add agents."""
     from evonav.controlled.evaluate import evaluate_controlled
     from evonav.controlled.layout import read_controlled
-    from evonav.evaluation.hosting.process import AgentHosting
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import RunConfig
     from evonav.evaluation.run.settings import SimulatorSettings
 
     record = read_controlled(directory)
-    num_workers = count_of(workers)
-    with settings_options("perception").errors():
-        perceived = perception.component()
+    num_workers = local_run.num_workers
     backend = Backend(
         simulator=SimulatorSettings(allow_unknown_assets=record.allow_unknown_assets).component(),
-        perception=perceived,
-        decision=decision_component(decisions, spending, out=directory, seed=seed, num_workers=num_workers),
+        perception=perception.component(),
+        decision=decision_component(decisions, spending, directory, seed, num_workers),
     )
-    hosting = AgentHosting(is_in_process=in_process, timeout_s=agent_timeout or decisions.answer_timeout_s)
-    config = RunConfig(seed=seed, backend=backend, stage_timeout_s=decisions.stage_timeout_s, hosting=hosting)
     names = names_of(agents, agent)
 
     def tell(arm: str, progress: "Progress") -> None:
@@ -142,7 +129,7 @@ def evaluate(
         summaries = evaluate_controlled(
             directory,
             names,
-            config=config,
+            config=local_run.config(seed, backend, decisions),
             num_workers=num_workers,
             retry_errored=retry_errored,
             on_progress=tell,

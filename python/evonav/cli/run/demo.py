@@ -7,41 +7,39 @@ import typer
 
 from evonav.cli.options.decisions import DryRun, decision_component, print_estimate
 from evonav.cli.options.settings import with_settings
-from evonav.cli.options.shared import AgentNames, Limit, Seed, Workers, count_of, names_of
+from evonav.cli.options.shared import AgentNames, Limit, Seed, names_of
 from evonav.cli.results.view import make_pages
 from evonav.cli.run.evaluate import exit_if_incomplete, print_results, run_tasks, running
 
 if TYPE_CHECKING:  # the command must start fast
-    from evonav.evaluation.run.settings import DecisionSettings, SpendingSettings
+    from evonav.evaluation.run.settings import DecisionSettings, RunSettings, SpendingSettings
 
 
-@with_settings("decisions", "spending")
+@with_settings("workers", "decisions", "spending")
 def demo(
+    workers: "RunSettings",
     decisions: "DecisionSettings",
     spending: "SpendingSettings",
     out: Path = Path("out/demo"),
     agents: AgentNames = None,
     limit: Limit = None,
     seed: Seed = 0,
-    workers: Workers = None,
     dry_run: DryRun = False,
 ) -> None:
     """Evaluate the paper's three heuristics on the bundled tasks, and write a report with replays of one task."""
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import RunConfig, evaluate
+    from evonav.evaluation.run.run import evaluate
     from evonav.report import write_report
 
-    num_workers = count_of(workers)
-    decision = decision_component(decisions, spending, out=out, seed=seed, num_workers=num_workers, dry_run=dry_run)
-    config = RunConfig(seed=seed, backend=Backend(decision=decision), stage_timeout_s=decisions.stage_timeout_s)
+    num_workers, names = workers.num_workers, names_of(agents)
+    decision = decision_component(decisions, spending, out, seed, num_workers, dry_run=dry_run)
+    config = workers.config(seed, Backend(decision=decision), decisions)
     with run_tasks(out, limit=limit) as task_files:
         if dry_run:
-            print_estimate(spending, names_of(agents), task_files, config, num_workers)
+            print_estimate(spending, names, task_files, config, num_workers)
             return
         with running(out, config) as show:
-            summaries = evaluate(
-                names_of(agents), task_files, out, config=config, num_workers=num_workers, on_progress=show
-            )
+            summaries = evaluate(names, task_files, out, config=config, num_workers=num_workers, on_progress=show)
     print_results(out, summaries)
     _, index = make_pages(out)
     typer.echo(f"report: {write_report(out)}")

@@ -8,29 +8,18 @@ import typer
 
 from evonav.cli.display import generation_progress, interruptible, print_failures, print_table, progress, status
 from evonav.cli.options.decisions import DryRun, decision_component, print_estimate, print_spending
-from evonav.cli.options.settings import settings_options, with_settings
+from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
     EXIT_INCOMPLETE,
-    AgentMemory,
     AgentNames,
-    AgentTimeout,
-    Engine,
-    EngineOption,
     Houses,
-    InProcess,
     Limit,
     OneAgent,
     Out,
-    RayAddress,
-    Retries,
     RetryErrored,
     Seed,
     Subset,
     Tasks,
-    WorkerGpus,
-    Workers,
-    check_engine,
-    count_of,
     names_of,
 )
 
@@ -42,17 +31,17 @@ if TYPE_CHECKING:  # the command must start fast: everything else is imported wh
     from evonav.evaluation.run.settings import (
         DecisionSettings,
         PerceptionSettings,
+        RunSettings,
         SimulatorSettings,
         SpendingSettings,
     )
     from evonav.tasks.listing import TaskFile
 
-NUM_RETRIES = 2
 
-
-@with_settings("simulation", "perception", "decisions", "spending")
+@with_settings("run", "simulation", "perception", "decisions", "spending")
 def evaluate(
     out: Out,
+    run: "RunSettings",
     simulation: "SimulatorSettings",
     perception: "PerceptionSettings",
     decisions: "DecisionSettings",
@@ -64,57 +53,38 @@ def evaluate(
     limit: Limit = None,
     subset: Subset = None,
     seed: Seed = 0,
-    workers: Workers = None,
-    engine: Engine = EngineOption.LOCAL,
-    ray_address: RayAddress = None,
-    worker_gpus: WorkerGpus = 0.0,
-    retries: Retries = NUM_RETRIES,
     retry_errored: RetryErrored = False,
-    in_process: InProcess = False,
-    agent_timeout: AgentTimeout = None,
-    agent_memory: AgentMemory = None,
     dry_run: DryRun = False,
 ) -> None:
     """Evaluate agents on tasks; run again to resume.
 
     Writes records.sqlite and summary.json into OUT.
     """
-    from evonav.evaluation.hosting.process import AgentHosting
     from evonav.evaluation.run.components import Backend
-    from evonav.evaluation.run.run import RunConfig, RunRequest, evaluate_all
-    from evonav.parallel.worker import Workforce
+    from evonav.evaluation.run.run import RunRequest, evaluate_all
 
     if houses is not None and tasks is not None:
         raise typer.BadParameter("give --houses or --tasks, not both")
     if limit is not None and subset is not None:
         raise typer.BadParameter("give --limit or --subset, not both")
-    check_engine(engine, ray_address, worker_gpus)
-    num_workers = count_of(workers)
-    with settings_options("simulation").errors():
-        simulator = simulation.component()
-    with settings_options("perception").errors():
-        perceived = perception.component()
-    decision = decision_component(decisions, spending, out=out, seed=seed, num_workers=num_workers, dry_run=dry_run)
-    config = RunConfig(
-        seed=seed,
-        backend=Backend(simulator=simulator, perception=perceived, decision=decision),
-        stage_timeout_s=decisions.stage_timeout_s,
-        hosting=AgentHosting(
-            is_in_process=in_process,
-            timeout_s=agent_timeout or decisions.answer_timeout_s,
-            memory_mb=agent_memory,
-        ),
+    workforce = run.workforce()
+    backend = Backend(
+        simulator=simulation.component(),
+        perception=perception.component(),
+        decision=decision_component(decisions, spending, out, seed, run.num_workers, dry_run=dry_run),
     )
+    config = run.config(seed, backend, decisions)
     names = names_of(agents, agent)
-    with run_tasks(out, houses, tasks, limit, subset, seed, simulation.allow_unknown_assets, num_workers) as task_files:
+    allows_any = simulation.allow_unknown_assets
+    with run_tasks(out, houses, tasks, limit, subset, seed, allows_any, run.num_workers) as task_files:
         if dry_run:
-            print_estimate(spending, names, task_files, config, num_workers)
+            print_estimate(spending, names, task_files, config, run.num_workers)
             return
         with running(out, config) as show:
             (summaries,) = evaluate_all(
                 [RunRequest(tuple(names), tuple(task_files), out, config)],
-                Workforce(num_workers, engine.value, ray_address, num_gpus=worker_gpus),
-                num_retries=retries,
+                workforce,
+                num_retries=run.num_retries,
                 retry_errored=retry_errored,
                 on_progress=lambda _, state: show(state),
             )

@@ -8,18 +8,22 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import EXIT_INTERRUPTED, show
-from evonav.cli.options.shared import EXIT_INCOMPLETE, EngineOption, count_of
+from evonav.cli.options.settings import with_settings
+from evonav.cli.options.shared import EXIT_INCOMPLETE, RetryErrored
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from evonav.evaluation.run.settings import RunSettings
     from evonav.sweeps.file import SweepFile
     from evonav.sweeps.row import SweepRow
     from evonav.sweeps.run import Cell, CellRun
     from evonav.tasks.listing import TaskFile
 
 
+@with_settings("changes")
 def sweep(
+    changes: "RunSettings",
     file: Annotated[
         Path | None, typer.Argument(help="Sweep file in TOML (docs/sweeps.md).", show_default=False)
     ] = None,
@@ -38,27 +42,7 @@ def sweep(
         list[str] | None,
         typer.Option(metavar="GLOB", help="Run only cells whose name matches. Repeat the option for more."),
     ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            min=0, help="Number of worker processes; 0 runs in this process. Default: the file's, else one per core."
-        ),
-    ] = None,
-    engine: Annotated[
-        EngineOption | None, typer.Option(help="Run workers as local processes or as Ray actors. Default: the file's.")
-    ] = None,
-    ray_address: Annotated[
-        str | None,
-        typer.Option(
-            help="Ray: address of a cluster that shares this file system. Default: start Ray on this machine."
-        ),
-    ] = None,
-    worker_gpus: Annotated[
-        float | None, typer.Option(min=0.0, help="Ray: GPUs reserved for each worker. Default: the file's.")
-    ] = None,
-    retry_errored: Annotated[
-        bool, typer.Option("--retry-errored", help="Run errored stages again, and those not run because of them.")
-    ] = False,
+    retry_errored: RetryErrored = False,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="List cells, stages and the estimated cost of models; run nothing.")
     ] = False,
@@ -78,25 +62,19 @@ def sweep(
     from evonav.sweeps.file import read_sweep
     from evonav.sweeps.run import cell_runs, cells_of, chosen, task_sets
 
-    flags = {
-        "workers": workers,
-        "engine": None if engine is None else engine.value,
-        "ray_address": ray_address,
-        "worker_gpus": worker_gpus,
-    }
-    changes = [*(set_ or ()), *(f"{key}={value}" for key, value in flags.items() if value is not None)]
-    settings = read_sweep(file, changes)
+    flags = changes.model_dump(exclude_unset=True)
+    every_change = [*(set_ or ()), *(f"{key}={value}" for key, value in flags.items())]
+    settings = read_sweep(file, every_change)
     folder = out or Path(settings.out or f"out/{file.stem}")
     cells = cells_of(settings)
     selected = chosen(cells, only or ())
-    num_workers = count_of(settings.workers)
     with task_sets(settings) as tasks:
         if dry_run:
-            _print_plan(settings, selected, tasks, folder, num_workers)
+            _print_plan(settings, selected, tasks, folder)
             return
         runs = cell_runs(settings, cells, tasks, folder)
         again = _command(file, out, set_ or (), only or (), flags)
-        _run(settings, folder, runs, selected, num_workers, retry_errored, again)
+        _run(settings, folder, runs, selected, retry_errored, again)
     is_incomplete = _print_summary(folder, {cell.name for cell in selected}, again)
     if is_incomplete:
         raise typer.Exit(EXIT_INCOMPLETE)
@@ -107,7 +85,6 @@ def _run(
     out: Path,
     runs: "Sequence[CellRun]",
     selected: "Sequence[Cell]",
-    num_workers: int,
     retry_errored: bool,
     again: str,
 ) -> None:
@@ -128,7 +105,6 @@ def _run(
                 settings,
                 out,
                 runs,
-                num_workers=num_workers,
                 only=sorted(names),
                 retry_errored=retry_errored,
                 on_progress=lines.take,
@@ -181,7 +157,7 @@ def _print_summary(out: Path, selected: "set[str]", again: str) -> bool:
 
 
 def _print_plan(
-    settings: "SweepFile", cells: "Sequence[Cell]", tasks: "Mapping[str, list[TaskFile]]", out: Path, num_workers: int
+    settings: "SweepFile", cells: "Sequence[Cell]", tasks: "Mapping[str, list[TaskFile]]", out: Path
 ) -> None:
     """Print the cells to run and their estimated cost."""
     from rich.table import Table
@@ -206,7 +182,7 @@ def _print_plan(
             cost = [""] * 3 if has_models else []
             if settings.decisions[cell.decision].kind == "vlm":
                 tell(cell.name)
-                found = cell_estimate(settings, run, num_workers)
+                found = cell_estimate(settings, run)
                 total_usd += found.dollars or 0.0
                 dollars = "?" if found.dollars is None else f"{found.dollars:.2f}"
                 cost = [f"{found.num_requests:.0f}", f"{found.input_tokens:.0f}", dollars]
@@ -237,5 +213,5 @@ def _command(
     arguments += [word for change in changes for word in ("--set", change)]
     arguments += [word for pattern in only for word in ("--only", pattern)]
     for key, value in flags.items():
-        arguments += [] if value is None else [f"--{key.replace('_', '-')}", str(value)]
+        arguments += [f"--{key.replace('_', '-')}", str(value)]
     return shlex.join(arguments)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from evonav.cli.options.settings import SettingsGroup
 from evonav.cli.options.shared import Limit
 from evonav.cli.tasks.schema import schema
 from evonav.cli.tasks.show import show
@@ -13,7 +14,9 @@ from evonav.cli.tasks.subset import subset
 from evonav.cli.tasks.validate import validate
 from evonav.cli.tasks.write import write
 
-tasks_app = typer.Typer(help="List, draw, describe, check and rewrite task files.", no_args_is_help=True)
+tasks_app = typer.Typer(
+    cls=SettingsGroup, help="List, draw, describe, check and rewrite task files.", no_args_is_help=True
+)
 
 Folder = Annotated[Path, typer.Argument(help="Folder that holds one folder per task.")]
 

@@ -6,25 +6,23 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from evonav.cli.display import generation_progress, interruptible
+from evonav.cli.options.settings import with_settings
 from evonav.cli.options.shared import (
     HOUSES,
     AnyAsset,
-    Engine,
-    EngineOption,
     Limit,
-    RayAddress,
     Seed,
     Subset,
-    Workers,
-    check_engine,
-    count_of,
 )
 
 if TYPE_CHECKING:
+    from evonav.evaluation.run.settings import RunSettings
     from evonav.generation.dataset import GenerationSummary
 
 
+@with_settings("pool")
 def generate(
+    pool: "RunSettings",
     houses: Annotated[Path, typer.Option(help=f"Houses: {HOUSES}.")],
     out: Annotated[Path, typer.Option(help="Folder of the tasks; an unfinished one is resumed.")],
     limit: Limit = None,
@@ -41,9 +39,6 @@ def generate(
         str | None,
         typer.Option(help="Numbers of stages to draw from, separated by commas. Default: the paper's 3,4,5."),
     ] = None,
-    workers: Workers = None,
-    engine: Engine = EngineOption.LOCAL,
-    ray_address: RayAddress = None,
     house_timeout: Annotated[float, typer.Option(min=1.0, help="Seconds before a house is abandoned.")] = 120.0,
     retry_failed: Annotated[
         bool, typer.Option("--retry-failed", help="Try houses again on which the generator failed.")
@@ -57,9 +52,8 @@ def generate(
     from evonav.generation.dataset import generate_dataset, inherited_names
     from evonav.generation.worker import GenerationOptions
     from evonav.house.files import HouseTexts
-    from evonav.parallel.worker import Workforce
 
-    check_engine(engine, ray_address)
+    workforce = pool.workforce()
     texts = HouseTexts(houses)
     dataset, inherited_split = inherited_names(texts)
     options = GenerationOptions(
@@ -76,7 +70,7 @@ def generate(
             options=options,
             limit=limit,
             subset=subset,
-            workforce=Workforce(count_of(workers), engine.value, ray_address),
+            workforce=workforce,
             house_timeout_s=house_timeout,
             retry_failed=retry_failed,
             on_progress=show,

@@ -5,18 +5,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options.shared import Workers, count_of
+from evonav.cli.options.settings import with_settings
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from evonav.evaluation.run.settings import RunSettings
     from evonav.tasks.statistics import Estimate, Metric, TaskStatistics, Test
 
 NUM_NAMES = 6
 """Largest number of values of a distribution in one line."""
 
 
+@with_settings("workers")
 def stats(
+    workers: "RunSettings",
     folders: Annotated[list[Path], typer.Argument(help="Folders that hold one folder per task.")],
     out: Annotated[
         Path | None, typer.Option(help="Folder to write statistics.json, statistics.html and statistics.svg to.")
@@ -28,7 +31,6 @@ def stats(
     plot: Annotated[
         Path | None, typer.Option(help="Write the paper's figure to a .svg, .png or .pdf file (extra `viz`).")
     ] = None,
-    workers: Workers = None,
 ) -> None:
     """Print and plot statistics of tasks beside the paper's."""
     from evonav.cli.display import status
@@ -42,7 +44,7 @@ def stats(
         found = statistics_of_folders(
             folders,
             mix=reweight,
-            num_workers=count_of(workers),
+            num_workers=workers.num_workers,
             on_task=lambda done, total: tell(f"{done} of {total}") if done % 50 == 0 else None,
         )
     print_statistics(found)

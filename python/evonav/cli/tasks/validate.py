@@ -6,19 +6,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from evonav.cli.options.shared import AnyAsset, Limit, Workers, count_of
+from evonav.cli.options.settings import with_settings
+from evonav.cli.options.shared import AnyAsset, Limit
 
 if TYPE_CHECKING:
+    from evonav.evaluation.run.settings import RunSettings
     from evonav.generation.validation import FolderReport
 
 NUM_EXAMPLES = 3
 """Largest number of examples of each kind of problem in the table."""
 
 
+@with_settings("workers")
 def validate(
+    workers: "RunSettings",
     folder: Annotated[Path, typer.Argument(help="Folder that holds one folder per task.")],
     limit: Limit = None,
-    workers: Workers = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all problems to a JSON file.")] = None,
     allow_unknown_assets: AnyAsset = False,
 ) -> None:
@@ -34,7 +37,7 @@ def validate(
         report = validate_folder(
             folder,
             limit=limit,
-            num_workers=count_of(workers),
+            num_workers=workers.num_workers,
             allow_unknown_assets=allow_unknown_assets,
             on_progress=lambda done, total: bar.update(tasks, completed=done, total=total),
         )

@@ -17,6 +17,7 @@ from evonav.evaluation.records.store import FILE_NAME, RunStore
 from evonav.evaluation.run.components import Backend, check_agent_name
 from evonav.evaluation.run.provenance import note_session
 from evonav.evaluation.run.scheduler import Progress, RunJobs, Schedule
+from evonav.evaluation.run.settings import NUM_RETRIES
 from evonav.evaluation.run.summary import MODELS_KEY
 from evonav.evaluation.run.worker import WORK, EpisodeJob, WorkerConfig
 from evonav.parallel.folders import check_same_run, writing
@@ -35,9 +36,6 @@ __all__ = [
     "perception_seed",
     "run_identity",
 ]
-
-NUM_RETRIES = 2
-"""Number of retries of a stage that lost its worker, its simulator or its agent's process."""
 
 
 @dataclass(frozen=True, slots=True)

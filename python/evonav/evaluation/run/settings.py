@@ -1,7 +1,7 @@
-"""Declare the options of a run's simulator, perception and decision model, once for Python, sweep files and commands.
+"""Declare the options of a run's parts and workers, once for Python, sweep files and commands.
 
 Sweep files are validated by these models, and the command derives its options from them
-(`evonav.cli.options.settings`). Each model builds a `Component`.
+(`evonav.cli.options.settings`). Each model builds what it describes: a `Component`, a `Workforce`, a `RunConfig`.
 """
 
 import os
@@ -16,6 +16,8 @@ from evonav.decision.question import DecisionModel
 from evonav.decision.vlm.caching_client import Mode
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError, StoreError
+from evonav.evaluation.protocol import ProtocolConfig
+from evonav.parallel.worker import EngineName, Workforce
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, read_word
 from evonav.tasks.records import Record
@@ -23,7 +25,11 @@ from evonav.world.simulator import Simulator
 
 if TYPE_CHECKING:
     from evonav.decision.vlm.account import Price
+    from evonav.evaluation.run.components import Backend
+    from evonav.evaluation.run.run import RunConfig
 
+NUM_RETRIES = 2
+"""Number of retries of a stage that lost its worker, its simulator or its agent's process."""
 EXCHANGES_NAME = "exchanges.sqlite"
 """File of questions and answers in the folder of a run."""
 MODEL_VARIABLE = "EVONAV_VLM_MODEL"
@@ -41,14 +47,16 @@ _SIMULATOR_HOST_OPTIONS = ("gpu_device", "x_display", "timeout_s")
 class SettingError(InvalidArgumentError):
     """A setting that is invalid beside the others; the command and sweep files add its full name."""
 
-    def __init__(self, key: str, problem: str) -> None:
+    def __init__(self, settings: "type[Settings]", key: str, problem: str) -> None:
         """Create the error.
 
         Args:
+            settings: The model of the settings.
             key: A field of the settings.
             problem: The problem, as the end of a sentence that begins with the field's name.
         """
         super().__init__(f"{key} {problem}")
+        self.settings = settings
         self.key = key
         self.problem = problem
 
@@ -95,7 +103,7 @@ class SimulatorSettings(Settings):
             host_options = {key: given.pop(key) for key in _SIMULATOR_HOST_OPTIONS if key in given}
             return Component(f"{_COMPONENTS}:ai2thor_simulator", given, host_options)
         if given:
-            raise SettingError(next(iter(given)), "is for simulator ai2thor")
+            raise SettingError(type(self), next(iter(given)), "is for simulator ai2thor")
         return Component(f"{_COMPONENTS}:{'lenient' if self.allow_unknown_assets else 'embedded'}_simulator")
 
 
@@ -124,7 +132,7 @@ class PerceptionSettings(Settings):
         host_options = _given(models=self.models and str(Path(self.models).absolute()), device=self.device)
         found = read_word(self.make, {**self.options, **(host_options if self.make.startswith("predicted") else {})})
         if host_options and found.path != PREDICTED:
-            raise SettingError(next(iter(host_options)), "is for perception predicted")
+            raise SettingError(type(self), next(iter(host_options)), "is for perception predicted")
         return found
 
 
@@ -196,11 +204,11 @@ class DecisionSettings(Settings):
             identity = self.identity(0)
             vlm_config(identity["model"], identity["request"], self._server(1))
         elif ":" not in self.kind:
-            raise SettingError("kind", f"{self.kind}: expected text, vlm or module:name")
+            raise SettingError(type(self), "kind", f"{self.kind}: expected text, vlm or module:name")
         else:
             self._refuse_all_but("model", "mode", "exchanges", "exchange_images")
         if self.mode == "live" and self.exchanges is not None:
-            raise SettingError("exchanges", "is of no use with mode live, which stores nothing")
+            raise SettingError(type(self), "exchanges", "is of no use with mode live, which stores nothing")
 
     def identity(self, seed: int) -> dict[str, Any]:
         """Return the options that decide the model's answers: part of a run's identity.
@@ -217,7 +225,9 @@ class DecisionSettings(Settings):
 
         model = self.model or os.environ.get(MODEL_VARIABLE)
         if not model:
-            raise SettingError("model", f"is needed to ask a model (or {MODEL_VARIABLE} in the environment)")
+            raise SettingError(
+                type(self), "model", f"is needed to ask a model (or {MODEL_VARIABLE} in the environment)"
+            )
         sampling: dict[str, Any] = {**SAMPLING, "seed": seed}
         if self.reasoning:
             sampling |= {"temperature": None, "top_p": None, "max_tokens_field": "max_completion_tokens"}
@@ -259,7 +269,7 @@ class DecisionSettings(Settings):
         """Reject settings that would be ignored."""
         for name in sorted(self.model_fields_set - {"kind", "noise", *allowed}):
             if getattr(self, name) != type(self).model_fields[name].default:
-                raise SettingError(name, f"is of no use where {self.kind} decides")
+                raise SettingError(type(self), name, f"is of no use where {self.kind} decides")
 
     def _server(self, num_workers: int) -> dict[str, Any]:
         """Return how the server is reached; each worker has an equal share of the rate limits."""
@@ -324,9 +334,74 @@ class SpendingSettings(Settings):
         """Return the keyword arguments of a decision model that asks `model`."""
         price = self.price(model)
         if self.max_cost is not None and price is None:
-            raise SettingError("max_cost", "needs the model's prices: name a table with prices")
+            raise SettingError(type(self), "max_cost", "needs the model's prices: name a table with prices")
         spending: dict[str, Any] = {} if price is None else {"price": [price.input_usd, price.output_usd]}
         return spending if self.max_cost is None else {**spending, "max_cost_usd": self.max_cost}
+
+
+class RunSettings(Settings):
+    """The workers of a run, the limits of its agents, and its retries. They do not decide records."""
+
+    workers: int | None = Field(default=None, ge=0)
+    """Number of worker processes; 0 runs in this process. Default: one per core."""
+    engine: EngineName = "local"
+    """Run workers as local processes or as Ray actors."""
+    ray_address: str | None = None
+    """Ray: address of a cluster that shares this file system. Default: start Ray on this machine."""
+    worker_gpus: float = Field(default=0.0, ge=0.0)
+    """Ray: GPUs reserved for each worker, such as 0.5, for perception that needs one."""
+    num_retries: int = Field(default=NUM_RETRIES, ge=0)
+    """Number of retries of a stage that lost its worker, simulator or agent process."""
+    in_process: bool = False
+    """Run agents in the evaluator's process, for debuggers; a crash of an agent then ends the worker."""
+    stage_timeout_s: float | None = Field(default=None, gt=0.0)
+    """Seconds before a stage is errored. Default: 900, with a VLM 14400."""
+    agent_timeout_s: float | None = Field(default=None, ge=0.1)
+    """Seconds to wait for an agent's answer before its stage is errored. Default: 600, with a VLM 3600."""
+    agent_memory_mb: int | None = Field(default=None, ge=256)
+    """Largest address space of an agent's process, in MB. Default: no limit."""
+
+    @property
+    def num_workers(self) -> int:
+        """The number of workers: the given one, or one per core."""
+        if self.workers is not None:
+            return self.workers
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+    def workforce(self) -> Workforce:
+        """Return the workers.
+
+        Raises:
+            SettingError: An option is of Ray, and the workers are not.
+            InvalidArgumentError: There are too few workers.
+        """
+        for key in ("ray_address", "worker_gpus"):
+            if getattr(self, key) and self.engine != "ray":
+                raise SettingError(type(self), key, "is for engine ray")
+        return Workforce(self.num_workers, self.engine, self.ray_address, num_gpus=self.worker_gpus)
+
+    def config(
+        self, seed: int, backend: "Backend", decisions: DecisionSettings, protocol: ProtocolConfig | None = None
+    ) -> "RunConfig":
+        """Return the configuration of a run with these limits.
+
+        Args:
+            seed: Seed of every random choice.
+            backend: The parts of the run.
+            decisions: Settings of the decision model, which have the default limits.
+            protocol: Default: the paper's.
+        """
+        from evonav.evaluation.hosting.process import AgentHosting
+        from evonav.evaluation.run.run import RunConfig
+
+        timeout_s = self.agent_timeout_s or decisions.answer_timeout_s
+        return RunConfig(
+            seed=seed,
+            protocol=protocol or ProtocolConfig(),
+            backend=backend,
+            stage_timeout_s=self.stage_timeout_s or decisions.stage_timeout_s,
+            hosting=AgentHosting(self.in_process, timeout_s, self.agent_memory_mb),
+        )
 
 
 @dataclass(frozen=True, slots=True)
