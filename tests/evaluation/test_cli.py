@@ -1,6 +1,5 @@
 """The command: what it prints, what it refuses, and with which exit code."""
 
-import importlib
 import json
 import subprocess
 import sys
@@ -10,7 +9,6 @@ import pytest
 from typer.testing import CliRunner
 
 from evonav.cli import app, main
-from evonav.evaluation.run import run as engine
 
 
 def run(*arguments):
@@ -31,11 +29,6 @@ def test_evaluates_bundled_tasks_and_resumes(tmp_path):
     assert again.exit_code == 0
     assert time.monotonic() - began_s < 5.0
     assert json.loads((tmp_path / "summary.json").read_text()) == summary
-
-
-def test_the_command_retries_as_often_as_the_function():
-    # The command's module is imported at every start, and the engine only when something is evaluated.
-    assert importlib.import_module("evonav.cli.run.evaluate").NUM_RETRIES == engine.NUM_RETRIES
 
 
 def test_lists():

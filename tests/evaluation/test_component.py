@@ -1,13 +1,13 @@
 """Components are built from import paths, and run headers keep the form of earlier versions."""
 
-import json
-from dataclasses import asdict
-
 import pytest
 
 from evonav.component import Component, import_callable
 from evonav.errors import InvalidArgumentError
+from evonav.evaluation.hosting.process import AgentHosting
+from evonav.evaluation.protocol import ProtocolConfig
 from evonav.evaluation.run.components import Backend
+from evonav.evaluation.run.worker import CONFIG, WorkerConfig
 
 PARTS = Backend(
     simulator=Component("a.b:make", {"quality": 1}, {"gpu_device": 0}),
@@ -40,7 +40,8 @@ def test_a_header_with_an_unknown_entry_is_refused() -> None:
 
 
 def test_workers_get_host_options_too() -> None:
-    assert Backend.from_json(json.loads(json.dumps(asdict(PARTS)))) == PARTS
+    config = WorkerConfig(PARTS, ProtocolConfig(), AgentHosting(), 1)
+    assert CONFIG.validate_json(CONFIG.dump_json(config)) == config
 
 
 def test_an_import_error_names_the_path() -> None:

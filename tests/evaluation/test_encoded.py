@@ -7,19 +7,22 @@ from made_up_stage import made_up_record
 from pydantic import ValidationError
 
 from evonav.evaluation.records.costs import StageCosts
-from evonav.evaluation.records.encoded import EncodedStage, encode_stage
+from evonav.evaluation.records.encoded import encode_stage
 from evonav.evaluation.records.schema import EndState, ErrorKind, StageError, StageRecord
 from evonav.evaluation.records.store import RunStore
+from evonav.evaluation.run.worker import EVENT
 
 
 def test_a_stage_survives_its_text():
     error = StageError(kind=ErrorKind.CRASH, message="two\nlines")
     record = made_up_record(stage=2).model_copy(update={"state": EndState.ERRORED, "error": error})
-    stage = encode_stage(record, wall_s=1.5, cpu_s=0.5, costs=StageCosts(cost_usd=2.0), traceback="a\nb")
-    assert EncodedStage.from_text(stage.to_text()) == stage
+    stage = encode_stage(
+        record, wall_s=1.5, cpu_s=0.5, costs=StageCosts(cost_usd=2.0, num_questions=3), traceback="a\nb"
+    )
+    assert EVENT.validate_json(EVENT.dump_json(stage)) == stage
     assert stage.failure is not None
     assert stage.failure.traceback == "a\nb"
-    assert stage.costs == {"cost_usd": 2.0}
+    assert repr(EVENT.validate_json(EVENT.dump_json(stage)).costs) == "{'num_questions': 3, 'cost_usd': 2.0}"
 
 
 def test_a_record_that_was_copied_with_invalid_parts_is_refused():
@@ -34,7 +37,7 @@ def test_the_store_keeps_the_text_of_the_worker(tmp_path, monkeypatch):
     stage = encode_stage(made_up_record(stage=2).model_copy(update={"path_length_m": 3}), wall_s=0.0, cpu_s=0.0)
     assert json.loads(stage.record)["path_length_m"] == 3.0
     assert '"path_length_m":3.0' in stage.record  # as a validated record is written
-    received = EncodedStage.from_text(stage.to_text())
+    received = EVENT.validate_json(EVENT.dump_json(stage))
     for name in ("model_validate", "model_validate_json", "model_dump_json"):
         monkeypatch.setattr(StageRecord, name, None)
     with RunStore(tmp_path, create=True) as store:

@@ -1,6 +1,5 @@
 """Encode a finished stage once, as the text that workers send and the store keeps."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
@@ -23,7 +22,7 @@ class EncodedStage:
     """The metrics of the record as JSON (`encode_metrics`)."""
     wall_s: float
     cpu_s: float
-    costs: Mapping[str, float] | None = None
+    costs: Mapping[str, int | float] | None = None
     """The measured costs by field of `StageCosts`; `None` if nothing was measured."""
     failure: StageFailure | None = None
     """The reason why the stage is errored; `None` if it is not."""
@@ -39,37 +38,6 @@ class EncodedStage:
     def is_scored(self) -> bool:
         """True if the stage counts in rates."""
         return self.state.is_scored
-
-    def to_text(self) -> str:
-        """Return the stage as four lines: a header, the record, the metrics and the floor plan."""
-        header = {
-            "agent": self.agent,
-            "task_id": self.task_id,
-            "stage": self.stage,
-            "state": self.state.value,
-            "wall_s": self.wall_s,
-            "cpu_s": self.cpu_s,
-            "costs": self.costs,
-            "failure": None if self.failure is None else asdict(self.failure),
-        }
-        return "\n".join((json.dumps(header), self.record, self.metrics, self.floor_plan or ""))
-
-    @classmethod
-    def from_text(cls, text: str) -> "EncodedStage":
-        """Read a stage that `to_text` wrote; record and metrics are not parsed."""
-        first, record, metrics, floor_plan = text.split("\n")
-        header = json.loads(first)
-        failure = header["failure"]
-        return cls(
-            **{
-                **header,
-                "state": EndState(header["state"]),
-                "failure": None if failure is None else StageFailure.from_values(failure),
-            },
-            record=record,
-            metrics=metrics,
-            floor_plan=floor_plan or None,
-        )
 
 
 def encode_stage(

@@ -86,11 +86,6 @@ class StageFailure:
     message: str
     traceback: str = ""
 
-    @classmethod
-    def from_values(cls, values: dict[str, Any]) -> "StageFailure":
-        """Read what `dataclasses.asdict` made of a failure, after JSON."""
-        return cls(**{**values, "kind": ErrorKind(values["kind"])})
-
 
 class PoseRecord(_Record):
     """A pose of the agent."""

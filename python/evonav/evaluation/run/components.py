@@ -87,11 +87,6 @@ class Backend:
             }
         )
 
-    @classmethod
-    def from_json(cls, values: Mapping[str, Mapping[str, Any]]) -> "Backend":
-        """Return the backend whose `dataclasses.asdict` is `values`."""
-        return cls(**{name: Component(**component) for name, component in values.items()})
-
     def check(self) -> None:
         """Create a perception and a simulator, start the simulator if it runs in a process of its own, and close it.
 

@@ -13,7 +13,7 @@ from evonav.evaluation.records.encoded import EncodedStage, encode_stage
 from evonav.evaluation.records.schema import EndState, ErrorKind, FloorPlan, StageFailure, StageRecord
 from evonav.evaluation.records.store import RunStore
 from evonav.evaluation.run.summary import write_summary
-from evonav.evaluation.run.worker import RETRIED, EpisodeJob, WorkerConfig, decode_event, floor_plan_if_possible
+from evonav.evaluation.run.worker import CONFIG, EVENT, RETRIED, EpisodeJob, WorkerConfig, floor_plan_if_possible
 from evonav.parallel.pool import Answer, Job, Pool
 from evonav.tasks.listing import TaskFile
 
@@ -55,7 +55,7 @@ class RunJobs:
         """
         self.jobs = jobs
         self.config = config
-        self.config_text = config.text
+        self.config_text = CONFIG.dump_json(config).decode()
         self.limit_s = limit_s
         self.summaries: list[AgentSummary] | None = None
         """A summary of each requested agent, once all jobs have ended."""
@@ -239,4 +239,4 @@ def _event_of(answer: Answer, run: RunJobs) -> EncodedStage | StageFailure | Non
     if answer.failure == "error":
         message = answer.detail.strip().rpartition("\n")[2]
         return StageFailure(0, ErrorKind.HARNESS, message, answer.detail)
-    return decode_event(answer.text)
+    return EVENT.validate_json(answer.text)

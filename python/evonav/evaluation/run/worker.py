@@ -14,7 +14,8 @@ from collections import defaultdict
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from evonav.agents.agent import Agent, AgentAction, Sensing
 from evonav.agents.hosting import error_text
@@ -51,21 +52,6 @@ class WorkerConfig:
     num_retries: int = 0
     """Number of retries of a stage."""
 
-    @property
-    def text(self) -> str:
-        """The configuration as JSON, which `from_values` reads."""
-        return json.dumps(asdict(self), sort_keys=True)
-
-    @classmethod
-    def from_values(cls, values: dict[str, Any]) -> "WorkerConfig":
-        """Return the configuration whose JSON is `values`."""
-        return cls(
-            Backend.from_json(values["backend"]),
-            ProtocolConfig(**values["protocol"]),
-            AgentHosting(**values["hosting"]),
-            values["num_retries"],
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class EpisodeJob:
@@ -83,8 +69,18 @@ class EpisodeJob:
     """Send the floor plans of the task's stages: one episode of a task does, for all agents."""
 
     def text(self, config_text: str) -> str:
-        """Return the text of the job for a worker."""
+        """Return the text of the job for a worker.
+
+        Args:
+            config_text: A `WorkerConfig`, as `CONFIG` writes it.
+        """
         return f"{json.dumps(asdict(self))}\n{config_text}"
+
+
+CONFIG = TypeAdapter(WorkerConfig)
+"""Writes and reads the configuration as JSON."""
+EVENT: TypeAdapter[EncodedStage | StageFailure | None] = TypeAdapter(EncodedStage | StageFailure | None)
+"""Writes and reads an event of a job as JSON: a finished stage, a failure, or `None` at an end without either."""
 
 
 class WorkerContext:
@@ -202,7 +198,7 @@ class EpisodeWork:
         self._contexts: dict[str, WorkerContext] = {}
 
     def __call__(self, text: str) -> Generator[str, None, str]:
-        """Run the episode of `EpisodeJob.text`; yield and return events for `decode_event`.
+        """Run the episode of `EpisodeJob.text`; yield and return events, as `EVENT` writes them.
 
         After a failure that costs only the attempt, the failure is an event, and the stages from stage 1 on come again.
         """
@@ -216,24 +212,22 @@ class EpisodeWork:
                 is_whole = True
                 for outcome in context.attempt(spec, job):
                     if outcome.failure is not None and num_left.take(outcome.failure):
-                        yield _failure_text(outcome.failure)
+                        yield _text(outcome.failure)
                         is_whole = False
                         context.close_simulator()
                         break
-                    yield _encoded(outcome, spec, sends_floor_plan=job.sends_floor_plans).to_text()
+                    yield _text(_encoded(outcome, spec, sends_floor_plan=job.sends_floor_plans))
         except Exception as error:
             context.close_simulator()
             message = f"{type(error).__name__}: {error}"
-            return _failure_text(StageFailure(0, ErrorKind.HARNESS, message, error_text.traceback_of(error)))
-        return "{}"
+            return _text(StageFailure(0, ErrorKind.HARNESS, message, error_text.traceback_of(error)))
+        return _text(None)
 
     def _context(self, config_text: str) -> WorkerContext:
         found = self._contexts.pop(config_text, None)
         while found is None and len(self._contexts) >= MAX_CONTEXTS:
             self._contexts.pop(next(iter(self._contexts))).close()
-        self._contexts[config_text] = context = found or WorkerContext(
-            WorkerConfig.from_values(json.loads(config_text)), self._alive
-        )
+        self._contexts[config_text] = context = found or WorkerContext(CONFIG.validate_json(config_text), self._alive)
         return context
 
     def close(self) -> None:
@@ -242,12 +236,8 @@ class EpisodeWork:
             self._contexts.popitem()[1].close()
 
 
-def decode_event(text: str) -> EncodedStage | StageFailure | None:
-    """Read an event of a job: a finished stage, a failure, or `None` for a job that ended without one."""
-    if "\n" in text:
-        return EncodedStage.from_text(text)
-    values = json.loads(text)
-    return StageFailure.from_values(values) if values else None
+def _text(event: EncodedStage | StageFailure | None) -> str:
+    return EVENT.dump_json(event).decode()
 
 
 def _encoded(outcome: StageOutcome, spec: EpisodeSpec, *, sends_floor_plan: bool) -> EncodedStage:
@@ -267,7 +257,3 @@ def floor_plan_if_possible(spec: EpisodeSpec, stage: int) -> FloorPlan | None:
         return spec.floor_plan(stage)
     except HouseError:
         return None
-
-
-def _failure_text(failure: StageFailure) -> str:
-    return json.dumps(asdict(failure))
