@@ -53,7 +53,7 @@ def test_a_broken_point_is_named(agent, check, verdict, words):
     report = evonav.check_agent(f"contract_breakers:{agent}", timeout_s=3.0)
     found = {found.name: found for found in report.checks}
     assert found[check].verdict == verdict, str(report)
-    assert words in found[check].said
+    assert words in found[check].finding
     assert report.is_ok == (verdict == "warn")
     others = {name: other.verdict for name, other in found.items() if name != check}
     assert "fail" not in others.values(), str(report)

@@ -193,19 +193,19 @@ def claim(out: Path, sweep: SweepFile, runs: Sequence[CellRun]) -> None:
     Raises:
         StoreError: The folder holds another sweep, or cannot be written; it says what differs.
     """
-    asked = {run.cell.name: _content(run) for run in runs}
+    requested = {run.cell.name: _content(run) for run in runs}
     path = out / SWEEP_NAME
     if path.exists():
         cells = read_claim(out)["cells"]
         there = {name: cell for name, cell in cells.items() if (out / RUNS_NAME / name / FILE_NAME).exists()}
-        differing = [*_differences(there, asked)]
+        differing = [*_differences(there, requested)]
         if differing:
             shown = "; ".join(differing[:3]) + (f"; and {len(differing) - 3} more" if len(differing) > 3 else "")
             raise StoreError(f"{out} holds another sweep ({shown}); use another folder")
     settings = sweep.model_dump(mode="json", exclude=_HOW)
     for decision in settings["decisions"].values():
         decision.pop("base_url")  # an address may hold a password
-    content = {"schema_version": SCHEMA_VERSION, "evonav": __version__, "settings": settings, "cells": asked}
+    content = {"schema_version": SCHEMA_VERSION, "evonav": __version__, "settings": settings, "cells": requested}
     write_atomically(path, json.dumps(content, indent=2) + "\n")
 
 
@@ -296,16 +296,16 @@ def _content(run: CellRun) -> dict[str, Any]:
     }
 
 
-def _differences(there: Mapping[str, Any], asked: Mapping[str, Any]) -> Iterator[str]:
+def _differences(there: Mapping[str, Any], requested: Mapping[str, Any]) -> Iterator[str]:
     """Yield how the stored cells differ from those of the file."""
     for name, cell in there.items():
-        if name not in asked:
+        if name not in requested:
             yield f"cell {name} is not in the file: put it back, `--only` runs a part"
             continue
-        gone = [agent for agent in cell["agents"] if agent not in asked[name]["agents"]]
+        gone = [agent for agent in cell["agents"] if agent not in requested[name]["agents"]]
         if gone:
             yield f"cell {name} is without agent {', '.join(gone)}: put it back"
-        for one in sorted(json_differences(cell["run"], asked[name]["run"]), key=lambda one: one.path):
+        for one in sorted(json_differences(cell["run"], requested[name]["run"]), key=lambda one: one.path):
             yield f"cell {name}: {one.path}: there {one.left!r}, asked {one.right!r}"
 
 

@@ -46,7 +46,7 @@ def check_agent(
     for column in ("check", "", "what was found"):
         table.add_column(column, no_wrap=column != "what was found")
     for check in report.checks:
-        table.add_row(check.name, Text(check.verdict, style=_STYLES[check.verdict]), Text(check.said))
+        table.add_row(check.name, Text(check.verdict, style=_STYLES[check.verdict]), Text(check.finding))
     Console().print(table)
     if not report.is_ok:
         raise typer.Exit(EXIT_BROKEN)

@@ -1,9 +1,9 @@
-"""An agent that is watched: it does what it does, and all of it is noted."""
+"""Wrap an agent, and record its calls, errors and answers."""
 
 import hashlib
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +13,17 @@ from evonav.agents.hosting import wire
 from evonav.sensors.observation import MapFrame, Observation
 from evonav.tasks.public import StageInput, TaskInfo
 
+T = TypeVar("T")
+
 MAP_MARGIN_M = 0.5
-"""An entry may lie this far outside the map: walls and what hangs on them do."""
+"""Distance that an entry may lie outside the map, as walls and objects on them do."""
 
 
 class Probe:
-    """An agent, and what it does."""
+    """An agent whose calls are recorded."""
 
     def __init__(self, agent: Agent) -> None:
+        """Wrap an agent."""
         self.agent = agent
         self.explains = isinstance(agent, ExplainingAgent)
         self.calls = {"begin_task": 0, "begin_stage": 0, "act": 0, "diagnostics": 0, "entries": 0}
@@ -35,7 +38,7 @@ class Probe:
 
     @property
     def sensing(self) -> Sensing:
-        """The agent's."""
+        """The sensors that the agent needs."""
         return self.agent.sensing
 
     @sensing.setter
@@ -62,36 +65,27 @@ class Probe:
             if view.rgb is not None:
                 self._note("rgb", view.rgb)
         began_s = time.perf_counter()
-        action: AgentAction = self._call("act", lambda: self.agent.act(observation))
+        action = self._call("act", lambda: self.agent.act(observation))
         self.seconds.append(time.perf_counter() - began_s)
         return action
 
     def diagnostics(self) -> RoundDiagnostics:
-        """Return the agent's diagnostics of the round, as they would be after JSON."""
+        """Return the agent's diagnostics of the round, as they are after JSON."""
         if not isinstance(self.agent, ExplainingAgent):
             return RoundDiagnostics()
         agent = self.agent
-
-        def ask() -> RoundDiagnostics:
-            text = wire.DIAGNOSTICS.write(agent.diagnostics())
-            self.largest_diagnostics = max(self.largest_diagnostics, len(text))
-            return wire.DIAGNOSTICS.read(text)
-
-        told: RoundDiagnostics = self._call("diagnostics", ask)
-        return told
+        text = self._call("diagnostics", lambda: wire.DIAGNOSTICS.write(agent.diagnostics()))
+        self.largest_diagnostics = max(self.largest_diagnostics, len(text))
+        return self._call("diagnostics", lambda: wire.DIAGNOSTICS.read(text))
 
     def entries(self) -> Sequence[EntryBelief]:
-        """Its object memory, as JSON would have it."""
+        """Return the agent's object memory, as it is after JSON."""
         if not isinstance(self.agent, ExplainingAgent):
             return ()
         agent = self.agent
-
-        def ask() -> list[EntryBelief]:
-            return wire.ENTRIES.read(wire.ENTRIES.write(list(agent.entries())))
-
-        found: list[EntryBelief] = self._call("entries", ask)
+        found = self._call("entries", lambda: wire.ENTRIES.read(wire.ENTRIES.write(list(agent.entries()))))
         self.num_entries += len(found)
-        self.outside += [said for entry in found if (said := self._misplaced(entry)) is not None]
+        self.outside += [problem for entry in found if (problem := self._misplaced(entry)) is not None]
         return found
 
     def changed(self) -> str:
@@ -106,6 +100,7 @@ class Probe:
         self._given.append((name, array, _digest(array)))
 
     def _misplaced(self, entry: EntryBelief) -> str | None:
+        """Describe an entry outside the map."""
         frame = self._frame
         if frame is None:
             return None
@@ -116,7 +111,8 @@ class Probe:
             return None
         return f"entry {entry.entry_id} ({entry.label}) is at {entry.centre_m}, outside the map"
 
-    def _call(self, name: str, function: Callable[[], Any]) -> Any:  # noqa: ANN401 - of the function
+    def _call(self, name: str, function: Callable[[], T]) -> T:
+        """Call the agent, and record its first error."""
         self.calls[name] += 1
         try:
             return function()

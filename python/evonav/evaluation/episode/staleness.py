@@ -188,9 +188,9 @@ class StalenessTracker:
     def begin(self, beliefs: Sequence[EntryBelief]) -> MemoryRecord:
         """Judge the agent's entries as the stage begins."""
         matches = matched_objects(beliefs, self.bodies)
-        carried = self._so_far.beliefs
-        carried_matches = matches if list(carried) == list(beliefs) else matched_objects(carried, self.bodies)
-        self._matched_before = {body.id for body in carried_matches if body is not None}
+        earlier = self._so_far.beliefs
+        earlier_matches = matches if list(earlier) == list(beliefs) else matched_objects(earlier, self.bodies)
+        self._matched_before = {body.id for body in earlier_matches if body is not None}
         self._stale = [_StaleEntry(belief) for belief, body in zip(beliefs, matches, strict=True) if body is None]
         return self._memory(beliefs, matches)
 

@@ -1,4 +1,4 @@
-"""What an agent's process has besides its socket: shared memory for what it is given, a log for what it prints."""
+"""Connect an agent's process: shared memory for its observations, a log for its output."""
 
 import mmap
 import os
@@ -17,14 +17,15 @@ _ALIGN = 64
 
 
 class SharedBlock:
-    """Memory that another process can read, from the writer's side."""
+    """Memory that the evaluator writes and another process can read."""
 
     def __init__(self) -> None:
+        """Create an empty block."""
         if hasattr(os, "memfd_create"):
             import fcntl
 
             self.descriptor = os.memfd_create("evonav", os.MFD_CLOEXEC | os.MFD_ALLOW_SEALING)
-            # A reader that made the file shorter would have the writer killed by its next write.
+            # If a reader made the file shorter, the next write would kill the writer.
             fcntl.fcntl(self.descriptor, fcntl.F_ADD_SEALS, fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_SEAL)
         else:
             with tempfile.TemporaryFile() as file:
@@ -60,12 +61,13 @@ class SharedBlock:
 
 
 class OutputLog:
-    """Takes what a process prints to a file, line by line, with what the process was at.
+    """Appends the output of a process to a file, line by line, with a label before each line.
 
-    Through a pipe: a descriptor of the file itself would tell the agent where the run is.
+    The process writes to a pipe: a descriptor of the file itself would reveal the run's folder to the agent.
     """
 
     def __init__(self, path: Path, name: str) -> None:
+        """Open a pipe, whose writing end is `descriptor`."""
         self._reader, self.descriptor = os.pipe()
         self._path = path
         self._label = name
@@ -73,7 +75,7 @@ class OutputLog:
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def begin(self) -> None:
-        """Close the descriptors of the child, after it was started or failed to start."""
+        """Close this process's copy of `descriptor` once the child has started, and begin to read."""
         os.close(self.descriptor)
         self._thread.start()
 
@@ -84,17 +86,17 @@ class OutputLog:
             self._left = MAX_LOG_BYTES
 
     def end(self) -> None:
-        """Wait shortly for the last output."""
+        """Wait up to a second for the last output."""
         self._thread.join(timeout=1.0)
 
     def _run(self) -> None:
         with os.fdopen(self._reader, "rb") as output:
             first = output.readline(_MAX_LINE_BYTES)
             with suppress(OSError):  # no such folder on this machine of a cluster, or a disk that is full
-                if first:  # no file where nothing is said
+                if first:  # without output there is no file
                     with self._path.open("ab", buffering=0) as file:
                         self._copy(first, output, file)
-            while output.read(_MAX_LINE_BYTES):  # an agent that prints is not to fail of it
+            while output.read(_MAX_LINE_BYTES):  # the agent must not block on a full pipe
                 pass
 
     def _copy(self, line: bytes, output: BinaryIO, file: BinaryIO) -> None:

@@ -1,12 +1,12 @@
-"""Agents in processes of their own: they cannot reach oracle data, and what they break is theirs.
+"""Run agents in processes of their own, where they cannot reach oracle data or harm the evaluator.
 
-A process serves agents of one name, a fresh object an episode (`evonav.agents.hosting.serving` is its side).
-Observations go there pickled, their arrays through one block of shared memory; answers come back as JSON
-(`evonav.agents.hosting.wire`), and nothing that an agent says is unpickled or believed to be well-formed. The process
-inherits no descriptor but three and its output, is given no path but those of its decision model's files, and leads a
-process group, so that what an agent has started ends with it.
+A process runs agents of one name, with a new object for each episode (`evonav.agents.hosting.serving` is its side). It receives
+pickled observations, with their arrays in one block of shared memory, and answers in JSON (`evonav.agents.hosting.wire`).
+Nothing that an agent sends is unpickled, and every answer is checked. The process inherits only three descriptors and
+its output, receives no path but those of its decision model's files, and leads a process group, so that processes that
+an agent has started end with it.
 
-This is no sandbox: an agent that goes looking can read what this user can read. For that, run evonav in a container.
+This is no sandbox: an agent can read every file that this user can read. To prevent this, run evonav in a container.
 """
 
 import os
@@ -31,13 +31,13 @@ from evonav.evaluation.records.schema import ErrorKind
 from evonav.parallel.local import one_thread_each
 
 LOG_NAME = "agents.log"
-"""File in a run's folder with everything that agents printed."""
+"""File in a run's folder with all output of agents."""
 LOAD_TIMEOUT_S = 300.0
 """Shortest limit for importing an agent's module."""
 IS_SUPPORTED = os.name == "posix"
-"""Elsewhere agents run in the evaluator's process."""
+"""True where agents can have processes of their own; elsewhere they run in the evaluator's."""
 MAX_PROCESSES = 8
-"""Kept by a worker, one an agent's name; the one that was used longest ago makes room."""
+"""Largest number of processes of a worker, one for each agent name; the least recently used one is ended."""
 MAX_ANSWER_BYTES = 2 * wire.MAX_ENTRIES_BYTES
 _PART_BYTES = 1 << 18
 _LONGEST_WAIT_S = 3600.0
@@ -51,30 +51,30 @@ _START = (
 
 @dataclass(frozen=True, slots=True)
 class AgentHosting:
-    """Settings of agents' processes; they are no part of a run's identity."""
+    """Settings of agents' processes; they are not part of a run's identity."""
 
     is_in_process: bool = False
     """Run agents in the evaluator's own process, where only exceptions are contained."""
     timeout_s: float = 600.0
-    """Longest time for an answer; then the process is ended."""
+    """Time limit of an answer, after which the process is ended."""
     memory_mb: int | None = None
-    """Address space that an agent's process may have."""
+    """Largest address space of an agent's process; default: no limit."""
     log: str | None = None
-    """File that what agents print is appended to; default: the evaluator's standard error."""
+    """File to which the output of agents is appended; default: the evaluator's standard error."""
 
 
 class AgentProcess:
     """A process with an agent in it."""
 
     def __init__(self, name: str, hosting: AgentHosting) -> None:
-        """Starts it; the agent's module is imported there.
+        """Start the process and import the agent's module in it.
 
         Raises:
-            AgentFailedError: It cannot be imported, dies of it, or takes too long.
+            AgentFailedError: The module cannot be imported in time, or the process died.
         """
         self.name = name
         self.cpu_s = 0.0
-        """CPU time that it has used, by its own account."""
+        """CPU time that the process reports."""
         self._hosting = hosting
         self._block = SharedBlock()
         self._connection, far_end = socket.socketpair()
@@ -113,12 +113,12 @@ class AgentProcess:
 
     @property
     def is_usable(self) -> bool:
-        """Whether it lives and waits for a request."""
+        """True if the process is alive and waits for a request."""
         return not self._is_closed and not self._is_waiting and self._process.poll() is None
 
     @property
     def memory_mb(self) -> float | None:
-        """Resident memory, at its most so far; `None` where the system does not tell, or it has ended."""
+        """Peak resident memory; `None` if the process has ended or the system does not report it."""
         try:
             status = Path(f"/proc/{self._process.pid}/status").read_text()
         except OSError:
@@ -127,16 +127,16 @@ class AgentProcess:
         return None if found is None else int(found) / 1024
 
     def describe(self, label: str) -> None:
-        """Says what it is at, for the log."""
+        """Set the label of the agent's output in the log."""
         if self._log is not None:
             self._log.begin_part(label)
 
     def ask(self, operation: str, *arguments: object, timeout_s: float | None = None) -> dict[str, bytes]:
-        """A request and the parts of its answer, still as JSON.
+        """Send a request, and return the parts of its answer, each as JSON.
 
         Raises:
-            AgentFailedError: The agent raised (`agent`, `decision`); or it died or hung (`crash`, `timeout`), and its
-                process is ended.
+            AgentFailedError: The agent raised (`agent`, `decision`), or it died or hung (`crash`, `timeout`) and its
+                process was ended.
         """
         timeout_s = timeout_s or self._hosting.timeout_s
         deadline_s = time.monotonic() + timeout_s
@@ -174,7 +174,7 @@ class AgentProcess:
             self._wait(deadline_s)
             part = self._connection.recv(_PART_BYTES)
             if not part:
-                raise ConnectionResetError("hung up")
+                raise ConnectionResetError("closed")
             data += part
             if size == LENGTH.size <= len(data):
                 size += LENGTH.unpack_from(data)[0]
@@ -206,10 +206,10 @@ class AgentProcess:
         return f"the agent's process died ({how})"
 
     def close(self, *, is_at_once: bool = False) -> None:
-        """Ends it and what it has started; safe to call twice.
+        """End the process and all that it has started; safe to call twice.
 
         Args:
-            is_at_once: Without a chance to end by itself.
+            is_at_once: Do not wait for the process to end by itself.
         """
         if self._is_closed:
             return
@@ -218,7 +218,7 @@ class AgentProcess:
         if not is_at_once and not self._is_waiting:
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(timeout=2.0)
-        # Its group may live on in a process that it started.
+        # Processes that it started may still run in its group.
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
@@ -231,7 +231,7 @@ class AgentProcess:
 
 
 class AgentProcesses:
-    """A worker's processes, by the name of the agent."""
+    """The agents' processes of a worker, by the name of the agent."""
 
     def __init__(self, hosting: AgentHosting) -> None:
         """Remember the settings; processes start when they are needed."""
@@ -239,10 +239,10 @@ class AgentProcesses:
         self._processes: dict[str, AgentProcess] = {}
 
     def process(self, name: str) -> AgentProcess:
-        """One that waits; another is started where there is none.
+        """Return a process that waits for requests; start one if there is none.
 
         Raises:
-            AgentFailedError: It does not start.
+            AgentFailedError: The process does not start.
         """
         found = self._processes.pop(name, None)
         if found is not None and not found.is_usable:
@@ -260,10 +260,10 @@ class AgentProcesses:
 
 
 def check_importable(name: str) -> None:
-    """Imports an agent in a process that ends then: this one runs no code of strangers.
+    """Check that an agent can be imported, in a process of its own, which then ends.
 
     Raises:
-        InvalidArgumentError: It cannot be imported.
+        InvalidArgumentError: The agent cannot be imported.
     """
     try:
         AgentProcess(name, AgentHosting()).close()
@@ -273,6 +273,6 @@ def check_importable(name: str) -> None:
 
 
 def failure_of(text: bytes) -> AgentFailedError:
-    """Return the failure of an agent that its process reports, from a `wire.FAILURE`."""
+    """Return the failure that an agent's process reports as a `wire.FAILURE`."""
     failure = wire.FAILURE.read(text)
     return AgentFailedError(ErrorKind(failure.kind), failure.message, failure.traceback)

@@ -1,7 +1,7 @@
-"""What explains a rate: means of `StageMetrics`'s measures for every agent, with intervals over houses.
+"""Aggregate the metrics of `StageMetrics` for every agent, with intervals over houses.
 
-Every figure is a ratio of sums: of a share, what is counted over what could have been; of a mean, the sum over the
-stages that have a value. Intervals are by house (`evonav.statistics`).
+Every value is a ratio of sums over stages: a share divides a count by the largest possible count, and a mean divides
+the sum of a metric by the number of stages that have one. Intervals are by house (`evonav.statistics`).
 """
 
 from collections.abc import Callable, Sequence
@@ -27,7 +27,7 @@ class Measure:
     """A column of a table."""
 
     name: str
-    words: str
+    label: str
     unit: Unit
     part: Callable[[StageMetrics], Part]
 
@@ -45,36 +45,28 @@ class MetricSummary:
     """Bootstrap by house; `None` of one house, or where all of them agree."""
 
 
-def _mean(name: str) -> Callable[[StageMetrics], Part]:
+def _ratio(
+    value: str, weight: str | None, numerator: Callable[[float, float], float]
+) -> Callable[[StageMetrics], Part]:
+    """Return a stage's parts of a ratio of two fields; the denominator is `weight`, by default 1."""
+
     def part(row: StageMetrics) -> Part:
-        value = getattr(row, name)
-        return None if value is None or not row.is_scored else (float(value), 1.0)
+        found, num = getattr(row, value), 1.0 if weight is None else getattr(row, weight)
+        return None if found is None or not num or not row.is_scored else (float(numerator(found, num)), float(num))
 
     return part
 
 
-def _share(of: str, among: str) -> Callable[[StageMetrics], Part]:
-    def part(row: StageMetrics) -> Part:
-        num, den = getattr(row, of), getattr(row, among)
-        return None if num is None or not den or not row.is_scored else (float(num), float(den))
-
-    return part
+def _mean(value: str, weight: str | None = None) -> Callable[[StageMetrics], Part]:
+    return _ratio(value, weight, lambda value, weight: value * weight)
 
 
-def _right(stale: str, entries: str) -> Callable[[StageMetrics], Part]:
-    def part(row: StageMetrics) -> Part:
-        num, den = getattr(row, stale), getattr(row, entries)
-        return None if num is None or not den or not row.is_scored else (float(den - num), float(den))
-
-    return part
+def _share(num: str, among: str) -> Callable[[StageMetrics], Part]:
+    return _ratio(num, among, lambda num, _: num)
 
 
-def _recall(name: str) -> Callable[[StageMetrics], Part]:
-    def part(row: StageMetrics) -> Part:
-        recall, num_seen = getattr(row, name), row.num_seen_objects
-        return None if recall is None or not num_seen or not row.is_scored else (recall, 1.0)
-
-    return part
+def _rest(num: str, among: str) -> Callable[[StageMetrics], Part]:
+    return _ratio(num, among, lambda num, among: among - num)
 
 
 def _later(part: Callable[[StageMetrics], Part]) -> Callable[[StageMetrics], Part]:
@@ -85,16 +77,6 @@ def _radius(radius_m: float) -> Callable[[StageMetrics], Part]:
     def part(row: StageMetrics) -> Part:
         is_success = row.is_success_at(radius_m)
         return None if is_success is None else (float(is_success), 1.0)
-
-    return part
-
-
-def _clearing(name: str, count: str) -> Callable[[StageMetrics], Part]:
-    """Return a stage's mean, weighted by its count."""
-
-    def part(row: StageMetrics) -> Part:
-        value, num = getattr(row, name), getattr(row, count)
-        return None if value is None or not num or not row.is_scored else (value * num, float(num))
 
     return part
 
@@ -119,21 +101,21 @@ STALENESS = (
         _share("num_stale_evident", "num_stale_at_start"),
     ),
     Measure("stale_cleared", "of them cleared in the stage", "%", _share("num_stale_cleared", "num_stale_evident")),
-    Measure("rounds_to_clear", "rounds until cleared", "rounds", _clearing("rounds_to_clear", "num_stale_cleared")),
-    Measure("metres_to_clear", "metres until cleared", "m", _clearing("metres_to_clear", "num_stale_cleared")),
+    Measure("rounds_to_clear", "rounds until cleared", "rounds", _mean("rounds_to_clear", "num_stale_cleared")),
+    Measure("metres_to_clear", "metres until cleared", "m", _mean("metres_to_clear", "num_stale_cleared")),
     Measure(
         "moved_found", "moved objects, of those seen, found anew", "%", _share("num_moved_found", "num_moved_seen")
     ),
-    Measure("rounds_to_find", "rounds until found", "rounds", _clearing("rounds_to_find", "num_moved_found")),
+    Measure("rounds_to_find", "rounds until found", "rounds", _mean("rounds_to_find", "num_moved_found")),
     Measure("forgotten", "objects forgotten", "", _later(_mean("num_forgotten"))),
 )
 MEMORY = (
     Measure("entries", "entries at the end", "", _mean("num_entries")),
-    Measure("precision", "precision at the end", "%", _right("num_stale_entries", "num_entries")),
-    Measure("recall", "recall at the end", "%", _recall("recall")),
+    Measure("precision", "precision at the end", "%", _rest("num_stale_entries", "num_entries")),
+    Measure("recall", "recall at the end", "%", _mean("recall")),
     Measure("precision_before", "precision before a change", "%", _mean("precision_before")),
     Measure("precision_at_start", "precision after it", "%", _later(_mean("precision_at_start"))),
-    Measure("recall_at_start", "recall after it", "%", _later(_recall("recall_at_start"))),
+    Measure("recall_at_start", "recall after it", "%", _later(_mean("recall_at_start"))),
     Measure("duplicates", "duplicates", "", _mean("num_duplicates")),
     Measure("position_error_m", "position error", "m", _mean("position_error_m")),
 )
@@ -152,15 +134,15 @@ COSTS = (
     Measure("agent_peak_rss_mb", "agent's memory", "MB", _mean("agent_peak_rss_mb")),
 )
 MEASURES = {"success": SUCCESS, "staleness": STALENESS, "memory": MEMORY, "costs": COSTS}
-"""By kind. Those of `costs` are of the machine, not of the run's inputs."""
+"""The measures by kind. `costs` depend on the machine; the others depend on the run's inputs alone."""
 
 
 def explain(rows: Sequence[StageMetrics], measures: Sequence[Measure]) -> dict[str, list[MetricSummary]]:
-    """Measures by agent, in the order of the rows.
+    """Return measures by agent, in the order of the rows.
 
     Args:
-        rows: Of a run, or of some of its stages.
-        measures: Of `MEASURES`.
+        rows: The stages of a run, or some of them.
+        measures: Measures of `MEASURES`.
     """
     agents = dict.fromkeys(row.agent for row in rows)
     return {

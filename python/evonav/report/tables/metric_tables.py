@@ -51,7 +51,7 @@ def measures_table(rows: Sequence[StageMetrics], kind: str) -> Table:
     for index, measure in enumerate(MEASURES[kind]):
         cells = {agent: metrics[index] for agent, metrics in found.items()}
         if any(cell.value is not None for cell in cells.values()):
-            name = f"{measure.words}, {measure.unit}" if measure.unit else measure.words
+            name = f"{measure.label}, {measure.unit}" if measure.unit else measure.label
             lines.append((name, *(_cell(cell, totals[agent]) for agent, cell in cells.items())))
     houses = {agent: len({house_of(row) for row in rows if row.agent == agent and row.is_scored}) for agent in found}
     sizes = "; ".join(f"{agent} {totals[agent]} stages of {houses[agent]} houses" for agent in found)
