@@ -18,6 +18,11 @@ END_TIMEOUT_S = 5.0
 """Time that a worker has to end cleanly before it is killed."""
 
 
+def num_cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 class ProcessHost:
     """Starts processes on this machine."""
 

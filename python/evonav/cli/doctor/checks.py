@@ -10,11 +10,13 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Literal
 
+from evonav.parallel.local import num_cores
 from evonav.perception.stacks import STACKS, StackConfig, StackName, weights_of
 from evonav.perception.weights import models_folder, places
 
@@ -76,54 +78,54 @@ class Where:
     base_url: str | None = None
 
 
+Result = tuple[State, str] | tuple[State, str, str]
+"""State, finding and, where there is one, the remedy of a check."""
+ESSENTIAL = ("evonav", "python", "bundled tasks", "renderer")
+
+
 def all_checks(where: Where) -> Iterator[Check]:
     """Run every check; a check that raises counts as failed."""
-    essential: tuple[tuple[str, Callable[[], Check]], ...] = (
-        ("evonav", _core),
-        ("python", _python),
-        ("bundled tasks", _bundled),
-        ("renderer", _renderer),
-    )
-    for name, check in essential:
-        yield _guarded(name, check, is_essential=True)
-    yield _guarded("processor", _processor)
-    yield _guarded("run folder", lambda: _folder(where.out))
-    for extra in EXTRAS:
-        yield _guarded(f"extra {extra}", lambda extra=extra: _extra(extra))  # type: ignore[misc]
-    yield _guarded("GPU", _gpu)
-    for stack in STACKS:
-        yield _guarded(f"models {stack}", lambda stack=stack: _models(stack))  # type: ignore[misc]
-    yield _guarded("AI2-THOR", _thor)
-    yield _guarded("ProcTHOR-10k", _procthor)
-    yield _guarded("model endpoint", lambda: _endpoint(where))
+    checks: dict[str, Callable[[], Result]] = {
+        "evonav": _core,
+        "python": _python,
+        "bundled tasks": _bundled,
+        "renderer": _renderer,
+        "processor": _processor,
+        "run folder": partial(_folder, where.out),
+        **{f"extra {extra}": partial(_extra, extra) for extra in EXTRAS},
+        "GPU": _gpu,
+        **{f"models {stack}": partial(_models, stack) for stack in STACKS},
+        "AI2-THOR": _thor,
+        "ProcTHOR-10k": _procthor,
+        "model endpoint": partial(_endpoint, where),
+    }
+    for name, check in checks.items():
+        is_essential = name in ESSENTIAL
+        try:
+            found = check()
+        except Exception as error:  # a broken part may raise anything
+            finding = " ".join(f"{type(error).__name__}: {error}".split())
+            found = ("failed", finding, "pip install --force-reinstall evonav" if is_essential else "")
+        state, finding, *remedy = found
+        yield Check(name, state, finding, "".join(remedy), is_essential)
 
 
-def _guarded(name: str, check: Callable[[], Check], *, is_essential: bool = False) -> Check:
-    try:
-        return check()
-    except Exception as error:  # a broken part may raise anything
-        finding = " ".join(f"{type(error).__name__}: {error}".split())
-        return Check(
-            name, "failed", finding, "pip install --force-reinstall evonav" if is_essential else "", is_essential
-        )
-
-
-def _core() -> Check:
+def _core() -> Result:
     import evonav
     from evonav import _core as core
 
     finding = f"{evonav.__version__}, Rust core {core.__version__}, in {Path(evonav.__file__).parent}"
-    return Check("evonav", "ok", finding, is_essential=True)
+    return "ok", finding
 
 
-def _python() -> Check:
+def _python() -> Result:
     finding = (
         f"{platform.python_version()} ({sys.executable}), numpy {version('numpy')}, {platform.platform(terse=True)}"
     )
-    return Check("python", "ok", finding, is_essential=True)
+    return "ok", finding
 
 
-def _bundled() -> Check:
+def _bundled() -> Result:
     from evonav.tasks.bundled import bundled_tasks
     from evonav.tasks.files import load_task
     from evonav.tasks.listing import task_roots
@@ -131,10 +133,10 @@ def _bundled() -> Check:
     with bundled_tasks() as folder:
         roots = task_roots(folder)
         task = load_task(roots[0])
-    return Check("bundled tasks", "ok", f"{len(roots)}, the first of {task.num_stages} stages", is_essential=True)
+    return "ok", f"{len(roots)}, the first of {task.num_stages} stages"
 
 
-def _renderer() -> Check:
+def _renderer() -> Result:
     """Render views of a bundled house for one second."""
     from dataclasses import replace
 
@@ -151,23 +153,22 @@ def _renderer() -> Check:
         num += 1
     simulator.close()
     if most == 0:
-        return Check("renderer", "failed", "sees nothing in a bundled house", "report this as a bug", is_essential=True)
+        return "failed", "sees nothing in a bundled house", "report this as a bug"
     size = f"{simulator.config.width_px}x{simulator.config.height_px}"
     finding = f"{num / took_s:.0f} views/s of {size} (colour, depth, instances) on one core"
-    return Check("renderer", "ok", finding, is_essential=True)
+    return "ok", finding
 
 
-def _processor() -> Check:
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def _processor() -> Result:
     info = Path("/proc/cpuinfo")
     text = info.read_text(encoding="utf-8", errors="replace") if info.is_file() else ""
     flags = set(" ".join(re.findall(r"^(?:flags|Features)\s*:(.*)$", text, re.MULTILINE)[:1]).split())
     known = [name for name in (*_X86_FEATURES, *_ARM_FEATURES) if name in flags]
     listed = f", {' '.join(known)}" if known else ""
-    return Check("processor", "ok", f"{platform.machine()}, {cores} cores for workers{listed}")
+    return "ok", f"{platform.machine()}, {num_cores()} cores for workers{listed}"
 
 
-def _folder(out: Path) -> Check:
+def _folder(out: Path) -> Result:
     """Check free space and file locks in the folder for runs."""
     place = next(folder for folder in (out.absolute(), *out.absolute().parents) if folder.is_dir())
     free_gb = shutil.disk_usage(place).free / 1e9
@@ -176,13 +177,13 @@ def _folder(out: Path) -> Check:
             has_locks = _has_locks(Path(folder) / "lock")
     except OSError as error:
         remedy = "name a folder that you may write to with --out"
-        return Check("run folder", "failed", f"{place}: {error.strerror or error}", remedy)
+        return "failed", f"{place}: {error.strerror or error}", remedy
     finding = f"{place}: {free_gb:.0f} GB free, {'locks work' if has_locks else 'no file locks'}"
     if not has_locks:
-        return Check("run folder", "failed", finding, "put runs on a local disk: two commands could write to one run")
+        return "failed", finding, "put runs on a local disk: two commands could write to one run"
     if free_gb < MIN_FREE_GB:
-        return Check("run folder", "failed", finding, "a run takes about 0.1 MB a stage, with a model 1 MB: make room")
-    return Check("run folder", "ok", finding)
+        return "failed", finding, "a run takes about 0.1 MB a stage, with a model 1 MB: make room"
+    return "ok", finding
 
 
 def _has_locks(path: Path) -> bool:
@@ -203,7 +204,7 @@ def _has_locks(path: Path) -> bool:
     return False
 
 
-def _extra(extra: str) -> Check:
+def _extra(extra: str) -> Result:
     packages, purpose = EXTRAS[extra]
     found, lacking = [], []
     for package in packages:
@@ -211,33 +212,32 @@ def _extra(extra: str) -> Check:
             found.append(f"{package} {version(package)}")
         except PackageNotFoundError:
             lacking.append(package)
-    name = f"extra {extra}"
     if lacking:
-        return Check(name, "missing", f"{purpose} (no {', '.join(lacking)})", f"pip install 'evonav[{extra}]'")
+        return "missing", f"{purpose} (no {', '.join(lacking)})", f"pip install 'evonav[{extra}]'"
     broken = [package for package in packages if find_spec(_MODULES.get(package, package)) is None]
     if broken:
         remedy = f"pip install --force-reinstall 'evonav[{extra}]'"
-        return Check(name, "failed", f"{purpose} ({', '.join(broken)} is installed and cannot be found)", remedy)
-    return Check(name, "ok", f"{purpose} ({', '.join(found)})")
+        return "failed", f"{purpose} ({', '.join(broken)} is installed and cannot be found)", remedy
+    return "ok", f"{purpose} ({', '.join(found)})"
 
 
-def _gpu() -> Check:
+def _gpu() -> Result:
     """Ask nvidia-smi; PyTorch's version is read without loading it, which would take seconds."""
     try:
         torch = f", torch {version('torch')}"
     except PackageNotFoundError:
         torch = ""
     tool = shutil.which("nvidia-smi")
-    none = Check("GPU", "missing", f"none found{torch}; evonav's own simulator and agents need none")
+    none: Result = ("missing", f"none found{torch}; evonav's own simulator and agents need none")
     if tool is None:
         return none
     command = [tool, "--query-gpu=name,memory.total,driver_version", "--format=csv,noheader"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)  # noqa: S603 - nvidia-smi
     names = [" ".join(line.split()) for line in done.stdout.splitlines() if line.strip()]
-    return Check("GPU", "ok", "; ".join(names) + torch) if done.returncode == 0 and names else none
+    return ("ok", "; ".join(names) + torch) if done.returncode == 0 and names else none
 
 
-def _models(stack: StackName) -> Check:
+def _models(stack: StackName) -> Result:
     """Look for the files of a stack by name; hashes take seconds and are compared before a run."""
     folder = models_folder(None)
     files = {
@@ -251,54 +251,54 @@ def _models(stack: StackName) -> Check:
         size_mb = sum(file.size_mb for file in lacking)
         finding = f"{len(lacking)} of {len(files)} files are not in {where} (about {size_mb} MB): {lacking[0].name}"
         remedy = "fetched at first use" if folder is None else "docs/perception.md says where to download them"
-        return Check(f"models {stack}", "missing", f"{finding}, ..." if len(lacking) > 1 else finding, remedy)
-    return Check(f"models {stack}", "ok", f"{len(files)} files in {where}")
+        return "missing", f"{finding}, ..." if len(lacking) > 1 else finding, remedy
+    return "ok", f"{len(files)} files in {where}"
 
 
-def _thor() -> Check:
+def _thor() -> Result:
     from evonav.errors import SimulationError
     from evonav.thor import executable
 
     try:
         engine = f"evonav-thor in {Path(executable().strip(chr(39))).parent}"
     except SimulationError as error:
-        return Check("AI2-THOR", "failed", str(error), "pip install --force-reinstall evonav")
+        return "failed", str(error), "pip install --force-reinstall evonav"
     releases = Path.home() / ".ai2thor" / "releases"
     builds = sorted(path.name for path in releases.glob("*") if path.is_dir()) if releases.is_dir() else []
     unity = f"{len(builds)} Unity builds in {releases}" if builds else "no Unity build (downloaded at first use)"
     if find_spec("ai2thor") is None:
-        return Check("AI2-THOR", "missing", f"no client; {engine}", "pip install 'evonav[thor]'")
-    return Check("AI2-THOR", "ok", f"client {version('ai2thor')}, {engine}, {unity}")
+        return "missing", f"no client; {engine}", "pip install 'evonav[thor]'"
+    return "ok", f"client {version('ai2thor')}, {engine}, {unity}"
 
 
-def _procthor() -> Check:
+def _procthor() -> Result:
     from evonav.house.procthor10k import dataset_folder, read_manifest
 
     folder = dataset_folder()
     manifest = read_manifest(folder)
     if manifest is None:
-        return Check("ProcTHOR-10k", "missing", f"not in {folder}", "evonav houses fetch procthor-10k")
+        return "missing", f"not in {folder}", "evonav houses fetch procthor-10k"
     listed = ", ".join(f"{name} {split.num_houses}" for name, split in manifest.splits.items())
-    return Check("ProcTHOR-10k", "ok", f"{listed} houses in {folder}")
+    return "ok", f"{listed} houses in {folder}"
 
 
-def _endpoint(where: Where) -> Check:
+def _endpoint(where: Where) -> Result:
     """Ask the configured endpoint for its models, if there is one."""
     from evonav.decision.vlm.client import KEY_VARIABLE, URL_VARIABLE
 
     key, url = os.environ.get(KEY_VARIABLE), where.base_url or os.environ.get(URL_VARIABLE)
     if not key and not url:
         remedy = f"export {KEY_VARIABLE}=..., or {URL_VARIABLE} of your own server (docs/decision.md)"
-        return Check("model endpoint", "missing", "none configured; rules decide without one", remedy)
+        return "missing", "none configured; rules decide without one", remedy
     url = (url or "https://api.openai.com/v1").rstrip("/")
     shown = re.sub(r"//[^/@]*@", "//", url)
     if not where.uses_network:
-        return Check("model endpoint", "ok", f"{shown} configured, not asked (--no-network)")
+        return "ok", f"{shown} configured, not asked (--no-network)"
     from urllib.error import HTTPError, URLError
     from urllib.request import Request, urlopen
 
     if not url.startswith(("http://", "https://")):
-        return Check("model endpoint", "failed", f"{shown}: no http address", f"set {URL_VARIABLE} to http(s)://.../v1")
+        return "failed", f"{shown}: no http address", f"set {URL_VARIABLE} to http(s)://.../v1"
     request = Request(f"{shown}/models", headers={"Authorization": f"Bearer {key or 'none'}"})  # noqa: S310 - http
     try:
         with urlopen(request, timeout=PING_S) as answer:  # noqa: S310 - http
@@ -306,8 +306,8 @@ def _endpoint(where: Where) -> Check:
     except HTTPError as error:
         is_key = error.code in (401, 403)
         remedy = f"check {KEY_VARIABLE}" if is_key else f"check {URL_VARIABLE}: it ends in /v1 for most servers"
-        return Check("model endpoint", "failed", f"{shown} answers {error.code}", remedy)
+        return "failed", f"{shown} answers {error.code}", remedy
     except (URLError, OSError, ValueError) as error:
         reason = getattr(error, "reason", error)
-        return Check("model endpoint", "failed", f"{shown}: {reason}", "is the server up? --no-network skips this")
-    return Check("model endpoint", "ok", f"{shown} answers; {KEY_VARIABLE} is {'set' if key else 'not set'}")
+        return "failed", f"{shown}: {reason}", "is the server up? --no-network skips this"
+    return "ok", f"{shown} answers; {KEY_VARIABLE} is {'set' if key else 'not set'}"

@@ -17,6 +17,7 @@ from evonav.decision.vlm.caching_client import Mode
 from evonav.decision.vlm.ledger import LEDGER_NAME
 from evonav.errors import InvalidArgumentError, StoreError
 from evonav.evaluation.protocol import ProtocolConfig
+from evonav.parallel.local import num_cores
 from evonav.parallel.worker import EngineName, Workforce
 from evonav.perception import Perception
 from evonav.perception.shorthand import PREDICTED, read_word
@@ -364,9 +365,7 @@ class RunSettings(Settings):
     @property
     def num_workers(self) -> int:
         """The number of workers: the given one, or one per core."""
-        if self.workers is not None:
-            return self.workers
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return num_cores() if self.workers is None else self.workers
 
     def workforce(self) -> Workforce:
         """Return the workers.
