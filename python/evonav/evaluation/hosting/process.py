@@ -1,10 +1,10 @@
 """Run agents in processes of their own, where they cannot reach oracle data or harm the evaluator.
 
-A process runs agents of one name, with a new object for each episode (`evonav.agents.hosting.serving` is its side). It receives
-pickled observations, with their arrays in one block of shared memory, and answers in JSON (`evonav.agents.hosting.wire`).
-Nothing that an agent sends is unpickled, and every answer is checked. The process inherits only three descriptors and
-its output, receives no path but those of its decision model's files, and leads a process group, so that processes that
-an agent has started end with it.
+A process runs agents of one name, with a new object for each episode (`evonav.agents.hosting.serving` is its side). It
+receives pickled observations, with their arrays in one block of shared memory, and answers in JSON
+(`evonav.agents.hosting.wire`). Nothing that an agent sends is unpickled, and every answer is checked. The process
+inherits only three descriptors and its output, receives no path but those of its decision model's files, and leads a
+process group, so that processes that an agent has started end with it.
 
 This is no sandbox: an agent can read every file that this user can read. To prevent this, run evonav in a container.
 """
