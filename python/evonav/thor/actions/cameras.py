@@ -7,14 +7,14 @@ a house's ceilings are drawn from below only, so a camera above them sees the ro
 import math
 import re
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from PIL import ImageColor
 from pydantic import BaseModel, ConfigDict
 
 from evonav.thor.actions.motion import invalid_operation
-from evonav.thor.actions.registry import ActionError, Vector3, action
+from evonav.thor.actions.registry import ActionError, Arguments, Vector3, action
 from evonav.thor.actions.teleport import out_of_range
 from evonav.thor.engine import Engine
 from evonav.thor.geometry import Vec3, box_around, vector
@@ -23,6 +23,7 @@ from evonav.world.camera import CameraView, Images
 from evonav.world.pose import Pose
 
 Rgb = tuple[int, int, int]
+_T = TypeVar("_T")
 
 NEAR_M, FAR_M = 0.1, 20.0
 """Clip planes of a camera without its own: those of the agent's camera."""
@@ -104,73 +105,58 @@ class ThirdPartyCamera:
         )
 
 
+class _Properties(Arguments):
+    """The properties that a new camera and a change of one have in common."""
+
+    fieldOfView: float | None = None
+    skyboxColor: str | None = None
+    orthographic: bool | None = None
+    orthographicSize: float | None = None
+    nearClippingPlane: float | None = None
+    farClippingPlane: float | None = None
+
+
+class _NewCamera(_Properties):
+    """The arguments of `AddThirdPartyCamera`."""
+
+    position: Vector3
+    rotation: Vector3
+    fieldOfView: float = 90.0
+    orthographic: bool = False
+    antiAliasing: str = "none"
+
+
+class _CameraChange(_Properties):
+    """The arguments of `UpdateThirdPartyCamera`."""
+
+    thirdPartyCameraId: int = 0
+    position: PartialVector3 | None = None
+    rotation: PartialVector3 | None = None
+
+
 @action("AddThirdPartyCamera")
-def add_third_party_camera(
-    engine: Engine,
-    *,
-    position: Vector3,
-    rotation: Vector3,
-    fieldOfView: float = 90.0,
-    skyboxColor: str | None = None,
-    orthographic: bool = False,
-    orthographicSize: float | None = None,
-    nearClippingPlane: float | None = None,
-    farClippingPlane: float | None = None,
-    antiAliasing: str = "none",
-) -> None:
+def add_third_party_camera(engine: Engine, given: _NewCamera) -> None:
     """Add a camera, whose images are part of every later event."""
     if len(engine.cameras) >= _MAX_CAMERAS:
         raise invalid_operation(f"there are already {_MAX_CAMERAS} third-party cameras; no more can be added")
-    blank = ThirdPartyCamera(
-        len(engine.cameras), (0, 0, 0), (0, 0, 0), 90.0, NEAR_M, FAR_M, False, ORTHOGRAPHIC_SIZE_M, None
-    )
-    camera = _changed(
-        blank,
-        position_m=(position.x, position.y, position.z),
-        rotation_deg=(rotation.x, rotation.y, rotation.z),
-        field_of_view_deg=fieldOfView,
-        skybox_colour=skyboxColor,
-        is_orthographic=orthographic,
-        orthographic_size_m=orthographicSize,
-        clip_m=(nearClippingPlane, farClippingPlane),
-    )
-    engine.cameras.append(camera)
+    origin, size_m = (0.0, 0.0, 0.0), ORTHOGRAPHIC_SIZE_M
+    blank = ThirdPartyCamera(len(engine.cameras), origin, origin, 90.0, NEAR_M, FAR_M, False, size_m, None)
+    engine.cameras.append(_changed(blank, given))
 
 
 @action("UpdateThirdPartyCamera")
-def update_third_party_camera(
-    engine: Engine,
-    *,
-    thirdPartyCameraId: int = 0,
-    position: PartialVector3 | None = None,
-    rotation: PartialVector3 | None = None,
-    fieldOfView: float | None = None,
-    skyboxColor: str | None = None,
-    orthographic: bool | None = None,
-    orthographicSize: float | None = None,
-    nearClippingPlane: float | None = None,
-    farClippingPlane: float | None = None,
-) -> None:
+def update_third_party_camera(engine: Engine, given: _CameraChange) -> None:
     """Change a camera; absent properties keep their value, except the clip planes, which become the agent's."""
-    num_cameras = len(engine.cameras)
-    if not 0 <= thirdPartyCameraId < num_cameras:
+    index, num_cameras = given.thirdPartyCameraId, len(engine.cameras)
+    if not 0 <= index < num_cameras:
         raise out_of_range(
-            f"thirdPartyCameraId: {thirdPartyCameraId} (int: default=0) must in 0 <= thirdPartyCameraId"
+            f"thirdPartyCameraId: {index} (int: default=0) must in 0 <= thirdPartyCameraId"
             f" < len(thirdPartyCameras)={num_cameras}."
         )
-    camera = engine.cameras[thirdPartyCameraId]
+    camera = engine.cameras[index]
     if not isinstance(camera, ThirdPartyCamera):
-        raise ActionError(f"camera {thirdPartyCameraId} is not a third-party camera")
-    engine.cameras[thirdPartyCameraId] = _changed(
-        camera,
-        position_m=_filled(position, camera.position_m),
-        rotation_deg=_filled(rotation, camera.rotation_deg),
-        field_of_view_deg=camera.field_of_view_deg if fieldOfView is None else fieldOfView,
-        skybox_colour=skyboxColor,
-        is_orthographic=orthographic,
-        orthographic_size_m=orthographicSize,
-        clip_m=(nearClippingPlane, farClippingPlane),
-    )
+        raise ActionError(f"camera {index} is not a third-party camera")
+    engine.cameras[index] = _changed(camera, given)
 
 
 @action("ToggleMapView")
@@ -203,51 +189,45 @@ def get_map_view_camera_properties(engine: Engine) -> dict[str, Any]:
     }
 
 
-def _changed(
-    camera: ThirdPartyCamera,
-    *,
-    position_m: Vec3,
-    rotation_deg: Vec3,
-    field_of_view_deg: float,
-    skybox_colour: str | None,
-    is_orthographic: bool | None,
-    orthographic_size_m: float | None,
-    clip_m: tuple[float | None, float | None],
-) -> ThirdPartyCamera:
+def _changed(camera: ThirdPartyCamera, given: _NewCamera | _CameraChange) -> ThirdPartyCamera:
     """Return the camera with new properties, checked as AI2-THOR checks them and as the renderer needs them."""
-    if not 0 < field_of_view_deg < 180:
-        raise out_of_range(f"fieldOfView: {field_of_view_deg:g} must be in 0 < fieldOfView > 0.")
-    if not _FOV_DEG[0] <= field_of_view_deg <= _FOV_DEG[1]:
-        raise out_of_range(
-            f"fieldOfView: {field_of_view_deg:g}: this engine draws {_FOV_DEG[0]} to {_FOV_DEG[1]} degrees"
-        )
-    if is_orthographic is not True and orthographic_size_m is not None:
+    fov_deg = _or(given.fieldOfView, camera.field_of_view_deg)
+    if not 0 < fov_deg < 180:
+        raise out_of_range(f"fieldOfView: {fov_deg:g} must be in 0 < fieldOfView > 0.")
+    if not _FOV_DEG[0] <= fov_deg <= _FOV_DEG[1]:
+        raise out_of_range(f"fieldOfView: {fov_deg:g}: this engine draws {_FOV_DEG[0]} to {_FOV_DEG[1]} degrees")
+    if given.orthographic is not True and given.orthographicSize is not None:
         raise invalid_operation(
-            f"orthographicSize(: {orthographic_size_m:g}) can only be set when orthographic=True.\n"
+            f"orthographicSize(: {given.orthographicSize:g}) can only be set when orthographic=True.\n"
             "Otherwise, we use assume perspective camera setting."
             "Hint: call .step(..., orthographic=True)."
         )
-    size_m = camera.orthographic_size_m if orthographic_size_m is None else orthographic_size_m
-    near_m, far_m = NEAR_M if clip_m[0] is None else clip_m[0], FAR_M if clip_m[1] is None else clip_m[1]
+    size_m = _or(given.orthographicSize, camera.orthographic_size_m)
+    near_m, far_m = _or(given.nearClippingPlane, NEAR_M), _or(given.farClippingPlane, FAR_M)
     if not _NEAR_M <= near_m < far_m <= _MAX_M:
         raise out_of_range(
             f"nearClippingPlane {near_m:g} and farClippingPlane {far_m:g}: {_NEAR_M:g} <= near < far <= {_MAX_M:g}"
         )
     if not 1e-3 <= size_m <= _MAX_M:
         raise out_of_range(f"orthographicSize: {size_m:g} must be in [0.001, {_MAX_M:g}]")
+    position_m, rotation_deg = _filled(given.position, camera.position_m), _filled(given.rotation, camera.rotation_deg)
     if max(map(abs, (*position_m, *rotation_deg))) > _MAX_M:
         raise out_of_range(f"position and rotation must be within {_MAX_M:g}")
     return replace(
         camera,
         position_m=position_m,
         rotation_deg=rotation_deg,
-        field_of_view_deg=field_of_view_deg,
+        field_of_view_deg=fov_deg,
         near_m=near_m,
         far_m=far_m,
-        is_orthographic=camera.is_orthographic if is_orthographic is None else is_orthographic,
+        is_orthographic=_or(given.orthographic, camera.is_orthographic),
         orthographic_size_m=size_m,
-        skybox=_skybox(skybox_colour, camera.skybox),
+        skybox=_skybox(given.skyboxColor, camera.skybox),
     )
+
+
+def _or(given: _T | None, otherwise: _T) -> _T:
+    return otherwise if given is None else given
 
 
 def _skybox(colour: str | None, before: Rgb | None) -> Rgb | None:
@@ -264,10 +244,10 @@ def _skybox(colour: str | None, before: Rgb | None) -> Rgb | None:
     return (red, green, blue)
 
 
-def _filled(given: PartialVector3 | None, before: Vec3) -> Vec3:
+def _filled(given: Vector3 | PartialVector3 | None, before: Vec3) -> Vec3:
     if given is None:
         return before
-    x, y, z = (old if new is None else new for new, old in zip((given.x, given.y, given.z), before, strict=True))
+    x, y, z = map(_or, (given.x, given.y, given.z), before)
     return (x, y, z)
 
 

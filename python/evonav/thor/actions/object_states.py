@@ -10,56 +10,54 @@ from pydantic import BaseModel
 
 from evonav.thor import edits, objects
 from evonav.thor.actions.object_queries import target
-from evonav.thor.actions.registry import ActionError, action
+from evonav.thor.actions.registry import ActionError, Arguments, action
 from evonav.thor.engine import Engine
 from evonav.thor.scene import Scene
 
 
+class _Target(Arguments):
+    """The object of an action, named by its id or by its place in the image."""
+
+    objectId: str | None = None
+    x: float | None = None
+    y: float | None = None
+    forceAction: bool = False
+
+    def record(self, engine: Engine) -> objects.Record:
+        return target(engine, self.objectId, self.x, self.y, is_far_allowed=self.forceAction)
+
+
+class _Closing(_Target, extra="allow"):
+    """The arguments of `CloseObject`."""
+
+
+class _Opening(_Closing):
+    """The arguments of `OpenObject`."""
+
+    openness: float = 1.0
+
+
 @action("OpenObject")
-def open_object(
-    engine: Engine,
-    *,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-    openness: float = 1.0,
-    **unused: Any,  # noqa: ANN401
-) -> None:
+def open_object(engine: Engine, given: _Opening) -> None:
     """Open an object to a degree of 0 to 1."""
-    record = target(engine, objectId, x, y, is_far_allowed=forceAction)
-    if not 0 <= openness <= 1:
+    record = given.record(engine)
+    if not 0 <= given.openness <= 1:
         raise ActionError("openness must be in [0.0:1.0]")
     _require(record, "openable", f"{record['objectId']} is not an Openable object")
-    _set(engine.scene, [record["objectId"]], {"openness": openness})
+    _set(engine.scene, [record["objectId"]], {"openness": given.openness})
 
 
 @action("CloseObject")
-def close_object(
-    engine: Engine,
-    *,
-    objectId: str | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    forceAction: bool = False,
-    **unused: Any,  # noqa: ANN401
-) -> None:
+def close_object(engine: Engine, given: _Closing) -> None:
     """Close an object."""
-    open_object(engine, objectId=objectId, x=x, y=y, forceAction=forceAction, openness=0.0)
+    open_object(engine, _Opening(**given.model_dump(), openness=0.0))
 
 
 def _toggler(way: str) -> Callable[..., None]:
     """Return the action that switches an object `on` or `off`."""
 
-    def toggle(
-        engine: Engine,
-        *,
-        objectId: str | None = None,
-        x: float | None = None,
-        y: float | None = None,
-        forceAction: bool = False,
-    ) -> None:
-        record = target(engine, objectId, x, y, is_far_allowed=forceAction)
+    def toggle(engine: Engine, given: _Target) -> None:
+        record = given.record(engine)
         _require(record, "toggleable", f"{record['objectId']} is not toggleable")
         if record["isToggled"] == (way == "on"):
             raise ActionError(f"can't toggle object {way} if it's already {way}!")

@@ -8,13 +8,13 @@ import importlib
 import inspect
 import reprlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
-from functools import cache
+from functools import cache, cached_property
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, PydanticUserError, TypeAdapter, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 
 # The functions of these modules register themselves.
 _MODULES = (
@@ -67,31 +67,54 @@ class Vector3(BaseModel):
     z: float = 0.0
 
 
-@dataclass(slots=True)
+class Arguments(BaseModel):
+    """The arguments of an action whose function takes them as one; with `extra="allow"`, others have no effect."""
+
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+
+@dataclass
 class _Action:
     function: Callable[..., object]
+    fields: dict[str, tuple[Any, Any]]
+    """Types and default values of the parameters, by name; the default of a required one is `...`."""
+    unused: Mapping[str, type]
+    """Types of the arguments that are not passed to the function, by name."""
     is_open: bool
-    """Whether the function takes any other keyword too."""
-    required: tuple[str, ...]
-    types: dict[str, Any]
-    """Types of the parameters, by name."""
-    unused: frozenset[str]
-    """Names in `types` that are not passed to the function."""
-    adapters: dict[str, TypeAdapter[Any]] = field(default_factory=dict)
-    """Validators of `types`, made on first use: making one takes longer than most actions."""
+    """Whether any other argument may be given too."""
+    given_model: type[Arguments] | None
+    """The model that the function takes; `None` for a function that takes the arguments by name."""
+
+    @property
+    def types(self) -> dict[str, Any]:
+        """Types of all arguments, by name."""
+        return {name: annotation for name, (annotation, _) in self.fields.items()} | dict(self.unused)
+
+    @cached_property
+    def model(self) -> type[BaseModel]:
+        """The validator of the arguments, made on first use: making one takes longer than most actions."""
+        if self.given_model is not None:
+            return self.given_model
+        fields: dict[str, Any] = self.fields | {name: (kind, None) for name, kind in self.unused.items()}
+        return create_model("Arguments", __base__=Arguments, **fields)
 
     @property
     def signature(self) -> str:
         """The signature in the form of AI2-THOR's messages."""
-        used = [_shown(parameter) for parameter in list(inspect.signature(self.function).parameters.values())[1:]]
-        return ", ".join(used + [f"{_type_name(self.types[name])} {name}" for name in sorted(self.unused)])
+        used = [
+            f"{_type_name(annotation)} {name}" + ("" if default is ... else f" = {default}")
+            for name, (annotation, default) in self.fields.items()
+        ]
+        return ", ".join(used + [f"{_type_name(self.unused[name])} {name}" for name in sorted(self.unused)])
 
 
 _ACTIONS: dict[str, _Action] = {}
 
 
 def action(*names: str, unused: Mapping[str, type] = MappingProxyType({})) -> Callable[[Function], Function]:
-    """Register `function(engine, *, parameters as on the wire) -> actionReturn` under AI2-THOR's names for it.
+    """Register a function under AI2-THOR's names for it.
+
+    The function is `function(engine, *, parameters as on the wire) -> actionReturn`, or takes one model of `Arguments`.
 
     Args:
         names: Names of the action.
@@ -100,13 +123,16 @@ def action(*names: str, unused: Mapping[str, type] = MappingProxyType({})) -> Ca
 
     def register(function: Function) -> Function:
         parameters = list(inspect.signature(function, eval_str=True).parameters.values())[1:]
+        model = None
+        if parameters and parameters[0].kind is inspect.Parameter.POSITIONAL_OR_KEYWORD:
+            model = parameters[0].annotation
+            parameters = list(inspect.signature(model).parameters.values())
         named = [p for p in parameters if p.kind is not p.VAR_KEYWORD]
-        required = tuple(p.name for p in named if p.default is p.empty)
-        types = {p.name: p.annotation for p in named} | dict(unused)
+        fields = {p.name: (p.annotation, ... if p.default is p.empty else p.default) for p in named}
         for name in names:
             if name in _ACTIONS:
                 raise ValueError(f"{name} is registered twice")
-            _ACTIONS[name] = _Action(function, named != parameters, required, types, frozenset(unused))
+            _ACTIONS[name] = _Action(function, fields, unused, named != parameters, model)
         return function
 
     return register
@@ -141,16 +167,19 @@ def call(engine: object, message: Mapping[str, Any]) -> object:
         problem = message.get("problem") if name is None else None
         raise ActionError(str(problem or f"Invalid action: {brief(name)}"), ErrorCode.INVALID_ACTION)
     common = _ENVELOPE if found.is_open else _COMMON  # an open action may read what Initialize also sets
-    arguments = {key: value for key, value in message.items() if key in found.types or key not in common}
-    unknown = [key for key in arguments if key not in found.types and not (found.is_open and key != "engine")]
+    types = found.types
+    arguments = {key: value for key, value in message.items() if key in types or key not in common}
+    unknown = [key for key in arguments if key not in types and not (found.is_open and key != "engine")]
     if unknown:
         raise ActionError(_invalid(str(name), found, unknown, list(arguments)), ErrorCode.INVALID_ARGUMENT)
-    values = {key: _converted(str(name), found, key, value) for key, value in arguments.items()}
-    missing = [key for key in found.required if key not in arguments]
-    if missing:
-        message_ = f"action: {name} is missing the following arguments: {','.join(missing)}"
-        raise ActionError(message_, ErrorCode.MISSING_ARGUMENTS)
-    return found.function(engine, **{key: value for key, value in values.items() if key not in found.unused})
+    try:
+        values = found.model.model_validate({key: arguments[key] for key in arguments if key in types})
+    except ValidationError as error:
+        raise _refusal(str(name), types, arguments, error) from error
+    if found.given_model is not None:
+        return found.function(engine, values)
+    others = {key: value for key, value in arguments.items() if key not in types}
+    return found.function(engine, **{key: getattr(values, key) for key in arguments if key in found.fields}, **others)
 
 
 @cache
@@ -160,30 +189,23 @@ def _served() -> dict[str, _Action]:
     return _ACTIONS
 
 
-def _converted(name: str, found: _Action, key: str, value: object) -> object:
-    if key not in found.types:
-        return value
-    adapter = found.adapters.get(key)
-    if adapter is None:
-        adapter = found.adapters[key] = _adapter(found.types[key])
-    try:
-        return adapter.validate_python(value)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_context=False)[0]
-        place = "".join(f".{part}" for part in first["loc"])
-        message = (
-            f"action: {name} has an invalid argument: {key} (=={brief(value)})."
-            f" Cannot convert to: {_type_name(found.types[key])}{place and f' ({place[1:]})'}: {first['msg']}"
-        )
-        raise ActionError(message, ErrorCode.INVALID_ARGUMENT) from error
-
-
-def _adapter(annotation: Any) -> TypeAdapter[Any]:  # noqa: ANN401
-    try:
-        return TypeAdapter(annotation, config=ConfigDict(allow_inf_nan=False))
-    except PydanticUserError:
-        # A model has a configuration of its own.
-        return TypeAdapter(annotation)
+def _refusal(
+    name: str, types: Mapping[str, Any], arguments: Mapping[str, object], error: ValidationError
+) -> ActionError:
+    """Return the error for the first argument that cannot be converted, or for the missing ones."""
+    problems = error.errors(include_url=False, include_context=False)
+    missing = [str(problem["loc"][0]) for problem in problems if problem["loc"][0] not in arguments]
+    if len(missing) == len(problems):
+        message = f"action: {name} is missing the following arguments: {','.join(missing)}"
+        return ActionError(message, ErrorCode.MISSING_ARGUMENTS)
+    wrong = {problem["loc"][0]: problem for problem in reversed(problems)}
+    key = next(key for key in arguments if key in wrong)
+    place = ".".join(str(part) for part in wrong[key]["loc"][1:])
+    message = (
+        f"action: {name} has an invalid argument: {key} (=={brief(arguments[key])})."
+        f" Cannot convert to: {_type_name(types[key])}{place and f' ({place})'}: {wrong[key]['msg']}"
+    )
+    return ActionError(message, ErrorCode.INVALID_ARGUMENT)
 
 
 def _invalid(name: str, found: _Action, unknown: list[str], given: list[str]) -> str:
@@ -195,11 +217,6 @@ def _invalid(name: str, found: _Action, unknown: list[str], given: list[str]) ->
         f"\n\tYour arguments: {quoted[1]}"
         f'\n\tValid ways to call "{name}" action:\n\t\t{name}({found.signature})'
     )
-
-
-def _shown(parameter: inspect.Parameter) -> str:
-    default = "" if parameter.default is parameter.empty else f" = {parameter.default}"
-    return f"{_type_name(parameter.annotation)} {parameter.name}{default}"
 
 
 def _type_name(annotation: object) -> str:

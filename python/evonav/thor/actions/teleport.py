@@ -6,7 +6,7 @@ Based on `teleportFull` and its callers in AI2-THOR's `BaseFPSAgentController` a
 import math
 
 from evonav.thor.actions.motion import invalid_operation, is_within_bounds, missing_arguments, snapped, vector_text
-from evonav.thor.actions.registry import ActionError, ErrorCode, Vector3, action
+from evonav.thor.actions.registry import ActionError, Arguments, ErrorCode, Vector3, action
 from evonav.thor.agent import BODY_Y_M, canonical_deg, canonical_yaw_deg
 from evonav.thor.engine import Engine
 
@@ -23,67 +23,59 @@ def out_of_range(message: str) -> ActionError:
     return ActionError(f"ArgumentOutOfRangeException: {reason}")
 
 
+class _Pose(Arguments):
+    """The parts of a pose; its position is a vector or, in the older form, three numbers."""
+
+    position: Vector3 | None = None
+    x: float | None = None
+    y: float | None = None
+    z: float | None = None
+    rotation: Vector3 | None = None
+    horizon: float | None = None
+    standing: bool | None = None
+    forceAction: bool = False
+
+    def checked_position(self, engine: Engine, name: str) -> Vector3 | None:
+        """Return the position; refuse a pose that does not fit the agent."""
+        if engine.agent.is_locobot and self.standing is not None:
+            raise ActionError(f"{name} of a locobot has no argument standing", ErrorCode.INVALID_ARGUMENT)
+        parts = {"x": self.x, "y": self.y, "z": self.z}
+        missing = [axis for axis, value in parts.items() if value is None]
+        if self.position is not None or len(missing) == 3:
+            return self.position
+        if missing:
+            raise missing_arguments(name, *missing)
+        return Vector3.model_validate(parts)
+
+
+class _FullPose(_Pose):
+    """A pose without defaults for the angles."""
+
+    rotation: Vector3
+    horizon: float
+
+
 @action("Teleport")
-def teleport(
-    engine: Engine,
-    *,
-    position: Vector3 | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    z: float | None = None,
-    rotation: Vector3 | None = None,
-    horizon: float | None = None,
-    standing: bool | None = None,
-    forceAction: bool = False,
-) -> None:
+def teleport(engine: Engine, given: _Pose) -> None:
     """Set the given parts of the pose."""
     agent = engine.agent
-    _check_standing(engine, "Teleport", standing)
-    at = _position_of("Teleport", position, (x, y, z)) or Vector3(x=agent.x_m, y=agent.y_m, z=agent.z_m)
-    turned = Vector3(y=agent.yaw_deg) if rotation is None else rotation
-    is_standing = agent.is_standing if standing is None else standing
-    _teleport(engine, at, turned, agent.horizon_deg if horizon is None else horizon, is_standing, forceAction)
+    at = given.checked_position(engine, "Teleport") or Vector3(x=agent.x_m, y=agent.y_m, z=agent.z_m)
+    turned = given.rotation or Vector3(y=agent.yaw_deg)
+    horizon_deg = agent.horizon_deg if given.horizon is None else given.horizon
+    is_standing = agent.is_standing if given.standing is None else given.standing
+    _teleport(engine, at, turned, horizon_deg, is_standing, given.forceAction)
 
 
 @action("TeleportFull")
-def teleport_full(
-    engine: Engine,
-    *,
-    position: Vector3 | None = None,
-    x: float | None = None,
-    y: float | None = None,
-    z: float | None = None,
-    rotation: Vector3,
-    horizon: float,
-    standing: bool | None = None,
-    forceAction: bool = False,
-) -> None:
+def teleport_full(engine: Engine, given: _FullPose) -> None:
     """Set the whole pose; `standing` is required for the default agent and refused for a LoCoBot."""
-    at = _position_of("TeleportFull", position, (x, y, z))
+    at = given.checked_position(engine, "TeleportFull")
     missing = ["position"] if at is None else []
-    _check_standing(engine, "TeleportFull", standing)
-    if standing is None and not engine.agent.is_locobot:
+    if given.standing is None and not engine.agent.is_locobot:
         missing.append("standing")
     if at is None or missing:
         raise missing_arguments("TeleportFull", *missing)
-    _teleport(engine, at, rotation, horizon, standing is not False, forceAction)
-
-
-def _check_standing(engine: Engine, name: str, standing: bool | None) -> None:
-    if engine.agent.is_locobot and standing is not None:
-        raise ActionError(f"{name} of a locobot has no argument standing", ErrorCode.INVALID_ARGUMENT)
-
-
-def _position_of(
-    name: str, position: Vector3 | None, parts: tuple[float | None, float | None, float | None]
-) -> Vector3 | None:
-    """Return the position from a vector or, in the older form, from three numbers."""
-    if position is not None or parts == (None, None, None):
-        return position
-    x, y, z = parts
-    if x is None or y is None or z is None:
-        raise missing_arguments(name, *(axis for axis, value in zip("xyz", parts, strict=True) if value is None))
-    return Vector3(x=x, y=y, z=z)
+    _teleport(engine, at, given.rotation, given.horizon, given.standing is not False, given.forceAction)
 
 
 def _teleport(
