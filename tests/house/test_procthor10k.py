@@ -246,7 +246,6 @@ def test_no_network_and_no_room(remote, monkeypatch, tmp_path) -> None:
 def test_names_of_splits(tmp_path, monkeypatch) -> None:
     assert house_set("procthor-10k:val") == HouseSet("val", REVISION)
     assert house_set(Path("procthor-10k:train@main")) == HouseSet("train", "main")
-    assert house_set("houses.jsonl.gz") is None
     for wrong in ("procthor-10k", "procthor-10k:valid", "procthor-10k:"):
         with pytest.raises(InvalidArgumentError, match="train, val, test"):
             house_set(wrong)

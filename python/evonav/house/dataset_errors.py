@@ -6,9 +6,6 @@ from evonav.errors import HouseError
 class DatasetError(HouseError):
     """A dataset cannot be fetched or used; the message ends with an alternative."""
 
-    def __init__(self, message: str) -> None:
-        super().__init__(message)
-
 
 class DatasetMissingError(DatasetError):
     """The dataset was never fetched."""

@@ -36,8 +36,7 @@ def load_houses(path: str | Path, limit: int | None = None) -> Iterator[House]:
         InvalidArgumentError: `limit` is negative.
     """
     if limit is not None and limit < 0:
-        message = f"argument `limit` is {limit}, expected None or at least 0"
-        raise InvalidArgumentError(message)
+        raise InvalidArgumentError(f"argument `limit` is {limit}, expected None or at least 0")
     return (House(text, name=name) for name, text in islice(HouseTexts(path), limit))
 
 
@@ -59,12 +58,18 @@ class HouseTexts:
             path: A path, as for `load_houses`.
 
         Raises:
+            DatasetError: The split was not fetched, or is incomplete.
             HouseError: The file does not exist.
-            InvalidArgumentError: The path names no split of a known dataset.
+            InvalidArgumentError: The path names a known dataset, but no split of it.
         """
-        self.published = named_set(path)
+        self.published: HouseSet | None = None
         """The published split that is read; `None` for a file or a directory."""
-        self._path = _file_of(path, self.published)
+        self._path = Path(path)
+        if str(path).startswith("procthor-10k") and not self._path.exists():
+            from evonav.house.procthor10k import house_set, split_path
+
+            self.published = house_set(path)
+            self._path = split_path(self.published)
         self.name = str(path if self.published else self._path)
         self.files = files_of(self._path)
         """The files to read, in order."""
@@ -91,8 +96,7 @@ class HouseTexts:
                 with file.open("rb") as self._raw, _text_of(file, self._raw) as text:
                     yield from _lines(name, text) if ".jsonl" in file.suffixes else _document(name, text.read())
             except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-                message = f"{file}: cannot be read: {error}"
-                raise HouseError(message) from error
+                raise HouseError(f"{file}: cannot be read: {error}") from error
             self._num_bytes_before += file.stat().st_size
             self._raw = None
 
@@ -106,47 +110,13 @@ def files_of(path: Path) -> list[Path]:
     if path.is_dir():
         files = sorted(file for file in path.iterdir() if file.name.endswith(SUFFIXES) and file.is_file())
         if not files:
-            message = f"{path}: no {', '.join(SUFFIXES)} file in this directory"
-            raise HouseError(message)
+            raise HouseError(f"{path}: no {', '.join(SUFFIXES)} file in this directory")
         return files
     if not path.name.endswith(SUFFIXES):
-        message = f"{path}: expected a directory or a file with one of {', '.join(SUFFIXES)}"
-        raise HouseError(message)
+        raise HouseError(f"{path}: expected a directory or a file with one of {', '.join(SUFFIXES)}")
     if not path.exists():
-        message = f"{path}: cannot be read: no such file"
-        raise HouseError(message)
+        raise HouseError(f"{path}: cannot be read: no such file")
     return [path]
-
-
-def named_set(path: str | Path) -> "HouseSet | None":
-    """Return the published split that a `--houses` argument names; `None` for a file or a directory.
-
-    Raises:
-        InvalidArgumentError: The argument names a known dataset, but no split of it.
-    """
-    if not str(path).startswith("procthor-10k") or Path(path).exists():
-        return None
-    from evonav.house.procthor10k import house_set
-
-    return house_set(path)
-
-
-def house_file(path: str | Path) -> Path:
-    """Return the file or directory that a `--houses` argument means.
-
-    Raises:
-        DatasetError: The argument is a published split that was not fetched, or is incomplete.
-        InvalidArgumentError: The argument names a known dataset, but no split of it.
-    """
-    return _file_of(path, named_set(path))
-
-
-def _file_of(path: str | Path, published: "HouseSet | None") -> Path:
-    if published is None:
-        return Path(path)
-    from evonav.house.procthor10k import split_path
-
-    return split_path(published)
 
 
 def bundled_houses(limit: int | None = None) -> Iterator[House]:

@@ -55,19 +55,17 @@ class Manifest(BaseModel):
     splits: dict[Split, SplitFile]
 
 
-def _published(split: Split, num_houses: int, sha256: str) -> tuple[Split, SplitFile]:
-    return split, SplitFile(file=f"{split}.jsonl.gz", num_houses=num_houses, sha256=sha256)
-
-
+_HOUSES: dict[Split, tuple[int, str]] = {
+    "train": (10_000, "ee3c4aa14b4d8f0895fecfb5fdaca59395427ca1018b2f9aeeedbc61e5824587"),
+    "val": (1_000, "d808540514e26b6726cd2790490e669b572eeb94febb5188a2f403591dd21721"),
+    "test": (1_000, "9a9fa6f134e76fe87f3fd92c00883651cf9fadf4e9ad4072d6d73be229f001dc"),
+}
 PUBLISHED: Mapping[str, Mapping[Split, SplitFile]] = MappingProxyType(
     {
-        REVISION: dict(
-            (
-                _published("train", 10_000, "ee3c4aa14b4d8f0895fecfb5fdaca59395427ca1018b2f9aeeedbc61e5824587"),
-                _published("val", 1_000, "d808540514e26b6726cd2790490e669b572eeb94febb5188a2f403591dd21721"),
-                _published("test", 1_000, "9a9fa6f134e76fe87f3fd92c00883651cf9fadf4e9ad4072d6d73be229f001dc"),
-            )
-        )
+        REVISION: {
+            split: SplitFile(file=f"{split}.jsonl.gz", num_houses=num_houses, sha256=sha256)
+            for split, (num_houses, sha256) in _HOUSES.items()
+        }
     }
 )
 """Counts stated by `main.py` and checksums stated by the git-lfs pointers, by revision."""
@@ -80,21 +78,20 @@ class HouseSet(NamedTuple):
     revision: str
 
 
-def house_set(text: str | Path) -> HouseSet | None:
-    """Return the split that a `--houses` argument names; `None` if it names something else, such as a file.
+def house_set(text: str | Path) -> HouseSet:
+    """Return the split that a `--houses` argument names.
 
     Raises:
-        InvalidArgumentError: The argument names the dataset, but no split of it.
+        InvalidArgumentError: The argument names no split of the dataset.
     """
     name, _, rest = str(text).partition(":")
-    if name.partition("@")[0] != NAME:
-        return None
     split, _, revision = rest.partition("@")
     for known in SPLITS:
-        if split == known:
+        if (name, split) == (NAME, known):
             return HouseSet(known, revision or REVISION)
-    message = f"`{text}`: expected {NAME}:SPLIT or {NAME}:SPLIT@REVISION with SPLIT one of {', '.join(SPLITS)}"
-    raise InvalidArgumentError(message)
+    raise InvalidArgumentError(
+        f"`{text}`: expected {NAME}:SPLIT or {NAME}:SPLIT@REVISION with SPLIT one of {', '.join(SPLITS)}"
+    )
 
 
 def cache_folder() -> Path:
@@ -122,8 +119,9 @@ def split_path(houses: HouseSet, cache: Path | None = None) -> Path:
     manifest = read_manifest(folder)
     if manifest is None or houses.split not in manifest.splits:
         at = "" if houses.revision == REVISION else f" --revision {houses.revision}"
-        message = f"{NAME}:{houses.split} is not in {folder}. Fetch it: evonav houses fetch {NAME}{at}. {INSTEAD}"
-        raise DatasetMissingError(message)
+        raise DatasetMissingError(
+            f"{NAME}:{houses.split} is not in {folder}. Fetch it: evonav houses fetch {NAME}{at}. {INSTEAD}"
+        )
     entry = manifest.splits[houses.split]
     check_file(folder / entry.file, entry)
     return folder / entry.file
@@ -141,8 +139,7 @@ def read_manifest(folder: Path) -> Manifest | None:
     except FileNotFoundError:
         return None
     except (OSError, ValidationError) as error:
-        message = f"{path}: {error}. Remove it and fetch again. {INSTEAD}"
-        raise DatasetCorruptError(message) from error
+        raise DatasetCorruptError(f"{path}: {error}. Remove it and fetch again. {INSTEAD}") from error
     for split, entry in manifest.splits.items():
         published = PUBLISHED.get(manifest.revision, {}).get(split, entry)
         if entry != published or manifest.revision != folder.name:
@@ -162,8 +159,9 @@ def check_file(path: Path, entry: SplitFile) -> None:
     try:
         digest = sha256_of_file(path)
     except OSError as error:
-        message = f"{path}: {error.strerror}. Fetch again: evonav houses fetch {NAME}. {INSTEAD}"
-        raise DatasetCorruptError(message) from error
+        raise DatasetCorruptError(
+            f"{path}: {error.strerror}. Fetch again: evonav houses fetch {NAME}. {INSTEAD}"
+        ) from error
     if digest != entry.sha256:
         message = (
             f"{path}: corrupt or truncated: its sha256 is {digest}, expected {entry.sha256}. "
@@ -182,5 +180,4 @@ def count_houses(path: Path) -> int:
         with gzip.open(path, "rb") as lines:
             return sum(1 for line in lines if line.strip())
     except (OSError, EOFError, zlib.error) as error:
-        message = f"{path}: cannot be unpacked: {error}. {INSTEAD}"
-        raise DatasetCorruptError(message) from error
+        raise DatasetCorruptError(f"{path}: cannot be unpacked: {error}. {INSTEAD}") from error

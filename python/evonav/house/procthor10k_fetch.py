@@ -112,8 +112,9 @@ def _commit_of(revision: str) -> str:
     if re.fullmatch(r"[0-9a-f]{40}", revision):
         return revision
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._/-]*", revision):
-        message = f"`{revision}` is no revision: expected a commit id of 40 digits, a tag or a branch. {INSTEAD}"
-        raise DatasetAccessError(message)
+        raise DatasetAccessError(
+            f"`{revision}` is no revision: expected a commit id of 40 digits, a tag or a branch. {INSTEAD}"
+        )
     return _text(f"{COMMITS}/{revision}").strip()
 
 
@@ -134,8 +135,7 @@ def _stated_checksum(commit: str, name: str) -> str:
     url = f"{POINTERS}/{commit}/{name}"
     pointer = _POINTER.match(_text(url))
     if pointer is None:
-        message = f"{url}: no git-lfs pointer, so that the houses cannot be verified. {INSTEAD}"
-        raise DatasetCorruptError(message)
+        raise DatasetCorruptError(f"{url}: no git-lfs pointer, so that the houses cannot be verified. {INSTEAD}")
     return pointer[1]
 
 
@@ -172,14 +172,11 @@ def _typed_errors(what: str) -> Iterator[None]:
     except HTTPError as error:
         raise _refusal(what, error.response.status_code) from error
     except RequestException as error:
-        message = f"{what}: the host cannot be reached ({_short(error)}). {INSTEAD}"
-        raise DatasetNetworkError(message) from error
+        raise DatasetNetworkError(f"{what}: the host cannot be reached ({_short(error)}). {INSTEAD}") from error
     except ValueError as error:
-        message = f"{what}: corrupt: {_short(error)}. {INSTEAD}"
-        raise DatasetCorruptError(message) from error
+        raise DatasetCorruptError(f"{what}: corrupt: {_short(error)}. {INSTEAD}") from error
     except (OSError, StoreError) as error:
-        message = f"{what}: {_short(error)}. {INSTEAD}"
-        raise DatasetError(message) from error
+        raise DatasetError(f"{what}: {_short(error)}. {INSTEAD}") from error
 
 
 def _refusal(url: str, status: int) -> DatasetError:

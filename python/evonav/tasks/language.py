@@ -33,36 +33,11 @@ SIZES = ("small", "large")
 SHAPES = ("round", "square", "rectangular", "L-shaped", "U-shaped", "long", "tall", "slim", "wide", "low")
 """Adjectives for a target's form and proportions."""
 
-COLOURS = (
-    "black",
-    "white",
-    "grey",
-    "red",
-    "orange",
-    "yellow",
-    "green",
-    "blue",
-    "purple",
-    "pink",
-    "brown",
-    "beige",
-)
+COLOURS = ("black", "white", "grey", "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown", "beige")
 """Adjectives for the colours that a target shows in its reference image."""
 
-MATERIALS = {
-    "cardboard": "cardboard",
-    "ceramic": "ceramic",
-    "fabric": "fabric",
-    "glass": "glass",
-    "leather": "leather",
-    "metal": "metal",
-    "paper": "paper",
-    "plastic": "plastic",
-    "rubber": "rubber",
-    "stone": "stone",
-    "wax": "wax",
-    "wood": "wooden",
-}
+_NOUNS = ("cardboard", "ceramic", "fabric", "glass", "leather", "metal", "paper", "plastic", "rubber", "stone", "wax")
+MATERIALS = {**{noun: noun for noun in _NOUNS}, "wood": "wooden"}
 """Adjectives for the materials of a target."""
 
 STRUCTURES = ("doorway", "window", "corner")

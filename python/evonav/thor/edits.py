@@ -143,7 +143,7 @@ def rest_height_m(
 def update_receptacles(scene: Scene, object_ids: Sequence[str]) -> None:
     """Put entries below the receptacles on which they now stand."""
     house, moved = scene.house or {}, set(object_ids)
-    records, lists = {record["objectId"]: record for record in objects.static_records(scene)}, lists_by_id(house)
+    records, lists = objects.table_of(scene).by_id, lists_by_id(house)
     placed = [entry for entry, _ in objects.placed_objects(house)]
     receptacles = [entry for entry in placed if records[entry["id"]]["receptacle"]]
     low, high = (np.array([_corner_m(records[e["id"]], side) for e in receptacles]).reshape(-1, 3) for side in (-1, 1))

@@ -132,10 +132,9 @@ class Engine:
             if message.get("agentId", 0) != 0:
                 raise ActionError(f"agentId {registry.brief(message['agentId'])}: this engine has one agent, 0")
             self.last = Result(name, action_return=registry.call(self, message))
-        except ActionError as error:
-            self.last = Result(name, False, _short(str(error)), error.code)
-        except EvonavError as error:
-            self.last = Result(name, False, _short(str(error)))
+        except (ActionError, EvonavError) as error:
+            code = error.code if isinstance(error, ActionError) else ErrorCode.NONE
+            self.last = Result(name, False, _short(str(error)), code)
         except Exception as error:
             problem = f"{name} failed inside the engine: {type(error).__name__}: {error}"
             log_once(error, problem)

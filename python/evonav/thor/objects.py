@@ -8,6 +8,7 @@ also lists parts of furniture (drawers `id___0`). Evonav does not know these: th
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 from weakref import WeakKeyDictionary
@@ -81,6 +82,8 @@ class Table(NamedTuple):
     """Instance ids in images, by object id."""
     by_body: dict[int, str]
     """Object ids by index of the body."""
+    by_id: dict[str, Record]
+    """The records by object id."""
 
 
 _tables: WeakKeyDictionary[EmbeddedSimulator, Table] = WeakKeyDictionary()
@@ -99,7 +102,7 @@ def _related_table(scene: Scene) -> Table:
         table = _tables[scene.simulator] = _build(scene.house, scene.simulator.objects)
     records = [dict(record) for record in table.records]
     _relate(scene.house, records)
-    return table._replace(records=records)
+    return table._replace(records=records, by_id={record["objectId"]: record for record in reversed(records)})
 
 
 def record_of(scene: Scene, object_id: str) -> Record:
@@ -108,10 +111,10 @@ def record_of(scene: Scene, object_id: str) -> Record:
     Raises:
         ActionError: The object does not exist.
     """
-    for record in static_records(scene):
-        if record["objectId"] == object_id:
-            return record
-    raise ActionError(f"ArgumentException: objectId: {object_id} is not the objectId on any object in the scene!")
+    record = table_of(scene).by_id.get(object_id)
+    if record is None:
+        raise ActionError(f"ArgumentException: objectId: {object_id} is not the objectId on any object in the scene!")
+    return record
 
 
 def own_size_m(scene: Scene, entry: Mapping[str, Any]) -> NDArray[np.float64]:
@@ -133,7 +136,7 @@ def _build(house: Mapping[str, Any], all_bodies: Sequence[SceneObject]) -> Table
     positions_m = np.array([list(record["position"].values()) for record in records], dtype=np.float64).reshape(-1, 3)
     by_body = {index: body.id for index, body in found}
     instances = {object_id: index + 1 for index, object_id in by_body.items()}
-    return Table(records, positions_m, instances, by_body)
+    return Table(records, positions_m, instances, by_body, {})
 
 
 def placed_objects(house: Mapping[str, Any]) -> Iterator[tuple[dict[str, Any], str | None]]:
@@ -169,8 +172,7 @@ def _object_record(entry: Mapping[str, Any], body: SceneObject) -> Record:
     asset = metadata_of_asset(str(_value_of(entry, "assetId", "")), body.category)
     rotation = {axis: float(entry["rotation"][axis]) % 360.0 for axis in "xyz"}
     centre_m = (float(entry["position"]["x"]), body.centre_m[1], float(entry["position"]["z"]))
-    record = _record(entry, body.category, asset, centre_m, rotation)
-    record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
+    record = _record(entry, body, asset, centre_m, rotation)
     if asset.is_movable:
         size_m, turn = (asset.size_m, rotation) if asset.size_m else (body.size_m, None)
         record["objectOrientedBoundingBox"] = {"cornerPoints": oriented_corners(centre_m, size_m, turn)}
@@ -189,40 +191,31 @@ def _opening_record(entry: Mapping[str, Any], body: SceneObject, house: Mapping[
             yaw_rad = math.radians(_wall_yaw_deg(wall))
             x_m, y_m, z_m = (float(start[axis]) for axis in "xyz")
             centre_m = (x_m + along_m * math.cos(yaw_rad), y_m + up_m, z_m - along_m * math.sin(yaw_rad))
-    record = _record(entry, body.category, asset, centre_m, {"x": 0.0, "y": yaw_deg, "z": 0.0})
-    record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
-    return record
+    return _record(entry, body, asset, centre_m, vector((0.0, yaw_deg, 0.0)))
 
 
 def _structure_records(house: Mapping[str, Any], bodies: Mapping[str, SceneObject]) -> Iterator[Record]:
     rooms = [bodies[room["id"]] for room in house.get("rooms", ())]
     low, high = box_around(rooms)
-    level = {"x": 0.0, "y": 0.0, "z": 0.0}
-    floor = AssetMetadata("Floor", frozenset({"receptacle"}))
-    record = _record({"id": _floor_id(house)}, "Floor", floor, (0.0, 0.0, 0.0), level)
-    record["axisAlignedBoundingBox"] = aligned_box(tuple((0.5 * (low + high)).tolist()), tuple((high - low).tolist()))
-    yield record
-    for room in rooms:
-        record = _record({"id": room.id}, "Floor", AssetMetadata("Floor"), (0.0, 0.0, 0.0), level)
-        record["axisAlignedBoundingBox"] = aligned_box(room.centre_m, room.size_m)
-        yield record
+    middle, size = (0.5 * (low + high)).tolist(), (high - low).tolist()
+    whole = SceneObject(_floor_id(house), "Floor", "floor", tuple(middle), tuple(size))
+    for body, flags in ((whole, {"receptacle"}), *((room, set[str]()) for room in rooms)):
+        asset = AssetMetadata("Floor", frozenset(flags))
+        yield _record({"id": body.id}, replace(body, category="Floor"), asset, (0.0, 0.0, 0.0), vector((0.0, 0.0, 0.0)))
     for wall in house.get("walls", ()):
         if not wall.get("empty"):
-            body = bodies[wall["id"]]
-            turn = {"x": 0.0, "y": _wall_yaw_deg(wall), "z": 0.0}
-            record = _record(wall, "Wall", AssetMetadata("Wall"), body.centre_m, turn)
-            record["axisAlignedBoundingBox"] = aligned_box(body.centre_m, body.size_m)
-            yield record
+            body = replace(bodies[wall["id"]], category="Wall")
+            yield _record(wall, body, AssetMetadata("Wall"), body.centre_m, vector((0.0, _wall_yaw_deg(wall), 0.0)))
 
 
 def _record(
     entry: Mapping[str, Any],
-    object_type: str,
+    body: SceneObject,
     asset: AssetMetadata,
     centre_m: Vec3,
     rotation: dict[str, float],
 ) -> Record:
-    """Make a record without boxes and receptacles; its `position` is the asset's pivot."""
+    """Make a record without its oriented box and receptacles; its `position` is the asset's pivot."""
     is_openable = "openable" in asset.flags
     openness = float(_value_of(entry, "openness", "isOpen" in asset.first_states)) if is_openable else 0.0
     pivot_m = np.add(centre_m, rotation_of(rotation) @ asset.pivot_m).tolist()
@@ -247,13 +240,13 @@ def _record(
         "salientMaterials": list(asset.materials) if asset.materials else None,
         "receptacleObjectIds": [] if "receptacle" in asset.flags else None,
         "distance": 0.0,
-        "objectType": object_type,
+        "objectType": body.category,
         "objectId": entry["id"],
         "assetId": str(_value_of(entry, "assetId", "")),
         "parentReceptacles": None,
         "controlledObjects": [] if "toggleable" in asset.flags else None,
         "isMoving": False,
-        "axisAlignedBoundingBox": None,
+        "axisAlignedBoundingBox": aligned_box(body.centre_m, body.size_m),
         "objectOrientedBoundingBox": None,
     }
 

@@ -13,16 +13,12 @@ from evonav.thor.engine import Engine
 from evonav.thor.geometry import Point, Vec3, box_around, ground_gap_m
 
 # AI2-THOR's parameters for objects in the agent's hand, other agents, and the motion of arms. They have no effect here.
-_UNUSED_IN_TURNS = {
-    **dict.fromkeys(("forceAction", "manualInteract", "returnToStart", "disableRendering", "waitForFixedUpdate"), bool),
+_UNUSED = {
+    **dict.fromkeys(("forceAction", "manualInteract", "returnToStart", "disableRendering"), bool),
     **dict.fromkeys(("speed", "fixedDeltaTime"), float),
 }
-_UNUSED_IN_MOVES = {
-    **dict.fromkeys(
-        ("forceAction", "manualInteract", "returnToStart", "disableRendering", "allowAgentsToIntersect"), bool
-    ),
-    **dict.fromkeys(("speed", "fixedDeltaTime"), float),
-}
+_UNUSED_IN_TURNS = {**_UNUSED, "waitForFixedUpdate": bool}
+_UNUSED_IN_MOVES = {**_UNUSED, "allowAgentsToIntersect": bool}
 
 
 def invalid_operation(message: str) -> ActionError:

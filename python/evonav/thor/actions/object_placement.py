@@ -97,7 +97,7 @@ def place_object_at_point(
 ) -> None:
     """Put an object on the surface below a point, if it is free; of several points, on the first free one."""
     scene = engine.scene
-    if not _is_listed(scene, objectId):
+    if objectId not in objects.table_of(scene).by_id:
         raise ActionError(f"Cannot find object with id {brief(objectId)}.")
     points = [position] if position is not None else positions or []
     if not points:
@@ -146,7 +146,7 @@ def teleport_object(
 @action("DisableObject")
 def disable_object(engine: Engine, *, objectId: str) -> None:
     """Remove an object from the scene until `EnableObject`; objects on it fall."""
-    if not _is_listed(engine.scene, objectId):
+    if objectId not in objects.table_of(engine.scene).by_id:
         raise ActionError("")  # AI2-THOR's message is empty.
     _remove(engine.scene, [objectId])
 
@@ -172,7 +172,7 @@ def enable_object(engine: Engine, *, objectId: str) -> None:
     """Put a disabled object back where it was; do nothing if it is not disabled."""
     scene = engine.scene
     if objectId not in scene.disabled:
-        if not _is_listed(scene, objectId):
+        if objectId not in objects.table_of(scene).by_id:
             raise ActionError("")  # AI2-THOR's message is empty.
         return
     with edits.editing(scene) as house:
@@ -187,12 +187,8 @@ def change_physics(engine: Engine) -> None:
     """Do nothing: all objects are at rest."""
 
 
-def _is_listed(scene: Scene, object_id: str) -> bool:
-    return any(record["objectId"] == object_id for record in objects.static_records(scene))
-
-
 def _put_pivot(entry: dict[str, Any], object_type: str, position: Vector3, rotation: Vector3) -> None:
-    turn = {"x": rotation.x, "y": rotation.y, "z": rotation.z}
+    turn = rotation.model_dump()
     offset_m = objects.rotation_of(turn) @ edits.metadata_of_entry(entry, object_type).pivot_m
     edits.set_pose(entry, np.subtract((position.x, position.y, position.z), offset_m).tolist(), turn)
 
@@ -206,7 +202,7 @@ def _outermost_last(house: dict[str, Any], object_ids: Any) -> list[str]:  # noq
 def _place_at(scene: Scene, object_id: str, point: Vector3, rotation: Vector3 | None, is_kinematic: bool) -> None:
     edits.settle(scene)
     entry = edits.entry_of(scene, object_id)
-    turn = {"x": rotation.x, "y": rotation.y, "z": rotation.z} if rotation else entry["rotation"]
+    turn = rotation.model_dump() if rotation else entry["rotation"]
     size_m = objects.own_size_m(scene, entry)
     axes = objects.rotation_of(turn)
     reach_m = 0.5 * np.abs(axes) @ size_m

@@ -234,8 +234,7 @@ def _object(engine: Engine, object_type: str | None, object_id: str | None) -> d
             message = f"Multiple objects of type {object_type} were found in the scene, cannot disambiguate."
             raise ActionError(f"ArgumentException: {message}")
         object_id = ids[0]
-    records = objects.static_records(engine.scene)
-    record = next((record for record in records if record["objectId"] == object_id), None)
+    record = objects.table_of(engine.scene).by_id.get(object_id or "")
     if record is None:
         raise ActionError(f"ArgumentException: Cannot find sim object with id {object_id or ''}")
     return record
